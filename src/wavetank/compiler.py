@@ -1,0 +1,92 @@
+"""The one file that imports the kernel compiler (Quadrants, the maintained continuation of Taichi).
+
+Everything else writes ``from wavetank.compiler import qd`` and calls `start` once before the first array is made.
+The compiler keeps one device program per process, so the back end is chosen once: asking for another one later is
+an error while arrays of the first are alive.
+"""
+
+import contextlib
+import io
+import os
+import warnings
+
+os.environ.setdefault("QD_LOG_LEVEL", "error")
+# The compiler prints a banner on import; a library should be silent.
+with contextlib.redirect_stdout(io.StringIO()):
+    import quadrants as qd
+
+from wavetank.errors import WavetankError
+
+__all__ = ["BACKENDS", "available_backends", "current_backend", "qd", "start", "synchronize", "vector"]
+
+#: Names a user may pass as ``arch``; ``gpu`` means the best one present.
+BACKENDS = ("cpu", "gpu", "cuda", "vulkan", "metal", "amdgpu")
+_GPU_ORDER = ("cuda", "metal", "amdgpu", "vulkan")
+_current: str | None = None
+
+
+def vector(dim: int, dtype: object = None) -> object:
+    """Return the device type of a vector with `dim` components (float32 unless told)."""
+    return qd.types.vector(dim, dtype or qd.f32)
+
+
+def available_backends() -> list[str]:
+    """Return the concrete back ends that this machine can start, best first, ``cpu`` last."""
+    with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = [name for name in _GPU_ORDER if _supported(name)]
+    return [*found, "cpu"]
+
+
+def current_backend() -> str | None:
+    """Return the concrete back end that is running, or None before `start`."""
+    return _current
+
+
+def start(arch: str = "cpu", *, threads: int | None = None) -> str:
+    """Start the compiler on `arch` and return the concrete back end that came up.
+
+    A second call with the same back end does nothing. Raises `WavetankError` for an unknown name, for a back end
+    that this machine does not have, and for a change of back end within a process.
+    """
+    global _current
+    if arch not in BACKENDS:
+        raise WavetankError(f"arch = {arch!r} is not a back end; use one of {', '.join(BACKENDS)}.")
+    if arch == "gpu" and _current in _GPU_ORDER:
+        return _current
+    if arch == _current:
+        return arch
+    wanted = next(iter(available_backends())) if arch == "gpu" else arch
+    if (arch == "gpu" and wanted == "cpu") or not _supported(wanted):
+        raise WavetankError(
+            f"arch = {arch!r} cannot be started on this machine; available: "
+            f"{', '.join(available_backends())} (see `wavetank doctor`)."
+        )
+    if _current is not None:
+        raise WavetankError(
+            f"arch = {arch!r} was asked for, but this process already computes on {_current!r}; "
+            "one process has one back end, start another process for another one."
+        )
+    options: dict[str, object] = {"arch": getattr(qd, wanted), "enable_fallback": False, "log_level": "error"}
+    if threads is not None:
+        options["cpu_max_num_threads"] = threads
+    with contextlib.redirect_stdout(io.StringIO()):
+        qd.init(**options)
+    came_up = {"x64": "cpu", "arm64": "cpu"}.get(_name(qd.lang.impl.current_cfg().arch), wanted)
+    if came_up != wanted:
+        raise WavetankError(f"arch = {arch!r} was asked for, but the compiler came up on {came_up!r}.")
+    _current = wanted
+    return wanted
+
+
+def synchronize() -> None:
+    """Wait until the device has finished everything launched so far."""
+    qd.sync()
+
+
+def _supported(name: str) -> bool:
+    return name == "cpu" or bool(qd.lang.misc.is_arch_supported(getattr(qd, name)))
+
+
+def _name(arch: object) -> str:
+    return str(getattr(arch, "name", arch)).split(".")[-1]

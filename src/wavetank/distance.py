@@ -1,0 +1,187 @@
+"""Signed distances on the device: one function per shape, and the program that combines them.
+
+A solid is a small program in postfix order over `DISTANCES` and the operations union, intersection and difference;
+it runs with a stack of `STACK` values. Every value is (gradient, distance): distance [m] is negative inside, the
+gradient is the unit outward normal. Shapes are exact; set operations are exact outside of a union and inside of an
+intersection and a lower bound elsewhere, as usual for constructive distance fields.
+
+Two-dimensional worlds are the plane z = 0 of the same solids: a box without a third size is a prism without end.
+
+Distance functions after Inigo Quilez, "3D SDF functions" (2013); the gradients are worked out here.
+
+    code      symbol   meaning                                  unit
+    p                  point in the frame of the shape          m
+    size      a        sizes of the shape, see each function    m
+    q                  signed excess over the half sizes        m
+"""
+
+import dataclasses
+
+from wavetank.compiler import qd
+
+# The numbers that `solids.py` writes and `local_distance` reads; kernels spell them out, because the compiler's cache
+# does not see global constants.
+STACK = 8  # deepest nesting of set operations
+UNION, INTERSECTION, DIFFERENCE = -1, -2, -3
+
+vec3 = qd.types.vector(3, qd.f32)
+vec4 = qd.types.vector(4, qd.f32)
+
+
+@qd.func
+def half_space_distance(p, size):
+    """Everything below y = 0."""
+    return vec4(0.0, 1.0, 0.0, p.y)
+
+
+@qd.func
+def sphere_distance(p, size):
+    """Ball of radius size.x around the origin."""
+    r = p.norm()
+    n = vec3(0.0, 1.0, 0.0)
+    if r > 1e-9:
+        n = p / r
+    return vec4(n.x, n.y, n.z, r - size.x)
+
+
+@qd.func
+def box_distance(p, size):
+    """Box of half sizes size.xyz around the origin."""
+    q = qd.abs(p) - vec3(size.x, size.y, size.z)
+    side = vec3(1.0, 1.0, 1.0)
+    for k in qd.static(range(3)):
+        if p[k] < 0.0:
+            side[k] = -1.0
+    n = vec3(0.0, 0.0, 0.0)
+    d = qd.max(q.x, q.y, q.z)
+    if d > 0.0:
+        outside = qd.max(q, 0.0)
+        d = outside.norm()
+        n = side * outside / d
+    elif q.x >= q.y and q.x >= q.z:
+        n.x = side.x
+    elif q.y >= q.z:
+        n.y = side.y
+    else:
+        n.z = side.z
+    return vec4(n.x, n.y, n.z, d)
+
+
+@qd.func
+def capsule_distance(p, size):
+    """Ball of radius size.x swept along y from -size.y to size.y."""
+    return sphere_distance(vec3(p.x, p.y - qd.min(qd.max(p.y, -size.y), size.y), p.z), size)
+
+
+@qd.func
+def cylinder_distance(p, size):
+    """Cylinder of radius size.x along y from -size.y to size.y."""
+    r = qd.sqrt(p.x * p.x + p.z * p.z)
+    radial = vec3(1.0, 0.0, 0.0)
+    if r > 1e-9:
+        radial = vec3(p.x / r, 0.0, p.z / r)
+    axial = vec3(0.0, 1.0, 0.0)
+    if p.y < 0.0:
+        axial = vec3(0.0, -1.0, 0.0)
+    q_r = r - size.x
+    q_y = qd.abs(p.y) - size.y
+    d = qd.max(q_r, q_y)
+    n = radial
+    if q_y > q_r:
+        n = axial
+    if q_r > 0.0 and q_y > 0.0:
+        d = qd.sqrt(q_r * q_r + q_y * q_y)
+        n = (radial * q_r + axial * q_y) / d
+    return vec4(n.x, n.y, n.z, d)
+
+
+DISTANCES = (half_space_distance, box_distance, sphere_distance, capsule_distance, cylinder_distance)
+
+
+@qd.func
+def rotate(q, v):
+    """Turn vector `v` by the unit quaternion `q` = (w, x, y, z)."""
+    u = vec3(q[1], q[2], q[3])
+    return v + 2.0 * u.cross(u.cross(v) + q[0] * v)
+
+
+@qd.func
+def conjugate(q):
+    """Inverse of a unit quaternion."""
+    return vec4(q[0], -q[1], -q[2], -q[3])
+
+
+@qd.func
+def lift(x: qd.template()):
+    """A point of a 2-D or 3-D world as a point in space."""
+    point = vec3(0.0, 0.0, 0.0)
+    for k in qd.static(range(x.n)):
+        point[k] = x[k]
+    return point
+
+
+@dataclasses.dataclass
+class SolidSet:
+    """All solids of a world on the device. Shapes in `model.py` words, frames nested: node in solid in world."""
+
+    op: qd.types.ndarray()  # i32 [nodes]: index into DISTANCES, or a set operation below zero
+    size: qd.types.ndarray()  # vec4 [nodes], m
+    offset: qd.types.ndarray()  # vec3 [nodes], m: origin of the node in its solid
+    turn: qd.types.ndarray()  # vec4 [nodes]: quaternion, node to solid
+    first: qd.types.ndarray()  # i32 [solids + 1]: where each solid's program starts
+    reach: qd.types.ndarray()  # f32 [solids], m: radius around the solid's origin that holds all of it
+    friction: qd.types.ndarray()  # f32 [solids]: Coulomb coefficient
+    position: qd.types.ndarray()  # vec3 [solids], m, at the end of the substep
+    rotation: qd.types.ndarray()  # vec4 [solids], at the end of the substep
+    old_position: qd.types.ndarray()  # vec3 [solids], m, at its start
+    old_rotation: qd.types.ndarray()  # vec4 [solids], at its start
+    count: qd.i32
+    tank_count: qd.i32  # the first so many are the walls of the tank
+
+
+@qd.func
+def local_distance(solids: SolidSet, k, p):
+    """(gradient, distance) of solid `k` at the point `p` in its own frame."""
+    stack = qd.Matrix([[0.0] * 4 for _ in range(8)])  # STACK
+    top = 0
+    for node in range(solids.first[k], solids.first[k + 1]):
+        op = solids.op[node]
+        if op >= 0:
+            turn = solids.turn[node]
+            at = rotate(conjugate(turn), p - solids.offset[node])
+            size = solids.size[node]
+            value = vec4(0.0, 0.0, 0.0, 0.0)
+            for shape in qd.static(range(len(DISTANCES))):
+                if op == shape:
+                    value = qd.static(DISTANCES[shape])(at, size)
+            n = rotate(turn, vec3(value.x, value.y, value.z))
+            for c in qd.static(range(3)):
+                stack[top, c] = n[c]
+            stack[top, 3] = value.w
+            top += 1
+        else:
+            top -= 1
+            sign = 1.0
+            if op == -3:  # DIFFERENCE
+                sign = -1.0
+            second = sign * stack[top, 3]
+            first = stack[top - 1, 3]
+            if (op == -1 and second < first) or (op != -1 and second > first):  # UNION
+                for c in qd.static(range(4)):
+                    stack[top - 1, c] = sign * stack[top, c]
+    return vec4(stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3])
+
+
+@qd.func
+def to_local(position, rotation, x):
+    """World point `x` in the frame of a solid at that pose."""
+    return rotate(conjugate(rotation), x - position)
+
+
+@qd.func
+def signed_distance(solids: SolidSet, k, x):
+    """(gradient, distance) of solid `k` at the world point `x` (vec3), with the pose of the substep's end."""
+    q = solids.rotation[k]
+    value = local_distance(solids, k, to_local(solids.position[k], q, x))
+    n = rotate(q, vec3(value.x, value.y, value.z))
+    return vec4(n.x, n.y, n.z, value.w)

@@ -1,0 +1,110 @@
+"""Every parameter of a world, declared once.
+
+From its one line come the validation, the key in a scene file, the option of the command line, the slider, the line
+in the reference, and whether it may change while the water moves (live) or needs a reset.
+"""
+
+import dataclasses
+from typing import Any, Literal
+
+from pydantic import Field
+
+from wavetank.model import Model
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """What one declaration says, for whoever lists parameters."""
+
+    name: str
+    default: Any
+    low: float | None
+    high: float | None
+    unit: str
+    symbol: str
+    sentence: str
+    live: bool
+
+
+def parameter(
+    default: float | str,
+    low: float | None,
+    high: float | None,
+    unit: str,
+    symbol: str,
+    sentence: str,
+    *,
+    live: bool = True,
+) -> Any:
+    """Declare a parameter: default, range (inclusive), unit, symbol, one sentence, live or needs-reset."""
+    note = {"unit": unit, "symbol": symbol, "live": live}
+    limits: dict[str, Any] = {} if isinstance(default, str) else {"ge": low, "le": high}
+    if isinstance(default, float):
+        limits["allow_inf_nan"] = False
+    return Field(default=default, description=sentence, json_schema_extra=note, **limits)
+
+
+KernelName = Literal["spiky", "poly6", "cubic", "wendland", "poly6-spiky"]
+
+
+# fmt: off
+class Parameters(Model):
+    """All parameters. Lengths that scale with the resolution are given in particle spacings, d."""
+
+    rest_density: float = parameter(1000.0, 1e-3, 1e5, "kg/m^3", "rho_0", "Density that the water keeps.", live=False)
+    support: float = parameter(2.0, 1.2, 3.0, "d", "h/d", "Support radius of the smoothing kernel.", live=False)
+    kernel: KernelName = parameter("spiky", None, None, "", "W", "Smoothing kernel; poly6-spiky takes one for the density and the other for its gradient.", live=False)
+    frame_time: float = parameter(1 / 60, 1e-5, 1.0, "s", "T", "Time of water in one frame.", live=False)
+    substeps: int = parameter(4, 1, 100, "", "n", "Time steps in a frame.")
+    iterations: int = parameter(4, 1, 100, "", "", "Solver iterations in a time step.")
+    relaxation: float = parameter(0.7, 0.05, 1.5, "", "omega", "Share of each Jacobi correction that is applied.")
+    force_mixing: float = parameter(0.05, 0.0, 1e4, "S_0", "eps", "Constraint force mixing (Eq. 5), relative to the sum of squared gradients in the rest lattice.")
+    tensile_strength: float = parameter(0.0, 0.0, 1.0, "1/S_0", "k", "Artificial pressure against clustering (Eq. 7), relative likewise; shared by the iterations.")
+    tensile_exponent: float = parameter(4.0, 1.0, 8.0, "", "n", "Exponent of the artificial pressure (Eq. 7).")
+    tensile_distance: float = parameter(0.3, 0.05, 0.95, "h", "dq", "Distance at which the artificial pressure is k (Eq. 7).")
+    attraction: float = parameter(0.0, 0.0, 1.0, "", "", "Share of corrections that pull where the density is too low; 0 solves rho <= rho_0.")
+    viscosity: float = parameter(0.05, 0.0, 1.0, "", "c", "XSPH viscosity (Eq. 11), dimensionless; at the default 240 steps a second.")
+    vorticity: float = parameter(0.0, 0.0, 100.0, "m/s", "eps_w", "Vorticity confinement (Eq. 10).")
+    friction: float = parameter(0.0, 0.0, 1.0, "", "mu", "Coulomb friction of walls and of solids that name none.", live=False)
+    wall_density: float = parameter(1.0, 0.0, 1.0, "", "", "Share of the density that walls contribute; 0 leaves plain clamps.")
+    wall_gap: float = parameter(0.25, 0.0, 0.5, "d", "", "Distance that particle centres keep from walls.")
+# fmt: on
+
+
+PARAMETERS: tuple[Parameter, ...] = tuple(
+    Parameter(
+        name=name,
+        default=field.default,
+        low=next((m.ge for m in field.metadata if hasattr(m, "ge")), None),
+        high=next((m.le for m in field.metadata if hasattr(m, "le")), None),
+        sentence=field.description or "",
+        **field.json_schema_extra,  # type: ignore[arg-type]
+    )
+    for name, field in Parameters.model_fields.items()
+)
+LIVE = frozenset(p.name for p in PARAMETERS if p.live) | {"gravity"}
+
+#: Values that a preset puts in place of the defaults. `paper` is the report's Table 1, which belongs to its own units:
+#: h = 1.1, m = 1, rho_0 = 3, so that d = 0.68195 is the lattice whose Poly6 density is 3. There S_0 = 1.3602, so that
+#: eps = 100 and k = 1e-4 become multiples of it; c = 0.01 becomes c rho_0 / m = 0.03 once the sum of Eq. 11 is a mean.
+#: Walls are plain clamps, as in the report.
+PAPER_SPACING = 0.681947
+PAPER_S0 = 1.360253
+PRESETS: dict[str, dict[str, Any]] = {
+    "standard": {},
+    "paper": {
+        "support": 1.1 / PAPER_SPACING,
+        "kernel": "poly6-spiky",
+        "substeps": 1,
+        "iterations": 5,
+        "relaxation": 1.0,
+        "force_mixing": 100.0 / PAPER_S0,
+        "tensile_strength": 1e-4 * PAPER_S0,
+        "tensile_exponent": 4.0,
+        "tensile_distance": 0.3,
+        "attraction": 1.0,
+        "viscosity": 0.03,
+        "vorticity": 0.01,
+        "wall_density": 0.0,
+    },
+}

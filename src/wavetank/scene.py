@@ -1,0 +1,370 @@
+"""A scene: plain validated data that says what a world is made of, from Python or from a TOML file."""
+
+import importlib.resources
+import json
+import math
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import tomli_w
+from pydantic import BeforeValidator, Field, PlainSerializer, ValidationError, WithJsonSchema, model_validator
+
+from wavetank.errors import WavetankError
+from wavetank.model import Model, Number, Positive, Size, Vector, register_model, sentence
+from wavetank.params import PRESETS, Parameters
+from wavetank.solids import AnySolid, HalfSpace, Solid
+
+MAX_PARTICLES = 100_000_000
+_TOLERANCE = 1e-6  # of a spacing: how far a fluid may reach beyond a wall by rounding
+
+
+class Tank(Model):
+    """The container: its inner size [m], the lower corner at the origin. Two numbers make a 2-D world."""
+
+    size: Size
+
+    def walls(self) -> list[Solid]:
+        """Return the walls as half-spaces, lower and upper for each axis."""
+        result: list[Solid] = []
+        for axis, (name, edge) in enumerate(zip("xyz", self.size, strict=False)):
+            normal = tuple(float(k == axis) for k in range(len(self.size)))
+            point = tuple(edge * n for n in normal)
+            result.append(HalfSpace(name=f"tank {name} lower", point=tuple(0.0 for _ in normal), normal=normal))
+            result.append(HalfSpace(name=f"tank {name} upper", point=point, normal=tuple(-n for n in normal)))
+        return result
+
+
+class Fluid(Model):
+    """What every fluid has."""
+
+    velocity: Vector | None = None  # m/s, at the start; at rest where None
+
+    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
+        """Name every vector of this fluid, to check that all live in one dimension."""
+        return [("velocity", self.velocity)] if self.velocity is not None else []
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner [m] of the fluid."""
+        raise NotImplementedError
+
+    def estimate(self, spacing: float) -> float:
+        """Number of particles to expect, without making them."""
+        lower, upper = self.bounds()
+        return float(np.prod(np.maximum((upper - lower) / spacing, 1.0)))
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        """Say for each of the points [n, dim] whether it lies in this fluid, bool [n]."""
+        raise NotImplementedError
+
+    def particles(self, spacing: float) -> np.ndarray:
+        """Positions [n, dim] of a cubic lattice that fills this fluid, half a spacing from its lower corner."""
+        lower, upper = self.bounds()
+        counts = np.floor((upper - lower) / spacing + 1e-6).astype(int)
+        axes = [low + (np.arange(n) + 0.5) * spacing for low, n in zip(lower, counts, strict=True)]
+        lattice = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
+        return lattice[self.contains(lattice)]
+
+
+class Block(Fluid):
+    """A rectangular block of fluid between two corners."""
+
+    shape: Literal["block"] = "block"
+    lower: Vector
+    upper: Vector
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Block":
+        if len(self.lower) != len(self.upper) or any(a >= b for a, b in zip(self.lower, self.upper, strict=True)):
+            raise ValueError(
+                f"fluid block lower = {self.lower}, upper = {self.upper} is not allowed; "
+                "every component of upper must be greater than that of lower."
+            )
+        return self
+
+    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
+        return [("lower", self.lower), ("upper", self.upper), *super().vectors()]
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(self.lower, float), np.array(self.upper, float)
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        lower, upper = self.bounds()
+        return np.all((points > lower) & (points < upper), axis=1)
+
+
+class Ball(Fluid):
+    """A ball of fluid; in a 2-D world a disc."""
+
+    shape: Literal["ball"] = "ball"
+    center: Vector
+    radius: Positive
+
+    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
+        return [("center", self.center), *super().vectors()]
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        center = np.array(self.center, float)
+        return center - self.radius, center + self.radius
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.sum((points - np.array(self.center)) ** 2, axis=1) < self.radius**2
+
+
+def _array(value: Any) -> np.ndarray:
+    try:
+        array = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        raise ValueError("positions and velocities must be arrays of numbers [n, 2] or [n, 3].") from None
+    if array.size == 0:
+        array = array.reshape(0, array.shape[1] if array.ndim == 2 else 3)
+    if array.ndim != 2 or array.shape[1] not in (2, 3):
+        raise ValueError(f"positions have shape {list(array.shape)}; they must be [n, 2] or [n, 3].")
+    bad = ~np.isfinite(array).all(axis=1)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise ValueError(f"positions[{row}] = {array[row].tolist()} is not finite; every number must be.")
+    return array
+
+
+Array = Annotated[
+    np.ndarray,
+    BeforeValidator(_array),
+    PlainSerializer(lambda array: array.tolist()),
+    WithJsonSchema({"type": "array", "items": {"type": "array", "items": {"type": "number"}}}),
+]
+
+
+class Points(Fluid):
+    """Fluid particles at given places, each of the mass that the scene's spacing gives."""
+
+    shape: Literal["points"] = "points"
+    positions: Array
+    velocities: Array | None = None
+
+    @model_validator(mode="after")
+    def _paired(self) -> "Points":
+        if self.velocities is not None and self.velocities.shape != self.positions.shape:
+            raise ValueError(
+                f"velocities have shape {list(self.velocities.shape)}; "
+                f"they must have that of positions, {list(self.positions.shape)}."
+            )
+        return self
+
+    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
+        return [*([("positions", tuple(self.positions[0]))] if len(self.positions) else []), *super().vectors()]
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.positions.min(axis=0), self.positions.max(axis=0)
+
+    def estimate(self, spacing: float) -> float:
+        return float(len(self.positions))
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros(len(points), bool)
+
+    def particles(self, spacing: float) -> np.ndarray:
+        return self.positions
+
+
+AnyFluid = Annotated[Block | Ball | Points, Field(discriminator="shape")]
+for _fluid in (Block, Ball, Points):
+    register_model(_fluid.model_fields["shape"].default, _fluid)
+
+
+def _tagged(values: Any, default: str) -> Any:
+    """Let a table without `shape` mean the usual one."""
+    if not isinstance(values, list | tuple):
+        return values
+    return [{"shape": default, **v} if isinstance(v, dict) and "shape" not in v else v for v in values]
+
+
+class Scene(Parameters):
+    """A world as data. Lengths in metres, y up; parameters of `params.py` are keys of the scene itself."""
+
+    title: str = ""
+    preset: Literal["standard", "paper"] = "standard"
+    spacing: Positive = Field(description="Particle spacing d [m].")
+    tank: Tank | None = None
+    fluids: Annotated[list[AnyFluid], BeforeValidator(lambda v: _tagged(v, "block"))] = []
+    solids: Annotated[list[AnySolid], BeforeValidator(lambda v: _tagged(v, "box"))] = []
+    gravity: Vector = (0.0, -9.81, 0.0)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_preset(cls, values: Any) -> Any:
+        if isinstance(values, dict) and isinstance(values.get("preset"), str):
+            return {**PRESETS.get(values["preset"], {}), **values}
+        return values
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Scene":
+        if "gravity" not in self.model_fields_set:
+            object.__setattr__(self, "gravity", self.gravity[: self.dim])
+        for name, vector in self._vectors():
+            if len(vector) != self.dim:
+                raise ValueError(
+                    f"{name} = {tuple(vector)} has {len(vector)} components in a {self.dim}-D world; give {self.dim}."
+                )
+        self._check_count()
+        self._check_inside()
+        names = [solid.name for solid in self.solids if solid.name]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"solids: the name {twice!r} is used twice; a name must be unique.")
+        return self
+
+    def assign(self, name: str, value: Any) -> None:
+        """Set one key in place, validated; raise `WavetankError` and change nothing where it is not allowed."""
+        try:
+            setattr(self, name, value)
+        except ValidationError as report:
+            raise WavetankError(sentence(report, type(self))) from None
+
+    @property
+    def dim(self) -> int:
+        """Number of dimensions, 2 or 3: that of the tank, else of the first fluid, else of gravity."""
+        if self.tank is not None:
+            return len(self.tank.size)
+        first = next((vector for fluid in self.fluids for _, vector in fluid.vectors()), None)
+        return len(first if first is not None else self.gravity)
+
+    def _vectors(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        yield "gravity", self.gravity
+        for kind, members in (("fluids", self.fluids), ("solids", self.solids)):
+            for number, member in enumerate(members):
+                for name, vector in member.vectors():
+                    yield f"{kind}[{number}].{name}", tuple(vector)
+
+    def _check_count(self) -> None:
+        count = sum(fluid.estimate(self.spacing) for fluid in self.fluids)
+        if count > MAX_PARTICLES:
+            raise ValueError(
+                f"spacing = {self.spacing} makes {count:.3g} particles; "
+                f"at most {MAX_PARTICLES:,} are allowed: use a larger spacing or less fluid."
+            )
+        if self.tank is not None and max(self.tank.size) / self.spacing > 1e6:
+            raise ValueError(
+                f"spacing = {self.spacing} divides the tank of {self.tank.size} m into more than 1e6 spacings; "
+                "single precision cannot tell such particles apart: use a larger spacing."
+            )
+
+    def _check_inside(self) -> None:
+        if self.tank is None:
+            return
+        slack = _TOLERANCE * self.spacing
+        for number, fluid in enumerate(self.fluids):
+            if isinstance(fluid, Points) and not len(fluid.positions):
+                continue
+            lower, upper = fluid.bounds()
+            if np.any(lower < -slack) or np.any(upper > np.array(self.tank.size) + slack):
+                raise ValueError(
+                    f"fluids[{number}] reaches from {_numbers(lower)} to {_numbers(upper)}, outside the tank; "
+                    f"it must lie between {_numbers(np.zeros(self.dim))} and {_numbers(self.tank.size)}."
+                )
+
+    @property
+    def particle_mass(self) -> float:
+        """Mass of a particle, rho_0 d^dim [kg] (per metre of depth in a 2-D world)."""
+        return float(self.rest_density * self.spacing**self.dim)
+
+    def particles(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions [m] and velocities [m/s], float32 [n, dim], of the fluids outside of the solids.
+
+        Where fluids overlap, the first one wins.
+        """
+        positions, velocities = [np.empty((0, self.dim))], [np.empty((0, self.dim))]
+        for number, fluid in enumerate(self.fluids):
+            x = fluid.particles(self.spacing)
+            v = np.zeros_like(x) if fluid.velocity is None else np.tile(np.array(fluid.velocity, float), (len(x), 1))
+            if isinstance(fluid, Points):
+                v = v if fluid.velocities is None else fluid.velocities
+            else:
+                taken = np.zeros(len(x), bool)
+                for other in self.fluids[:number]:
+                    taken |= other.contains(x)
+                x, v = x[~taken], v[~taken]
+            positions.append(x)
+            velocities.append(v)
+        return np.concatenate(positions).astype(np.float32), np.concatenate(velocities).astype(np.float32)
+
+    # --- files ---
+
+    @classmethod
+    def load(cls, name: str | Path) -> "Scene":
+        """Read a bundled scene by name, or a TOML file by path."""
+        text, origin = _read(name)
+        try:
+            table = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise WavetankError(f"{origin}: this is not TOML: {error}.") from None
+        return cls.parse(table, origin)  # type: ignore[no-any-return]
+
+    def save(self, path: str | Path) -> None:
+        """Write this scene as TOML; a file of that name is replaced in one move."""
+        target = Path(path)
+        partial = target.with_name(target.name + ".partial")
+        partial.write_text(tomli_w.dumps(self.table()), encoding="utf-8")
+        partial.replace(target)
+
+    def table(self) -> dict[str, Any]:
+        """Return what was set (not the defaults) as plain data that `parse` reads back to an equal scene."""
+        result: dict[str, Any] = self.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+        result |= {name: getattr(self, name) for name in PRESETS[self.preset]}
+        for kind, members in (("fluids", self.fluids), ("solids", self.solids)):
+            for row, member in zip(result.get(kind, []), members, strict=False):
+                row["shape"] = member.shape
+        return {key: result[key] for key in sorted(result, key=lambda k: isinstance(result[k], list | dict))}
+
+    def changed(self, **values: Any) -> "Scene":
+        """Return a copy with these keys changed, validated as a whole."""
+        return type(self).parse({**self.table(), **values})  # type: ignore[no-any-return]
+
+    def scaled(self, factor: float) -> "Scene":
+        """Return the same scene with every length multiplied by `factor` (velocities and gravity stay)."""
+        if not (math.isfinite(factor) and factor > 0):
+            raise WavetankError(f"factor = {factor} is not allowed; it must be a positive number.")
+        lengths = {"spacing", "size", "lower", "upper", "center", "radius", "start", "end", "point", "positions"}
+
+        def walk(value: Any, key: str = "") -> Any:
+            if isinstance(value, dict):
+                return {k: walk(v, k) for k, v in value.items()}
+            if isinstance(value, list | tuple):
+                return [walk(v, key) for v in value]
+            return value * factor if key in lengths and isinstance(value, int | float) else value
+
+        return type(self).parse(walk(self.table()))  # type: ignore[no-any-return]
+
+
+def bundled_scenes() -> list[str]:
+    """Names of the scenes that come with the package, sorted."""
+    folder = importlib.resources.files("wavetank") / "scenes"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def scene_schema() -> str:
+    """JSON Schema of a scene file, for editors."""
+    return json.dumps(Scene.model_json_schema(), indent=2)
+
+
+def _read(name: str | Path) -> tuple[str, str]:
+    if str(name) in (bundled := bundled_scenes()):
+        return (importlib.resources.files("wavetank") / "scenes" / f"{name}.toml").read_text("utf-8"), str(name)
+    path = Path(name)
+    if not path.is_file():
+        raise WavetankError(
+            f"scene {str(name)!r} is neither a file nor a bundled scene; bundled are: {', '.join(bundled)}."
+        )
+    try:
+        return path.read_text("utf-8"), str(path)
+    except (OSError, UnicodeDecodeError) as error:
+        raise WavetankError(f"{path}: the scene cannot be read: {error}.") from None
+
+
+def _numbers(values: Any) -> str:
+    return "(" + ", ".join(f"{float(v):g}" for v in values) + ")"
+
+
+__all__ = ["Ball", "Block", "Number", "Points", "Scene", "Tank", "bundled_scenes", "scene_schema"]

@@ -1,0 +1,305 @@
+"""Solids as plain data: shapes, set operations between them, and their way to the device.
+
+A shape is one model here with its `program`, and one distance function in `distance.py`.
+"""
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from wavetank.compiler import qd
+from wavetank.distance import (
+    DIFFERENCE, DISTANCES, INTERSECTION, STACK, UNION, SolidSet, box_distance, capsule_distance,
+    cylinder_distance, half_space_distance, sphere_distance, vec3, vec4,
+)  # fmt: skip
+from wavetank.errors import WavetankError
+from wavetank.model import Model, Number, Positive, Quaternion, Size, Vector, register_model
+from wavetank.rotations import product, turn_from_y, turned, unit_quaternion
+
+ENDLESS = 1.0e5  # half size [m] of what has no end
+
+
+class Node:
+    """One step of a solid's program: a shape with its place, or a set operation."""
+
+    def __init__(
+        self, op: int, size: Sequence[float] = (), offset: Sequence[float] = (), turn: Sequence[float] = ()
+    ) -> None:
+        self.op = op
+        self.size = np.zeros(4)
+        self.size[: len(size)] = size
+        self.offset = np.array(offset if len(offset) else (0.0, 0.0, 0.0), float)
+        self.turn = np.array(turn if len(turn) else (1.0, 0.0, 0.0, 0.0), float)
+
+    def placed(self, offset: np.ndarray, turn: np.ndarray) -> "Node":
+        """Return this node as seen from a frame in which its own frame has that offset and turn."""
+        return Node(self.op, self.size, offset + turned(turn, self.offset), product(turn, self.turn))
+
+
+class Solid(Model):
+    """What every solid has: a name to move it by, a pose and a surface."""
+
+    name: str = ""
+    rotation: Quaternion | Number = (1.0, 0.0, 0.0, 0.0)  # (w, x, y, z), or an angle about z [rad]
+    friction: Annotated[Number, Field(ge=0, le=1)] | None = None  # the scene's friction where None
+
+    @property
+    def origin(self) -> np.ndarray:
+        """Position of the solid's frame [m], shape [3]."""
+        raise NotImplementedError
+
+    @property
+    def quaternion(self) -> np.ndarray:
+        """Rotation of the solid's frame as a unit quaternion (w, x, y, z)."""
+        return unit_quaternion(self.rotation)
+
+    def program(self) -> list[Node]:
+        """Return the nodes of this solid in postfix order, in its own frame."""
+        raise NotImplementedError
+
+    def reach(self) -> float:
+        """Radius [m] around the origin that holds the whole solid."""
+        raise NotImplementedError
+
+    def vectors(self) -> list[tuple[str, Sequence[float]]]:
+        """Name every point or size of this solid, to check that all live in one dimension."""
+        return []
+
+
+class Box(Solid):
+    """A box; in a 2-D world a rectangle."""
+
+    shape: Literal["box"] = "box"
+    center: Vector
+    size: Size
+
+    @property
+    def origin(self) -> np.ndarray:
+        return _point(self.center)
+
+    def program(self) -> list[Node]:
+        half = [0.5 * edge for edge in self.size]
+        return [Node(DISTANCES.index(box_distance), half if len(half) == 3 else [*half, ENDLESS])]
+
+    def reach(self) -> float:
+        return 0.5 * float(np.linalg.norm(self.size))
+
+    def vectors(self) -> list[tuple[str, Sequence[float]]]:
+        return [("center", self.center), ("size", self.size)]
+
+
+class Sphere(Solid):
+    """A ball; in a 2-D world a disc."""
+
+    shape: Literal["sphere"] = "sphere"
+    center: Vector
+    radius: Positive
+
+    @property
+    def origin(self) -> np.ndarray:
+        return _point(self.center)
+
+    def program(self) -> list[Node]:
+        return [Node(DISTANCES.index(sphere_distance), [self.radius])]
+
+    def reach(self) -> float:
+        return self.radius
+
+    def vectors(self) -> list[tuple[str, Sequence[float]]]:
+        return [("center", self.center)]
+
+
+class _Axial(Solid):
+    start: Vector
+    end: Vector
+    radius: Positive
+
+    @model_validator(mode="after")
+    def _has_length(self) -> "_Axial":
+        if len(self.start) != len(self.end):
+            raise ValueError(f"start = {self.start} and end = {self.end} must have the same number of components.")
+        return self
+
+    @property
+    def origin(self) -> np.ndarray:
+        return 0.5 * (_point(self.start) + _point(self.end))
+
+    def _node(self, op: int) -> Node:
+        axis = _point(self.end) - _point(self.start)
+        return Node(op, [self.radius, 0.5 * float(np.linalg.norm(axis))], turn=turn_from_y(axis))
+
+    def vectors(self) -> list[tuple[str, Sequence[float]]]:
+        return [("start", self.start), ("end", self.end)]
+
+
+class Capsule(_Axial):
+    """All points within `radius` of the segment from `start` to `end`."""
+
+    shape: Literal["capsule"] = "capsule"
+
+    def program(self) -> list[Node]:
+        return [self._node(DISTANCES.index(capsule_distance))]
+
+    def reach(self) -> float:
+        return 0.5 * float(np.linalg.norm(_point(self.end) - _point(self.start))) + self.radius
+
+
+class Cylinder(_Axial):
+    """A round cylinder between the centres `start` and `end` of its two faces."""
+
+    shape: Literal["cylinder"] = "cylinder"
+
+    def program(self) -> list[Node]:
+        return [self._node(DISTANCES.index(cylinder_distance))]
+
+    def reach(self) -> float:
+        return float(np.hypot(0.5 * np.linalg.norm(_point(self.end) - _point(self.start)), self.radius))
+
+
+class HalfSpace(Solid):
+    """Everything behind a plane through `point`; `normal` points out of the solid, into the water."""
+
+    shape: Literal["half-space"] = "half-space"
+    point: Vector
+    normal: Vector
+
+    @model_validator(mode="after")
+    def _has_direction(self) -> "HalfSpace":
+        if not any(self.normal):
+            raise ValueError(f"normal = {self.normal} has no direction; give a vector of any length but zero.")
+        return self
+
+    @property
+    def origin(self) -> np.ndarray:
+        return _point(self.point)
+
+    def program(self) -> list[Node]:
+        return [Node(DISTANCES.index(half_space_distance), turn=turn_from_y(_point(self.normal)))]
+
+    def reach(self) -> float:
+        return ENDLESS
+
+    def vectors(self) -> list[tuple[str, Sequence[float]]]:
+        return [("point", self.point), ("normal", self.normal)]
+
+
+class _SetOperation(Solid):
+    center: Vector = (0.0, 0.0, 0.0)
+    parts: Annotated[list["AnySolid"], Field(min_length=2)]
+
+    @property
+    def origin(self) -> np.ndarray:
+        return _point(self.center)
+
+    def _combine(self, op: int) -> list[Node]:
+        nodes: list[Node] = []
+        for number, part in enumerate(self.parts):
+            nodes += [node.placed(part.origin, part.quaternion) for node in part.program()]
+            if number:
+                nodes.append(Node(op))
+        return nodes
+
+    def reach(self) -> float:
+        return max(float(np.linalg.norm(part.origin)) + part.reach() for part in self.parts)
+
+    def vectors(self) -> list[tuple[str, Sequence[float]]]:
+        own = [("center", self.center)] if "center" in self.model_fields_set else []
+        return own + [
+            (f"parts[{number}].{name}", vector)
+            for number, part in enumerate(self.parts)
+            for name, vector in part.vectors()
+        ]
+
+
+class Union(_SetOperation):
+    """All points that are in any part. Parts are placed in the frame of the whole."""
+
+    shape: Literal["union"] = "union"
+
+    def program(self) -> list[Node]:
+        return self._combine(UNION)
+
+
+class Intersection(_SetOperation):
+    """All points that are in every part."""
+
+    shape: Literal["intersection"] = "intersection"
+
+    def program(self) -> list[Node]:
+        return self._combine(INTERSECTION)
+
+
+class Difference(_SetOperation):
+    """All points of the first part that are in none of the others."""
+
+    shape: Literal["difference"] = "difference"
+
+    def program(self) -> list[Node]:
+        return self._combine(DIFFERENCE)
+
+    def reach(self) -> float:
+        return float(np.linalg.norm(self.parts[0].origin)) + self.parts[0].reach()
+
+
+SHAPES: tuple[type[Solid], ...] = (
+    Box, Sphere, Capsule, Cylinder, HalfSpace, Union, Intersection, Difference,
+)  # fmt: skip
+AnySolid = Annotated[
+    Box | Sphere | Capsule | Cylinder | HalfSpace | Union | Intersection | Difference, Field(discriminator="shape")
+]
+for _shape in SHAPES:
+    _shape.model_rebuild()
+    register_model(_shape.model_fields["shape"].default, _shape)
+
+
+def build(solids: Sequence[Solid], tank_count: int, friction: float) -> SolidSet:
+    """Put `solids` on the device; the first `tank_count` are the walls of the tank."""
+    programs = [solid.program() for solid in solids]
+    for solid, program in zip(solids, programs, strict=True):
+        depth = deepest = 0
+        for node in program:
+            depth += 1 if node.op >= 0 else -1
+            deepest = max(deepest, depth)
+        if deepest > STACK:
+            raise WavetankError(
+                f"solid {solid.name or type(solid).__name__!r} nests set operations {deepest} deep; "
+                f"at most {STACK} are allowed: build it from several solids."
+            )
+    nodes = [node for program in programs for node in program] or [Node(0)]
+    count = max(len(solids), 1)
+    first = np.concatenate([[0], np.cumsum([len(program) for program in programs], dtype=int)])
+    position = np.array([s.origin for s in solids]).reshape(-1, 3)
+    rotation = np.array([s.quaternion for s in solids]).reshape(-1, 4)
+    frictions = [friction if s.friction is None else s.friction for s in solids]
+
+    def array(values: Any, kind: Any, length: int) -> Any:
+        result = qd.ndarray(kind, shape=(length,))
+        host = np.zeros(result.to_numpy().shape, np.int32 if kind is qd.i32 else np.float32)
+        values = np.asarray(values)
+        host[: len(values)] = values
+        result.from_numpy(host)
+        return result
+
+    return SolidSet(
+        op=array([n.op for n in nodes], qd.i32, len(nodes)),
+        size=array([n.size for n in nodes], vec4, len(nodes)),
+        offset=array([n.offset for n in nodes], vec3, len(nodes)),
+        turn=array([n.turn for n in nodes], vec4, len(nodes)),
+        first=array(first, qd.i32, count + 1),
+        reach=array([s.reach() for s in solids], qd.f32, count),
+        friction=array(frictions, qd.f32, count),
+        position=array(position, vec3, count),
+        rotation=array(rotation, vec4, count),
+        old_position=array(position, vec3, count),
+        old_rotation=array(rotation, vec4, count),
+        count=len(solids),
+        tank_count=tank_count,
+    )
+
+
+def _point(vector: Sequence[float]) -> np.ndarray:
+    point = np.zeros(3)
+    point[: len(vector)] = vector
+    return point

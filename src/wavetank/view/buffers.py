@@ -1,0 +1,63 @@
+"""Arrays of one picture size, allocated once and refilled by every picture.
+
+rows x columns are the pixels that are computed: `supersample` times the picture's in each direction.
+"""
+
+import dataclasses
+from typing import Any
+
+from wavetank.compiler import qd
+from wavetank.view.lens import vec2, vec3
+
+# What `surface` holds besides the places of particles. Kernels spell the numbers out, because the compiler's cache
+# does not see global constants; depths are kept as their bit pattern, which orders like the depth itself.
+NOTHING, SOLID, FLOOR = 0x7FFFFFFF, -1, -2
+FARTHEST = 0x7F000000  # bits of 1.7e38 m
+
+
+@dataclasses.dataclass
+class Buffers:
+    """What the passes hand to each other, per computed pixel."""
+
+    depth: Any  # i32 [rows, columns]: bits of the f32 depth along the view [m] of the nearest surface
+    surface: Any  # i32 [rows, columns]: place of the particle in device order, or NOTHING, SOLID, FLOOR
+    normal: Any  # vec3 [rows, columns], unit, in the world
+    color: Any  # vec3 [rows, columns], linear RGB: albedo until the shade pass, radiance from then on
+    light: Any  # vec2 [rows, columns]: share of the sun, share of the sky that reaches the surface
+    smooth_light: Any  # vec2 [rows, columns]: the same without its noise
+    lines: Any  # i32 [rows, columns]: coverage by the tank's edges, 0 to 255
+    sun_depth: Any  # i32 [texels, texels]: bits of the depth [m] of what the sun sees first
+    picture: Any  # i32 [height, width]: finished sRGB pixels, red in the lowest byte
+
+    @property
+    def rows(self) -> int:
+        """Computed pixels from top to bottom."""
+        return int(self.depth.shape[0])
+
+    @property
+    def columns(self) -> int:
+        """Computed pixels from left to right."""
+        return int(self.depth.shape[1])
+
+    @property
+    def texels(self) -> int:
+        """Edge of the sun's depth map in pixels."""
+        return int(self.sun_depth.shape[0])
+
+
+def allocate(width: int, height: int, supersample: int) -> Buffers:
+    """Return buffers for a picture of `width` x `height` pixels with `supersample`^2 samples in each."""
+    shape = (height * supersample, width * supersample)
+    # As fine as the picture, within what a shadow needs and a device likes.
+    texels = min(2048, max(256, shape[0]))
+    return Buffers(
+        depth=qd.ndarray(qd.i32, shape=shape),
+        surface=qd.ndarray(qd.i32, shape=shape),
+        normal=qd.ndarray(vec3, shape=shape),
+        color=qd.ndarray(vec3, shape=shape),
+        light=qd.ndarray(vec2, shape=shape),
+        smooth_light=qd.ndarray(vec2, shape=shape),
+        lines=qd.ndarray(qd.i32, shape=shape),
+        sun_depth=qd.ndarray(qd.i32, shape=(texels, texels)),
+        picture=qd.ndarray(qd.i32, shape=(height, width)),
+    )

@@ -1,0 +1,172 @@
+"""Where a picture is taken from: plain data on the host."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wavetank.errors import WavetankError
+from wavetank.view.extent import Extent, extent_of
+from wavetank.view.lens import Lens, lens_at
+
+Point = tuple[float, float, float]
+
+#: Three-quarter view from slightly above: azimuth from +z towards +x, elevation above the horizon [rad].
+FRAMING_AZIMUTH, FRAMING_ELEVATION = math.radians(30.0), math.radians(20.0)
+STEEPEST = math.radians(89.0)  # an orbit stops short of the pole, where `up` has no meaning
+NEAREST, FARTHEST = 1e-3, 1e4  # m: how close and how far zooming goes
+
+
+@dataclasses.dataclass(frozen=True)
+class Camera:
+    """An eye at `eye` that looks at `target`. Moving it returns a new one."""
+
+    eye: Point  # m
+    target: Point  # m
+    up: Point = (0.0, 1.0, 0.0)
+    field_of_view: float = math.radians(28.0)  # rad, vertical
+    near: float = 0.02  # m, nothing nearer is drawn
+    height: float | None = None  # m; a number makes the camera orthographic with that much height in view
+
+    def __post_init__(self) -> None:
+        """Refuse what has no picture; raises `WavetankError`."""
+        for name in ("eye", "target", "up"):
+            point = getattr(self, name)
+            if len(point) != 3 or not all(math.isfinite(part) for part in point):
+                raise WavetankError(f"camera {name} = {point} must be three finite numbers.")
+            object.__setattr__(self, name, tuple(float(part) for part in point))
+        if not 0.0 < self.field_of_view < math.pi:
+            raise WavetankError(f"camera field_of_view = {self.field_of_view} must lie between 0 and pi [rad].")
+        if not (math.isfinite(self.near) and self.near >= 1e-6):
+            raise WavetankError(f"camera near = {self.near} must be a length of at least 1e-6 m.")
+        if self.height is not None and not (math.isfinite(self.height) and self.height > 0.0):
+            raise WavetankError(f"camera height = {self.height} must be a positive length [m], or None.")
+        if self.distance < 1e-9:
+            raise WavetankError(f"camera eye and target are both {self.eye}; they must differ.")
+        if not any(self.up):
+            raise WavetankError("camera up = (0, 0, 0) has no direction; (0, 1, 0) is usual.")
+
+    @property
+    def distance(self) -> float:
+        """Distance from the eye to the target [m]."""
+        return math.dist(self.eye, self.target)
+
+    @property
+    def visible_height(self) -> float:
+        """Height of the picture at the target [m]."""
+        return self.height or 2.0 * self.distance * math.tan(0.5 * self.field_of_view)
+
+    def lens(self, width: int, height: int) -> Lens:
+        """Return this camera on the device for a picture of that many pixels."""
+        eye, target = np.array(self.eye), np.array(self.target)
+        # A pixel is square: the height alone sets the scale.
+        view = self.height or 2.0 * math.tan(0.5 * self.field_of_view)
+        return lens_at(
+            eye, (target - eye) / self.distance, np.array(self.up), width, height, height / view,
+            perspective=self.height is None, near=self.near,
+        )  # fmt: skip
+
+    def orbit(self, azimuth: float, elevation: float) -> "Camera":
+        """Turn around the target by `azimuth` about y and `elevation` towards the zenith [rad], distance kept."""
+        offset = np.subtract(self.eye, self.target)
+        old = math.asin(max(-1.0, min(1.0, offset[1] / self.distance)))
+        new = max(-STEEPEST, min(STEEPEST, old + elevation))
+        around = math.atan2(offset[0], offset[2]) + azimuth
+        return self._looking_from(around, new, self.distance)
+
+    def zoom(self, factor: float) -> "Camera":
+        """Show `factor` times as much height: below 1 comes closer, above 1 goes away."""
+        if not (math.isfinite(factor) and factor > 0.0):
+            raise WavetankError(f"zoom factor = {factor} must be a positive number; below 1 comes closer.")
+        if self.height is not None:
+            return dataclasses.replace(self, height=max(NEAREST, min(FARTHEST, self.height * factor)))
+        distance = max(NEAREST, min(FARTHEST, self.distance * factor))
+        offset = np.subtract(self.eye, self.target) * (distance / self.distance)
+        return dataclasses.replace(self, eye=_point(np.add(self.target, offset)))
+
+    def pan(self, right: float, up: float) -> "Camera":
+        """Move eye and target by these shares of the visible height."""
+        lens = self.lens(1, 1)
+        shift = self.visible_height * (right * _host(lens.right) + up * _host(lens.up))
+        return dataclasses.replace(
+            self, eye=_point(np.add(self.eye, shift)), target=_point(np.add(self.target, shift))
+        )
+
+    def ray(self, column: float, row: float, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return origin [m] and unit direction of the ray through a place in a picture of `width` x `height` px."""
+        lens = self.lens(width, height)
+        u, v = (column - 0.5 * width) / lens.focal, (0.5 * height - row) / lens.focal
+        across = u * _host(lens.right) + v * _host(lens.up)
+        if self.height is not None:
+            return np.add(self.eye, across), _host(lens.forward)
+        direction = _host(lens.forward) + across
+        return np.array(self.eye), direction / np.linalg.norm(direction)
+
+    def project(self, points: Any, width: int, height: int) -> np.ndarray:
+        """Return column and row [px] and depth [m] of `points` [n, 3], shape [n, 3]; NaN pixels behind the eye."""
+        lens = self.lens(width, height)
+        c = (np.atleast_2d(points) - self.eye) @ np.stack([_host(lens.right), _host(lens.up), _host(lens.forward)]).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scale = lens.focal * (1.0 if self.height else np.where(c[:, 2] > 0.0, 1.0 / c[:, 2], np.nan))
+        return np.stack([0.5 * width + scale * c[:, 0], 0.5 * height - scale * c[:, 1], c[:, 2]], axis=1)
+
+    @classmethod
+    def framing(cls, scene: Any, aspect: float = 16 / 9) -> "Camera":
+        """Return a camera that frames the tank: from slightly above in 3-D, straight from the front in 2-D."""
+        return cls.framing_extent(extent_of(scene), aspect)
+
+    @classmethod
+    def framing_extent(cls, extent: Extent, aspect: float = 16 / 9) -> "Camera":
+        """Return a camera that frames a box of the world."""
+        if extent.dim == 2:
+            return _front(cls, extent, aspect)
+        return _three_quarter(cls, extent, aspect)
+
+    def _looking_from(self, azimuth: float, elevation: float, distance: float) -> "Camera":
+        return dataclasses.replace(self, eye=_point(np.add(self.target, distance * _direction(azimuth, elevation))))
+
+
+def _front(kind: type[Camera], extent: Extent, aspect: float) -> Camera:
+    margin = 1.16  # room for the outline and the legend
+    size = extent.upper - extent.lower
+    height = margin * max(float(size[1]), float(size[0]) / aspect)
+    middle = extent.middle
+    distance = max(float(size.max()), 10.0 * extent.spacing)
+    return kind(
+        eye=_point(middle + [0.0, 0.0, distance]), target=_point(middle), near=min(0.02, 0.1 * distance), height=height
+    )
+
+
+def _three_quarter(kind: type[Camera], extent: Extent, aspect: float) -> Camera:
+    """Step back until all corners are in view, and move the target until they sit in the middle."""
+    margin = 1.12
+    target, toward = extent.middle.copy(), _direction(FRAMING_AZIMUTH, FRAMING_ELEVATION)
+    camera = kind(eye=_point(target + toward), target=_point(target))
+    lens = camera.lens(1, 1)
+    right, up = _host(lens.right), _host(lens.up)
+    steep = math.tan(0.5 * camera.field_of_view) / margin
+    for _ in range(8):
+        offset = extent.corners - target
+        across, rise, ahead = offset @ right, offset @ up, offset @ toward
+        distance = max(float(np.max(np.abs(rise) / steep + ahead)), float(np.max(np.abs(across) / (steep * aspect) + ahead)))
+        u, v = across / (distance - ahead), rise / (distance - ahead)
+        target = target + 0.5 * distance * ((u.max() + u.min()) * right + (v.max() + v.min()) * up)
+    return kind(
+        eye=_point(target + distance * toward), target=_point(target), near=max(1e-6, min(0.02, 0.01 * distance))
+    )
+
+
+def _direction(azimuth: float, elevation: float) -> np.ndarray:
+    flat = math.cos(elevation)
+    return np.array([flat * math.sin(azimuth), math.sin(elevation), flat * math.cos(azimuth)])
+
+
+def _host(vector: Any) -> np.ndarray:
+    return np.array([float(vector[k]) for k in range(3)])
+
+
+def _point(values: Sequence[float] | np.ndarray) -> Point:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

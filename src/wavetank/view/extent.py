@@ -1,0 +1,58 @@
+"""The box of the world that is worth looking at."""
+
+import dataclasses
+import itertools
+from typing import Any
+
+import numpy as np
+
+ENDLESS = 1e4  # m: what reaches that far, a half-space, is no reason to step back
+
+
+@dataclasses.dataclass(frozen=True)
+class Extent:
+    """A box; flat in z for a 2-D world."""
+
+    dim: int
+    spacing: float  # m
+    lower: np.ndarray  # m, [3]
+    upper: np.ndarray  # m, [3]
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Centre of the box [m], shape [3]."""
+        return 0.5 * (self.lower + self.upper)
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Corners of the box [m], shape [8, 3]."""
+        return np.array(list(itertools.product(*zip(self.lower, self.upper, strict=True))))
+
+    @property
+    def radius(self) -> float:
+        """Radius [m] of the ball around the middle that holds the box."""
+        return 0.5 * float(np.linalg.norm(self.upper - self.lower))
+
+
+def extent_of(scene: Any) -> Extent:
+    """Return the tank of `scene`; without one the box around its fluids and solids, without those a unit box."""
+    if scene.tank is not None:
+        boxes = [(np.zeros(scene.dim), np.array(scene.tank.size, float))]
+    else:
+        fluids = [fluid for fluid in getattr(scene, "fluids", []) if fluid.estimate(scene.spacing) > 0.0]
+        boxes = [fluid.bounds() for fluid in fluids]
+        boxes += [(s.origin - s.reach(), s.origin + s.reach()) for s in scene.solids if s.reach() < ENDLESS]
+    boxes = boxes or [(np.zeros(scene.dim), np.ones(scene.dim))]
+    lower = np.min([_in_space(low) for low, _ in boxes], axis=0)
+    upper = np.max([_in_space(high) for _, high in boxes], axis=0)
+    if scene.dim == 2:
+        lower[2] = upper[2] = 0.0
+    # A single particle, or a sheet of them, still needs a box with an inside.
+    thin = (upper - lower < scene.spacing) & (np.arange(3) < scene.dim)
+    return Extent(
+        scene.dim, float(scene.spacing), lower - 0.5 * scene.spacing * thin, upper + 0.5 * scene.spacing * thin
+    )
+
+
+def _in_space(point: np.ndarray) -> np.ndarray:
+    return np.concatenate([point, np.zeros(3 - len(point))])

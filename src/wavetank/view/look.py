@@ -1,0 +1,83 @@
+"""How a picture is lit: the numbers that the passes share.
+
+All colours are linear RGB; lengths are relative to the world, so that a puddle and a harbour look alike.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from wavetank.compiler import qd
+from wavetank.view.colormaps import rgb_of, to_linear
+from wavetank.view.lens import vec3
+
+
+@dataclasses.dataclass
+class Look:
+    """Light and colours of a picture, on the device."""
+
+    to_sun: vec3  # unit
+    sun: vec3  # radiance of a white surface that faces the sun
+    sky: vec3  # radiance of a white surface that sees only the upper half of the sky
+    ground: vec3  # radiance of a white surface that sees only the floor
+    horizon: vec3  # background behind the floor, and what distance fades to
+    zenith: vec3  # background overhead
+    floor: vec3  # albedo
+    solid: vec3  # albedo
+    line: vec3  # radiance of the tank's edges
+    line_strength: qd.f32  # share of what is behind an edge that the edge hides
+    glass: qd.f32  # share of the horizon that a pane of the tank mirrors, seen face on
+    wrap: qd.f32  # how far the sun's light wraps around particles: 0 hard, 1 all around
+    gloss: qd.f32  # strength of the highlight on particles and solids
+    sun_size: qd.f32  # tangent of the sun's angular radius: softness of shadows
+    shade_depth: qd.f32  # darkness of ambient occlusion, 0 to 1
+
+
+def studio() -> Look:
+    """Neutral light studio with a warm sun from behind the left shoulder: worlds in space."""
+    return Look(
+        to_sun=_unit(-0.62, 1.0, 0.28),
+        sun=vec3(0.80, 0.765, 0.71),
+        sky=vec3(0.50, 0.53, 0.57),
+        ground=vec3(0.27, 0.26, 0.25),
+        horizon=_linear("#e9edf0"),
+        zenith=_linear("#c3ccd4"),
+        floor=_linear("#dfe1e2"),
+        solid=_linear("#b9b2a8"),
+        line=_linear("#5b6b78"),
+        line_strength=0.75,
+        glass=0.03,
+        wrap=0.35,
+        gloss=0.18,
+        sun_size=0.10,
+        shade_depth=0.9,
+    )
+
+
+def paper() -> Look:
+    """Even light on white paper: worlds in the plane."""
+    return Look(
+        to_sun=_unit(-0.35, 0.55, 1.0),
+        sun=vec3(0.36, 0.36, 0.36),
+        sky=vec3(0.72, 0.72, 0.72),
+        ground=vec3(0.52, 0.52, 0.54),
+        horizon=_linear("#fbfbfa"),
+        zenith=_linear("#fbfbfa"),
+        floor=_linear("#ffffff"),
+        solid=_linear("#a9adb0"),
+        line=_linear("#3c444b"),
+        line_strength=1.0,
+        glass=0.0,
+        wrap=0.5,
+        gloss=0.0,
+        sun_size=0.0,
+        shade_depth=0.5,
+    )
+
+
+def _linear(color: str) -> vec3:
+    return vec3(*(float(part) for part in to_linear(np.array(rgb_of(color)))))
+
+
+def _unit(x: float, y: float, z: float) -> vec3:
+    return vec3(*(float(part) for part in np.array([x, y, z]) / np.linalg.norm([x, y, z])))

@@ -1,0 +1,69 @@
+"""What particles can be coloured by: one device function and one entry in `QUANTITIES` each.
+
+The device functions take the frame's arrays and the place of a particle; kernels choose one by its index in
+`DEVICE_FUNCTIONS` at compile time.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+from wavetank.compiler import qd
+from wavetank.view.extent import extent_of
+
+Limits = tuple[float, float]
+
+
+@qd.func
+def speed(x, v, rho, i):
+    """|v| [m/s]."""
+    return v[i].norm()
+
+
+@qd.func
+def density(x, v, rho, i):
+    """rho [kg/m^3]."""
+    return rho[i]
+
+
+@qd.func
+def nothing(x, v, rho, i):
+    """Zero: every particle has the first colour of the table."""
+    return 0.0
+
+
+def _speed_limits(scene: Any) -> Limits:
+    """Zero to a round number near the speed of water that falls through a third of the world's height."""
+    extent = extent_of(scene)
+    gravity = math.hypot(*scene.gravity)
+    top = math.sqrt(2.0 / 3.0 * gravity * float(extent.upper[1] - extent.lower[1]))
+    return 0.0, _round_up(top) if top > 0.0 else 1.0
+
+
+def _density_limits(scene: Any) -> Limits:
+    """A twentieth below and above the rest density."""
+    return 0.95 * scene.rest_density, 1.05 * scene.rest_density
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """How a coloured quantity is named and shown unless told otherwise."""
+
+    value: Any  # device function
+    unit: str
+    colormap: str
+    limits: Callable[[Any], Limits]  # of the scene, so that the colours of a film do not jump
+
+
+QUANTITIES: dict[str, Quantity] = {
+    "speed": Quantity(speed, "m/s", "water", _speed_limits),
+    "density": Quantity(density, "kg/m³", "balance", _density_limits),
+}
+DEVICE_FUNCTIONS = (nothing, *(quantity.value for quantity in QUANTITIES.values()))
+
+
+def _round_up(value: float) -> float:
+    """The next of 1, 1.5, 2, 3, 4, 5, 6, 8, 10 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return power * next(step for step in (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0) if step * power >= value * 0.999)
