@@ -1,0 +1,46 @@
+"""wavetank: real-time, interactive, position-based fluids.
+
+    import wavetank as wt
+
+    sim = wt.Simulation(wt.Scene.load("obstacle-tank"))
+    sim.advance(0.5)
+    image = wt.render(sim)
+"""
+
+from importlib.metadata import version as _version
+from typing import TYPE_CHECKING, Any
+
+from wavetank.errors import WavetankError
+from wavetank.params import PARAMETERS, PRESETS
+from wavetank.scene import Ball, Block, Points, Scene, Tank, bundled_scenes
+from wavetank.solids import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
+
+if TYPE_CHECKING:
+    from wavetank.simulation import Simulation
+    from wavetank.view.camera import Camera
+    from wavetank.view.renderer import render
+
+__version__ = _version("wavetank")
+
+__all__ = [
+    "PARAMETERS", "PRESETS", "Ball", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference", "HalfSpace",
+    "Intersection", "Points", "Scene", "Simulation", "Sphere", "Tank", "Union", "WavetankError", "bundled_scenes",
+    "render",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """Import what needs the kernels' sources only when it is first used: data alone should load fast."""
+    if name == "Simulation":
+        from wavetank.simulation import Simulation
+
+        return Simulation
+    if name == "Camera":
+        from wavetank.view.camera import Camera
+
+        return Camera
+    if name == "render":
+        from wavetank.view.renderer import render
+
+        return render
+    raise AttributeError(f"module 'wavetank' has no attribute {name!r}")

@@ -57,15 +57,17 @@ class Parameters(Model):
     frame_time: float = parameter(1 / 60, 1e-5, 1.0, "s", "T", "Time of water in one frame.", live=False)
     substeps: int = parameter(4, 1, 100, "", "n", "Time steps in a frame.")
     iterations: int = parameter(4, 1, 100, "", "", "Solver iterations in a time step.")
-    relaxation: float = parameter(0.7, 0.05, 1.5, "", "omega", "Share of each Jacobi correction that is applied.")
+    relaxation: float = parameter(0.625, 0.05, 1.5, "", "omega", "Share of the first Jacobi correction of a time step that is applied.")
+    slowest_mode: float = parameter(0.2, 0.0, 0.5, "", "a", "Lower end of the eigenvalues that four iterations damp evenly (Chebyshev); 0 is plain Jacobi.")
     force_mixing: float = parameter(0.05, 0.0, 1e4, "S_0", "eps", "Constraint force mixing (Eq. 5), relative to the sum of squared gradients in the rest lattice.")
     tensile_strength: float = parameter(0.0, 0.0, 1.0, "1/S_0", "k", "Artificial pressure against clustering (Eq. 7), relative likewise; shared by the iterations.")
     tensile_exponent: float = parameter(4.0, 1.0, 8.0, "", "n", "Exponent of the artificial pressure (Eq. 7).")
     tensile_distance: float = parameter(0.3, 0.05, 0.95, "h", "dq", "Distance at which the artificial pressure is k (Eq. 7).")
-    attraction: float = parameter(0.0, 0.0, 1.0, "", "", "Share of corrections that pull where the density is too low; 0 solves rho <= rho_0.")
+    attraction: float = parameter(0.0, 0.0, 1.0, "", "", "Share of negative pressure that is kept; 0 keeps none, so that water parts freely.")
     viscosity: float = parameter(0.05, 0.0, 1.0, "", "c", "XSPH viscosity (Eq. 11), dimensionless; at the default 240 steps a second.")
     vorticity: float = parameter(0.0, 0.0, 100.0, "m/s", "eps_w", "Vorticity confinement (Eq. 10).")
     friction: float = parameter(0.0, 0.0, 1.0, "", "mu", "Coulomb friction of walls and of solids that name none.", live=False)
+    speed_limit: float = parameter(1.0, 0.1, 1e6, "", "", "Largest speed, in units of what gravity and moving solids can give in this tank.")
     wall_density: float = parameter(1.0, 0.0, 1.0, "", "", "Share of the density that walls contribute; 0 leaves plain clamps.")
     wall_gap: float = parameter(0.25, 0.0, 0.5, "d", "", "Distance that particle centres keep from walls.")
 # fmt: on
@@ -98,6 +100,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "substeps": 1,
         "iterations": 5,
         "relaxation": 1.0,
+        "slowest_mode": 0.0,
         "force_mixing": 100.0 / PAPER_S0,
         "tensile_strength": 1e-4 * PAPER_S0,
         "tensile_exponent": 4.0,

@@ -61,6 +61,8 @@ class Simulation:
         upload(self.world.particles.p, positions)
         upload(self.world.particles.v, velocities)
         upload(self.world.particles.id, ids)
+        self._fastest_start = float(np.linalg.norm(velocities, axis=1).max(initial=0.0))
+        self._fastest_solid = 0.0
         self._outdated = True
 
     # --- time ---
@@ -93,7 +95,7 @@ class Simulation:
         for part in range(substeps):
             self._move_solids(part / substeps, (part + 1) / substeps)
             if self.count:
-                step(self.world, self.scene, duration / substeps)
+                step(self.world, self.scene, duration / substeps, self._speed_limit(duration))
         for number, target in self._targets.items():
             self._poses[number] = target
         compiler.synchronize()
@@ -101,6 +103,24 @@ class Simulation:
         self.time += duration
         self.frame_number += 1
         self._outdated = True
+
+    def _speed_limit(self, duration: float) -> float:
+        """Return the largest speed [m/s] that gravity, the start and the solids can have given to a particle.
+
+        That is the speed of a free fall through the tank, above the fastest particle at the start and the fastest
+        solid so far. Without a tank a fall has no end, and neither has the limit.
+        """
+        if self.scene.tank is None:
+            return math.inf
+        for number, (position, rotation) in self._targets.items():
+            old_position, old_rotation = self._poses[number]
+            turn = 2.0 * math.acos(min(1.0, abs(float(old_rotation @ rotation))))
+            reach = float(np.linalg.norm(self.scene.tank.size))
+            way = float(np.linalg.norm(position - old_position)) + turn * reach
+            self._fastest_solid = max(self._fastest_solid, way / duration)
+        fall = sum(2.0 * abs(g) * edge for g, edge in zip(self.scene.gravity, self.scene.tank.size, strict=True))
+        given = math.sqrt(fall + self._fastest_start**2) + 2.0 * self._fastest_solid
+        return self.scene.speed_limit * max(given, 1e-6)
 
     # --- solids ---
 

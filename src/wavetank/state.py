@@ -27,7 +27,8 @@ class Scratch:
     """What a substep computes and forgets."""
 
     rho: qd.types.ndarray()  # f32 [capacity]: density over rest density
-    lam: qd.types.ndarray()  # f32 [capacity], m^2: multiplier of the constraint
+    lam: qd.types.ndarray()  # f32 [capacity], m^2: multiplier, the sum over the iterations of a substep
+    dlam: qd.types.ndarray()  # f32 [capacity], m^2: its change in the last iteration
     omega: qd.types.ndarray()  # vec3 [capacity], 1/s: vorticity
     near: qd.types.ndarray()  # i32 [capacity]: bit k is set where solid k is near, the last bit for all beyond
 
@@ -67,11 +68,13 @@ class Coefficients:
     gradient_scale: qd.f32  # 1/m
     eps: qd.f32  # 1/m^2, constraint force mixing
     relaxation: qd.f32
+    momentum: qd.f32
     attraction: qd.f32
     tensile: qd.f32  # m^2, artificial pressure of one iteration over w(dq)^n
     tensile_exponent: qd.f32
     viscosity: qd.f32  # share per substep
     vorticity: qd.f32  # m/s
+    speed_limit: qd.f32  # m/s
     wall_density: qd.f32
     wall_gap: qd.f32  # m
 
@@ -107,4 +110,4 @@ def new_particles(dim: int, capacity: int) -> Particles:
 
 def new_scratch(capacity: int) -> Scratch:
     """Allocate the scratch arrays."""
-    return Scratch(scalars(capacity), scalars(capacity), vectors(3, capacity), integers(capacity))
+    return Scratch(scalars(capacity), scalars(capacity), scalars(capacity), vectors(3, capacity), integers(capacity))

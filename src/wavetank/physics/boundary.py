@@ -16,7 +16,7 @@ Contact: conservative advancement along the path (Hart 1996, "Sphere tracing", 1
 """
 
 from wavetank.compiler import qd
-from wavetank.distance import SolidSet, conjugate, lift, local_distance, rotate, signed_distance, to_local, vec3, vec4
+from wavetank.distance import SolidSet, lift, local_distance, rotate, signed_distance, to_local, vec3, vec4
 from wavetank.state import Coefficients, Particles, Scratch, Walls
 
 # Bit 30 of `near` stands for every solid from number 30 on.
@@ -56,74 +56,72 @@ def wall_density(x: qd.template(), near, solids: SolidSet, walls: Walls, c: Coef
 
 
 @qd.func
-def mark_near(x: qd.template(), p: qd.template(), solids: SolidSet, c: Coefficients):
-    """Bits of the solids that the particle may touch or feel on its way from `x` to `p` and a little beyond."""
-    near = 0
-    margin = 1.2 * c.h + (p - x).norm()
-    point = lift(p)
-    for k in range(solids.count):
-        moved = (solids.position[k] - solids.old_position[k]).norm()
-        if (point - solids.position[k]).norm() < solids.reach[k] + margin + moved:
-            if signed_distance(solids, k, point).w < margin + moved:
-                near |= 1 << qd.min(k, 30)
-    return near
-
-
-@qd.func
-def keep_out(x: qd.template(), p: qd.template(), near, solids: SolidSet, c: Coefficients):
-    """Return `p` moved out of the marked solids, as reached from `x` without passing through any.
-
-    Tank walls come last in effect: they are convex from inside, so the final word keeps the particle in the tank.
-    """
-    target = lift(p)
-    origin = lift(x)
-    for turn in range(2):
-        for back in range(solids.count):
-            k = solids.count - 1 - back
-            if is_near(near, k) == 1:
-                target = keep_out_of(k, origin, target, solids, c.wall_gap)
-    result = p
-    for axis in qd.static(range(x.n)):
-        result[axis] = target[axis]
-    return result
-
-
-@qd.func
 def keep_out_of(k, origin, target, solids: SolidSet, gap):
-    """Return `target` moved out of solid `k`, as reached from `origin`; both world points, in the solid's motion."""
-    q = solids.rotation[k]
-    start = to_local(solids.old_position[k], solids.old_rotation[k], origin)
-    end = to_local(solids.position[k], q, target)
-    way = end - start
-    length = way.norm()
-    s_start = local_distance(solids, k, start).w
-    value = local_distance(solids, k, end)
-    # To enter and to leave again costs at least the distances at both ends, so a longer way alone can pass through.
-    if value.w >= gap and s_start > 0.0 and s_start + value.w < length:
-        step = way / length
-        t = 0.0
-        s = s_start
-        for _ in range(32):
-            if s > 0.1 * gap and t < length:
-                t = qd.min(t + s, length)
-                s = local_distance(solids, k, start + step * t).w
-        if t < length:
-            hit = local_distance(solids, k, start + step * t)
-            n = vec3(hit.x, hit.y, hit.z)
-            end = start + step * t + (1.0 - t / length) * (way - n * way.dot(n))
-            value = local_distance(solids, k, end)
+    """Return `target` moved out of solid `k`, as reached from `origin`; world points, in the solid's own motion.
+
+    The path is followed in steps as long as the distance to the solid; where it touches, the rest of it slides on
+    along the surface. Whatever the speed, nothing passes through a wall that the distance function resolves.
+    """
+    rotation = solids.rotation[k]
+    at = to_local(solids.old_position[k], solids.old_rotation[k], origin)
+    end = to_local(solids.position[k], rotation, target)
+    nearest = 0.1 * gap
+    for _ in range(64):
+        way = end - at
+        length = way.norm()
+        if length > 0.0:
+            value = local_distance(solids, k, at)
+            n = vec3(value.x, value.y, value.z)
+            inward = way.dot(n)
+            if value.w >= length:
+                at = end
+            elif value.w > nearest or inward >= 0.0:
+                at += way * (qd.max(value.w, nearest) / length) if value.w < length else way
+            else:
+                end -= n * inward
+                # What is left of a way straight into the wall is rounding.
+                if (end - at).norm() < 1e-3 * length:
+                    end = at
     for _ in range(2):
+        value = local_distance(solids, k, end)
         if value.w < gap:
             end += vec3(value.x, value.y, value.z) * (gap - value.w)
-            value = local_distance(solids, k, end)
-    return solids.position[k] + rotate(q, end)
+    return solids.position[k] + rotate(rotation, end)
+
+
+@qd.kernel(fastcache=True)
+def keep_out_of_solids(particles: Particles, scratch: Scratch, solids: SolidSet, c: Coefficients, count: qd.i32):
+    """Move the predicted positions out of the solids, as reached from the positions before.
+
+    Twice over all solids, the tank last: it is convex from inside, so its word holds.
+    """
+    for i in range(count):
+        near = scratch.near[i]
+        if near != 0:
+            origin = lift(particles.x[i])
+            target = lift(particles.p[i])
+            for turn in range(2 * solids.count):
+                k = solids.count - 1 - turn % solids.count
+                if is_near(near, k) == 1:
+                    target = keep_out_of(k, origin, target, solids, c.wall_gap)
+            p = particles.p[i]
+            for axis in qd.static(range(p.n)):
+                p[axis] = target[axis]
+            particles.p[i] = p
 
 
 @qd.kernel(fastcache=True)
 def mark_near_solids(particles: Particles, scratch: Scratch, solids: SolidSet, c: Coefficients, count: qd.i32):
-    """Mark for every particle the solids to look at in this substep."""
+    """Mark for every particle the solids that it may touch or feel on its way and a little beyond."""
     for i in range(count):
-        scratch.near[i] = mark_near(particles.x[i], particles.p[i], solids, c)
-
-
-__all__ = ["conjugate", "keep_out", "mark_near_solids", "wall_density"]
+        x = lift(particles.x[i])
+        p = lift(particles.p[i])
+        near = 0
+        for k in range(solids.count):
+            turn = (solids.rotation[k] - solids.old_rotation[k]).norm()
+            margin = 1.2 * c.h + (p - x).norm() + (solids.position[k] - solids.old_position[k]).norm()
+            margin += 2.0 * turn * qd.min(solids.reach[k], (p - solids.position[k]).norm())
+            if (p - solids.position[k]).norm() < solids.reach[k] + margin:
+                if signed_distance(solids, k, p).w < margin:
+                    near |= 1 << qd.min(k, 30)
+        scratch.near[i] = near

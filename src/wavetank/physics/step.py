@@ -5,10 +5,14 @@ substep, particles are sorted rather than hashed, and contact is part of every c
 """
 
 import dataclasses
+import math
 
+from wavetank.compiler import qd
 from wavetank.distance import SolidSet
-from wavetank.physics.boundary import mark_near_solids
-from wavetank.physics.density_constraint import correct_positions, measure_density, solve_multipliers
+from wavetank.physics.boundary import keep_out_of_solids, mark_near_solids
+from wavetank.physics.density_constraint import (
+    clear_multipliers, correct_positions, measure_density, schedule, solve_multipliers,
+)  # fmt: skip
 from wavetank.physics.integrate import accept_positions, forget_predictions, predict, update_velocities
 from wavetank.physics.neighbors import find_neighbors, sort_particles
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
@@ -33,24 +37,29 @@ class World:
     count: int
 
 
-def step(world: World, scene: Scene, dt: float) -> None:
-    """Advance `world` by `dt` [s]."""
-    c, method, count = coefficients(scene, dt), method_number(scene), world.count
+def step(world: World, scene: Scene, dt: float, speed_limit: float = math.inf) -> None:
+    """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
+    c, method, count = coefficients(scene, dt, speed_limit), method_number(scene), world.count
     now, spare, scratch, grid, solids, walls = (
         world.particles, world.spare, world.scratch, world.grid, world.solids, world.walls,
     )  # fmt: skip
 
-    predict(now, solids, c, count, [*scene.gravity, 0.0, 0.0][:3])  # 1-4
+    predict(now, c, count, qd.Vector([*scene.gravity, 0.0, 0.0][:3]))  # 1-4
+    mark_near_solids(now, scratch, solids, c, count)
+    keep_out_of_solids(now, scratch, solids, c, count)
 
     sort_particles(now, spare, grid, c, count)  # 5-7
     now, spare = spare, now
-    find_neighbors(now, grid, c, count)
     mark_near_solids(now, scratch, solids, c, count)
+    find_neighbors(now, grid, c, count)
 
-    for _ in range(scene.iterations):  # 8-19
+    clear_multipliers(scratch, count)
+    for relaxation, momentum in schedule(scene.iterations, scene.relaxation, scene.slowest_mode):  # 8-19
+        c = dataclasses.replace(c, relaxation=relaxation, momentum=momentum)
         solve_multipliers(scratch, now, grid, solids, walls, c, count, method)  # 9-11
         correct_positions(spare, now, scratch, grid, solids, walls, c, count, method)  # 12-18
         now.p, spare.p = spare.p, now.p
+        keep_out_of_solids(now, scratch, solids, c, count)
 
     update_velocities(now, c, count)  # 21
     if scene.vorticity > 0.0:
@@ -84,7 +93,7 @@ def method_number(scene: Scene) -> int:
     return number
 
 
-def coefficients(scene: Scene, dt: float) -> Coefficients:
+def coefficients(scene: Scene, dt: float, speed_limit: float = math.inf) -> Coefficients:
     """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here."""
     h = scene.support * scene.spacing
     rest = rest_lattice(scene.kernel, scene.dim, scene.support)
@@ -98,11 +107,14 @@ def coefficients(scene: Scene, dt: float) -> Coefficients:
         gradient_scale=rest.gradient_scale / h,
         eps=scene.force_mixing * s_0,
         relaxation=scene.relaxation,
+        momentum=0.0,
         attraction=scene.attraction,
         tensile=scene.tensile_strength / s_0 / scene.iterations / w_dq**scene.tensile_exponent,
         tensile_exponent=scene.tensile_exponent,
         viscosity=min(1.0, scene.viscosity * REFERENCE_RATE * dt),
         vorticity=scene.vorticity,
+        speed_limit=speed_limit,
         wall_density=scene.wall_density,
         wall_gap=scene.wall_gap * scene.spacing,
     )
+

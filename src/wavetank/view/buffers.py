@@ -6,13 +6,17 @@ rows x columns are the pixels that are computed: `supersample` times the picture
 import dataclasses
 from typing import Any
 
+import numpy as np
+
 from wavetank.compiler import qd
+from wavetank.view.colormaps import to_srgb
 from wavetank.view.lens import vec2, vec3
 
 # What `surface` holds besides the places of particles. Kernels spell the numbers out, because the compiler's cache
 # does not see global constants; depths are kept as their bit pattern, which orders like the depth itself.
 NOTHING, SOLID, FLOOR = 0x7FFFFFFF, -1, -2
 FARTHEST = 0x7F000000  # bits of 1.7e38 m
+CURVE_ENTRIES = 8192  # so many that the steepest part of the sRGB curve loses no byte
 
 
 @dataclasses.dataclass
@@ -24,10 +28,14 @@ class Buffers:
     normal: Any  # vec3 [rows, columns], unit, in the world
     color: Any  # vec3 [rows, columns], linear RGB: albedo until the shade pass, radiance from then on
     light: Any  # vec2 [rows, columns]: share of the sun, share of the sky that reaches the surface
-    smooth_light: Any  # vec2 [rows, columns]: the same without its noise
+    rough_light: Any  # vec2 [rows, columns]: the same while it is being smoothed
     lines: Any  # i32 [rows, columns]: coverage by the tank's edges, 0 to 255
     sun_depth: Any  # i32 [texels, texels]: bits of the depth [m] of what the sun sees first
+    solid_box: Any  # i32 [4]: first and last column, first and last row that may show a solid
+    curve: Any  # i32 [entries]: sRGB byte of linear light 0 to 1, in equal steps
     picture: Any  # i32 [height, width]: finished sRGB pixels, red in the lowest byte
+
+    probes: int  # of light per computed pixel: fewer where more pixels are averaged
 
     @property
     def rows(self) -> int:
@@ -50,14 +58,19 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
     shape = (height * supersample, width * supersample)
     # As fine as the picture, within what a shadow needs and a device likes.
     texels = min(2048, max(256, shape[0]))
+    curve = qd.ndarray(qd.i32, shape=(CURVE_ENTRIES,))
+    curve.from_numpy((255.0 * to_srgb(np.linspace(0.0, 1.0, CURVE_ENTRIES)) + 0.5).astype(np.int32))
     return Buffers(
         depth=qd.ndarray(qd.i32, shape=shape),
         surface=qd.ndarray(qd.i32, shape=shape),
         normal=qd.ndarray(vec3, shape=shape),
         color=qd.ndarray(vec3, shape=shape),
         light=qd.ndarray(vec2, shape=shape),
-        smooth_light=qd.ndarray(vec2, shape=shape),
+        rough_light=qd.ndarray(vec2, shape=shape),
         lines=qd.ndarray(qd.i32, shape=shape),
         sun_depth=qd.ndarray(qd.i32, shape=(texels, texels)),
+        solid_box=qd.ndarray(qd.i32, shape=(4,)),
+        curve=curve,
         picture=qd.ndarray(qd.i32, shape=(height, width)),
+        probes=8 if supersample == 1 else 4,
     )

@@ -129,10 +129,10 @@ class Camera:
 
 
 def _front(kind: type[Camera], extent: Extent, aspect: float) -> Camera:
-    margin = 1.16  # room for the outline and the legend
     size = extent.upper - extent.lower
-    height = margin * max(float(size[1]), float(size[0]) / aspect)
-    middle = extent.middle
+    height = max(1.24 * float(size[1]), 1.08 * float(size[0]) / aspect)
+    # The legend stands below, so the world stands a little higher.
+    middle = extent.middle - [0.0, min(0.04 * height, 0.5 * height - 0.55 * float(size[1])), 0.0]
     distance = max(float(size.max()), 10.0 * extent.spacing)
     return kind(
         eye=_point(middle + [0.0, 0.0, distance]), target=_point(middle), near=min(0.02, 0.1 * distance), height=height

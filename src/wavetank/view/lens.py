@@ -31,6 +31,7 @@ class Lens:
     forward: vec3  # unit
     middle: vec2  # px: column and row of the optical axis
     focal: qd.f32  # px (perspective) or px/m (orthographic)
+    pixel: qd.f32  # 1 / focal: width of a pixel in u and v
     perspective: qd.f32  # 1 or 0
     near: qd.f32  # m: nothing nearer is drawn
 
@@ -51,6 +52,7 @@ def lens_at(
         forward=vec3(*map(float, forward)),
         middle=vec2(0.5 * width, 0.5 * height),
         focal=float(focal),
+        pixel=1.0 / float(focal),
         perspective=float(perspective),
         near=float(near),
     )
@@ -72,7 +74,7 @@ def from_view(lens: Lens, c):
 @qd.func
 def plane_position(lens: Lens, row, column):
     """(u, v) at the centre of a pixel."""
-    return vec2((column + 0.5 - lens.middle.x) / lens.focal, (lens.middle.y - row - 0.5) / lens.focal)
+    return vec2((column + 0.5 - lens.middle.x) * lens.pixel, (lens.middle.y - row - 0.5) * lens.pixel)
 
 
 @qd.func
@@ -96,6 +98,14 @@ def ray_origin(lens: Lens, ray):
 def ray_direction(lens: Lens, ray):
     """World direction of a view ray; its length is the way [m] per metre of depth."""
     return ray.z * lens.right + ray.w * lens.up + lens.forward
+
+
+@qd.func
+def point_at(lens: Lens, row, column, depth):
+    """What a pixel shows at a depth, in view coordinates [m]."""
+    uv = plane_position(lens, row, column)
+    scale = 1.0 + lens.perspective * (depth - 1.0)
+    return vec3(scale * uv.x, scale * uv.y, depth)
 
 
 @qd.func

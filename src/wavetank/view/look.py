@@ -26,7 +26,8 @@ class Look:
     solid: vec3  # albedo
     line: vec3  # radiance of the tank's edges
     line_strength: qd.f32  # share of what is behind an edge that the edge hides
-    glass: qd.f32  # share of the horizon that a pane of the tank mirrors, seen face on
+    pane: vec3  # radiance that the panes of the tank mirror
+    glass: qd.f32  # share of it in what is seen through a pane
     wrap: qd.f32  # how far the sun's light wraps around particles: 0 hard, 1 all around
     gloss: qd.f32  # strength of the highlight on particles and solids
     sun_size: qd.f32  # tangent of the sun's angular radius: softness of shadows
@@ -36,17 +37,18 @@ class Look:
 def studio() -> Look:
     """Neutral light studio with a warm sun from behind the left shoulder: worlds in space."""
     return Look(
-        to_sun=_unit(-0.62, 1.0, 0.28),
-        sun=vec3(0.80, 0.765, 0.71),
-        sky=vec3(0.50, 0.53, 0.57),
-        ground=vec3(0.27, 0.26, 0.25),
-        horizon=_linear("#e9edf0"),
-        zenith=_linear("#c3ccd4"),
-        floor=_linear("#dfe1e2"),
-        solid=_linear("#b9b2a8"),
+        to_sun=_unit(-0.72, 1.0, 0.08),
+        sun=vec3(0.86, 0.82, 0.76),
+        sky=vec3(0.48, 0.51, 0.55),
+        ground=vec3(0.36, 0.35, 0.34),
+        horizon=_linear("#dbe1e6"),
+        zenith=_linear("#a3b1bd"),
+        floor=_linear("#dadcdd"),
+        solid=_linear("#d9a982"),
         line=_linear("#5b6b78"),
         line_strength=0.75,
-        glass=0.03,
+        pane=_linear("#f4f8fa"),
+        glass=0.0,
         wrap=0.35,
         gloss=0.18,
         sun_size=0.10,
@@ -61,13 +63,14 @@ def paper() -> Look:
         sun=vec3(0.36, 0.36, 0.36),
         sky=vec3(0.72, 0.72, 0.72),
         ground=vec3(0.52, 0.52, 0.54),
-        horizon=_linear("#fbfbfa"),
-        zenith=_linear("#fbfbfa"),
+        horizon=_linear("#f0f2f3"),
+        zenith=_linear("#f0f2f3"),
         floor=_linear("#ffffff"),
         solid=_linear("#a9adb0"),
         line=_linear("#3c444b"),
         line_strength=1.0,
-        glass=0.0,
+        pane=vec3(1.0, 1.0, 1.0),
+        glass=1.0,
         wrap=0.5,
         gloss=0.0,
         sun_size=0.0,

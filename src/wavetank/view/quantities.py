@@ -1,6 +1,6 @@
 """What particles can be coloured by: one device function and one entry in `QUANTITIES` each.
 
-The device functions take the frame's arrays and the place of a particle; kernels choose one by its index in
+The device functions take what the frame knows of one particle; kernels choose one by its index in
 `DEVICE_FUNCTIONS` at compile time.
 """
 
@@ -16,19 +16,19 @@ Limits = tuple[float, float]
 
 
 @qd.func
-def speed(x, v, rho, i):
+def speed(x, v, rho):
     """|v| [m/s]."""
-    return v[i].norm()
+    return v.norm()
 
 
 @qd.func
-def density(x, v, rho, i):
+def density(x, v, rho):
     """rho [kg/m^3]."""
-    return rho[i]
+    return rho
 
 
 @qd.func
-def nothing(x, v, rho, i):
+def nothing(x, v, rho):
     """Zero: every particle has the first colour of the table."""
     return 0.0
 

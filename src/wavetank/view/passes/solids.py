@@ -1,40 +1,65 @@
 """Solids by sphere tracing: step along the ray by the distance to the solid until it is reached.
 
-Each ray looks only at solids whose bounding ball it meets, and no farther than what is already there. A window in
-the world clips what is drawn: solids without end stop at the tank, and a 2-D world shows the cut at its plane. Where
-a ray enters the window inside a solid, the cut face is drawn.
+Each ray looks only at solids whose bounding ball it meets, and no farther than what is already there. What has no
+end, a half-space, is cut off at the tank; a 2-D world shows the cut through its plane, moved in front of the
+particles, which are balls around that plane and would cover the rim of every solid.
 
-    code     symbol   meaning                                       unit
-    t                 depth along the ray                           m
-    pace              way per metre of depth, the ray's length      m/m
-    first, last       depths between which a solid may be met       m
+    code         symbol   meaning                                       unit
+    t                     depth along the ray                           m
+    pace                  way per metre of depth, the ray's length      m/m
+    first, last           depths between which a solid may be met       m
+    raised                way towards the eye that a cut is moved       m
 """
+
+import dataclasses
 
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, signed_distance
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, vec4, view_ray
+from wavetank.view.lens import (
+    Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, view_ray,
+)  # fmt: skip
 from wavetank.view.shot import Shot
+
+UNBOUNDED = 1e4  # m
+
+
+@dataclasses.dataclass
+class Window:
+    """Where solids are drawn, on the device."""
+
+    lower: vec3  # m: every solid between these corners
+    upper: vec3
+    lower_endless: vec3  # m: and those without end between these
+    upper_endless: vec3
+    raised: qd.f32  # m
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Draw the solids that are not walls of the tank, in front of or behind what is there."""
     solids = shot.frame.solids
     if solids.count > solids.tank_count:
-        lower, upper = window(shot)
+        bound(solids, shot.lens, buffers.rows, buffers.columns, buffers.solid_box)
         trace(
-            solids, lower, upper, shot.lens, shot.look.solid, buffers.depth, buffers.surface, buffers.normal,
-            buffers.color,
+            solids, window(shot), shot.lens, shot.look.solid, buffers.solid_box, buffers.depth, buffers.surface,
+            buffers.normal, buffers.color,
         )  # fmt: skip
 
 
-def window(shot: Shot) -> tuple[vec3, vec3]:
-    """Return the corners [m] of the box within which solids are drawn."""
-    lower, upper = [-1e4] * 3, [1e4] * 3
-    if shot.frame.dim == 2:
-        # In front of the particles, which are balls around the plane and would cover the rim of the solid.
-        lower[2] = upper[2] = shot.radius
-    return vec3(*lower), vec3(*upper)
+def window(shot: Shot) -> Window:
+    """Return where the solids of this world are drawn."""
+    flat = shot.frame.dim == 2
+    wide = [UNBOUNDED, UNBOUNDED, 0.0 if flat else UNBOUNDED]
+    lower, upper = [-w for w in wide], wide
+    if shot.frame.scene.tank is not None:
+        lower, upper = list(map(float, shot.extent.lower)), list(map(float, shot.extent.upper))
+    return Window(
+        lower=vec3(*(-w for w in wide)),
+        upper=vec3(*wide),
+        lower_endless=vec3(*lower),
+        upper_endless=vec3(*upper),
+        raised=shot.radius if flat else 0.0,
+    )
 
 
 @qd.func
@@ -65,20 +90,24 @@ def ball_interval(origin, direction, center, r):
 
 
 @qd.func
-def meet(solids: SolidSet, k, origin, direction, first, last):
-    """(normal, depth) where a ray meets solid `k` between two depths; depth -1 where it does not."""
+def meet(solids: SolidSet, k, origin, direction, first, last, bevel):
+    """(normal, depth) where a ray meets solid `k` between two depths; depth -1 where it does not.
+
+    The cut face is rounded off towards its rim over `bevel` [m].
+    """
     pace = direction.norm()
     t = first
     hit = vec4(0.0, 0.0, 0.0, -1.0)
     value = signed_distance(solids, k, origin + t * direction)
     if value.w <= 0.0:
-        toward = -direction / pace
-        hit = vec4(toward.x, toward.y, toward.z, t)  # the cut face
+        tilt = qd.max(1.0 + value.w / qd.max(bevel, 1e-9), 0.0)
+        toward = (vec3(value.x, value.y, value.z) * tilt - direction / pace).normalized(1e-9)
+        hit = vec4(toward.x, toward.y, toward.z, t)
     else:
         steps = 0
-        # A ray that grazes a surface creeps; after so many steps it is near enough to none.
+        # A ray that grazes a surface creeps; after so many steps it counts as a miss.
         while steps < 128 and t <= last:
-            if value.w < 2e-4 * t + 1e-6:
+            if value.w < 1e-4 * t + 1e-6:
                 hit = vec4(value.x, value.y, value.z, t)
                 break
             t += value.w / pace
@@ -88,46 +117,75 @@ def meet(solids: SolidSet, k, origin, direction, first, last):
 
 
 @qd.func
-def nearest_solid(solids: SolidSet, lower, upper, origin, direction, near, far):
-    """(normal, depth) of the first solid on a ray between two depths; depth -1 where there is none."""
+def nearest_solid(solids: SolidSet, window: Window, lens: Lens, row, column, far):
+    """(normal, depth) of the first solid in a pixel nearer than `far`; depth -1 where there is none."""
+    ray = view_ray(lens, row, column)
+    origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
     best = vec4(0.0, 0.0, 0.0, -1.0)
-    last = far
-    inside = box_interval(origin, direction, lower, upper)
+    last = qd.min(far, 1e4) + window.raised
     for k in range(solids.tank_count, solids.count):
         bound = ball_interval(origin, direction, solids.position[k], 1.001 * solids.reach[k] + 1e-4)
-        first = qd.max(near, bound[0], inside[0])
-        end = qd.min(last, bound[1], inside[1])
+        first, end = qd.max(lens.near + window.raised, bound[0]), qd.min(last, bound[1])
         if first <= end:
-            hit = meet(solids, k, origin, direction, first, end)
+            inside = box_interval(origin, direction, window.lower, window.upper)
+            if solids.reach[k] > 1e4:
+                inside = box_interval(origin, direction, window.lower_endless, window.upper_endless)
+            first, end = qd.max(first, inside[0]), qd.min(end, inside[1])
+        if first <= end:
+            hit = meet(solids, k, origin, direction, first, end, window.raised)
             if hit.w >= 0.0:
                 best = hit
                 last = hit.w
+    best.w -= window.raised
     return best
+
+
+@qd.func
+def in_box(box: qd.template(), row, column):
+    """Whether a pixel lies in a box of pixels (first and last column, first and last row)."""
+    return column >= box[0] and column <= box[1] and row >= box[2] and row <= box[3]
+
+
+@qd.kernel(fastcache=True)
+def bound(solids: SolidSet, lens: Lens, rows: qd.i32, columns: qd.i32, box: qd.types.ndarray()):
+    """Find the box of pixels (first and last column, first and last row) in which any solid can be."""
+    for _ in range(1):
+        whole = qd.Vector([columns, -1, rows, -1])
+        for k in range(solids.tank_count, solids.count):
+            c, r = to_view(lens, solids.position[k]), 1.001 * solids.reach[k] + 1e-4
+            part = qd.Vector([0, columns - 1, 0, rows - 1])
+            if r < 1e4 and (c.z > r + lens.near or lens.perspective < 0.5):
+                part = box_of_ball(lens, c, r, rows, columns)
+            if part[0] <= part[1]:
+                whole[0], whole[1] = qd.min(whole[0], part[0]), qd.max(whole[1], part[1])
+                whole[2], whole[3] = qd.min(whole[2], part[2]), qd.max(whole[3], part[3])
+        for k in qd.static(range(4)):
+            box[k] = whole[k]
 
 
 @qd.kernel(fastcache=True)
 def trace(
-    solids: SolidSet, lower: vec3, upper: vec3, lens: Lens, albedo: vec3, depth: qd.types.ndarray(),
+    solids: SolidSet, window: Window, lens: Lens, albedo: vec3, box: qd.types.ndarray(), depth: qd.types.ndarray(),
     surface: qd.types.ndarray(), normal: qd.types.ndarray(), color: qd.types.ndarray(),
 ):  # fmt: skip
     """Draw the nearest solid at every pixel where it is nearer than what is there."""
     for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        ray = view_ray(lens, row, column)
-        far = qd.min(qd.bit_cast(depth[row, column], qd.f32), 1e4)
-        hit = nearest_solid(solids, lower, upper, ray_origin(lens, ray), ray_direction(lens, ray), lens.near, far)
-        if hit.w > 0.0:
-            depth[row, column] = qd.bit_cast(hit.w, qd.i32)
-            surface[row, column] = -1  # SOLID
-            normal[row, column] = vec3(hit.x, hit.y, hit.z)
-            color[row, column] = albedo
+        if in_box(box, row, column):
+            hit = nearest_solid(solids, window, lens, row, column, qd.bit_cast(depth[row, column], qd.f32))
+            if hit.w > 0.0:
+                depth[row, column] = qd.bit_cast(hit.w, qd.i32)
+                surface[row, column] = -1  # SOLID
+                normal[row, column] = vec3(hit.x, hit.y, hit.z)
+                color[row, column] = albedo
 
 
 @qd.kernel(fastcache=True)
-def trace_depth(solids: SolidSet, lower: vec3, upper: vec3, lens: Lens, depth: qd.types.ndarray()):
+def trace_depth(
+    solids: SolidSet, window: Window, lens: Lens, box: qd.types.ndarray(), depth: qd.types.ndarray()
+):  # fmt: skip
     """Lower `depth` to that of the nearest solid."""
     for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        ray = view_ray(lens, row, column)
-        far = qd.min(qd.bit_cast(depth[row, column], qd.f32), 1e4)
-        hit = nearest_solid(solids, lower, upper, ray_origin(lens, ray), ray_direction(lens, ray), lens.near, far)
-        if hit.w > 0.0:
-            depth[row, column] = qd.bit_cast(hit.w, qd.i32)
+        if in_box(box, row, column):
+            hit = nearest_solid(solids, window, lens, row, column, qd.bit_cast(depth[row, column], qd.f32))
+            if hit.w > 0.0:
+                depth[row, column] = qd.bit_cast(hit.w, qd.i32)

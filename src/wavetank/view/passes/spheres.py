@@ -18,7 +18,7 @@ from wavetank.compiler import qd
 from wavetank.distance import lift
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import (
-    Lens, ball_depth, box_of_ball, from_view, pixels_per_metre, to_view, vec3, view_ray,
+    Lens, ball_depth, box_of_ball, from_view, pixels_per_metre, point_at, to_view, view_ray,
 )  # fmt: skip
 from wavetank.view.quantities import DEVICE_FUNCTIONS
 from wavetank.view.shot import Shot
@@ -48,11 +48,22 @@ def clear(depth: qd.types.ndarray(), surface: qd.types.ndarray()):
 
 
 @qd.kernel(fastcache=True)
+def clear_depth(depth: qd.types.ndarray()):
+    """Nothing to see, infinitely far."""
+    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
+        depth[row, column] = 0x7F000000  # FARTHEST
+
+
+@qd.kernel(fastcache=True)
 def splat(
     x: qd.types.ndarray(), count: qd.i32, radius: qd.f32, lens: Lens, largest: qd.f32, depth: qd.types.ndarray()
 ):
     """Lower `depth` to that of every ball."""
-    for i in range(count):
+    for n in range(count):
+        # Particles are sorted by place more often than not: the end that is nearer goes first and hides the rest.
+        i = n
+        if lens.forward.dot(lift(x[0]) - lift(x[count - 1])) > 0.0:
+            i = count - 1 - n
         c = to_view(lens, lift(x[i]))
         if c.z > lens.near + radius:
             r = qd.min(radius, largest / pixels_per_metre(lens, c.z))
@@ -101,9 +112,8 @@ def paint(
         if i != 0x7FFFFFFF:  # NOTHING
             c = to_view(lens, lift(x[i]))
             t = qd.bit_cast(depth[row, column], qd.f32)
-            ray = view_ray(lens, row, column)
-            normal[row, column] = from_view(lens, (vec3(ray.x + t * ray.z, ray.y + t * ray.w, t) - c).normalized(1e-12))
-            share = (qd.static(DEVICE_FUNCTIONS[quantity])(x, v, rho, i) - low) * scale
+            normal[row, column] = from_view(lens, (point_at(lens, row, column, t) - c).normalized(1e-12))
+            share = (qd.static(DEVICE_FUNCTIONS[quantity])(x[i], v[i], rho[i]) - low) * scale
             last = colors.shape[0] - 1
             # The minimum comes second: it turns a NaN into a colour.
             entry = qd.min(qd.max(share, 0.0), 1.0) * last

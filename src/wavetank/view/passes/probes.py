@@ -1,0 +1,39 @@
+"""Probe points that many pixels share: a spiral, turned from pixel to pixel in a 4 x 4 pattern.
+
+Few probes a pixel and an average over 4 x 4 pixels are worth sixteen times as many, and the pattern, unlike noise,
+averages out without a rest.
+"""
+
+import math
+
+from wavetank.compiler import qd
+from wavetank.view.lens import vec2
+
+_GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
+
+
+def _spiral(count: int) -> tuple[tuple[float, float], ...]:
+    """Points evenly spread over the unit disc (H. Vogel, "A better way to construct the sunflower head", 1979)."""
+    return tuple(
+        (math.sqrt((k + 0.5) / count) * math.cos(_GOLDEN_ANGLE * k), math.sqrt((k + 0.5) / count) * math.sin(_GOLDEN_ANGLE * k))
+        for k in range(count)
+    )
+
+
+#: SPIRAL[n]: n points of the unit disc
+SPIRAL = tuple(_spiral(count) for count in range(17))
+
+
+@qd.func
+def pattern_turn(row, column):
+    """(cos, sin) of one of 16 angles, all of which occur in every 4 x 4 pixels (a Bayer matrix)."""
+    a, b = row % 4, column % 4
+    near, far = (a % 2) ^ (b % 2), (a // 2) ^ (b // 2)
+    angle = (8 * near + 4 * (a % 2) + 2 * far + a // 2) * 0.39269908  # 2 pi / 16
+    return vec2(qd.cos(angle), qd.sin(angle))
+
+
+@qd.func
+def turned(turn, point: qd.template()):
+    """Point (x, y) turned by (cos, sin)."""
+    return vec2(turn.x * point[0] - turn.y * point[1], turn.y * point[0] + turn.x * point[1])
