@@ -218,9 +218,12 @@ class Scene(Parameters):
 
     def assign(self, name: str, value: Any) -> None:
         """Set one key in place, validated; raise `WavetankError` and change nothing where it is not allowed."""
+        before = dict(self.__dict__)
         try:
             setattr(self, name, value)
         except ValidationError as report:
+            # A whole-scene check runs after the value is in place.
+            self.__dict__.update(before)
             raise WavetankError(sentence(report, type(self))) from None
 
     @property
@@ -311,11 +314,7 @@ class Scene(Parameters):
 
     def table(self) -> dict[str, Any]:
         """Return what was set (not the defaults) as plain data that `parse` reads back to an equal scene."""
-        result: dict[str, Any] = self.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
-        result |= {name: getattr(self, name) for name in PRESETS[self.preset]}
-        for kind, members in (("fluids", self.fluids), ("solids", self.solids)):
-            for row, member in zip(result.get(kind, []), members, strict=False):
-                row["shape"] = member.shape
+        result = _set_values(self) | {name: getattr(self, name) for name in PRESETS[self.preset]}
         return {key: result[key] for key in sorted(result, key=lambda k: isinstance(result[k], list | dict))}
 
     def changed(self, **values: Any) -> "Scene":
@@ -336,6 +335,23 @@ class Scene(Parameters):
             return value * factor if key in lengths and isinstance(value, int | float) else value
 
         return type(self).parse(walk(self.table()))  # type: ignore[no-any-return]
+
+
+def _set_values(value: Any) -> Any:
+    """Reduce a model to plain data: the keys that differ from their defaults, and the shape that tells a table's kind."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_set_values(member) for member in value]
+    if not isinstance(value, Model):
+        return value
+    result = {}
+    for name, field in type(value).model_fields.items():
+        member = getattr(value, name)
+        default = None if isinstance(member, np.ndarray) else field.default
+        if name == "shape" or (member is not None and (isinstance(member, np.ndarray) or member != default)):
+            result[name] = _set_values(member)
+    return result
 
 
 def bundled_scenes() -> list[str]:

@@ -4,6 +4,12 @@ from wavetank.compiler import qd
 from wavetank.state import Coefficients, Particles
 
 
+@qd.func
+def free_motion(x, v, c: Coefficients):
+    """Where a particle is after dt if nothing touches it."""
+    return x + c.dt * v
+
+
 @qd.kernel(fastcache=True)
 def predict(particles: Particles, c: Coefficients, count: qd.i32, gravity: qd.types.vector(3, qd.f32)):
     """Accelerate and move freely: Algorithm 1, lines 2-3."""
@@ -13,14 +19,20 @@ def predict(particles: Particles, c: Coefficients, count: qd.i32, gravity: qd.ty
         for k in qd.static(range(x.n)):
             v[k] += c.dt * gravity[k]
         particles.v[i] = v
-        particles.p[i] = x + c.dt * v
+        particles.p[i] = free_motion(x, v, c)
 
 
 @qd.kernel(fastcache=True)
 def update_velocities(particles: Particles, c: Coefficients, count: qd.i32):
-    """Set v = (p - x) / dt: Algorithm 1, line 21; shortened to the speed limit."""
+    """Set v = (p - x) / dt: Algorithm 1, line 21; shortened to the speed limit.
+
+    It is written as a change of the free velocity, so that a particle that nothing touched keeps its velocity to the
+    last digit; the difference of two positions would lose what is below their rounding.
+    """
     for i in range(count):
-        v = (particles.p[i] - particles.x[i]) / c.dt
+        x = particles.x[i]
+        v = particles.v[i]
+        v += (particles.p[i] - free_motion(x, v, c)) / c.dt
         particles.v[i] = v * qd.min(1.0, c.speed_limit / qd.max(v.norm(), 1e-12))
 
 

@@ -1,0 +1,1 @@
+"""Pictures of a world, computed by kernels: camera, passes, colours, legend."""

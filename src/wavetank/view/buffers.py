@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, synchronize
 from wavetank.view.colormaps import to_srgb
 from wavetank.view.lens import vec2, vec3
 
@@ -33,7 +33,8 @@ class Buffers:
     sun_depth: Any  # i32 [texels, texels]: bits of the depth [m] of what the sun sees first
     solid_box: Any  # i32 [4]: first and last column, first and last row that may show a solid
     curve: Any  # i32 [entries]: sRGB byte of linear light 0 to 1, in equal steps
-    picture: Any  # i32 [height, width]: finished sRGB pixels, red in the lowest byte
+    picture: Any  # i32 [words]: the finished picture, three sRGB bytes a pixel, row by row
+    supersample: int  # computed pixels per pixel of the picture, in each direction
 
     probes: int  # of light per computed pixel: fewer where more pixels are averaged
 
@@ -51,6 +52,14 @@ class Buffers:
     def texels(self) -> int:
         """Edge of the sun's depth map in pixels."""
         return int(self.sun_depth.shape[0])
+
+    def host_picture(self) -> np.ndarray:
+        """Return a copy of the finished picture, uint8 [height, width, 3]."""
+        synchronize()
+        shape = (self.rows // self.supersample, self.columns // self.supersample, 3)
+        # Without a copy where the device shares memory with the host; the one below is ours to keep.
+        words: np.ndarray = self.picture.to_numpy(copy=None)
+        return words.view(np.uint8)[: shape[0] * shape[1] * 3].reshape(shape).copy()
 
 
 def allocate(width: int, height: int, supersample: int) -> Buffers:
@@ -71,6 +80,7 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
         sun_depth=qd.ndarray(qd.i32, shape=(texels, texels)),
         solid_box=qd.ndarray(qd.i32, shape=(4,)),
         curve=curve,
-        picture=qd.ndarray(qd.i32, shape=(height, width)),
+        picture=qd.ndarray(qd.i32, shape=(3 * -(-height * width // 4),)),
+        supersample=supersample,
         probes=8 if supersample == 1 else 4,
     )

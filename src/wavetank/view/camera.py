@@ -27,7 +27,7 @@ class Camera:
     target: Point  # m
     up: Point = (0.0, 1.0, 0.0)
     field_of_view: float = math.radians(28.0)  # rad, vertical
-    near: float = 0.02  # m, nothing nearer is drawn
+    near: float = 0.01  # m, nothing nearer is drawn
     height: float | None = None  # m; a number makes the camera orthographic with that much height in view
 
     def __post_init__(self) -> None:
@@ -90,9 +90,7 @@ class Camera:
         """Move eye and target by these shares of the visible height."""
         lens = self.lens(1, 1)
         shift = self.visible_height * (right * _host(lens.right) + up * _host(lens.up))
-        return dataclasses.replace(
-            self, eye=_point(np.add(self.eye, shift)), target=_point(np.add(self.target, shift))
-        )
+        return dataclasses.replace(self, eye=_point(np.add(self.eye, shift)), target=_point(np.add(self.target, shift)))
 
     def ray(self, column: float, row: float, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         """Return origin [m] and unit direction of the ray through a place in a picture of `width` x `height` px."""
@@ -130,12 +128,12 @@ class Camera:
 
 def _front(kind: type[Camera], extent: Extent, aspect: float) -> Camera:
     size = extent.upper - extent.lower
-    height = max(1.24 * float(size[1]), 1.08 * float(size[0]) / aspect)
+    height = max(1.28 * float(size[1]), 1.08 * float(size[0]) / aspect)
     # The legend stands below, so the world stands a little higher.
-    middle = extent.middle - [0.0, min(0.04 * height, 0.5 * height - 0.55 * float(size[1])), 0.0]
+    middle = extent.middle - [0.0, min(0.055 * height, 0.5 * height - 0.55 * float(size[1])), 0.0]
     distance = max(float(size.max()), 10.0 * extent.spacing)
     return kind(
-        eye=_point(middle + [0.0, 0.0, distance]), target=_point(middle), near=min(0.02, 0.1 * distance), height=height
+        eye=_point(middle + [0.0, 0.0, distance]), target=_point(middle), near=min(0.01, 0.1 * distance), height=height
     )
 
 
@@ -150,11 +148,12 @@ def _three_quarter(kind: type[Camera], extent: Extent, aspect: float) -> Camera:
     for _ in range(8):
         offset = extent.corners - target
         across, rise, ahead = offset @ right, offset @ up, offset @ toward
-        distance = max(float(np.max(np.abs(rise) / steep + ahead)), float(np.max(np.abs(across) / (steep * aspect) + ahead)))
+        need = np.maximum(np.abs(rise) / steep, np.abs(across) / (steep * aspect)) + ahead
+        distance = float(need.max())
         u, v = across / (distance - ahead), rise / (distance - ahead)
         target = target + 0.5 * distance * ((u.max() + u.min()) * right + (v.max() + v.min()) * up)
     return kind(
-        eye=_point(target + distance * toward), target=_point(target), near=max(1e-6, min(0.02, 0.01 * distance))
+        eye=_point(target + distance * toward), target=_point(target), near=max(1e-6, min(0.01, 0.01 * distance))
     )
 
 

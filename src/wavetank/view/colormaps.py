@@ -50,7 +50,8 @@ def _table(name: str) -> np.ndarray:
     places = np.linspace(0.0, len(anchors) - 1.0, ENTRIES)
     even = np.stack([np.interp(places, np.arange(len(anchors)), channel) for channel in anchors.T], axis=1)
     linear = (even @ np.linalg.inv(_TO_LAB).T) ** 3 @ np.linalg.inv(_TO_CONES).T
-    return np.clip(linear, 0.0, 1.0).astype(np.float32)
+    colors: np.ndarray = np.clip(linear, 0.0, 1.0).astype(np.float32)
+    return colors
 
 
 def rgb_of(color: str) -> tuple[float, float, float]:
@@ -74,4 +75,5 @@ def to_srgb(linear: np.ndarray) -> np.ndarray:
 
 def oklab(linear: np.ndarray) -> np.ndarray:
     """Return linear RGB [n, 3] as Oklab (lightness 0 to 1, green-red, blue-yellow) [n, 3]."""
-    return np.cbrt(linear @ _TO_CONES.T) @ _TO_LAB.T
+    lab: np.ndarray = np.cbrt(linear @ _TO_CONES.T) @ _TO_LAB.T
+    return lab

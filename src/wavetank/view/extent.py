@@ -21,7 +21,8 @@ class Extent:
     @property
     def middle(self) -> np.ndarray:
         """Centre of the box [m], shape [3]."""
-        return 0.5 * (self.lower + self.upper)
+        middle: np.ndarray = 0.5 * (self.lower + self.upper)
+        return middle
 
     @property
     def corners(self) -> np.ndarray:

@@ -23,7 +23,7 @@ def draw_bar(picture: np.ndarray, colors: np.ndarray, limits: tuple[float, float
     unit = _unit(picture)
     plate = _bar(colors.tobytes(), limits, label, unit, int(max(0.2 * picture.shape[1], 8 * unit)))
     _lay(picture, plate, picture.shape[0] - plate.shape[0] - unit, unit)
-    return plate.shape[1] + unit
+    return int(plate.shape[1]) + unit
 
 
 def write_time(picture: np.ndarray, time: float, count: int, column: int = 0) -> None:
@@ -85,12 +85,12 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def _has_room(picture: np.ndarray) -> bool:
-    return picture.shape[1] >= SMALLEST[0] and picture.shape[0] >= SMALLEST[1]
+    return bool(picture.shape[1] >= SMALLEST[0] and picture.shape[0] >= SMALLEST[1])
 
 
 def _unit(picture: np.ndarray) -> int:
     """Size of the letters [px]."""
-    return max(10, round(min(picture.shape[0], picture.shape[1]) / 48))
+    return max(9, round(min(int(picture.shape[0]), int(picture.shape[1])) / 48))
 
 
 @functools.lru_cache(maxsize=8)

@@ -149,13 +149,17 @@ def box_of_ball(lens: Lens, c, r, rows, columns):
     """
     u = interval_of_ball(lens, c.x, c.z, r)
     v = interval_of_ball(lens, c.y, c.z, r)
-    left = qd.max(lens.middle.x + lens.focal * u[0] - 0.5, 0.0)
-    right = qd.min(lens.middle.x + lens.focal * u[1] - 0.5, columns - 1.0)
-    above = qd.max(lens.middle.y - lens.focal * v[1] - 0.5, 0.0)
-    below = qd.min(lens.middle.y - lens.focal * v[0] - 0.5, rows - 1.0)
+    left = lens.middle.x + lens.focal * u[0] - 0.5
+    right = lens.middle.x + lens.focal * u[1] - 0.5
+    above = lens.middle.y - lens.focal * v[1] - 0.5
+    below = lens.middle.y - lens.focal * v[0] - 0.5
     box = qd.Vector([0, -1, 0, -1])
-    if left <= right and above <= below:
-        box = qd.Vector([qd.ceil(left, int), qd.floor(right, int), qd.ceil(above, int), qd.floor(below, int)])
+    if left < columns and right >= 0.0 and above < rows and below >= 0.0:
+        # Clamped twice: a float before it becomes an integer, and the integer in case that float was no number.
+        box[0] = qd.max(qd.ceil(qd.max(left, 0.0), int), 0)
+        box[1] = qd.min(qd.floor(qd.min(right, columns - 1.0), int), columns - 1)
+        box[2] = qd.max(qd.ceil(qd.max(above, 0.0), int), 0)
+        box[3] = qd.min(qd.floor(qd.min(below, rows - 1.0), int), rows - 1)
     return box
 
 

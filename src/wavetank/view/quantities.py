@@ -17,13 +17,13 @@ Limits = tuple[float, float]
 
 @qd.func
 def speed(x, v, rho):
-    """|v| [m/s]."""
+    """Speed |v| [m/s]."""
     return v.norm()
 
 
 @qd.func
 def density(x, v, rho):
-    """rho [kg/m^3]."""
+    """Density rho [kg/m^3]."""
     return rho
 
 
@@ -58,7 +58,7 @@ class Quantity:
 
 QUANTITIES: dict[str, Quantity] = {
     "speed": Quantity(speed, "m/s", "water", _speed_limits),
-    "density": Quantity(density, "kg/m³", "balance", _density_limits),
+    "density": Quantity(density, "kg/m^3", "balance", _density_limits),
 }
 DEVICE_FUNCTIONS = (nothing, *(quantity.value for quantity in QUANTITIES.values()))
 
@@ -66,4 +66,5 @@ DEVICE_FUNCTIONS = (nothing, *(quantity.value for quantity in QUANTITIES.values(
 def _round_up(value: float) -> float:
     """The next of 1, 1.5, 2, 3, 4, 5, 6, 8, 10 times a power of ten."""
     power = 10.0 ** math.floor(math.log10(value))
-    return power * next(step for step in (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0) if step * power >= value * 0.999)
+    steps = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+    return power * next(step for step in steps if step * power >= 0.999 * value)

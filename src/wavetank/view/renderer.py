@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import current_backend, qd
 from wavetank.errors import WavetankError
 from wavetank.frame import Frame
 from wavetank.view import legend as legends
@@ -47,6 +47,8 @@ class Renderer:
         ):  # fmt: skip
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= most:
                 raise WavetankError(f"render: {name} = {value!r} must be a whole number from 1 to {most}.")
+        if current_backend() is None:
+            raise WavetankError("render: nothing computes yet; make a Simulation first, or call compiler.start().")
         self.width, self.height, self.supersample = int(width), int(height), int(supersample)
         self.buffers = allocate(self.width, self.height, self.supersample)
         self._colors = qd.ndarray(vec3, shape=(ENTRIES,))
@@ -70,8 +72,7 @@ class Renderer:
         shot = self.shot(frame, camera, color_by, colormap, limits, radius)
         for draw in PASSES:
             draw(shot, self.buffers)
-        pixels = self.buffers.picture.to_numpy().astype("<i4", copy=False)
-        picture = np.ascontiguousarray(pixels.view(np.uint8).reshape(self.height, self.width, 4)[..., :3])
+        picture = self.buffers.host_picture()
         if legend:
             self._write_legend(picture, shot, color_by, colormap)
         return picture
@@ -123,10 +124,13 @@ class Renderer:
         quantity = QUANTITIES[color_by]
         name = colormap or quantity.colormap
         self._load_colors(name, table(name))
-        low, high = limits if limits is not None else quantity.limits(frame.scene)
+        try:
+            low, high = (float(limit) for limit in limits or quantity.limits(frame.scene))
+        except (TypeError, ValueError):
+            low = high = math.nan
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise WavetankError(f"render: limits = ({low}, {high}) must be two finite numbers, the lower one first.")
-        return 1 + list(QUANTITIES).index(color_by), (float(low), float(high))
+            raise WavetankError(f"render: limits = {limits} must be two finite numbers, the lower one first.")
+        return 1 + list(QUANTITIES).index(color_by), (low, high)
 
     def _load_colors(self, name: str, colors: np.ndarray) -> None:
         if name != self._colors_name:
@@ -144,8 +148,8 @@ def _sun_lens(extent: Extent, to_sun: Any, texels: int) -> Lens:
     toward = np.array([float(part) for part in to_sun])
     reach = 1.15 * extent.radius
     return lens_at(
-        extent.middle + 10.0 * reach * toward, -toward, np.array([0.0, 0.0, -1.0]), texels, texels, 0.5 * texels / reach,
-        perspective=False, near=1e-6,
+        extent.middle + 10.0 * reach * toward, -toward, np.array([0.0, 0.0, -1.0]), texels, texels,
+        0.5 * texels / reach, perspective=False, near=1e-6,
     )  # fmt: skip
 
 

@@ -22,15 +22,15 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     reach = max(5.0 * shot.radius, 0.05 * shot.extent.radius)
     lower, upper = (vec3(*map(float, corner)) for corner in (shot.extent.lower, shot.extent.upper))
     look_around(
-        shot.lens, lower, upper, reach, shot.look.shade_depth, buffers.probes, buffers.depth, buffers.surface, buffers.normal,
-        buffers.light,
+        shot.lens, lower, upper, reach, shot.look.shade_depth, buffers.probes, buffers.depth, buffers.surface,
+        buffers.normal, buffers.light,
     )  # fmt: skip
 
 
 @qd.kernel(fastcache=True)
 def look_around(
-    lens: Lens, lower: vec3, upper: vec3, reach: qd.f32, strength: qd.f32, probes: qd.template(), depth: qd.types.ndarray(),
-    surface: qd.types.ndarray(), normal: qd.types.ndarray(), light: qd.types.ndarray(),
+    lens: Lens, lower: vec3, upper: vec3, reach: qd.f32, strength: qd.f32, probes: qd.template(),
+    depth: qd.types.ndarray(), surface: qd.types.ndarray(), normal: qd.types.ndarray(), light: qd.types.ndarray(),
 ):  # fmt: skip
     """Sum up what stands in the way of the sky around every visible point."""
     rows, columns = depth.shape[0], depth.shape[1]

@@ -14,10 +14,8 @@ _GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 
 def _spiral(count: int) -> tuple[tuple[float, float], ...]:
     """Points evenly spread over the unit disc (H. Vogel, "A better way to construct the sunflower head", 1979)."""
-    return tuple(
-        (math.sqrt((k + 0.5) / count) * math.cos(_GOLDEN_ANGLE * k), math.sqrt((k + 0.5) / count) * math.sin(_GOLDEN_ANGLE * k))
-        for k in range(count)
-    )
+    polar = [(math.sqrt((k + 0.5) / count), _GOLDEN_ANGLE * k) for k in range(count)]
+    return tuple((r * math.cos(angle), r * math.sin(angle)) for r, angle in polar)
 
 
 #: SPIRAL[n]: n points of the unit disc
@@ -28,9 +26,20 @@ SPIRAL = tuple(_spiral(count) for count in range(17))
 def pattern_turn(row, column):
     """(cos, sin) of one of 16 angles, all of which occur in every 4 x 4 pixels (a Bayer matrix)."""
     a, b = row % 4, column % 4
-    near, far = (a % 2) ^ (b % 2), (a // 2) ^ (b // 2)
-    angle = (8 * near + 4 * (a % 2) + 2 * far + a // 2) * 0.39269908  # 2 pi / 16
-    return vec2(qd.cos(angle), qd.sin(angle))
+    quarter = 2 * ((a % 2) ^ (b % 2)) + a % 2
+    step = 2 * ((a // 2) ^ (b // 2)) + a // 2
+    turn = vec2(1.0, 0.0)  # steps of 22.5 degrees
+    if step == 1:
+        turn = vec2(0.92387953, 0.38268343)
+    elif step == 2:
+        turn = vec2(0.70710678, 0.70710678)
+    elif step == 3:
+        turn = vec2(0.38268343, 0.92387953)
+    if quarter % 2 == 1:
+        turn = vec2(-turn.y, turn.x)
+    if quarter >= 2:
+        turn = -turn
+    return turn
 
 
 @qd.func

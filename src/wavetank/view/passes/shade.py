@@ -1,10 +1,10 @@
 """Light: turns albedo into radiance, and fills what is empty with the background.
 
-    code      symbol   meaning                                        unit
-    n                  normal of the surface
-    seen               unit vector from the surface to the eye
-    lit                share of the sun that arrives, with the angle
-    open_sky           share of the sky that arrives
+code      symbol   meaning                                                 unit
+n                  normal of the surface                                   1
+seen               direction from the surface to the eye                   1
+lit                share of the sun that arrives, its angle included       1
+far                share of the background in what is far away             1
 """
 
 from wavetank.compiler import qd
@@ -24,23 +24,32 @@ def draw(shot: Shot, buffers: Buffers) -> None:
 
 
 @qd.func
-def background(look: Look, direction):
-    """Radiance of the empty studio in a unit direction."""
-    rise = qd.min(qd.max(direction.y * 1.6 + 0.08, 0.0), 1.0)
-    return look.horizon + (look.zenith - look.horizon) * (rise * rise * (3.0 - 2.0 * rise))
+def smoothstep(share):
+    """Ease from 0 to 1."""
+    within = qd.min(qd.max(share, 0.0), 1.0)
+    return within * within * (3.0 - 2.0 * within)
 
 
 @qd.func
-def surface_radiance(look: Look, albedo, n, seen, sun_share, sky_share, wrap, gloss):
-    """Radiance of a matte surface with a soft highlight, in the sun, the sky and the light from the floor."""
-    facing = n.dot(look.to_sun)
-    lit = qd.max((facing + wrap) / (1.0 + wrap), 0.0) * sun_share
-    up = 0.5 + 0.5 * n.y
-    ambient = (look.ground + (look.sky - look.ground) * up) * sky_share
-    half = (look.to_sun + seen).normalized(1e-9)
-    highlight = gloss * qd.max(n.dot(half), 0.0) ** 40 * sun_share
-    rim = gloss * (1.0 - qd.max(n.dot(seen), 0.0)) ** 4 * sky_share
-    return albedo * (look.sun * lit + ambient) + highlight * look.sun + rim * look.horizon
+def background(look: Look, direction):
+    """Radiance of the empty studio in a unit direction."""
+    return look.horizon + (look.zenith - look.horizon) * smoothstep(direction.y * 1.6 + 0.08)
+
+
+@qd.func
+def surface_radiance(look: Look, albedo, n, seen, share, wrap, gloss):
+    """Radiance of a matte surface with a soft highlight, in the sun, the sky and the light from the floor.
+
+    `share` holds the shares of the sun and of the sky that arrive.
+    """
+    lit = qd.max((n.dot(look.to_sun) + wrap) / (1.0 + wrap), 0.0) * share.x
+    ambient = (look.ground + (look.sky - look.ground) * (0.5 + 0.5 * n.y)) * share.y
+    result = albedo * (look.sun * lit + ambient)
+    if gloss > 0.0:
+        half = (look.to_sun + seen).normalized(1e-9)
+        result += gloss * share.x * qd.max(n.dot(half), 0.0) ** 40 * look.sun
+        result += 0.3 * gloss * share.y * (1.0 - qd.max(n.dot(seen), 0.0)) ** 4 * look.horizon
+    return result
 
 
 @qd.kernel(fastcache=True)
@@ -48,27 +57,24 @@ def light(
     lens: Lens, look: Look, middle: vec3, size: qd.f32, depth: qd.types.ndarray(), surface: qd.types.ndarray(),
     normal: qd.types.ndarray(), light_share: qd.types.ndarray(), color: qd.types.ndarray(),
 ):  # fmt: skip
-    """Shade every pixel; the floor fades into the background away from the world's `middle`."""
+    """Shade every pixel; floor and solids fade into the background far away from the world's `middle`."""
     for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
         ray = view_ray(lens, row, column)
         direction = ray_direction(lens, ray)
         ahead = direction.normalized()
         what = surface[row, column]
+        wrap, gloss, far = look.wrap, look.gloss, 0.0
+        if what < 0:  # SOLID or FLOOR; what has no end must not end at a hard horizon
+            gloss = qd.select(what == -1, 0.3 * gloss, 0.0)
+            wrap = qd.select(what == -1, 0.4 * wrap, 0.0)
+            at = ray_origin(lens, ray) + qd.bit_cast(depth[row, column], qd.f32) * direction
+            far = smoothstep(((at - middle).norm() / size - 1.5) / 5.0)
         result = vec3(0.0, 0.0, 0.0)
         if what == 0x7FFFFFFF:  # NOTHING
-            result = background(look, ahead)
+            far = 1.0
         else:
-            n = normal[row, column]
             share = light_share[row, column]
-            albedo = color[row, column]
-            if what == -2:  # FLOOR
-                at = ray_origin(lens, ray) + qd.bit_cast(depth[row, column], qd.f32) * direction
-                away = qd.min(qd.max(((at - middle).norm() / size - 1.5) / 5.0, 0.0), 1.0)
-                ground = surface_radiance(look, albedo, n, -ahead, share.x, share.y, 0.0, 0.0)
-                behind = background(look, ahead)
-                result = ground + (behind - ground) * (away * away * (3.0 - 2.0 * away))
-            elif what == -1:  # SOLID
-                result = surface_radiance(look, albedo, n, -ahead, share.x, share.y, 0.0, 0.3 * look.gloss)
-            else:
-                result = surface_radiance(look, albedo, n, -ahead, share.x, share.y, look.wrap, look.gloss)
+            result = surface_radiance(look, color[row, column], normal[row, column], -ahead, share, wrap, gloss)
+        if far > 0.0:
+            result += far * (background(look, ahead) - result)
         color[row, column] = result

@@ -9,7 +9,7 @@ smooth pass averages that pattern away.
     c                  the point in the sun's view: right, up, depth        m
     gap                depth of the point below what the sun sees first     m
     spread             radius of the probes                                 texels
-    lift               way along the normal that avoids self-shadow         m
+    away, lift         way along the normal that avoids self-shadow         m
 """
 
 from wavetank.compiler import qd
@@ -63,12 +63,16 @@ def receive(
     """Compare every visible point with the sun's depth map."""
     texels = sun_depth.shape[0]
     for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        share = 1.0
-        # What faces away from the sun is dark without a look.
+        share = 0.0  # what faces away from the sun is dark without a look
         if surface[row, column] != 0x7FFFFFFF and normal[row, column].dot(to_sun) > -0.4:  # NOTHING
+            share = 1.0
             t = qd.bit_cast(depth[row, column], qd.f32)
             at = lens.eye + from_view(lens, point_at(lens, row, column, t))
-            c = to_view(sun, at + (lift + 1.5 / sun.focal) * normal[row, column])
+            # The more a surface turns from the sun, the deeper it is within one texel of the map.
+            away = (1.75 - 1.25 * normal[row, column].dot(to_sun)) / sun.focal
+            if surface[row, column] >= 0:
+                away += lift
+            c = to_view(sun, at + away * normal[row, column])
             place = to_pixel(sun, c)
             # The cone in which something as high as a few tenths of the map could stand in the way.
             wide = 0.25 * sun_size * texels

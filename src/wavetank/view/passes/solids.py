@@ -16,9 +16,7 @@ import dataclasses
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, signed_distance
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import (
-    Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, view_ray,
-)  # fmt: skip
+from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, view_ray
 from wavetank.view.shot import Shot
 
 UNBOUNDED = 1e4  # m

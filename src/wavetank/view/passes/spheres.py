@@ -10,16 +10,15 @@ other, and portable devices have no wider atomics.
     near              depth of the ball's nearest point, as bits
     key               depth of the ball at a pixel, as bits
 
-A positive float orders like its bit pattern. A ball that would fill the view is drawn smaller rather than cut off,
-which bounds the work of one particle; one that the near plane cuts is not drawn.
+A positive float orders like its bit pattern; a miss, -1, is a negative integer as well. A ball that would fill the
+view is drawn smaller rather than cut off, which bounds the work of one particle; one that the near plane cuts is not
+drawn.
 """
 
 from wavetank.compiler import qd
 from wavetank.distance import lift
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import (
-    Lens, ball_depth, box_of_ball, from_view, pixels_per_metre, point_at, to_view, view_ray,
-)  # fmt: skip
+from wavetank.view.lens import Lens, ball_depth, box_of_ball, from_view, pixels_per_metre, point_at, to_view, view_ray
 from wavetank.view.quantities import DEVICE_FUNCTIONS
 from wavetank.view.shot import Shot
 
@@ -55,9 +54,7 @@ def clear_depth(depth: qd.types.ndarray()):
 
 
 @qd.kernel(fastcache=True)
-def splat(
-    x: qd.types.ndarray(), count: qd.i32, radius: qd.f32, lens: Lens, largest: qd.f32, depth: qd.types.ndarray()
-):
+def splat(x: qd.types.ndarray(), count: qd.i32, radius: qd.f32, lens: Lens, largest: qd.f32, depth: qd.types.ndarray()):
     """Lower `depth` to that of every ball."""
     for n in range(count):
         # Particles are sorted by place more often than not: the end that is nearer goes first and hides the rest.
@@ -72,10 +69,9 @@ def splat(
             for row in range(box[2], box[3] + 1):
                 for column in range(box[0], box[1] + 1):
                     if near < depth[row, column]:
-                        t = ball_depth(view_ray(lens, row, column), c, r)
-                        key = qd.bit_cast(t, qd.i32)
+                        key = qd.bit_cast(ball_depth(view_ray(lens, row, column), c, r), qd.i32)
                         # A look before the atomic saves most of them; depths only ever fall.
-                        if t > 0.0 and key < depth[row, column]:
+                        if key > 0 and key < depth[row, column]:
                             qd.atomic_min(depth[row, column], key)
 
 
@@ -94,9 +90,9 @@ def claim(
             for row in range(box[2], box[3] + 1):
                 for column in range(box[0], box[1] + 1):
                     if near <= depth[row, column]:
-                        t = ball_depth(view_ray(lens, row, column), c, r)
+                        key = qd.bit_cast(ball_depth(view_ray(lens, row, column), c, r), qd.i32)
                         # Two kernels may round the same sum differently: a few last digits are forgiven.
-                        if t > 0.0 and qd.bit_cast(t, qd.i32) <= depth[row, column] + 8:
+                        if key > 0 and key <= depth[row, column] + 8:
                             qd.atomic_min(surface[row, column], i)
 
 
@@ -115,6 +111,6 @@ def paint(
             normal[row, column] = from_view(lens, (point_at(lens, row, column, t) - c).normalized(1e-12))
             share = (qd.static(DEVICE_FUNCTIONS[quantity])(x[i], v[i], rho[i]) - low) * scale
             last = colors.shape[0] - 1
-            # The minimum comes second: it turns a NaN into a colour.
-            entry = qd.min(qd.max(share, 0.0), 1.0) * last
-            color[row, column] = colors[qd.cast(entry + 0.5, qd.i32)]
+            entry = qd.cast(qd.min(qd.max(share, 0.0), 1.0) * last + 0.5, qd.i32)
+            # Once more as an integer: a quantity that is no number must still be a colour.
+            color[row, column] = colors[qd.min(qd.max(entry, 0), last)]

@@ -11,9 +11,7 @@ across the line with how much of them it covers. Marks are integers and the larg
 
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import (
-    Lens, pixels_per_metre, ray_direction, ray_origin, to_pixel, to_view, vec2, vec3, view_ray,
-)  # fmt: skip
+from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, view_ray
 from wavetank.view.look import Look
 from wavetank.view.passes.solids import box_interval
 from wavetank.view.shot import Shot

@@ -1,7 +1,7 @@
 """Radiance to pixels: compress what is too bright, average the samples of a pixel, encode as sRGB.
 
-Khronos PBR Neutral tone mapper (2024): colours below 0.8 keep their value, so that what a colour map says survives; brighter ones
-lose saturation on their way to white.
+Khronos PBR Neutral tone mapper (2024): colours below 0.8 keep their hue, so that what a colour map says survives;
+brighter ones lose saturation on their way to white.
 """
 
 from wavetank.compiler import qd
@@ -12,7 +12,7 @@ from wavetank.view.shot import Shot
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill `picture` from `color`."""
-    develop(buffers.color, buffers.curve, buffers.picture)
+    develop(buffers.color, buffers.supersample, buffers.curve, buffers.picture)
 
 
 @qd.func
@@ -36,18 +36,26 @@ def neutral(color):
 
 
 @qd.kernel(fastcache=True)
-def develop(color: qd.types.ndarray(), curve: qd.types.ndarray(), picture: qd.types.ndarray()):
-    """Write every pixel of the picture from its samples; `curve` encodes linear light as sRGB bytes."""
-    samples = color.shape[0] // picture.shape[0]
-    last = curve.shape[0] - 1
-    for row, column in qd.ndrange(picture.shape[0], picture.shape[1]):
-        total = vec3(0.0, 0.0, 0.0)
-        for k in range(samples):
+def develop(color: qd.types.ndarray(), samples: qd.i32, curve: qd.types.ndarray(), picture: qd.types.ndarray()):
+    """Write the picture from `samples`^2 samples a pixel; `curve` encodes linear light as sRGB bytes.
+
+    Four pixels of three bytes fill three words, so that the words in memory are the bytes of the picture.
+    """
+    columns = color.shape[1] // samples
+    pixels = color.shape[0] // samples * columns
+    for group in range(picture.shape[0] // 3):
+        word = qd.Vector([0, 0, 0])
+        for k in qd.static(range(4)):
+            pixel = qd.min(4 * group + k, pixels - 1)
+            total = vec3(0.0, 0.0, 0.0)
             for m in range(samples):
-                total += neutral(color[row * samples + k, column * samples + m])
-        total = qd.min(total / (samples * samples), 1.0) * last + 0.5
-        picture[row, column] = (
-            curve[qd.cast(total.x, qd.i32)]
-            | (curve[qd.cast(total.y, qd.i32)] << 8)
-            | (curve[qd.cast(total.z, qd.i32)] << 16)
-        )
+                for n in range(samples):
+                    total += neutral(color[pixel // columns * samples + m, pixel % columns * samples + n])
+            last = curve.shape[0] - 1
+            place = total * (last / (samples * samples)) + 0.5
+            for channel in qd.static(range(3)):
+                byte = 3 * k + channel
+                entry = qd.min(qd.max(qd.cast(place[channel], qd.i32), 0), last)
+                word[byte // 4] |= curve[entry] << (8 * (byte % 4))
+        for k in qd.static(range(3)):
+            picture[3 * group + k] = word[k]

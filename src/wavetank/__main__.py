@@ -1,0 +1,5 @@
+"""Run `python -m wavetank`."""
+
+from wavetank.cli import main
+
+main()

@@ -1,0 +1,162 @@
+"""Run a scene without a screen: video, pictures, particle files and figures into a folder."""
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.text import Text
+
+from wavetank.errors import WavetankError
+from wavetank.export import exporter_for, exporter_named
+from wavetank.export.mp4 import VideoWriter
+from wavetank.export.png import write_png
+from wavetank.frame import Frame
+from wavetank.simulation import Simulation
+from wavetank.view.renderer import Renderer
+
+
+class _Figures(ProgressColumn):
+    """Water time, speed, particles and density error of the running simulation."""
+
+    def render(self, task: Task) -> Text:
+        figures = task.fields
+        return Text(
+            f"{figures['time']:5.2f} s of water  {figures['fps']:5.1f} fps  {figures['count']:,} particles  "
+            f"density error {100 * figures['error']:.2f} %"
+        )
+
+
+def record(
+    sim: Simulation,
+    out: Path,
+    *,
+    seconds: float,
+    fps: float = 30.0,
+    size: tuple[int, int] = (1280, 720),
+    name: str = "run",
+    video: bool = True,
+    frames: bool = False,
+    exports: Sequence[str] = (),
+    console: Console | None = None,
+    **look: Any,
+) -> dict[str, Any]:
+    """Advance `sim` by `seconds` [s], write what was asked for into `out` and return the figures of the run.
+
+    Ctrl-C ends the run early; every file is complete then, and the figures say `interrupted`.
+    """
+    if not (math.isfinite(seconds) and 0 <= seconds <= 86400):
+        raise WavetankError(f"--seconds = {seconds} is not allowed; it must be a number from 0 to 86400.")
+    if not 1.0 <= fps <= 240.0:
+        raise WavetankError(f"--fps = {fps} is not allowed; it must be a number from 1 to 240.")
+    writers = [exporter_named(format_) for format_ in exports]
+    renderer = Renderer(*size) if video or frames else None
+    out.mkdir(parents=True, exist_ok=True)
+    files: list[str] = []
+    summary = _Summary(sim, seconds)
+    with ExitStack() as stack:
+        sinks: list[Callable[[int, Frame, Any], None]] = []
+        if video:
+            path = out / f"{name}.mp4"
+            film = stack.enter_context(VideoWriter(path, *size, fps))
+            sinks.append(lambda number, frame, image: film.write(image))
+            files.append(str(path))
+        if frames:
+            sinks.append(lambda number, frame, image: write_png(out / f"{name}-{number:05d}.png", image))
+            files.append(str(out / f"{name}-#####.png"))
+        for writer in writers:
+            pattern = f"{name}-{{:05d}}{writer.SUFFIXES[0]}"
+            sinks.append(lambda number, frame, image, w=writer, p=pattern: w.write(out / p.format(number), frame))
+            files.append(str(out / f"{name}-#####{writer.SUFFIXES[0]}"))
+        _loop(sim, seconds, fps, renderer, sinks, summary, console, look)
+    still = out / f"{name}.png"
+    image = (renderer or Renderer(*size)).render(sim.frame(), **look)
+    write_png(still, image, {"scene": sim.scene.title, "time": f"{sim.time:.4f} s"})
+    figures = summary.figures() | {"files": [*files, str(still)]}
+    stats = out / "stats.json"
+    figures["files"].append(str(stats))
+    stats.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    return figures
+
+
+def _loop(
+    sim: Simulation, seconds: float, fps: float, renderer: Renderer | None, sinks: list[Any], summary: "_Summary",
+    console: Console | None, look: dict[str, Any],
+) -> None:  # fmt: skip
+    progress = Progress(
+        TextColumn("{task.description}"), BarColumn(), _Figures(), TimeRemainingColumn(),
+        console=console or Console(stderr=True), transient=False,
+    )  # fmt: skip
+    with progress:
+        task = progress.add_task("wavetank", total=seconds or 1.0, time=sim.time, fps=0.0, count=sim.count, error=0.0)
+        try:
+            for number, frame in enumerate(sim.frames(seconds, fps)):
+                image = renderer.render(frame, **look) if renderer is not None else None
+                for sink in sinks:
+                    sink(number, frame, image)
+                summary.add()
+                speed = task_speed(progress, number)
+                progress.update(
+                    task, completed=sim.time - summary.begin, time=sim.time, fps=speed, count=sim.count,
+                    error=summary.last["density_error_mean"],
+                )  # fmt: skip
+        except KeyboardInterrupt:
+            summary.interrupted = True
+
+
+def task_speed(progress: Progress, frames: int) -> float:
+    """Frames per second of wall time since the bar started."""
+    elapsed = progress.tasks[0].elapsed or 0.0
+    return frames / elapsed if elapsed > 0 else 0.0
+
+
+class _Summary:
+    """Collects the figures of a run."""
+
+    def __init__(self, sim: Simulation, seconds: float) -> None:
+        self.sim, self.begin, self.seconds = sim, sim.time, seconds
+        self.history: list[dict[str, float]] = []
+        self.interrupted = False
+
+    @property
+    def last(self) -> dict[str, float]:
+        return self.history[-1]
+
+    def add(self) -> None:
+        self.history.append(self.sim.stats())
+
+    def figures(self) -> dict[str, Any]:
+        """Return the last instant, and what was worst on the way."""
+        rows = self.history or [self.sim.stats()]
+        energies = [row["kinetic_energy"] + row["potential_energy"] for row in rows]
+        return {
+            "scene": self.sim.scene.title,
+            "arch": self.sim.arch,
+            "interrupted": self.interrupted,
+            "seconds_of_water": self.sim.time - self.begin,
+            "worst": {
+                "density_error_mean": max(row["density_error_mean"] for row in rows),
+                "density_error_p99": max(row["density_error_p99"] for row in rows),
+                "speed_max": max(row["speed_max"] for row in rows),
+                "energy_rise": max((b - a for a, b in zip(energies, energies[1:], strict=False)), default=0.0),
+            },
+            "mean": {
+                "density_error_mean": sum(row["density_error_mean"] for row in rows) / len(rows),
+                "milliseconds_per_frame": _mean([row["milliseconds_per_frame"] for row in rows[1:]]),
+            },
+            "last": rows[-1],
+        }
+
+
+def _mean(values: list[float]) -> float | None:
+    return sum(values) / len(values) if values else None
+
+
+def write_still(sim: Simulation, path: Path, size: tuple[int, int], **look: Any) -> None:
+    """Write one picture of `sim` as it is, in the format that the suffix of `path` names."""
+    exporter_for(path)
+    write_png(path, Renderer(*size).render(sim.frame(), **look), {"scene": sim.scene.title, "time": f"{sim.time:.4f} s"})

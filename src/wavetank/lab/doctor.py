@@ -1,0 +1,63 @@
+"""What is installed and what works on this machine."""
+
+import importlib.metadata
+import os
+import platform
+import shutil
+import sys
+from typing import Any
+
+from wavetank import compiler
+
+_PACKAGES = {
+    "quadrants": "", "numpy": "", "pydantic": "", "typer": "", "rich": "", "pillow": "", "av": "", "tomli-w": "",
+    "matplotlib": "plots of `wavetank converge`: pip install wavetank[plot]",
+}  # fmt: skip
+
+
+def examine() -> dict[str, Any]:
+    """Return versions, back ends and what is missing, as plain data: {"ok": bool, "checks": [...]}."""
+    checks = [
+        _check("wavetank", importlib.metadata.version("wavetank"), ""),
+        _check("python", platform.python_version(), sys.executable),
+        _check("system", platform.platform(), f"{os.cpu_count()} processors"),
+    ]
+    missing = []
+    for package, hint in _PACKAGES.items():
+        try:
+            checks.append(_check(package, importlib.metadata.version(package), ""))
+        except importlib.metadata.PackageNotFoundError:
+            checks.append(_check(package, "missing", hint or "pip install wavetank"))
+            missing.append(package)
+    available = compiler.available_backends()
+    for name in compiler.BACKENDS:
+        if name == "gpu":
+            continue
+        found = "works" if name == "cpu" and _runs() else "available" if name in available else "not here"
+        checks.append(_check(f"back end {name}", found, _BACKEND_NOTES.get(name, "") if found == "not here" else ""))
+    best = next(iter(available))
+    checks.append(_check("--arch gpu", best if best != "cpu" else "not here", "the best graphics processor there is"))
+    checks.append(_check("terminal", str(shutil.get_terminal_size()[0]), "columns"))
+    return {"ok": not [name for name in missing if not _PACKAGES[name]], "checks": checks}
+
+
+_BACKEND_NOTES = {
+    "cuda": "needs an NVIDIA card and its driver",
+    "vulkan": "needs a Vulkan 1.1 driver and the loader (libvulkan1)",
+    "metal": "needs macOS",
+    "amdgpu": "needs an AMD card and ROCm",
+}
+
+
+def _runs() -> bool:
+    """Start the CPU back end and move one array there and back."""
+    import numpy as np
+
+    compiler.start(compiler.current_backend() or "cpu")
+    array = compiler.qd.ndarray(compiler.qd.f32, shape=(4,))
+    array.from_numpy(np.arange(4, dtype=np.float32))
+    return bool(array.to_numpy().sum() == 6.0)
+
+
+def _check(name: str, found: str, note: str) -> dict[str, str]:
+    return {"name": name, "found": found, "note": note}

@@ -1,0 +1,10 @@
+"""Every test computes on the CPU back end, started once."""
+
+import pytest
+
+from wavetank import compiler
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cpu() -> str:
+    return compiler.start("cpu")

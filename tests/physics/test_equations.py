@@ -1,0 +1,162 @@
+"""The report's equations, each against a sum over all pairs in double precision."""
+
+import numpy as np
+import pytest
+from clouds import Cloud
+
+from wavetank.physics.density_constraint import clear_multipliers, correct_positions, schedule, solve_multipliers
+from wavetank.physics.viscosity import apply_viscosity
+from wavetank.physics.vorticity import confine_vorticity, find_vorticity
+
+CASES = [(2, "spiky"), (3, "spiky"), (3, "poly6-spiky"), (2, "cubic"), (3, "wendland")]
+cases = pytest.mark.parametrize(("dim", "kernel"), CASES)
+
+
+def solve(cloud: Cloud) -> None:
+    world, count = cloud.world, cloud.count
+    clear_multipliers(world.scratch, count)
+    solve_multipliers(
+        world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, cloud.method
+    )
+    correct_positions(
+        world.spare, world.particles, world.scratch, world.grid, world.solids, world.walls, cloud.c, count, cloud.method
+    )
+
+
+def multipliers(cloud: Cloud) -> np.ndarray:
+    """Eq. 2, 4, 5 with the scene's relaxation, bilateral, over all pairs."""
+    volume = cloud.mass_over_rest_density()
+    constraint = volume * cloud.w().sum(axis=1) - 1.0  # Eq. 1, 2
+    grad = volume * cloud.grad_w()
+    squares = np.sum(np.sum(grad, axis=1) ** 2, axis=1) + np.sum(grad**2, axis=(1, 2))  # k = i and k = j
+    return -cloud.c.relaxation * constraint / (squares + cloud.c.eps)
+
+
+@cases
+def test_density_eq_1(dim, kernel):
+    cloud = Cloud(dim, kernel=kernel)
+    expected = cloud.scene.rest_density * cloud.mass_over_rest_density() * cloud.w().sum(axis=1)
+    np.testing.assert_allclose(cloud.world.scratch.rho.to_numpy(), expected, rtol=2e-5)
+
+
+@cases
+def test_multiplier_eq_5(dim, kernel):
+    cloud = Cloud(dim, kernel=kernel, attraction=1.0, force_mixing=0.3)
+    solve(cloud)
+    expected = multipliers(cloud)
+    np.testing.assert_allclose(cloud.world.scratch.lam.to_numpy(), expected, atol=1e-4 * np.abs(expected).max())
+
+
+def test_only_compression_is_corrected_by_default():
+    cloud = Cloud(3)
+    solve(cloud)
+    lam = cloud.world.scratch.lam.to_numpy()
+    expected = np.minimum(multipliers(cloud), 0.0)
+    assert (expected < 0).any()
+    assert (expected == 0).any()
+    np.testing.assert_allclose(lam, expected, atol=1e-4 * np.abs(expected).max())
+
+
+@cases
+def test_correction_eq_8(dim, kernel):
+    """Delta p_i = sum_j (lambda_i + lambda_j + s_corr) grad W m / rho_0, with Eq. 7 for s_corr."""
+    cloud = Cloud(dim, kernel=kernel, attraction=1.0, tensile_strength=0.2, iterations=1)
+    solve(cloud)
+    volume, lam = cloud.mass_over_rest_density(), multipliers(cloud)
+    from wavetank.physics.smoothing import NAMES, kernel_shape, rest_lattice
+
+    name = NAMES[kernel][0]
+    ratio = kernel_shape(name, cloud.distance / cloud.h)[0] / kernel_shape(name, np.array(0.3))[0]
+    s_0 = rest_lattice(kernel, dim, 2.0).squared_gradients / cloud.h**2
+    s_corr = -0.2 / s_0 * ratio**4.0
+    expected = volume * np.sum((lam[:, None] + lam[None, :] + s_corr)[..., None] * cloud.grad_w(), axis=1)
+    moved = cloud.world.spare.p.to_numpy().astype(np.float64) - cloud.x
+    np.testing.assert_allclose(moved, expected, atol=2e-4 * np.abs(expected).max())
+
+
+@cases
+def test_corrections_keep_the_centre_of_mass(dim, kernel):
+    """Eq. 8 is antisymmetric in i and j: without walls the corrections sum to zero, to rounding."""
+    cloud = Cloud(dim, kernel=kernel, tensile_strength=0.1)
+    solve(cloud)
+    moved = cloud.world.spare.p.to_numpy().astype(np.float64) - cloud.x
+    assert np.abs(moved.sum(axis=0)).max() < 1e-6 * np.abs(moved).sum()
+
+
+@cases
+def test_vorticity_eq_9(dim, kernel):
+    cloud = Cloud(dim, kernel=kernel)
+    world = cloud.world
+    find_vorticity(world.scratch, world.particles, world.grid, cloud.c, cloud.count, cloud.method)
+    v_ij = cloud.v[None, :, :] - cloud.v[:, None, :]
+    grad_j = -cloud.grad_w()
+    pad = ((0, 0), (0, 0), (0, 3 - dim))
+    expected = cloud.mass_over_rest_density() * np.sum(np.cross(np.pad(v_ij, pad), np.pad(grad_j, pad)), axis=1)
+    np.testing.assert_allclose(world.scratch.omega.to_numpy(), expected, atol=1e-4 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_vorticity_confinement_eq_10(dim):
+    cloud = Cloud(dim, vorticity=2.0)
+    world = cloud.world
+    find_vorticity(world.scratch, world.particles, world.grid, cloud.c, cloud.count, cloud.method)
+    omega = world.scratch.omega.to_numpy().astype(np.float64)
+    confine_vorticity(world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method)
+    size = np.linalg.norm(omega, axis=1)
+    pad = ((0, 0), (0, 0), (0, 3 - dim))
+    eta = cloud.mass_over_rest_density() * np.sum(
+        (size[None, :] - size[:, None])[..., None] * np.pad(cloud.grad_w(), pad), axis=1
+    )
+    n = eta / np.maximum(np.linalg.norm(eta, axis=1), 1e-6)[:, None]
+    expected = cloud.v + cloud.c.dt * 2.0 * np.cross(n, omega)[:, :dim]
+    np.testing.assert_allclose(world.particles.v.to_numpy(), expected, atol=2e-4 * np.abs(expected).max())
+
+
+def test_solid_rotation_has_twice_its_rate_as_vorticity():
+    """curl of omega x r is 2 omega; inside a lattice Eq. 9 finds it up to the kernel's lattice error."""
+    import wavetank as wt
+    from wavetank.physics.step import coefficients
+    from wavetank.simulation import Simulation
+
+    axis = np.arange(-5, 6) * 0.1
+    x = np.stack(np.meshgrid(axis, axis, axis), -1).reshape(-1, 3).astype(np.float32)
+    v = np.cross([0.0, 0.0, 3.0], x).astype(np.float32)
+    sim = Simulation(wt.Scene(spacing=0.1, kernel="cubic", support=2.5, fluids=[wt.Points(positions=x, velocities=v)]))
+    sim.frame()
+    world = sim.world
+    find_vorticity(world.scratch, world.particles, world.grid, coefficients(sim.scene, 0.01), sim.count, 2)
+    middle = np.argmin(np.linalg.norm(world.particles.x.to_numpy(), axis=1))
+    assert world.scratch.omega.to_numpy()[middle] == pytest.approx([0, 0, 6], rel=0.05, abs=1e-3)
+
+
+@cases
+def test_xsph_eq_11(dim, kernel):
+    cloud = Cloud(dim, kernel=kernel, viscosity=0.2)
+    world = cloud.world
+    apply_viscosity(world.spare, world.particles, world.grid, cloud.c, cloud.count, cloud.method)
+    v_ij = cloud.v[None, :, :] - cloud.v[:, None, :]
+    expected = cloud.v + 0.2 * cloud.mass_over_rest_density() * np.sum(v_ij * cloud.w()[..., None], axis=1)
+    np.testing.assert_allclose(world.spare.v.to_numpy(), expected, atol=1e-5 * np.abs(expected).max())
+
+
+def test_xsph_keeps_momentum():
+    cloud = Cloud(3, viscosity=0.5)
+    world = cloud.world
+    apply_viscosity(world.spare, world.particles, world.grid, cloud.c, cloud.count, cloud.method)
+    change = world.spare.v.to_numpy().astype(np.float64).sum(axis=0) - cloud.v.sum(axis=0)
+    assert np.abs(change).max() < 1e-6 * np.abs(cloud.v).sum()
+
+
+def test_chebyshev_damps_its_interval_evenly():
+    """The error polynomial of the schedule is T_k scaled to one at zero (Saad 2003, Eq. 12.4)."""
+    k, a, b = 4, 0.2, 3.0
+    steps = schedule(k, 2.0 / (a + b), a)
+    for mu in np.linspace(a, b, 30):
+        error, change = 1.0, 0.0
+        for relaxation, momentum in steps:
+            change = -relaxation * mu * error + momentum * change
+            error += change
+        chebyshev = np.polynomial.chebyshev.Chebyshev.basis(k)
+        expected = chebyshev((b + a - 2 * mu) / (b - a)) / chebyshev((b + a) / (b - a))
+        assert error == pytest.approx(expected, abs=1e-9)
+    assert schedule(3, 0.7, 0.0) == [(0.7, 0.0)] * 3

@@ -1,0 +1,179 @@
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import wavetank as wt
+from wavetank.simulation import Simulation
+
+
+def small(dim: int = 3, **keys) -> wt.Scene:
+    size = (0.6, 0.4, 0.3)[:dim]
+    return wt.Scene(**{
+        "spacing": 0.04, "tank": wt.Tank(size=size),
+        "fluids": [wt.Block(lower=(0.0,) * dim, upper=(0.3, 0.3, 0.3)[:dim])], **keys,
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_contract(dim):
+    sim = Simulation(small(dim))
+    assert sim.time == 0.0
+    sim.step()
+    assert sim.time == pytest.approx(1 / 60)
+    sim.advance(0.11)
+    assert sim.time == pytest.approx(1 / 60 + 0.11)
+    assert sim.positions.shape == sim.velocities.shape == (sim.count, dim)
+    assert sim.densities.shape == (sim.count,)
+    assert {a.dtype for a in (sim.positions, sim.velocities, sim.densities)} == {np.dtype(np.float32)}
+    times = [frame.time for frame in sim.frames(seconds=0.1, fps=30)]
+    np.testing.assert_allclose(np.diff(times), 1 / 30, atol=1e-9)
+    assert len(times) == 4
+    keys = {"density_error_mean", "density_error_p99", "density_error_max", "kinetic_energy", "speed_max",
+            "neighbors_mean", "milliseconds_per_frame", "time", "count"}  # fmt: skip
+    assert keys <= set(sim.stats())
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_any_number_of_particles(dim, count):
+    x = np.full((count, dim), 0.2) + 0.01 * np.arange(count)[:, None]
+    sim = Simulation(small(dim, fluids=[wt.Points(positions=x)] if count else []))
+    sim.advance(0.5)
+    assert sim.count == count
+    assert np.isfinite(sim.positions).all()
+    assert sim.stats()["count"] == count
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_free_fall_is_exact(dim):
+    """Symplectic Euler of a free particle: v = g n dt, x = x0 + g dt^2 n (n + 1) / 2, to rounding."""
+    g = (0.5, -9.81, 1.0)[:dim]
+    sim = Simulation(wt.Scene(spacing=0.1, gravity=g, fluids=[wt.Points(positions=[(0.0,) * dim])]))
+    sim.advance(1.0)
+    n, dt = 240, 1 / 240
+    np.testing.assert_allclose(sim.velocities[0], np.array(g) * n * dt, rtol=2e-6)
+    np.testing.assert_allclose(sim.positions[0], np.array(g) * dt**2 * n * (n + 1) / 2, rtol=2e-5)
+
+
+def test_ids_keep_their_particle():
+    """Positions are ordered by id, whatever the order on the device."""
+    x = np.random.default_rng(0).uniform(-5, 5, (300, 3)).astype(np.float32)
+    v = np.random.default_rng(1).normal(0, 3, (300, 3)).astype(np.float32)
+    sim = Simulation(wt.Scene(spacing=0.01, gravity=(0, 0, 0), fluids=[wt.Points(positions=x, velocities=v)]))
+    sim.advance(0.5)
+    np.testing.assert_allclose(sim.positions, x + 0.5 * v, atol=1e-4)
+
+
+def test_runs_repeat_bit_for_bit():
+    def run() -> np.ndarray:
+        sim = Simulation(small())
+        sim.advance(0.3)
+        return sim.positions
+
+    np.testing.assert_array_equal(run(), run())
+
+
+def test_looking_does_not_change_the_motion():
+    looked, alone = Simulation(small()), Simulation(small())
+    for _ in range(10):
+        looked.step()
+        looked.stats()
+        alone.step()
+    np.testing.assert_array_equal(looked.positions, alone.positions)
+
+
+def test_the_number_of_threads_does_not_matter():
+    code = (
+        "import sys, hashlib, wavetank as wt; from wavetank import compiler\n"
+        "compiler.start('cpu', threads=int(sys.argv[1]))\n"
+        "sim = wt.Simulation(wt.Scene.load('dam-break')); sim.advance(0.1)\n"
+        "print(hashlib.sha256(sim.positions.tobytes() + sim.velocities.tobytes()).hexdigest())"
+    )
+    outputs = {
+        subprocess.run([sys.executable, "-c", code, n], capture_output=True, text=True, check=True).stdout.split()[-1]
+        for n in ("1", "2", "3")
+    }
+    assert len(outputs) == 1
+
+
+def test_reset_starts_again():
+    sim = Simulation(small())
+    first = sim.positions
+    sim.advance(0.2)
+    after = sim.positions
+    sim.reset()
+    assert sim.time == 0.0
+    np.testing.assert_array_equal(sim.positions, first)
+    sim.advance(0.2)
+    np.testing.assert_array_equal(sim.positions, after)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_saved_state_continues_exactly(dim, tmp_path):
+    box = wt.Box(name="lid", center=(0.5, 0.3, 0.15)[:dim], size=(0.08,) * dim)
+    sim = Simulation(small(dim, solids=[box]))
+    sim.viscosity = 0.02
+    sim.advance(0.15)
+    sim.move("lid", position=(0.45, 0.2, 0.15)[:dim])
+    sim.save(tmp_path / "state.npz")
+    again = Simulation.restore(tmp_path / "state.npz")
+    assert again.time == sim.time
+    assert again.scene.viscosity == 0.02
+    for world in (sim, again):
+        world.advance(0.15)
+    np.testing.assert_array_equal(again.positions, sim.positions)
+    np.testing.assert_array_equal(again.velocities, sim.velocities)
+
+
+def test_a_file_that_is_no_state(tmp_path):
+    (tmp_path / "x.npz").write_bytes(b"nothing")
+    with pytest.raises(wt.WavetankError, match=r"x\.npz: this is not a state"):
+        Simulation.restore(tmp_path / "x.npz")
+
+
+def test_live_parameters():
+    sim = Simulation(small(gravity=(0, 0, 0)))
+    sim.gravity = (1.0, 0.0, 0.0)
+    sim.substeps = 2
+    assert sim.gravity == (1.0, 0.0, 0.0)
+    sim.step()
+    assert sim.velocities[:, 0].mean() > 0.005
+    with pytest.raises(wt.WavetankError, match="viscosity = -1 is not allowed; .*at least 0"):
+        sim.viscosity = -1
+    with pytest.raises(wt.WavetankError, match="gravity.*3"):
+        sim.gravity = (0.0, -9.81)
+    assert sim.gravity == (1.0, 0.0, 0.0)
+    with pytest.raises(AttributeError):
+        _ = sim.no_such_thing
+
+
+def test_bad_times_are_refused():
+    sim = Simulation(small())
+    for seconds in (-1.0, float("nan"), float("inf")):
+        with pytest.raises(wt.WavetankError, match="seconds"):
+            sim.advance(seconds)
+    with pytest.raises(wt.WavetankError, match="fps"):
+        next(sim.frames(1.0, fps=0))
+
+
+def test_a_moving_solid_pushes_the_water():
+    paddle = wt.Box(name="paddle", center=(0.02, 0.2, 0.15), size=(0.02, 0.4, 0.3))
+    sim = Simulation(small(solids=[paddle], fluids=[wt.Block(lower=(0.04, 0, 0), upper=(0.3, 0.12, 0.3))]))
+    for k in range(60):
+        sim.move("paddle", position=(0.02 + 0.003 * (k + 1), 0.2, 0.15))
+        sim.step()
+    assert sim.positions[:, 0].min() > 0.2 + 0.01 - 1e-4
+    with pytest.raises(wt.WavetankError, match="no solid named 'cup'; named solids: paddle"):
+        sim.move("cup", position=(0, 0, 0))
+    with pytest.raises(wt.WavetankError, match="3 finite numbers"):
+        sim.move("paddle", position=(0, float("nan"), 0))
+
+
+def test_a_back_end_that_is_not_there_is_an_error():
+    code = "import wavetank as wt; wt.Simulation(wt.Scene.load('drop-2d'), arch='metal')"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "arch = 'metal' cannot be started on this machine; available:" in result.stderr
+    with pytest.raises(wt.WavetankError, match="'opengl' is not a back end; use one of cpu"):
+        Simulation(small(), arch="opengl")
