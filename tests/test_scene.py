@@ -71,7 +71,8 @@ def test_everything_survives_a_round_trip(tmp_path):
         solids=[
             wt.Difference(name="cup", center=(0.5, 0.5, 0.5), rotation=(0, 1, 0, 0), parts=[
                 wt.Cylinder(start=(0, 0, 0), end=(0, 0.3, 0), radius=0.1),
-                wt.Union(parts=[wt.Sphere(center=(0, 0, 0), radius=0.1), wt.Capsule(start=(0, 0, 0), end=(1, 0, 0), radius=0.1)]),
+                wt.Union(parts=[wt.Sphere(center=(0, 0, 0), radius=0.1),
+                                wt.Capsule(start=(0, 0, 0), end=(1, 0, 0), radius=0.1)]),
             ]),
             wt.HalfSpace(point=(0, 0.1, 0), normal=(0, 1, 1), friction=0.3),
         ],

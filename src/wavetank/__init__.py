@@ -1,18 +1,19 @@
 """wavetank: real-time, interactive, position-based fluids.
 
-    import wavetank as wt
+import wavetank as wt
 
-    sim = wt.Simulation(wt.Scene.load("obstacle-tank"))
-    sim.advance(0.5)
-    image = wt.render(sim)
+sim = wt.Simulation(wt.Scene.load("obstacle-tank"))
+sim.advance(0.5)
+image = wt.render(sim)
 """
 
 from importlib.metadata import version as _version
 from typing import TYPE_CHECKING, Any
 
 from wavetank.errors import WavetankError
+from wavetank.fluids import Ball, Block, Points
 from wavetank.params import PARAMETERS, PRESETS
-from wavetank.scene import Ball, Block, Points, Scene, Tank, bundled_scenes
+from wavetank.scene import Scene, Tank, bundled_scenes
 from wavetank.solids import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
 
 if TYPE_CHECKING:

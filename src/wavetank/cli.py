@@ -56,12 +56,12 @@ def run(
     out: Annotated[Path, typer.Option(help="Folder for what is written.")] = Path("out"),
     video: Annotated[bool, typer.Option("--video", help="Write an MP4.")] = False,
     frames: Annotated[bool, typer.Option("--frames", help="Write a PNG for each frame.")] = False,
-    export: Annotated[list[str], typer.Option(help="Write the particles of each frame: npz, csv, ply.")] = [],
+    export: Annotated[list[str], typer.Option(help="Write particles: npz, csv, ply.")] = [],  # noqa: B006
     fps: Annotated[float, typer.Option(help="Frames per second of water in video and files.")] = 30.0,
     size: Annotated[str, typer.Option(help="Width x height of pictures.")] = "1280x720",
-    color_by: Annotated[str, typer.Option(help="speed, density or fixed.")] = "speed",
+    color_by: Annotated[str, typer.Option(help="speed, density or a colour such as #3f99da.")] = "speed",
     name: Annotated[str, typer.Option(help="Front part of the files' names.")] = "",
-    settings: Settings = [],
+    settings: Settings = [],  # noqa: B006
     arch: Arch = "cpu",
     as_json: Json = False,
 ) -> None:
@@ -161,7 +161,8 @@ def _report(figures: dict[str, Any]) -> None:
     print(f"{figures['seconds_of_water']:.2f} s of water, {last['count']:,} particles on {figures['arch']}")
     print(
         f"density error: mean {100 * figures['mean']['density_error_mean']:.2f} %, "
-        f"worst frame {100 * worst['density_error_mean']:.2f} % (99th percentile {100 * worst['density_error_p99']:.2f} %)"
+        f"worst frame {100 * worst['density_error_mean']:.2f} % and 99th percentile "
+        f"{100 * worst['density_error_p99']:.2f} %"
     )
     for path in figures["files"]:
         print(f"  {path}")

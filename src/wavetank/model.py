@@ -2,7 +2,7 @@
 
 import difflib
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic._internal._model_construction import ModelMetaclass
@@ -19,11 +19,15 @@ Quaternion = tuple[Number, Number, Number, Number]
 class _OneSentence(ModelMetaclass):
     """Turns pydantic's report into one `WavetankError` when a user calls a model's constructor."""
 
-    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+    def __call__(
+        cls,  # noqa: N805
+        *args: Any,
+        **kwargs: Any,
+    ) -> Any:
         try:
             return super().__call__(*args, **kwargs)
         except ValidationError as report:
-            raise WavetankError(sentence(report, cls)) from None
+            raise WavetankError(sentence(report, cast(type[BaseModel], cls))) from None
 
 
 class Model(BaseModel, metaclass=_OneSentence):

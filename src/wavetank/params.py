@@ -5,11 +5,11 @@ in the reference, and whether it may change while the water moves (live) or need
 """
 
 import dataclasses
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from wavetank.model import Model
+from wavetank.model import Model, Vector
 
 
 @dataclasses.dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Parameter:
     """What one declaration says, for whoever lists parameters."""
 
     name: str
-    default: Any
+    default: Any  # None where it must be given
     low: float | None
     high: float | None
     unit: str
@@ -37,7 +37,7 @@ def parameter(
     live: bool = True,
 ) -> Any:
     """Declare a parameter: default, range (inclusive), unit, symbol, one sentence, live or needs-reset."""
-    note = {"unit": unit, "symbol": symbol, "live": live}
+    note: Any = {"unit": unit, "symbol": symbol, "live": live}
     limits: dict[str, Any] = {} if isinstance(default, str) else {"ge": low, "le": high}
     if isinstance(default, float):
         limits["allow_inf_nan"] = False
@@ -51,6 +51,8 @@ KernelName = Literal["spiky", "poly6", "cubic", "wendland", "poly6-spiky"]
 class Parameters(Model):
     """All parameters. Lengths that scale with the resolution are given in particle spacings, d."""
 
+    spacing: Annotated[float, Field(gt=0, allow_inf_nan=False, description="Distance of particles at rest.", json_schema_extra={"unit": "m", "symbol": "d", "live": False})]
+    gravity: Annotated[Vector, Field(description="Acceleration of everything.", json_schema_extra={"unit": "m/s^2", "symbol": "g", "live": True})] = (0.0, -9.81, 0.0)
     rest_density: float = parameter(1000.0, 1e-3, 1e5, "kg/m^3", "rho_0", "Density that the water keeps.", live=False)
     support: float = parameter(2.0, 1.2, 3.0, "d", "h/d", "Support radius of the smoothing kernel.", live=False)
     kernel: KernelName = parameter("spiky", None, None, "", "W", "Smoothing kernel; poly6-spiky takes one for the density and the other for its gradient.", live=False)
@@ -72,11 +74,21 @@ class Parameters(Model):
     wall_gap: float = parameter(0.25, 0.0, 0.5, "d", "", "Distance that particle centres keep from walls.")
 # fmt: on
 
+    @property
+    def dim(self) -> int:
+        """Number of dimensions of the world, 2 or 3: that of gravity."""
+        return len(self.gravity)
+
+    @property
+    def particle_mass(self) -> float:
+        """Mass of a particle, rho_0 d^dim [kg] (per metre of depth in a 2-D world)."""
+        return float(self.rest_density * self.spacing**self.dim)
+
 
 PARAMETERS: tuple[Parameter, ...] = tuple(
     Parameter(
         name=name,
-        default=field.default,
+        default=None if field.is_required() else field.default,
         low=next((m.ge for m in field.metadata if hasattr(m, "ge")), None),
         high=next((m.le for m in field.metadata if hasattr(m, "le")), None),
         sentence=field.description or "",
@@ -84,7 +96,7 @@ PARAMETERS: tuple[Parameter, ...] = tuple(
     )
     for name, field in Parameters.model_fields.items()
 )
-LIVE = frozenset(p.name for p in PARAMETERS if p.live) | {"gravity"}
+LIVE = frozenset(p.name for p in PARAMETERS if p.live)
 
 #: Values that a preset puts in place of the defaults. `paper` is the report's Table 1, which belongs to its own units:
 #: h = 1.1, m = 1, rho_0 = 3, so that d = 0.68195 is the lattice whose Poly6 density is 3. There S_0 = 1.3607, so that

@@ -10,10 +10,11 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import tomli_w
-from pydantic import BeforeValidator, Field, PlainSerializer, ValidationError, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, ValidationError, model_validator
 
 from wavetank.errors import WavetankError
-from wavetank.model import Model, Number, Positive, Size, Vector, register_model, sentence
+from wavetank.fluids import AnyFluid, Points
+from wavetank.model import Model, Size, sentence
 from wavetank.params import PRESETS, Parameters
 from wavetank.solids import AnySolid, HalfSpace, Solid
 
@@ -37,143 +38,6 @@ class Tank(Model):
         return result
 
 
-class Fluid(Model):
-    """What every fluid has."""
-
-    velocity: Vector | None = None  # m/s, at the start; at rest where None
-
-    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
-        """Name every vector of this fluid, to check that all live in one dimension."""
-        return [("velocity", self.velocity)] if self.velocity is not None else []
-
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper corner [m] of the fluid."""
-        raise NotImplementedError
-
-    def estimate(self, spacing: float) -> float:
-        """Number of particles to expect, without making them."""
-        lower, upper = self.bounds()
-        return float(np.prod(np.maximum((upper - lower) / spacing, 1.0)))
-
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        """Say for each of the points [n, dim] whether it lies in this fluid, bool [n]."""
-        raise NotImplementedError
-
-    def particles(self, spacing: float) -> np.ndarray:
-        """Positions [n, dim] of a cubic lattice that fills this fluid, half a spacing from its lower corner."""
-        lower, upper = self.bounds()
-        counts = np.floor((upper - lower) / spacing + 1e-6).astype(int)
-        axes = [low + (np.arange(n) + 0.5) * spacing for low, n in zip(lower, counts, strict=True)]
-        lattice = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
-        return lattice[self.contains(lattice)]
-
-
-class Block(Fluid):
-    """A rectangular block of fluid between two corners."""
-
-    shape: Literal["block"] = "block"
-    lower: Vector
-    upper: Vector
-
-    @model_validator(mode="after")
-    def _ordered(self) -> "Block":
-        if len(self.lower) != len(self.upper) or any(a >= b for a, b in zip(self.lower, self.upper, strict=True)):
-            raise ValueError(
-                f"fluid block lower = {self.lower}, upper = {self.upper} is not allowed; "
-                "every component of upper must be greater than that of lower."
-            )
-        return self
-
-    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
-        return [("lower", self.lower), ("upper", self.upper), *super().vectors()]
-
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        return np.array(self.lower, float), np.array(self.upper, float)
-
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        lower, upper = self.bounds()
-        return np.all((points > lower) & (points < upper), axis=1)
-
-
-class Ball(Fluid):
-    """A ball of fluid; in a 2-D world a disc."""
-
-    shape: Literal["ball"] = "ball"
-    center: Vector
-    radius: Positive
-
-    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
-        return [("center", self.center), *super().vectors()]
-
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        center = np.array(self.center, float)
-        return center - self.radius, center + self.radius
-
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        return np.sum((points - np.array(self.center)) ** 2, axis=1) < self.radius**2
-
-
-def _array(value: Any) -> np.ndarray:
-    try:
-        array = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        raise ValueError("positions and velocities must be arrays of numbers [n, 2] or [n, 3].") from None
-    if array.size == 0:
-        array = array.reshape(0, array.shape[1] if array.ndim == 2 else 3)
-    if array.ndim != 2 or array.shape[1] not in (2, 3):
-        raise ValueError(f"positions have shape {list(array.shape)}; they must be [n, 2] or [n, 3].")
-    bad = ~np.isfinite(array).all(axis=1)
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise ValueError(f"positions[{row}] = {array[row].tolist()} is not finite; every number must be.")
-    return array
-
-
-Array = Annotated[
-    np.ndarray,
-    BeforeValidator(_array),
-    PlainSerializer(lambda array: array.tolist()),
-    WithJsonSchema({"type": "array", "items": {"type": "array", "items": {"type": "number"}}}),
-]
-
-
-class Points(Fluid):
-    """Fluid particles at given places, each of the mass that the scene's spacing gives."""
-
-    shape: Literal["points"] = "points"
-    positions: Array
-    velocities: Array | None = None
-
-    @model_validator(mode="after")
-    def _paired(self) -> "Points":
-        if self.velocities is not None and self.velocities.shape != self.positions.shape:
-            raise ValueError(
-                f"velocities have shape {list(self.velocities.shape)}; "
-                f"they must have that of positions, {list(self.positions.shape)}."
-            )
-        return self
-
-    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
-        return [*([("positions", tuple(self.positions[0]))] if len(self.positions) else []), *super().vectors()]
-
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.positions.min(axis=0), self.positions.max(axis=0)
-
-    def estimate(self, spacing: float) -> float:
-        return float(len(self.positions))
-
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        return np.zeros(len(points), bool)
-
-    def particles(self, spacing: float) -> np.ndarray:
-        return self.positions
-
-
-AnyFluid = Annotated[Block | Ball | Points, Field(discriminator="shape")]
-for _fluid in (Block, Ball, Points):
-    register_model(_fluid.model_fields["shape"].default, _fluid)
-
-
 def _tagged(values: Any, default: str) -> Any:
     """Let a table without `shape` mean the usual one."""
     if not isinstance(values, list | tuple):
@@ -186,11 +50,9 @@ class Scene(Parameters):
 
     title: str = ""
     preset: Literal["standard", "paper"] = "standard"
-    spacing: Positive = Field(description="Particle spacing d [m].")
     tank: Tank | None = None
     fluids: Annotated[list[AnyFluid], BeforeValidator(lambda v: _tagged(v, "block"))] = []
     solids: Annotated[list[AnySolid], BeforeValidator(lambda v: _tagged(v, "box"))] = []
-    gravity: Vector = (0.0, -9.81, 0.0)
 
     @model_validator(mode="before")
     @classmethod
@@ -202,11 +64,12 @@ class Scene(Parameters):
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":
         if "gravity" not in self.model_fields_set:
-            object.__setattr__(self, "gravity", self.gravity[: self.dim])
+            self.__dict__["gravity"] = self.gravity[: self._world_dim()]
+        dim = self._world_dim()
         for name, vector in self._vectors():
-            if len(vector) != self.dim:
+            if len(vector) != dim:
                 raise ValueError(
-                    f"{name} = {tuple(vector)} has {len(vector)} components in a {self.dim}-D world; give {self.dim}."
+                    f"{name} = {tuple(vector)} has {len(vector)} components in a {dim}-D world; give {dim}."
                 )
         self._check_count()
         self._check_inside()
@@ -226,9 +89,8 @@ class Scene(Parameters):
             self.__dict__.update(before)
             raise WavetankError(sentence(report, type(self))) from None
 
-    @property
-    def dim(self) -> int:
-        """Number of dimensions, 2 or 3: that of the tank, else of the first fluid, else of gravity."""
+    def _world_dim(self) -> int:
+        """Number of dimensions that the tank has, else the first fluid, else gravity."""
         if self.tank is not None:
             return len(self.tank.size)
         first = next((vector for fluid in self.fluids for _, vector in fluid.vectors()), None)
@@ -268,11 +130,6 @@ class Scene(Parameters):
                     f"it must lie between {_numbers(np.zeros(self.dim))} and {_numbers(self.tank.size)}."
                 )
 
-    @property
-    def particle_mass(self) -> float:
-        """Mass of a particle, rho_0 d^dim [kg] (per metre of depth in a 2-D world)."""
-        return float(self.rest_density * self.spacing**self.dim)
-
     def particles(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions [m] and velocities [m/s], float32 [n, dim], of the fluids outside of the solids.
 
@@ -303,7 +160,7 @@ class Scene(Parameters):
             table = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             raise WavetankError(f"{origin}: this is not TOML: {error}.") from None
-        return cls.parse(table, origin)  # type: ignore[no-any-return]
+        return cls.parse(table, origin)
 
     def save(self, path: str | Path) -> None:
         """Write this scene as TOML; a file of that name is replaced in one move."""
@@ -319,7 +176,7 @@ class Scene(Parameters):
 
     def changed(self, **values: Any) -> "Scene":
         """Return a copy with these keys changed, validated as a whole."""
-        return type(self).parse({**self.table(), **values})  # type: ignore[no-any-return]
+        return type(self).parse({**self.table(), **values})
 
     def scaled(self, factor: float) -> "Scene":
         """Return the same scene with every length multiplied by `factor` (velocities and gravity stay)."""
@@ -334,11 +191,11 @@ class Scene(Parameters):
                 return [walk(v, key) for v in value]
             return value * factor if key in lengths and isinstance(value, int | float) else value
 
-        return type(self).parse(walk(self.table()))  # type: ignore[no-any-return]
+        return type(self).parse(walk(self.table()))
 
 
 def _set_values(value: Any) -> Any:
-    """Reduce a model to plain data: the keys that differ from their defaults, and the shape that tells a table's kind."""
+    """Reduce a model to plain data: the keys that differ from their defaults, and the shape that names a kind."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, list | tuple):
@@ -381,6 +238,3 @@ def _read(name: str | Path) -> tuple[str, str]:
 
 def _numbers(values: Any) -> str:
     return "(" + ", ".join(f"{float(v):g}" for v in values) + ")"
-
-
-__all__ = ["Ball", "Block", "Number", "Points", "Scene", "Tank", "bundled_scenes", "scene_schema"]

@@ -56,6 +56,7 @@ class Simulation:
             solids=solids.build(members, 2 * dim if tank else 0, scene.friction),
             walls=walls,
             count=count,
+            has_friction=scene.friction > 0.0 or any(solid.friction for solid in members),
         )
         upload(self.world.particles.x, positions)
         upload(self.world.particles.p, positions)
@@ -196,7 +197,13 @@ class Simulation:
         """Measure this instant; see `physics.measure.statistics` for the keys."""
         frame = self.frame()
         neighbors = self.world.grid.number.to_numpy()[: self.count]
-        return measure.statistics(frame, neighbors) | {"milliseconds_per_frame": 1e3 * self._seconds_per_frame}
+        figures = measure.statistics(frame.positions, frame.velocities, frame.densities, neighbors, self.scene)
+        return {
+            "time": self.time,
+            "frame": self.frame_number,
+            **figures,
+            "milliseconds_per_frame": 1e3 * self._seconds_per_frame,
+        }
 
     def _measure(self) -> None:
         """Renew neighbours and densities for the positions as they are."""
@@ -249,9 +256,7 @@ class Simulation:
             self._fill(data["positions"], data["velocities"], np.arange(len(data["positions"])))
             self.time, self.frame_number = float(data["time"]), int(data["frame_number"])
             self._poses = list(zip(data["solid_positions"], data["solid_rotations"], strict=True))
-            self._targets = {
-                int(k): (row[:3], row[3:]) for k, row in zip(data["moving"], data["targets"], strict=True)
-            }
+            self._targets = {int(k): (row[:3], row[3:]) for k, row in zip(data["moving"], data["targets"], strict=True)}
         except (OSError, KeyError, ValueError) as error:
             raise WavetankError(f"{path}: this is not a state that `Simulation.save` wrote: {error}.") from None
         solid_set = self.world.solids

@@ -8,25 +8,36 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
+from typing_extensions import override
 
 from wavetank.compiler import qd
 from wavetank.distance import (
-    DIFFERENCE, DISTANCES, INTERSECTION, STACK, UNION, SolidSet, box_distance, capsule_distance,
-    cylinder_distance, half_space_distance, sphere_distance, vec3, vec4,
+    DIFFERENCE,
+    DISTANCES,
+    INTERSECTION,
+    STACK,
+    UNION,
+    SolidSet,
+    box_distance,
+    capsule_distance,
+    cylinder_distance,
+    half_space_distance,
+    sphere_distance,
+    vec3,
+    vec4,
 )  # fmt: skip
 from wavetank.errors import WavetankError
 from wavetank.model import Model, Number, Positive, Quaternion, Size, Vector, register_model
 from wavetank.rotations import product, turn_from_y, turned, unit_quaternion
 
+Floats = Sequence[float] | np.ndarray
 ENDLESS = 1.0e5  # half size [m] of what has no end
 
 
 class Node:
     """One step of a solid's program: a shape with its place, or a set operation."""
 
-    def __init__(
-        self, op: int, size: Sequence[float] = (), offset: Sequence[float] = (), turn: Sequence[float] = ()
-    ) -> None:
+    def __init__(self, op: int, size: Floats = (), offset: Floats = (), turn: Floats = ()) -> None:
         self.op = op
         self.size = np.zeros(4)
         self.size[: len(size)] = size
@@ -76,16 +87,20 @@ class Box(Solid):
     size: Size
 
     @property
+    @override
     def origin(self) -> np.ndarray:
         return _point(self.center)
 
+    @override
     def program(self) -> list[Node]:
         half = [0.5 * edge for edge in self.size]
         return [Node(DISTANCES.index(box_distance), half if len(half) == 3 else [*half, ENDLESS])]
 
+    @override
     def reach(self) -> float:
         return 0.5 * float(np.linalg.norm(self.size))
 
+    @override
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
         return [("center", self.center), ("size", self.size)]
 
@@ -98,15 +113,19 @@ class Sphere(Solid):
     radius: Positive
 
     @property
+    @override
     def origin(self) -> np.ndarray:
         return _point(self.center)
 
+    @override
     def program(self) -> list[Node]:
         return [Node(DISTANCES.index(sphere_distance), [self.radius])]
 
+    @override
     def reach(self) -> float:
         return self.radius
 
+    @override
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
         return [("center", self.center)]
 
@@ -139,9 +158,11 @@ class Capsule(_Axial):
 
     shape: Literal["capsule"] = "capsule"
 
+    @override
     def program(self) -> list[Node]:
         return [self._node(DISTANCES.index(capsule_distance))]
 
+    @override
     def reach(self) -> float:
         return 0.5 * float(np.linalg.norm(_point(self.end) - _point(self.start))) + self.radius
 
@@ -151,9 +172,11 @@ class Cylinder(_Axial):
 
     shape: Literal["cylinder"] = "cylinder"
 
+    @override
     def program(self) -> list[Node]:
         return [self._node(DISTANCES.index(cylinder_distance))]
 
+    @override
     def reach(self) -> float:
         return float(np.hypot(0.5 * np.linalg.norm(_point(self.end) - _point(self.start)), self.radius))
 
@@ -172,15 +195,19 @@ class HalfSpace(Solid):
         return self
 
     @property
+    @override
     def origin(self) -> np.ndarray:
         return _point(self.point)
 
+    @override
     def program(self) -> list[Node]:
         return [Node(DISTANCES.index(half_space_distance), turn=turn_from_y(_point(self.normal)))]
 
+    @override
     def reach(self) -> float:
         return ENDLESS
 
+    @override
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
         return [("point", self.point), ("normal", self.normal)]
 
@@ -218,6 +245,7 @@ class Union(_SetOperation):
 
     shape: Literal["union"] = "union"
 
+    @override
     def program(self) -> list[Node]:
         return self._combine(UNION)
 
@@ -227,6 +255,7 @@ class Intersection(_SetOperation):
 
     shape: Literal["intersection"] = "intersection"
 
+    @override
     def program(self) -> list[Node]:
         return self._combine(INTERSECTION)
 
@@ -236,9 +265,11 @@ class Difference(_SetOperation):
 
     shape: Literal["difference"] = "difference"
 
+    @override
     def program(self) -> list[Node]:
         return self._combine(DIFFERENCE)
 
+    @override
     def reach(self) -> float:
         return float(np.linalg.norm(self.parts[0].origin)) + self.parts[0].reach()
 

@@ -72,6 +72,7 @@ class Coefficients:
     attraction: qd.f32
     tensile: qd.f32  # m^2, artificial pressure of one iteration over w(dq)^n
     tensile_exponent: qd.f32
+    largest_correction: qd.f32  # m, of one iteration
     viscosity: qd.f32  # share per substep
     vorticity: qd.f32  # m/s
     speed_limit: qd.f32  # m/s
@@ -103,9 +104,7 @@ def upload(array: Any, values: np.ndarray) -> None:
 
 def new_particles(dim: int, capacity: int) -> Particles:
     """Allocate particles that all rest at the origin."""
-    return Particles(
-        vectors(dim, capacity), vectors(dim, capacity), vectors(dim, capacity), integers(capacity)
-    )
+    return Particles(vectors(dim, capacity), vectors(dim, capacity), vectors(dim, capacity), integers(capacity))
 
 
 def new_scratch(capacity: int) -> Scratch:

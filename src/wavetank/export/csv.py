@@ -30,7 +30,8 @@ def read_csv(path: str | Path) -> dict[str, np.ndarray]:
     """Return the columns of a file by name, float64 [count]."""
     with Path(path).open(encoding="utf-8") as file:
         names = file.readline().strip().split(",")
-        rows = np.loadtxt(file, delimiter=",", ndmin=2).reshape(-1, len(names))
+        lines = file.readlines()
+    rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.empty((0, len(names)))
     return dict(zip(names, rows.T, strict=True))
 
 

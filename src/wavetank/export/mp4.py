@@ -33,10 +33,11 @@ class VideoWriter:
             )
         self.path, self.width, self.height = Path(path), int(width), int(height)
         self.count = 0
+        self._rate = Fraction(fps).limit_denominator(1001)
         self._partial = partial_path(path)
         self._container = _open(self._partial)
         # The format halves the resolution of colours: sizes must be even, odd ones get one more row or column.
-        self._stream = _add_stream(self._container, width + width % 2, height + height % 2, fps, quality)
+        self._stream = _add_stream(self._container, width + width % 2, height + height % 2, self._rate, quality)
 
     def write(self, image: np.ndarray) -> None:
         """Append a picture, uint8 [height, width, 3]."""
@@ -52,7 +53,7 @@ class VideoWriter:
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(padded), format="rgb24")
         encoded = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
         encoded.pts = self.count
-        encoded.time_base = self._stream.codec_context.time_base
+        encoded.time_base = 1 / self._rate
         for packet in self._stream.encode(encoded):
             self._container.mux(packet)
         self.count += 1
@@ -103,11 +104,11 @@ def _open(path: Path) -> Any:
         raise WavetankError(f"{str(path)!r} cannot be written: {error}.") from None
 
 
-def _add_stream(container: Any, width: int, height: int, fps: float, quality: int) -> Any:
+def _add_stream(container: Any, width: int, height: int, rate: Fraction, quality: int) -> Any:
     import av
 
     name = "libx264" if "libx264" in av.codecs_available else "h264"
-    stream = container.add_stream(name, rate=Fraction(fps).limit_denominator(1001))
+    stream = container.add_stream(name, rate=rate)
     stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
     stream.options = {"crf": str(quality), "preset": "veryfast"}
     context = stream.codec_context

@@ -1,0 +1,1 @@
+"""Ways to watch a world: headless files now, window and browser later."""

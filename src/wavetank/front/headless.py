@@ -1,10 +1,12 @@
 """Run a scene without a screen: video, pictures, particle files and figures into a folder."""
 
+import itertools
 import json
 import math
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from rich.console import Console
@@ -12,12 +14,14 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn,
 from rich.text import Text
 
 from wavetank.errors import WavetankError
-from wavetank.export import exporter_for, exporter_named
+from wavetank.export import exporter_named
 from wavetank.export.mp4 import VideoWriter
 from wavetank.export.png import write_png
 from wavetank.frame import Frame
 from wavetank.simulation import Simulation
 from wavetank.view.renderer import Renderer
+
+Sink = Callable[[int, Frame, Any], None]  # takes the number of a frame, the frame and its picture (or None)
 
 
 class _Figures(ProgressColumn):
@@ -54,27 +58,26 @@ def record(
     if not 1.0 <= fps <= 240.0:
         raise WavetankError(f"--fps = {fps} is not allowed; it must be a number from 1 to 240.")
     writers = [exporter_named(format_) for format_ in exports]
-    renderer = Renderer(*size) if video or frames else None
+    renderer = Renderer(*size)
+    renderer.render(sim.frame(), **look)  # what is wrong with the look shows before anything is written
     out.mkdir(parents=True, exist_ok=True)
     files: list[str] = []
     summary = _Summary(sim, seconds)
     with ExitStack() as stack:
-        sinks: list[Callable[[int, Frame, Any], None]] = []
+        sinks: list[Sink] = []
         if video:
-            path = out / f"{name}.mp4"
-            film = stack.enter_context(VideoWriter(path, *size, fps))
+            film = stack.enter_context(VideoWriter(out / f"{name}.mp4", *size, fps))
             sinks.append(lambda number, frame, image: film.write(image))
-            files.append(str(path))
+            files.append(str(out / f"{name}.mp4"))
         if frames:
             sinks.append(lambda number, frame, image: write_png(out / f"{name}-{number:05d}.png", image))
             files.append(str(out / f"{name}-#####.png"))
         for writer in writers:
-            pattern = f"{name}-{{:05d}}{writer.SUFFIXES[0]}"
-            sinks.append(lambda number, frame, image, w=writer, p=pattern: w.write(out / p.format(number), frame))
+            sinks.append(_particle_sink(writer, out, name))
             files.append(str(out / f"{name}-#####{writer.SUFFIXES[0]}"))
-        _loop(sim, seconds, fps, renderer, sinks, summary, console, look)
+        _loop(sim, seconds, fps, renderer if video or frames else None, sinks, summary, console, look)
     still = out / f"{name}.png"
-    image = (renderer or Renderer(*size)).render(sim.frame(), **look)
+    image = renderer.render(sim.frame(), **look)
     write_png(still, image, {"scene": sim.scene.title, "time": f"{sim.time:.4f} s"})
     figures = summary.figures() | {"files": [*files, str(still)]}
     stats = out / "stats.json"
@@ -83,8 +86,15 @@ def record(
     return figures
 
 
+def _particle_sink(writer: ModuleType, out: Path, name: str) -> Sink:
+    def write(number: int, frame: Frame, image: Any) -> None:
+        writer.write(out / f"{name}-{number:05d}{writer.SUFFIXES[0]}", frame)
+
+    return write
+
+
 def _loop(
-    sim: Simulation, seconds: float, fps: float, renderer: Renderer | None, sinks: list[Any], summary: "_Summary",
+    sim: Simulation, seconds: float, fps: float, renderer: Renderer | None, sinks: list[Sink], summary: "_Summary",
     console: Console | None, look: dict[str, Any],
 ) -> None:  # fmt: skip
     progress = Progress(
@@ -99,19 +109,14 @@ def _loop(
                 for sink in sinks:
                     sink(number, frame, image)
                 summary.add()
-                speed = task_speed(progress, number)
+                elapsed = progress.tasks[0].elapsed or 0.0
+                speed = number / elapsed if elapsed > 0 else 0.0
                 progress.update(
                     task, completed=sim.time - summary.begin, time=sim.time, fps=speed, count=sim.count,
                     error=summary.last["density_error_mean"],
                 )  # fmt: skip
         except KeyboardInterrupt:
             summary.interrupted = True
-
-
-def task_speed(progress: Progress, frames: int) -> float:
-    """Frames per second of wall time since the bar started."""
-    elapsed = progress.tasks[0].elapsed or 0.0
-    return frames / elapsed if elapsed > 0 else 0.0
 
 
 class _Summary:
@@ -142,7 +147,7 @@ class _Summary:
                 "density_error_mean": max(row["density_error_mean"] for row in rows),
                 "density_error_p99": max(row["density_error_p99"] for row in rows),
                 "speed_max": max(row["speed_max"] for row in rows),
-                "energy_rise": max((b - a for a, b in zip(energies, energies[1:], strict=False)), default=0.0),
+                "energy_rise": max((b - a for a, b in itertools.pairwise(energies)), default=0.0),
             },
             "mean": {
                 "density_error_mean": sum(row["density_error_mean"] for row in rows) / len(rows),
@@ -154,9 +159,3 @@ class _Summary:
 
 def _mean(values: list[float]) -> float | None:
     return sum(values) / len(values) if values else None
-
-
-def write_still(sim: Simulation, path: Path, size: tuple[int, int], **look: Any) -> None:
-    """Write one picture of `sim` as it is, in the format that the suffix of `path` names."""
-    exporter_for(path)
-    write_png(path, Renderer(*size).render(sim.frame(), **look), {"scene": sim.scene.title, "time": f"{sim.time:.4f} s"})

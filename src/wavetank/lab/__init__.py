@@ -1,0 +1,1 @@
+"""Experiments over the public interface; nothing else imports them."""

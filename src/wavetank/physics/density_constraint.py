@@ -108,7 +108,8 @@ def correct_positions(
             wall = wall_density(p, scratch.near[i], solids, walls, c)
             for k in qd.static(range(p.n)):
                 dp[k] += scratch.dlam[i] * wall[k]
-        corrected.p[i] = p + dp
+        # Within one substep a particle must not run past the solids that were marked for it.
+        corrected.p[i] = p + dp * qd.min(1.0, c.largest_correction / qd.max(dp.norm(), 1e-12))
 
 
 @qd.kernel(fastcache=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wavetank.frame import Frame
+from wavetank.params import Parameters
 
 
 def density_error(densities: np.ndarray, rest_density: float) -> np.ndarray:
@@ -14,35 +14,39 @@ def density_error(densities: np.ndarray, rest_density: float) -> np.ndarray:
     return np.maximum(densities.astype(np.float64) / rest_density - 1.0, 0.0)
 
 
-def kinetic_energy(frame: Frame) -> float:
+def kinetic_energy(velocities: np.ndarray, mass: float) -> float:
     """Return the sum of m v^2 / 2 [J] (per metre of depth in a 2-D world)."""
-    return 0.5 * frame.scene.particle_mass * float(np.sum(frame.velocities.astype(np.float64) ** 2))
+    return 0.5 * mass * float(np.sum(velocities.astype(np.float64) ** 2))
 
 
-def potential_energy(frame: Frame) -> float:
+def potential_energy(positions: np.ndarray, mass: float, gravity: tuple[float, ...]) -> float:
     """Return the sum of -m g x [J], zero at the origin (per metre of depth in a 2-D world)."""
-    return -frame.scene.particle_mass * float(np.sum(frame.positions.astype(np.float64) @ np.array(frame.scene.gravity)))
+    return -mass * float(np.sum(positions.astype(np.float64) @ np.array(gravity)))
 
 
-def statistics(frame: Frame, neighbors: np.ndarray) -> dict[str, float]:
-    """Return the figures of `frame` as plain numbers; `neighbors` is the number of neighbours of each particle."""
-    rest = frame.scene.rest_density
-    densities = frame.densities if frame.count else np.array([0.0], np.float32)
-    error = density_error(densities, rest)
-    speed = np.linalg.norm(frame.velocities.astype(np.float64), axis=1)
+def statistics(
+    positions: np.ndarray,
+    velocities: np.ndarray,
+    densities: np.ndarray,
+    neighbors: np.ndarray,
+    params: Parameters,
+) -> dict[str, float]:
+    """Return the figures of an instant as plain numbers; every array has one row for each particle."""
+    count = len(positions)
+    densities = densities if count else np.array([0.0], np.float32)
+    error = density_error(densities, params.rest_density)
+    speed = np.linalg.norm(velocities.astype(np.float64), axis=1)
     return {
-        "time": frame.time,
-        "frame": frame.number,
-        "count": frame.count,
+        "count": count,
         "density_mean": float(densities.mean(dtype=np.float64)),
         "density_max": float(densities.max()),
         "density_error_mean": float(error.mean()),
         "density_error_p99": float(np.percentile(error, 99)),
         "density_error_max": float(error.max()),
-        "kinetic_energy": kinetic_energy(frame),
-        "potential_energy": potential_energy(frame),
+        "kinetic_energy": kinetic_energy(velocities, params.particle_mass),
+        "potential_energy": potential_energy(positions, params.particle_mass, params.gravity),
         "speed_max": float(speed.max(initial=0.0)),
-        "speed_rms": float(np.sqrt(np.mean(speed**2))) if frame.count else 0.0,
-        "neighbors_mean": float(neighbors.mean()) if frame.count else 0.0,
+        "speed_rms": float(np.sqrt(np.mean(speed**2))) if count else 0.0,
+        "neighbors_mean": float(neighbors.mean()) if count else 0.0,
         "neighbors_max": int(neighbors.max(initial=0)),
     }

@@ -7,18 +7,25 @@ substep, particles are sorted rather than hashed, and contact is part of every c
 import dataclasses
 import math
 
+import numpy as np
+
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet
+from wavetank.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids, mark_near_solids
 from wavetank.physics.density_constraint import (
-    clear_multipliers, correct_positions, measure_density, schedule, solve_multipliers,
+    clear_multipliers,
+    correct_positions,
+    measure_density,
+    schedule,
+    solve_multipliers,
 )  # fmt: skip
+from wavetank.physics.friction import apply_friction
 from wavetank.physics.integrate import accept_positions, forget_predictions, predict, update_velocities
 from wavetank.physics.neighbors import find_neighbors, sort_particles
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
 from wavetank.physics.viscosity import apply_viscosity
 from wavetank.physics.vorticity import confine_vorticity, find_vorticity
-from wavetank.scene import Scene
 from wavetank.state import Coefficients, Grid, Particles, Scratch, Walls
 
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
@@ -35,16 +42,17 @@ class World:
     solids: SolidSet
     walls: Walls
     count: int
+    has_friction: bool
 
 
-def step(world: World, scene: Scene, dt: float, speed_limit: float = math.inf) -> None:
+def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
     """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
-    c, method, count = coefficients(scene, dt, speed_limit), method_number(scene), world.count
+    c, method, count = coefficients(params, dt, speed_limit), method_number(params), world.count
     now, spare, scratch, grid, solids, walls = (
         world.particles, world.spare, world.scratch, world.grid, world.solids, world.walls,
     )  # fmt: skip
 
-    predict(now, c, count, qd.Vector([*scene.gravity, 0.0, 0.0][:3]))  # 1-4
+    predict(now, c, count, qd.Vector([*params.gravity, 0.0, 0.0][:3]))  # 1-4
     mark_near_solids(now, scratch, solids, c, count)
     keep_out_of_solids(now, scratch, solids, c, count)
 
@@ -54,7 +62,7 @@ def step(world: World, scene: Scene, dt: float, speed_limit: float = math.inf) -
     find_neighbors(now, grid, c, count)
 
     clear_multipliers(scratch, count)
-    for relaxation, momentum in schedule(scene.iterations, scene.relaxation, scene.slowest_mode):  # 8-19
+    for relaxation, momentum in schedule(params.iterations, params.relaxation, params.slowest_mode):  # 8-19
         c = dataclasses.replace(c, relaxation=relaxation, momentum=momentum)
         solve_multipliers(scratch, now, grid, solids, walls, c, count, method)  # 9-11
         correct_positions(spare, now, scratch, grid, solids, walls, c, count, method)  # 12-18
@@ -62,10 +70,12 @@ def step(world: World, scene: Scene, dt: float, speed_limit: float = math.inf) -
         keep_out_of_solids(now, scratch, solids, c, count)
 
     update_velocities(now, c, count)  # 21
-    if scene.vorticity > 0.0:
+    if world.has_friction:
+        apply_friction(now, scratch, solids, walls, c, count)
+    if params.vorticity > 0.0:
         find_vorticity(scratch, now, grid, c, count, method)  # 22
         confine_vorticity(now, scratch, grid, c, count, method)
-    if scene.viscosity > 0.0:
+    if params.viscosity > 0.0:
         apply_viscosity(spare, now, grid, c, count, method)
         now.v, spare.v = spare.v, now.v
     accept_positions(now, count)  # 23
@@ -73,48 +83,48 @@ def step(world: World, scene: Scene, dt: float, speed_limit: float = math.inf) -
     world.particles, world.spare = now, spare
 
 
-def update_densities(world: World, scene: Scene) -> None:
+def update_densities(world: World, params: Parameters) -> None:
     """Measure the densities [kg/m^3] of `world` as it stands. The order of particles changes, the motion does not."""
-    c, method, count = coefficients(scene, scene.frame_time), method_number(scene), world.count
+    c, method, count = coefficients(params, params.frame_time), method_number(params), world.count
     forget_predictions(world.particles, count)
     sort_particles(world.particles, world.spare, world.grid, c, count)
     world.particles, world.spare = world.spare, world.particles
     find_neighbors(world.particles, world.grid, c, count)
     mark_near_solids(world.particles, world.scratch, world.solids, c, count)
     measure_density(
-        world.scratch, world.particles, world.grid, world.solids, world.walls, c, count, scene.rest_density, method
+        world.scratch, world.particles, world.grid, world.solids, world.walls, c, count, params.rest_density, method
     )
 
 
-def method_number(scene: Scene) -> int:
-    """Return the place of the scene's smoothing kernel in KERNELS."""
-    number = list(NAMES).index(scene.kernel)
+def method_number(params: Parameters) -> int:
+    """Return the place of the chosen smoothing kernel in KERNELS."""
+    number = list(NAMES).index(params.kernel)
     assert number < len(KERNELS)
     return number
 
 
-def coefficients(scene: Scene, dt: float, speed_limit: float = math.inf) -> Coefficients:
+def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf) -> Coefficients:
     """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here."""
-    h = scene.support * scene.spacing
-    rest = rest_lattice(scene.kernel, scene.dim, scene.support)
+    h = params.support * params.spacing
+    rest = rest_lattice(params.kernel, params.dim, params.support)
     s_0 = rest.squared_gradients / h**2
-    w_dq = float(kernel_shape(NAMES[scene.kernel][0], scene.tensile_distance)[0])
+    w_dq = float(kernel_shape(NAMES[params.kernel][0], np.array(params.tensile_distance))[0])
     return Coefficients(
         dt=dt,
         h=h,
-        d=scene.spacing,
+        d=params.spacing,
         density_scale=rest.density_scale,
         gradient_scale=rest.gradient_scale / h,
-        eps=scene.force_mixing * s_0,
-        relaxation=scene.relaxation,
+        eps=params.force_mixing * s_0,
+        relaxation=params.relaxation,
         momentum=0.0,
-        attraction=scene.attraction,
-        tensile=scene.tensile_strength / s_0 / scene.iterations / w_dq**scene.tensile_exponent,
-        tensile_exponent=scene.tensile_exponent,
-        viscosity=min(1.0, scene.viscosity * REFERENCE_RATE * dt),
-        vorticity=scene.vorticity,
+        attraction=params.attraction,
+        tensile=params.tensile_strength / s_0 / params.iterations / w_dq**params.tensile_exponent,
+        tensile_exponent=params.tensile_exponent,
+        largest_correction=h / params.iterations,
+        viscosity=min(1.0, params.viscosity * REFERENCE_RATE * dt),
+        vorticity=params.vorticity,
         speed_limit=speed_limit,
-        wall_density=scene.wall_density,
-        wall_gap=scene.wall_gap * scene.spacing,
+        wall_density=params.wall_density,
+        wall_gap=params.wall_gap * params.spacing,
     )
-

@@ -35,7 +35,6 @@ class Buffers:
     curve: Any  # i32 [entries]: sRGB byte of linear light 0 to 1, in equal steps
     picture: Any  # i32 [words]: the finished picture, three sRGB bytes a pixel, row by row
     supersample: int  # computed pixels per pixel of the picture, in each direction
-
     probes: int  # of light per computed pixel: fewer where more pixels are averaged
 
     @property

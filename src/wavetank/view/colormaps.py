@@ -14,7 +14,7 @@ ENTRIES = 256
 
 #: name -> colours at equal distances from the lower to the upper limit
 COLORMAPS: dict[str, tuple[str, ...]] = {
-    "water": ("#174fa6", "#1a68bc", "#2482d0", "#459ee0", "#78bbeb", "#a9d5f3", "#d3ebf9", "#f8fcfe"),
+    "water": ("#174fa6", "#1a68bc", "#2482d0", "#459ee0", "#78bbeb", "#a9d5f3", "#d0eaf8", "#f1f9fd"),
     "viridis": ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30", "#fde725"),
     "ember": ("#1b1033", "#4a1a5f", "#86235f", "#c13b4a", "#e96a37", "#f6a53f", "#f9e08a"),
     "balance": ("#1f3f8f", "#4477bd", "#8fb4dc", "#eceef0", "#eba98e", "#cf5f4c", "#8c1c2f"),

@@ -60,16 +60,17 @@ def draw_scale(picture: np.ndarray, pixels_per_metre: float) -> None:
 def _bar(colors: bytes, limits: tuple[float, float], label: str, unit: int, length: int) -> np.ndarray:
     """The bar on its plate, RGBA."""
     table = np.frombuffer(colors, np.float32).reshape(-1, 3)
-    plate = _plate(length + 2 * unit, int(4.4 * unit))
+    margin = 2 * unit  # the numbers at the ends are wider than the bar
+    plate = _plate(length + 2 * margin, int(4.4 * unit))
     pen, font = ImageDraw.Draw(plate), _font(unit)
     entries = np.linspace(0, len(table) - 1, length).round().astype(int)
     stripe = (255.0 * to_srgb(table[entries]) + 0.5).astype(np.uint8)
     top, thick = int(1.8 * unit), max(2, int(0.7 * unit))
-    plate.paste(Image.fromarray(np.repeat(stripe[None], thick, axis=0)), (unit, top))
-    pen.rectangle((unit - 1, top - 1, unit + length, top + thick), outline=INK)
-    pen.text((unit, unit), label, INK, font, anchor="lm")
+    plate.paste(Image.fromarray(np.repeat(stripe[None], thick, axis=0)), (margin, top))
+    pen.rectangle((margin - 1, top - 1, margin + length, top + thick), outline=INK)
+    pen.text((margin, unit), label, INK, font, anchor="lm")
     for value in ticks(*limits):
-        at = unit + (length - 1) * (value - limits[0]) / (limits[1] - limits[0])
+        at = margin + (length - 1) * (value - limits[0]) / (limits[1] - limits[0])
         pen.line((at, top + thick, at, top + thick + unit // 3), fill=INK)
         pen.text((at, top + thick + unit), f"{value:g}", INK, font, anchor="mm")
     return np.asarray(plate)

@@ -27,11 +27,11 @@ class Look:
     line: vec3  # radiance of the tank's edges
     line_strength: qd.f32  # share of what is behind an edge that the edge hides
     pane: vec3  # radiance that the panes of the tank mirror
-    glass: qd.f32  # share of it in what is seen through a pane
+    glass: qd.f32  # share of it in what is seen through a pane; 1 is white paper, cut off at the tank
     wrap: qd.f32  # how far the sun's light wraps around particles: 0 hard, 1 all around
     gloss: qd.f32  # strength of the highlight on particles and solids
     sun_size: qd.f32  # tangent of the sun's angular radius: softness of shadows
-    shade_depth: qd.f32  # darkness of ambient occlusion, 0 to 1
+    shade_depth: qd.f32  # strength of ambient occlusion, about 1
 
 
 def studio() -> Look:
@@ -52,7 +52,7 @@ def studio() -> Look:
         wrap=0.25,
         gloss=0.18,
         sun_size=0.10,
-        shade_depth=0.9,
+        shade_depth=2.0,
     )
 
 
@@ -63,18 +63,18 @@ def paper() -> Look:
         sun=vec3(0.36, 0.36, 0.36),
         sky=vec3(0.72, 0.72, 0.72),
         ground=vec3(0.52, 0.52, 0.54),
-        horizon=_linear("#f0f2f3"),
-        zenith=_linear("#f0f2f3"),
+        horizon=vec3(2.5, 2.5, 2.5),  # the tone mapper makes it white
+        zenith=vec3(2.5, 2.5, 2.5),
         floor=_linear("#ffffff"),
-        solid=_linear("#a9adb0"),
+        solid=_linear("#cda587"),
         line=_linear("#3c444b"),
         line_strength=1.0,
-        pane=vec3(2.5, 2.5, 2.5),  # the tone mapper makes it white,
+        pane=_linear("#edf2f5"),
         glass=1.0,
         wrap=0.5,
         gloss=0.0,
         sun_size=0.0,
-        shade_depth=0.5,
+        shade_depth=1.0,
     )
 
 

@@ -35,6 +35,8 @@ PASSES = (
 )
 LARGEST_SIDE, LARGEST_SUPERSAMPLE = 8192, 4
 KEPT_RENDERERS = 4
+#: Of a drawn particle [d] in 2-D and 3-D worlds: what has no depth should close its gaps.
+RADIUS = {2: 0.62, 3: 0.55}
 
 
 class Renderer:
@@ -62,12 +64,13 @@ class Renderer:
         colormap: str | None = None,
         limits: tuple[float, float] | None = None,
         legend: bool = True,
-        radius: float = 0.55,
+        radius: float | None = None,
     ) -> np.ndarray:
         """Return a picture of `frame`, uint8 [height, width, 3].
 
         `color_by` is one of `QUANTITIES` or a colour ``#rrggbb``; `limits` are the values of the first and the last
-        colour; `radius` of a drawn particle is in particle spacings. Raises `WavetankError` for what is not allowed.
+        colour; `radius` of a drawn particle is in particle spacings, about a half if not given. Raises
+        `WavetankError` for what is not allowed.
         """
         shot = self.shot(frame, camera, color_by, colormap, limits, radius)
         for draw in PASSES:
@@ -89,9 +92,10 @@ class Renderer:
 
     def shot(
         self, frame: Frame, camera: Camera | None, color_by: str, colormap: str | None,
-        limits: tuple[float, float] | None, radius: float,
+        limits: tuple[float, float] | None, radius: float | None,
     ) -> Shot:  # fmt: skip
         """Check what is asked for and return what the passes need to know."""
+        radius = RADIUS[frame.dim] if radius is None else radius
         if not (isinstance(radius, int | float) and math.isfinite(radius) and 0.0 < radius <= 10.0):
             raise WavetankError(f"render: radius = {radius!r} must be a number of spacings above 0, at most 10.")
         extent = extent_of(frame.scene)
@@ -128,7 +132,7 @@ class Renderer:
             low, high = (float(limit) for limit in limits or quantity.limits(frame.scene))
         except (TypeError, ValueError):
             low = high = math.nan
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        if not (math.isfinite(low) and math.isfinite(high) and high - low > 1e-30):
             raise WavetankError(f"render: limits = {limits} must be two finite numbers, the lower one first.")
         return 1 + list(QUANTITIES).index(color_by), (low, high)
 

@@ -127,5 +127,7 @@ def blend(
                 for k in qd.static(range(2)):
                     if panes[k] > lens.near and panes[k] < here:
                         result += look.glass * (look.pane - result)
+            elif look.glass == 1.0:  # a plane: particles are wider than their distance to the wall
+                result = look.horizon
         cover = look.line_strength * lines[row, column] / 255.0
         color[row, column] = result + cover * (look.line - result)

@@ -1,0 +1,43 @@
+# Two commands: `make demo` and `make test`. Both build .venv by themselves.
+
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: demo test lint figures clean
+
+demo: .venv/demo-ready
+	$(BIN)/wavetank run obstacle-tank --seconds 4 --fps 30 --size 1280x720 --video --name demo --out out
+	@echo
+	@echo "Look at out/demo.mp4 and out/demo.png; the figures are in out/stats.json. Try next:"
+	@echo "  $(BIN)/wavetank scenes"
+	@echo "  $(BIN)/wavetank run drop --video"
+	@echo "  $(BIN)/wavetank run double-dam-2d --video --set spacing=0.01"
+	@echo "  $(BIN)/python examples/01_ten_lines.py"
+
+test: lint
+	$(BIN)/python -m pytest
+
+lint: .venv/test-ready
+	$(BIN)/ruff format --check src tests examples
+	$(BIN)/ruff check src tests examples
+	$(BIN)/mypy
+
+# The pictures in docs, made anew.
+figures: .venv/test-ready
+	$(BIN)/python docs/figures.py
+
+clean:
+	rm -rf .venv out
+
+.venv/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "wavetank needs Python 3.11 or newer; this is $$($(PYTHON) --version). Use make PYTHON=python3.12"; exit 1; }
+	$(PYTHON) -m venv .venv
+
+.venv/demo-ready: pyproject.toml constraints.txt | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	@touch $@
+
+.venv/test-ready: pyproject.toml constraints.txt | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@touch $@ .venv/demo-ready

@@ -1,0 +1,47 @@
+"""Coulomb friction between water and solids.
+
+A wall that has pushed a particle by delta along its normal in this substep may hold back its sliding by at most
+mu delta. The push is that of the wall's share of the density (`boundary.py`): |lambda_i grad rho_wall|.
+Position-based friction after Macklin et al. 2014, "Unified Particle Physics" (10.1145/2601097.2601152), Sec. 6.1.
+
+    code     symbol    meaning                                           unit
+    push     delta     displacement that the wall has given              m
+    slip     v_t       velocity along the wall, in the wall's motion     m/s
+"""
+
+from wavetank.compiler import qd
+from wavetank.distance import SolidSet, lift, rotate, signed_distance, to_local, vec3
+from wavetank.physics.boundary import is_near, wall_share
+from wavetank.state import Coefficients, Particles, Scratch, Walls
+
+
+@qd.kernel(fastcache=True)
+def apply_friction(
+    particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, count: qd.i32
+):
+    """Reduce the velocities along walls by Coulomb friction."""
+    for i in range(count):
+        near = scratch.near[i]
+        if near != 0:
+            p = lift(particles.p[i])
+            v = lift(particles.v[i])
+            for k in range(solids.count):
+                if is_near(near, k) == 1 and solids.friction[k] > 0.0:
+                    value = signed_distance(solids, k, p)
+                    n = vec3(value.x, value.y, value.z)
+                    push = qd.abs(scratch.lam[i]) * wall_share(walls, value.w, c.h)[1] * c.wall_density / c.h
+                    relative = v - surface_velocity(solids, k, p, c.dt)
+                    slip = relative - n * n.dot(relative)
+                    v -= slip * qd.min(1.0, solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12))
+            held = particles.v[i]
+            for axis in qd.static(range(held.n)):
+                held[axis] = v[axis]
+            particles.v[i] = held
+
+
+@qd.func
+def surface_velocity(solids: SolidSet, k, x, dt):
+    """Velocity [m/s] of the material point of solid `k` that is at `x` at the end of the substep."""
+    own = to_local(solids.position[k], solids.rotation[k], x)
+    before = solids.old_position[k] + rotate(solids.old_rotation[k], own)
+    return (x - before) / dt

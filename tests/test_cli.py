@@ -1,0 +1,144 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import av
+import pytest
+
+
+def wavetank(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, "-m", "wavetank", *arguments], capture_output=True, text=True, cwd=cwd, timeout=300
+    )
+
+
+def pictures(path: Path) -> list:
+    with av.open(str(path)) as container:
+        return [frame.to_ndarray(format="rgb24").shape for frame in container.decode(video=0)]
+
+
+def test_run_writes_what_was_asked_for(tmp_path):
+    result = wavetank(
+        "run", "drop-2d", "--seconds", "0.2", "--fps", "20", "--size", "160x90", "--out", str(tmp_path / "a" / "b"),
+        "--video", "--frames", "--export", "npz", "--export", "ply", "--set", "viscosity=0.2", "--json",
+    )  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    figures = json.loads(result.stdout.strip().splitlines()[-1])
+    assert figures["last"]["count"] == 512
+    assert figures["seconds_of_water"] == pytest.approx(0.2)
+    assert figures["interrupted"] is False
+    out = tmp_path / "a" / "b"
+    assert pictures(out / "drop-2d.mp4") == [(90, 160, 3)] * 5
+    for suffix in ("png", "npz", "ply"):
+        assert len(list(out.glob(f"drop-2d-0*.{suffix}"))) == 5
+    assert json.loads((out / "stats.json").read_text()) == figures
+    assert not list(out.glob("*partial*"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("run", "no-such-scene"), ["no-such-scene", "obstacle-tank"]),
+        (("run", "drop", "--set", "viscos=1"), ["'viscos'", "did you mean 'viscosity'"]),
+        (("run", "drop", "--set", "viscosity=nan"), ["viscosity = nan"]),
+        (("run", "drop", "--set", "viscosity=thick"), ["viscosity = 'thick'"]),
+        (("run", "drop", "--set", "viscosity"), ["NAME=VALUE"]),
+        (("run", "drop", "--set", "spacing=-1"), ["spacing = -1", "greater than 0"]),
+        (("run", "drop", "--set", "spacing=1e-5"), ["spacing = 1e-05", "100,000,000"]),
+        (("run", "drop", "--set", "tank.size=3"), ["'tank.size'"]),
+        (("run", "drop", "--seconds", "-1"), ["--seconds = -1.0", "0 to 86400"]),
+        (("run", "drop", "--seconds", "nan"), ["--seconds = nan"]),
+        (("run", "drop", "--fps", "0"), ["--fps = 0.0"]),
+        (("run", "drop", "--size", "big"), ["--size = 'big'", "1280x720"]),
+        (("run", "drop", "--export", "obj"), ["'obj'", "npz, csv, ply"]),
+        (("run", "drop", "--color-by", "taste"), ["'taste'", "speed"]),
+        (("run", "drop", "--arch", "opengl"), ["'opengl'", "cpu"]),
+        (("run", "drop", "--arch", "metal"), ["'metal'", "available"]),
+        (("converge", "drop-2d", "--iterations", "0"), ["--iterations = 0"]),
+    ],
+)
+def test_a_mistake_is_one_line_and_leaves_nothing(arguments, words, tmp_path):
+    result = wavetank(*arguments, cwd=tmp_path)
+    assert result.returncode == 1
+    lines = [line for line in result.stderr.splitlines() if line]
+    assert len(lines) == 1, result.stderr
+    assert lines[0].startswith("wavetank: ")
+    for word in words:
+        assert word in lines[0]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_broken_scene_file_is_one_line(tmp_path):
+    path = tmp_path / "mine.toml"
+    for text, words in (
+        ("spacing = 0.1\nspacing = 0.2", "this is not TOML"),
+        ("spacing = 0.1\n[tank]\nsize = [1, nan]", "tank.size[1] = nan"),
+        ("spacing = 0.1\n[[fluids]]\nlower = [0, 0]", "fluids[0].upper is missing"),
+        ("spacing = 0.1\n[tank]\nsize = [1, 1]\n[[fluids]]\nlower = [0, 0]\nupper = [2, 1]", "outside the tank"),
+        ('spacing = "0.1 m"', "spacing = '0.1 m'"),
+    ):
+        path.write_text(text)
+        result = wavetank("run", str(path), "--out", str(tmp_path / "out"))
+        assert result.returncode == 1
+        assert result.stderr.count("\n") == 1
+        assert "mine.toml: " in result.stderr
+        assert words in result.stderr
+        assert not (tmp_path / "out").exists()
+
+
+def test_wrong_usage_exits_with_2():
+    assert wavetank("run").returncode == 2
+    assert wavetank("run", "drop", "--no-such-option").returncode == 2
+    assert wavetank("swim").returncode == 2
+
+
+def test_ctrl_c_finishes_the_files(tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "wavetank", "run", "drop-2d", "--seconds", "1000", "--size", "96x64", "--video",
+         "--out", str(tmp_path), "--json"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    deadline = time.time() + 120
+    while time.time() < deadline and not any(p.stat().st_size for p in tmp_path.glob("*partial*")):
+        time.sleep(0.1)
+    time.sleep(2.0)
+    os.kill(process.pid, signal.SIGINT)
+    stdout, stderr = process.communicate(timeout=120)
+    assert process.returncode == 0, stderr
+    figures = json.loads(stdout.strip().splitlines()[-1])
+    assert figures["interrupted"] is True
+    assert len(pictures(tmp_path / "drop-2d.mp4")) > 0
+    assert (tmp_path / "stats.json").exists()
+    assert not list(tmp_path.glob("*partial*"))
+    assert "Traceback" not in stderr
+
+
+def test_scenes_and_schema(tmp_path):
+    listed = json.loads(wavetank("scenes", "--json").stdout)
+    assert {"obstacle-tank", "dam-break", "double-dam", "still-tank", "drop", "drop-2d"} <= set(listed)
+    schema = json.loads(wavetank("scenes", "--schema").stdout)
+    assert schema["properties"]["viscosity"]["maximum"] == 1.0
+    assert "obstacle-tank" in wavetank("scenes").stdout
+
+
+def test_doctor_says_what_works():
+    findings = json.loads(wavetank("doctor", "--json").stdout)
+    rows = {row["name"]: row["found"] for row in findings["checks"]}
+    assert findings["ok"] is True
+    assert rows["back end cpu"] == "works"
+    assert rows["back end metal"] in ("not here", "available")
+    assert wavetank("doctor").returncode == 0
+
+
+def test_converge_draws_the_reports_figures(tmp_path):
+    result = wavetank("converge", "obstacle-tank-2d", "--seconds", "0.1", "--iterations", "4", "--out", str(tmp_path))
+    assert result.returncode == 0, result.stderr
+    assert {path.name for path in tmp_path.iterdir()} == {"converge.csv", "converge-steps.csv", "converge.png"}
+    rows = [line.split(",") for line in (tmp_path / "converge.csv").read_text().splitlines()]
+    assert rows[0][:4] == ["preset", "iteration", "density_max", "density_mean"]
+    assert [row[0] for row in rows[1:]] == ["paper"] * 4 + ["standard"] * 4
+    assert all(2.0 < float(row[3]) < 6.0 for row in rows[1:])

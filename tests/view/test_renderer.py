@@ -1,0 +1,195 @@
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from wavetank import Box, HalfSpace, Scene, Tank
+from wavetank.errors import WavetankError
+from wavetank.view import renderer as module
+from wavetank.view.camera import Camera
+from wavetank.view.renderer import Renderer, render
+
+SIZE = (96, 64)
+
+
+def test_a_picture_is_bytes_of_the_asked_size(splash):
+    for supersample in (1, 2, 3):
+        image = Renderer(97, 53, supersample).render(splash)
+        assert image.shape == (53, 97, 3)
+        assert image.dtype == np.uint8
+        assert image.std() > 10.0
+
+
+def test_a_picture_is_ours_to_keep(splash):
+    renderer = Renderer(*SIZE)
+    image = renderer.render(splash)
+    before = image.copy()
+    renderer.render(splash, color_by="density", camera=Camera(eye=(3, 3, 3), target=(0, 0, 0)))
+    assert (image == before).all()
+
+
+def test_pictures_repeat_bit_for_bit(splash):
+    first = Renderer(*SIZE, 2)
+    image = first.render(splash)
+    first.render(splash, camera=Camera(eye=(0.5, 0.5, 0.5), target=(0, 0, 0)))
+    assert (first.render(splash) == image).all()
+    assert (Renderer(*SIZE, 2).render(splash) == image).all()
+
+
+def test_the_order_of_particles_does_not_matter(make_frame, splash):
+    order = np.random.default_rng(2).permutation(splash.count)
+    shuffled = make_frame(splash.scene, splash.positions[order], splash.velocities[order], splash.densities[order])
+    renderer = Renderer(*SIZE)
+    assert (renderer.render(shuffled) == renderer.render(splash)).all()
+
+
+def test_the_number_of_threads_does_not_matter():
+    program = """
+import sys, hashlib
+from wavetank import compiler
+compiler.start("cpu", threads=int(sys.argv[1]))
+sys.path.insert(0, sys.argv[2])
+import numpy as np
+from conftest import frame_of
+from wavetank import Scene, Tank
+from wavetank.view.renderer import Renderer
+x = np.random.default_rng(3).uniform(0.1, 0.9, (2000, 3))
+frame = frame_of(Scene(spacing=0.05, tank=Tank(size=(1, 1, 1))), x, x)
+print(hashlib.sha256(Renderer(96, 64).render(frame).tobytes()).hexdigest())
+"""
+    folder = str(__import__("pathlib").Path(__file__).parent)
+    digests = {
+        subprocess.run(
+            [sys.executable, "-c", program, threads, folder], capture_output=True, text=True, check=True
+        ).stdout
+        for threads in ("1", "2")
+    }
+    assert len(digests) == 1
+
+
+EYES = {
+    "framing": None,
+    "inside": Camera(eye=(0.5, 0.5, 0.5), target=(0.1, 0.4, 0.2)),
+    "away": Camera(eye=(0.5, 0.5, 3.0), target=(0.5, 0.5, 6.0)),
+    "below": Camera(eye=(0.5, -1.0, 2.0), target=(0.5, 0.5, 0.5)),
+    "on the floor": Camera(eye=(2.0, 0.0, 2.0), target=(0.5, 0.0, 0.5)),
+    "straight down": Camera(eye=(0.5, 4.0, 0.5), target=(0.5, 0.0, 0.5)),
+    "flat": Camera(eye=(0.5, 0.5, 3.0), target=(0.5, 0.5, 0.5), height=2.0),
+    "very far": Camera(eye=(0.0, 0.0, 9e3), target=(0.0, 0.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("eye", EYES)
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("count", [0, 1, 300])
+@pytest.mark.parametrize("tank", [True, False])
+def test_nothing_breaks_from_any_eye(make_frame, eye, dim, count, tank):
+    solids = [
+        Box(center=(0.4, 0.1, 0.5)[:dim], size=(0.2, 0.2, 0.3)[:dim]),
+        HalfSpace(point=(0.8, 0.0, 0.0)[:dim], normal=(-1.0, 1.0, 0.0)[:dim]),
+    ]
+    scene = Scene(
+        spacing=0.05, tank=Tank(size=(1.0, 1.0, 1.0)[:dim]) if tank else None, solids=solids,
+        gravity=(0.0, -9.81, 0.0)[:dim],
+    )  # fmt: skip
+    frame = make_frame(scene, np.random.default_rng(0).uniform(0.1, 0.9, (count, dim)))
+    renderer = Renderer(*SIZE)
+    image = renderer.render(frame, camera=EYES[eye])
+    assert image.shape == (SIZE[1], SIZE[0], 3)
+    assert np.isfinite(renderer.buffers.color.to_numpy()).all()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 40), (40, 1), (3, 3)])
+def test_tiny_pictures(splash, size):
+    assert Renderer(*size).render(splash).shape == (size[1], size[0], 3)
+
+
+def test_particles_that_are_no_numbers_are_survived(make_frame, tank_scene):
+    x = np.full((6, 3), 0.5)
+    x[1], x[2], x[3], x[4, 0] = np.nan, np.inf, 1e30, -np.inf
+    frame = make_frame(tank_scene, x, velocities=np.full((6, 3), np.nan), densities=np.full(6, np.nan))
+    for quantity in ("speed", "density"):
+        image = Renderer(*SIZE).render(frame, color_by=quantity)
+        assert image.shape == (SIZE[1], SIZE[0], 3)
+
+
+def centre_color(make_frame, scene, velocity=0.0, density=1000.0, **options):
+    frame = make_frame(scene, [(0.5, 0.5, 0.5)], [(velocity, 0.0, 0.0)], [density])
+    camera = Camera(eye=(0.5, 0.9, 2.0), target=(0.5, 0.5, 0.5))
+    image = Renderer(64, 64).render(frame, camera=camera, radius=3.0, legend=False, **options)
+    return image[28:36, 28:36].reshape(-1, 3).mean(axis=0)
+
+
+def test_colours_follow_the_quantity(make_frame, tank_scene):
+    slow, fast = (centre_color(make_frame, tank_scene, velocity=v, limits=(0.0, 2.0)) for v in (0.0, 2.0))
+    assert slow[2] > 2.0 * slow[0]  # blue
+    assert fast.min() > 180  # nearly white
+    low, rest, high = (
+        centre_color(make_frame, tank_scene, density=rho, color_by="density") for rho in (900.0, 1000.0, 1100.0)
+    )
+    assert low[2] > 1.5 * low[0]
+    assert high[0] > 1.5 * high[2]
+    assert np.ptp(rest) < 40
+    red, green, blue = centre_color(make_frame, tank_scene, color_by="#20c040")
+    assert green > 1.5 * max(red, blue)
+    assert tuple(centre_color(make_frame, tank_scene, velocity=2.0, colormap="viridis", limits=(0, 2))) != tuple(fast)
+
+
+def test_limits_of_the_scene_are_round_and_do_not_change_with_time(splash):
+    shot = Renderer(*SIZE).shot(splash, None, "speed", None, None, 0.5)
+    assert shot.limits == (0.0, 3.0)
+    weightless = Scene(spacing=0.05, tank=Tank(size=(1.0, 1.0, 1.0)), gravity=(0.0, 0.0, 0.0))
+    assert module.QUANTITIES["speed"].limits(weightless) == (0.0, 1.0)
+
+
+def test_the_legend_stays_in_its_corner(splash):
+    renderer = Renderer(480, 270)
+    bare, written = renderer.render(splash, legend=False), renderer.render(splash)
+    changed = (bare != written).any(axis=2)
+    assert changed[200:, :200].mean() > 0.2
+    assert not changed[:200].any()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"color_by": "spede"}, "speed"),
+        ({"color_by": "#12"}, "rrggbb"),
+        ({"colormap": "jet"}, "viridis"),
+        ({"limits": (1.0, 1.0)}, "limits"),
+        ({"limits": (0.0, float("nan"))}, "limits"),
+        ({"limits": (1.0,)}, "limits"),
+        ({"limits": "auto"}, "limits"),
+        ({"radius": 0.0}, "radius"),
+        ({"radius": "big"}, "radius"),
+    ],
+)
+def test_mistakes_are_named(splash, options, message):
+    with pytest.raises(WavetankError, match=message):
+        Renderer(*SIZE).render(splash, **options)
+
+
+@pytest.mark.parametrize("wrong", [(0, 10), (10, 10_000), (1.5, 10), (10, 10, 5), (10, True)])
+def test_impossible_sizes_are_refused(wrong):
+    with pytest.raises(WavetankError, match="whole number"):
+        Renderer(*wrong)
+
+
+def test_render_takes_frames_and_whatever_has_one(splash):
+    world = SimpleNamespace(frame=lambda: splash)
+    image = render(world, *SIZE)
+    assert (image == render(splash, *SIZE)).all()
+    assert (image == Renderer(*SIZE, 2).render(splash)).all()
+    with pytest.raises(WavetankError, match="int"):
+        render(3)
+
+
+def test_renderers_are_kept_but_not_without_end(splash):
+    for width in range(20, 20 + 2 * module.KEPT_RENDERERS):
+        render(splash, width, 20)
+    assert len(module._kept) <= module.KEPT_RENDERERS
+    kept = module._kept[(width, 20, 2)]
+    render(splash, width, 20)
+    assert module._kept[(width, 20, 2)] is kept
