@@ -137,6 +137,14 @@ def test_colours_follow_the_quantity(make_frame, tank_scene):
     assert tuple(centre_color(make_frame, tank_scene, velocity=2.0, colormap="viridis", limits=(0, 2))) != tuple(fast)
 
 
+def test_a_renderer_changes_its_colours(splash):
+    renderer = Renderer(*SIZE)
+    first = renderer.render(splash, colormap="viridis", legend=False)
+    assert (renderer.render(splash, colormap="ember", legend=False) != first).any()
+    assert (renderer.render(splash, color_by="#ff0000", legend=False) != first).any()
+    assert (renderer.render(splash, colormap="viridis", legend=False) == first).all()
+
+
 def test_limits_of_the_scene_are_round_and_do_not_change_with_time(splash):
     shot = Renderer(*SIZE).shot(splash, None, "speed", None, None, 0.5)
     assert shot.limits == (0.0, 3.0)

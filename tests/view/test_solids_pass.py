@@ -14,13 +14,19 @@ WIDTH, HEIGHT = 120, 90
 FRONT = Camera(eye=(0.5, 0.5, 3.0), target=(0.5, 0.5, 0.5), height=1.5)
 
 
-def drawn(frame, camera):
-    """(depth, surface) after particles and solids."""
+def buffers_of(frame, camera):
+    """The buffers after particles and solids."""
     renderer = Renderer(WIDTH, HEIGHT)
     shot = renderer.shot(frame, camera, "speed", None, None, 0.5)
     for draw in (spheres.draw, solids.draw):
         draw(shot, renderer.buffers)
-    return renderer.buffers.depth.to_numpy().view(np.float32), renderer.buffers.surface.to_numpy()
+    return renderer.buffers
+
+
+def drawn(frame, camera):
+    """(depth, surface) after particles and solids."""
+    buffers = buffers_of(frame, camera)
+    return buffers.depth.to_numpy().view(np.float32), buffers.surface.to_numpy()
 
 
 def world(*shapes, size=(1.0, 1.0, 1.0)):
@@ -86,7 +92,7 @@ def test_a_half_space_ends_at_the_tank(make_frame):
 def test_a_plane_shows_the_cut_in_front_of_particles(make_frame, camera):
     scene = world(Sphere(center=(0.4, 0.6), radius=0.2), Box(center=(0.8, 0.2), size=(0.2, 0.1)), size=(1.0, 1.0))
     frame = make_frame(scene, [(0.4, 0.405), (0.1, 0.1)])
-    _, surface = drawn(frame, camera)
+    depth, surface = drawn(frame, camera)
     rows, columns = np.mgrid[:HEIGHT, :WIDTH] + 0.5
     scale = HEIGHT / (camera.height or 2.0 * 2.5 * np.tan(0.3))
     x, y = 0.5 + (columns - WIDTH / 2) / scale, 0.5 + (HEIGHT / 2 - rows) / scale
@@ -94,14 +100,16 @@ def test_a_plane_shows_the_cut_in_front_of_particles(make_frame, camera):
     distance = np.minimum(ball, np.maximum(np.abs(x - 0.8) - 0.1, np.abs(y - 0.2) - 0.05))
     assert (surface[distance < -0.01] == SOLID).all()
     assert (surface[distance > 0.01] != SOLID).all()
+    assert depth[distance < -0.01] == pytest.approx(camera.eye[2] - 0.025, abs=1e-4)
     assert 1 in surface
 
 
 def test_the_eye_inside_a_solid_sees_its_inside(make_frame):
     camera = Camera(eye=(0.5, 0.5, 0.5), target=(0.5, 0.5, 0.0))
-    depth, surface = drawn(make_frame(world(Sphere(center=(0.5, 0.5, 0.5), radius=0.3)), [(0.5, 0.5, 0.1)]), camera)
-    assert (surface == SOLID).all()
-    assert np.isfinite(depth).all()
+    scene = world(Sphere(center=(0.5, 0.5, 0.55), radius=0.3))
+    buffers = buffers_of(make_frame(scene, [(0.5, 0.5, 0.1)]), camera)
+    assert (buffers.surface.to_numpy() == SOLID).all()
+    assert (buffers.normal.to_numpy()[..., 2] > 0.5).all()  # it faces the eye
 
 
 def test_the_box_of_solids_is_empty_when_they_are_out_of_sight(make_frame):

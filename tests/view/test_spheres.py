@@ -40,17 +40,18 @@ def drawn(frame, camera):
 CAMERAS = [
     Camera(eye=(0.5, 0.7, 2.0), target=(0.5, 0.5, 0.5), field_of_view=0.8),
     Camera(eye=(1.2, 1.4, 1.3), target=(0.5, 0.5, 0.5), field_of_view=1.2),  # wide: balls become ellipses
+    Camera(eye=(0.45, 0.4, 1.1), target=(0.5, 0.5, 0.5), field_of_view=2.2),  # and wider still
     Camera(eye=(0.5, 0.5, 3.0), target=(0.5, 0.5, 0.5), height=1.2),
 ]
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-@pytest.mark.parametrize("center", [(0.5, 0.5, 0.5), (0.2, 0.8, 0.4), (0.85, 0.15, 0.9)])
+@pytest.mark.parametrize("center", [(0.5, 0.5, 0.5), (0.2, 0.8, 0.4), (0.85, 0.15, 0.9), (0.2, 0.9, 0.85)])
 def test_a_ball_covers_the_pixels_whose_rays_meet_it(make_frame, tank_scene, camera, center):
     depth, surface = drawn(make_frame(tank_scene, [center]), camera)
     exact, grown, shrunk = (entry_depths(camera, center, RADIUS * size) for size in (1.0, 1.001, 0.999))
     covered = surface == 0
-    assert np.isfinite(exact).sum() > 10
+    assert np.isfinite(exact).sum() > 5 or camera is CAMERAS[1]  # which may not see it
     assert not (covered & ~np.isfinite(grown)).any()
     assert not (~covered & np.isfinite(shrunk)).any()
     assert (surface[~covered] == NOTHING).all()
@@ -81,6 +82,14 @@ def test_what_is_behind_the_eye_or_at_it_is_not_drawn(make_frame, tank_scene):
     camera = Camera(eye=(0.5, 0.5, 0.5), target=(0.5, 0.5, 0.0))
     _, surface = drawn(make_frame(tank_scene, [(0.5, 0.5, 0.6), (0.5, 0.5, 0.9), (0.5, 0.5, 0.5)]), camera)
     assert (surface == NOTHING).all()
+
+
+def test_a_ball_that_the_near_plane_cuts_is_left_out(make_frame, tank_scene):
+    camera = Camera(eye=(0.5, 0.5, 0.5), target=(0.5, 0.5, 0.0), near=0.1)
+    depth, surface = drawn(make_frame(tank_scene, [(0.5, 0.5, 0.37), (0.5, 0.5, 0.2)]), camera)
+    assert (surface != 0).all()
+    assert (depth > 0.1).all()
+    assert 1 in surface
 
 
 def test_a_ball_at_the_eye_is_bounded(make_frame, tank_scene):

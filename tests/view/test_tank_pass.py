@@ -48,11 +48,30 @@ def test_a_solid_hides_the_edges_behind_it_only(make_frame):
         assert with_box[int(row) - 1 : int(row) + 2, int(column) - 1 : int(column) + 2].max() > 100
 
 
-def test_edges_through_the_eye_and_behind_it_do_no_harm(make_frame, tank_scene):
-    for eye in ((0.5, 0.5, 0.5), (1.0, 1.0, 1.0), (0.0, 0.0, 0.5)):
+@pytest.mark.parametrize("eye", [(0.5, 0.5, 0.5), (1.2, 1.1, 0.9), (0.9, 0.1, 0.8), (0.5, -0.5, 0.5)])
+def test_only_edges_in_front_of_the_eye_are_marked_and_only_there(make_frame, tank_scene, eye):
+    camera = Camera(eye=eye, target=(0.2, 0.3, 0.1), field_of_view=1.8)
+    lines = lines_of(make_frame(tank_scene, []), camera)
+    points = np.concatenate([edge_points(tank_scene, share) for share in np.linspace(0.0, 1.0, 3001)])
+    pixels = camera.project(points, WIDTH, HEIGHT)
+    seen = pixels[(pixels[:, 2] > 1.01 * camera.near) & (np.abs(pixels[:, :2]) < 1e4).all(axis=1)]
+    columns, rows = np.floor(seen[:, :2]).astype(int).T
+    inside = (columns >= 0) & (columns < WIDTH) & (rows >= 0) & (rows < HEIGHT)
+    expected = np.zeros((HEIGHT + 4, WIDTH + 4), bool)
+    expected[rows[inside] + 2, columns[inside] + 2] = True
+    near = np.zeros((HEIGHT, WIDTH), bool)
+    for row in range(5):
+        for column in range(5):
+            near |= expected[row : row + HEIGHT, column : column + WIDTH]
+    assert not ((lines > 0) & ~near)[3:-3, 3:-3].any()
+    floor_or_edge = expected[2:-2, 2:-2]
+    assert (lines > 0)[floor_or_edge].mean() > (0.9 if eye[1] > 0 else 0.3)
+
+
+def test_an_edge_through_the_eye_does_no_harm(make_frame, tank_scene):
+    for eye in ((1.0, 1.0, 1.0), (0.0, 0.0, 0.5)):
         lines = lines_of(make_frame(tank_scene, []), Camera(eye=eye, target=(0.2, 0.3, 0.1), field_of_view=1.5))
-        assert lines.min() >= 0
-        assert lines.max() <= 255
+        assert 0 <= lines.min() <= lines.max() <= 255
 
 
 def test_no_tank_no_lines(make_frame):

@@ -54,9 +54,9 @@ def add_correction(sums: qd.template(), r, i, j, dlam: qd.template(), c: Coeffic
     w = kernel(method, length / c.h)
     s_corr = 0.0
     if c.tensile > 0.0:
-        s_corr = -c.tensile * w[0] ** c.tensile_exponent
+        s_corr = -c.tensile * w[0] ** c.tensile_exponent  # Eq. 7
     push = (dlam[i] + dlam[j] + s_corr) * c.gradient_scale * w[1] / qd.max(length, 1e-12)
-    sums += push * r
+    sums += push * r  # Eq. 8
 
 
 @qd.kernel(fastcache=True)
@@ -78,7 +78,8 @@ def solve_multipliers(
         for k in qd.static(range(dim)):
             own += (sums[1 + k] + wall[k]) ** 2
         rho += wall.w
-        newton = -(rho - 1.0) / (sums[dim + 1] + own + c.eps)
+        constraint = rho - 1.0  # Eq. 2
+        newton = -constraint / (sums[dim + 1] + own + c.eps)  # Eq. 5
         lam = scratch.lam[i] + c.relaxation * newton + c.momentum * scratch.dlam[i]
         if lam > 0.0:
             lam *= c.attraction

@@ -1,0 +1,30 @@
+"""Every bundled scene moves, keeps its water and makes a picture."""
+
+import numpy as np
+import pytest
+
+import wavetank as wt
+from wavetank.simulation import Simulation
+
+
+@pytest.mark.parametrize("name", wt.bundled_scenes())
+def test_scene_runs_and_shows(name):
+    sim = Simulation(wt.Scene.load(name))
+    count = sim.count
+    sim.advance(0.1)
+    assert sim.count == count > 400
+    assert np.all((sim.positions >= 0) & (sim.positions <= np.array(sim.scene.tank.size, np.float32)))
+    assert sim.stats()["density_error_mean"] < 0.01
+    image = wt.render(sim, width=192, height=108)
+    assert image.shape == (108, 192, 3)
+    assert image.std() > 10
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 200
+
+
+@pytest.mark.parametrize("name", wt.bundled_scenes())
+def test_both_presets_hold(name):
+    """The report's parameters are softer, but nothing is lost or leaves the tank."""
+    sim = Simulation(wt.Scene.load(name).changed(preset="paper"))
+    sim.advance(0.1)
+    assert np.isfinite(sim.positions).all()
+    assert np.all((sim.positions >= 0) & (sim.positions <= np.array(sim.scene.tank.size, np.float32)))

@@ -1,0 +1,114 @@
+"""The rules of ARCHITECTURE.md, held against the code."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "src" / "wavetank"
+FILES = sorted(PACKAGE.rglob("*.py"))
+CORE = {"numpy", "pydantic", "pydantic_core", "tomli_w", "typer", "rich", "PIL", "typing_extensions"}
+
+#: room -> rooms of this package that it must not know
+FORBIDDEN = {
+    "physics": {"view", "front", "lab", "export", "scene", "fluids", "simulation", "frame", "cli"},
+    "view": {"front", "lab", "physics", "simulation", "export", "cli"},
+    "export": {"front", "lab", "physics", "simulation", "view", "cli"},
+    "front": {"lab", "cli"},
+    "state.py": {"physics", "view", "front", "scene", "simulation"},
+    "scene.py": {"physics", "view", "front", "simulation", "state"},
+    "simulation.py": {"view", "front", "lab", "export", "cli"},
+    "lab": {"cli", "view", "front"},
+}
+
+
+def imports(path: Path, *, top_only: bool = False) -> set[str]:
+    """Dotted names that a file imports; `top_only` leaves out what functions import."""
+    tree = ast.parse(path.read_text())
+    nodes = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+    if top_only:
+        inner = {
+            id(node)
+            for function in ast.walk(tree)
+            if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
+            for node in ast.walk(function)
+        }
+        typing_only = {
+            id(node)
+            for block in ast.walk(tree)
+            if isinstance(block, ast.If) and "TYPE_CHECKING" in ast.dump(block.test)
+            for node in ast.walk(block)
+        }
+        nodes = [node for node in nodes if id(node) not in inner | typing_only]
+    names = set()
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        else:
+            assert node.level == 0, f"{path.name}: write imports in full"
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+def room(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_rooms_know_only_what_is_below(path):
+    for name in imports(path):
+        if name.startswith("quadrants"):
+            assert path.name == "compiler.py", "only compiler.py imports the kernel compiler"
+        if name.startswith("wavetank."):
+            assert name.split(".")[1] not in FORBIDDEN.get(room(path), set()), f"{path.name} imports {name}"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_optional_packages_are_imported_where_used(path):
+    import sys
+
+    for name in imports(path, top_only=True):
+        top = name.split(".")[0]
+        known = top in sys.stdlib_module_names or top in CORE | {"wavetank"}
+        assert known or (top == "quadrants" and path.name == "compiler.py"), f"{path.name} imports {name} at the top"
+
+
+def test_architecture_names_every_file_and_no_other():
+    """The tree in ARCHITECTURE.md is the disk."""
+    text = (ROOT / "ARCHITECTURE.md").read_text()
+    tree = re.search(r"```text\n(.*?)```", text, re.DOTALL)
+    assert tree
+    told, folders = set(), []
+    for line in tree[1].splitlines()[1:]:
+        entry = re.match(r"( *)(\S+)", line)
+        if not entry:
+            continue
+        depth, name = len(entry[1]) // 2 - 1, entry[2]
+        folders = folders[:depth]
+        if name.endswith("/"):
+            folders.append(name[:-1])
+        else:
+            told.add("/".join([*folders, name]))
+    disk = {str(path.relative_to(PACKAGE)) for path in FILES if path.name != "__init__.py"}
+    disk |= {"scenes/*.toml"}
+    assert told == disk
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_a_file_is_one_room(path):
+    assert len(path.read_text().splitlines()) <= 400
+
+
+def test_no_part_of_the_paper_is_missing():
+    """Every equation of the report stands in the code with its number."""
+    physics = "\n".join(path.read_text() for path in (PACKAGE / "physics").glob("*.py"))
+    for number in (1, 2, 4, 5, 7, 8, 9, 10, 11):
+        assert re.search(rf"Eq\. (\d+, )*{number}\b", physics), f"Eq. {number}"
+
+
+def test_parameters_page_is_up_to_date():
+    from wavetank.lab.reference import parameters_page
+
+    assert (ROOT / "docs" / "parameters.md").read_text() == parameters_page()
