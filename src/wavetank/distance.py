@@ -140,36 +140,43 @@ class SolidSet:
 
 
 @qd.func
+def node_distance(solids: SolidSet, node, p):
+    """(gradient, distance) of one shape of a program, at the point `p` in the solid's frame."""
+    turn = solids.turn[node]
+    at = rotate(conjugate(turn), p - solids.offset[node])
+    size = solids.size[node]
+    op = solids.op[node]
+    value = vec4(0.0, 0.0, 0.0, 0.0)
+    for shape in qd.static(range(len(DISTANCES))):
+        if op == shape:
+            value = qd.static(DISTANCES[shape])(at, size)
+    n = rotate(turn, vec3(value.x, value.y, value.z))
+    return vec4(n.x, n.y, n.z, value.w)
+
+
+@qd.func
 def local_distance(solids: SolidSet, k, p):
     """(gradient, distance) of solid `k` at the point `p` in its own frame."""
     stack = qd.Matrix([[0.0] * 4 for _ in range(8)])  # STACK
-    top = 0
+    depth = 0
+    # The top of the stack stays in registers: most solids are a single shape and never touch the rest.
+    top = vec4(0.0, 0.0, 0.0, 0.0)
     for node in range(solids.first[k], solids.first[k + 1]):
         op = solids.op[node]
         if op >= 0:
-            turn = solids.turn[node]
-            at = rotate(conjugate(turn), p - solids.offset[node])
-            size = solids.size[node]
-            value = vec4(0.0, 0.0, 0.0, 0.0)
-            for shape in qd.static(range(len(DISTANCES))):
-                if op == shape:
-                    value = qd.static(DISTANCES[shape])(at, size)
-            n = rotate(turn, vec3(value.x, value.y, value.z))
-            for c in qd.static(range(3)):
-                stack[top, c] = n[c]
-            stack[top, 3] = value.w
-            top += 1
-        else:
-            top -= 1
-            sign = 1.0
-            if op == -3:  # DIFFERENCE
-                sign = -1.0
-            second = sign * stack[top, 3]
-            first = stack[top - 1, 3]
-            if (op == -1 and second < first) or (op != -1 and second > first):  # UNION
+            if node > solids.first[k]:
                 for c in qd.static(range(4)):
-                    stack[top - 1, c] = sign * stack[top, c]
-    return vec4(stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3])
+                    stack[depth, c] = top[c]
+                depth += 1
+            top = node_distance(solids, node, p)
+        else:
+            depth -= 1
+            below = vec4(stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3])
+            if op == -3:  # DIFFERENCE
+                top = -top
+            if (op == -1 and below.w < top.w) or (op != -1 and below.w > top.w):  # UNION
+                top = below
+    return top
 
 
 @qd.func

@@ -20,6 +20,7 @@ class Particles:
     p: qd.types.ndarray()  # vec [capacity], m: predicted position, Algorithm 1's x*
     v: qd.types.ndarray()  # vec [capacity], m/s
     id: qd.types.ndarray()  # i32 [capacity]: number of the particle, 0 .. count - 1
+    near: qd.types.ndarray()  # i32 [capacity]: bit k is set where solid k is near, bit 30 for all solids from 30 on
 
 
 @dataclasses.dataclass
@@ -30,7 +31,6 @@ class Scratch:
     lam: qd.types.ndarray()  # f32 [capacity], m^2: multiplier, the sum over the iterations of a substep
     dlam: qd.types.ndarray()  # f32 [capacity], m^2: its change in the last iteration
     omega: qd.types.ndarray()  # vec3 [capacity], 1/s: vorticity
-    near: qd.types.ndarray()  # i32 [capacity]: bit k is set where solid k is near, the last bit for all beyond
 
 
 @dataclasses.dataclass
@@ -104,9 +104,11 @@ def upload(array: Any, values: np.ndarray) -> None:
 
 def new_particles(dim: int, capacity: int) -> Particles:
     """Allocate particles that all rest at the origin."""
-    return Particles(vectors(dim, capacity), vectors(dim, capacity), vectors(dim, capacity), integers(capacity))
+    x, p, v = (vectors(dim, capacity) for _ in range(3))
+    return Particles(x, p, v, id=integers(capacity), near=integers(capacity))
 
 
 def new_scratch(capacity: int) -> Scratch:
     """Allocate the scratch arrays."""
-    return Scratch(scalars(capacity), scalars(capacity), scalars(capacity), vectors(3, capacity), integers(capacity))
+    rho, lam, dlam = (scalars(capacity) for _ in range(3))
+    return Scratch(rho, lam, dlam, omega=vectors(3, capacity))

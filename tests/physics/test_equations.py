@@ -19,8 +19,9 @@ def solve(cloud: Cloud) -> None:
         world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, cloud.method
     )
     correct_positions(
-        world.spare, world.particles, world.scratch, world.grid, world.solids, world.walls, cloud.c, count, cloud.method
-    )
+        world.spare, world.particles, world.scratch, world.grid, world.solids, world.walls, cloud.c, count,
+        cloud.method, int(cloud.scene.tensile_strength > 0),
+    )  # fmt: skip
 
 
 def multipliers(cloud: Cloud) -> np.ndarray:

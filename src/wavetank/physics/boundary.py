@@ -17,7 +17,7 @@ Contact: conservative advancement along the path (Hart 1996, "Sphere tracing", 1
 
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, local_distance, rotate, signed_distance, to_local, vec3, vec4
-from wavetank.state import Coefficients, Particles, Scratch, Walls
+from wavetank.state import Coefficients, Particles, Walls
 
 # Bit 30 of `near` stands for every solid from number 30 on.
 
@@ -56,15 +56,12 @@ def wall_density(x: qd.template(), near, solids: SolidSet, walls: Walls, c: Coef
 
 
 @qd.func
-def keep_out_of(k, origin, target, solids: SolidSet, gap):
-    """Return `target` moved out of solid `k`, as reached from `origin`; world points, in the solid's own motion.
+def follow(k, at, end, solids: SolidSet, gap):
+    """Return where a particle on its way from `at` to `end` comes out, both in the frame of solid `k`.
 
     The path is followed in steps as long as the distance to the solid; where it touches, the rest of it slides on
     along the surface. Whatever the speed, nothing passes through a wall that the distance function resolves.
     """
-    rotation = solids.rotation[k]
-    at = to_local(solids.old_position[k], solids.old_rotation[k], origin)
-    end = to_local(solids.position[k], rotation, target)
     nearest = 0.1 * gap
     for _ in range(64):
         way = end - at
@@ -86,24 +83,34 @@ def keep_out_of(k, origin, target, solids: SolidSet, gap):
         value = local_distance(solids, k, end)
         if value.w < gap:
             end += vec3(value.x, value.y, value.z) * (gap - value.w)
-    return solids.position[k] + rotate(rotation, end)
+    return end
 
 
 @qd.kernel(fastcache=True)
-def keep_out_of_solids(particles: Particles, scratch: Scratch, solids: SolidSet, c: Coefficients, count: qd.i32):
-    """Move the predicted positions out of the solids, as reached from the positions before.
+def keep_out_of_solids(particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
+    """Move the predicted positions out of the solids, as reached from the positions before, in the solids' motion.
 
-    Twice over all solids, the tank last: it is convex from inside, so its word holds.
+    The tank comes last: it is convex from inside, so its word holds. Where one solid moved a particle all are asked
+    once more.
     """
     for i in range(count):
-        near = scratch.near[i]
+        near = particles.near[i]
         if near != 0:
             origin = lift(particles.x[i])
             target = lift(particles.p[i])
+            turns = solids.count
             for turn in range(2 * solids.count):
                 k = solids.count - 1 - turn % solids.count
-                if is_near(near, k) == 1:
-                    target = keep_out_of(k, origin, target, solids, c.wall_gap)
+                if turn < turns and is_near(near, k) == 1:
+                    rotation = solids.rotation[k]
+                    end = to_local(solids.position[k], rotation, target)
+                    at = to_local(solids.old_position[k], solids.old_rotation[k], origin)
+                    # A way no longer than the distance at its end has not touched the solid.
+                    if local_distance(solids, k, end).w < qd.max(c.wall_gap, (end - at).norm()):
+                        out = follow(k, at, end, solids, c.wall_gap)
+                        if (out - end).norm() > 0.0:
+                            target = solids.position[k] + rotate(rotation, out)
+                            turns = 2 * solids.count
             p = particles.p[i]
             for axis in qd.static(range(p.n)):
                 p[axis] = target[axis]
@@ -111,7 +118,7 @@ def keep_out_of_solids(particles: Particles, scratch: Scratch, solids: SolidSet,
 
 
 @qd.kernel(fastcache=True)
-def mark_near_solids(particles: Particles, scratch: Scratch, solids: SolidSet, c: Coefficients, count: qd.i32):
+def mark_near_solids(particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
     """Mark for every particle the solids that it may touch or feel on its way and a little beyond."""
     for i in range(count):
         x = lift(particles.x[i])
@@ -124,4 +131,4 @@ def mark_near_solids(particles: Particles, scratch: Scratch, solids: SolidSet, c
             if (p - solids.position[k]).norm() < solids.reach[k] + margin:
                 if signed_distance(solids, k, p).w < margin:
                     near |= 1 << qd.min(k, 30)
-        scratch.near[i] = near
+        particles.near[i] = near

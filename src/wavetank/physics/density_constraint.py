@@ -49,14 +49,22 @@ def add_density(sums: qd.template(), r, i, j, data: qd.template(), c: Coefficien
 
 @qd.func
 def add_correction(sums: qd.template(), r, i, j, dlam: qd.template(), c: Coefficients, method: qd.template()):
-    """Add neighbour j to the correction of particle i: Eq. 8, with the artificial pressure of Eq. 7."""
+    """Add neighbour j to the correction of particle i: Eq. 6."""
+    length = r.norm()
+    slope = c.gradient_scale * kernel(method, length / c.h)[1]
+    sums += r * ((dlam[i] + dlam[j]) * slope / qd.max(length, 1e-12))
+
+
+@qd.func
+def add_tensile_correction(sums: qd.template(), r, i, j, dlam: qd.template(), c: Coefficients, method: qd.template()):
+    """Add neighbour j to the correction of particle i: Eq. 8, Eq. 6 with the artificial pressure of Eq. 7."""
     length = r.norm()
     w = kernel(method, length / c.h)
-    s_corr = 0.0
-    if c.tensile > 0.0:
-        s_corr = -c.tensile * w[0] ** c.tensile_exponent  # Eq. 7
-    push = (dlam[i] + dlam[j] + s_corr) * c.gradient_scale * w[1] / qd.max(length, 1e-12)
-    sums += push * r  # Eq. 8
+    s_corr = -c.tensile * w[0] ** c.tensile_exponent  # Eq. 7
+    sums += r * ((dlam[i] + dlam[j] + s_corr) * c.gradient_scale * w[1] / qd.max(length, 1e-12))
+
+
+CORRECTIONS = (add_correction, add_tensile_correction)
 
 
 @qd.kernel(fastcache=True)
@@ -73,8 +81,8 @@ def solve_multipliers(
         rho = c.density_scale * (sums[0] + kernel(method, 0.0)[0])
         own = 0.0
         wall = vec4(0.0, 0.0, 0.0, 0.0)
-        if scratch.near[i] != 0:
-            wall = wall_density(p, scratch.near[i], solids, walls, c)
+        if particles.near[i] != 0:
+            wall = wall_density(p, particles.near[i], solids, walls, c)
         for k in qd.static(range(dim)):
             own += (sums[1 + k] + wall[k]) ** 2
         rho += wall.w
@@ -98,15 +106,15 @@ def clear_multipliers(scratch: Scratch, count: qd.i32):
 @qd.kernel(fastcache=True)
 def correct_positions(
     corrected: Particles, particles: Particles, scratch: Scratch, grid: Grid, solids: SolidSet, walls: Walls,
-    c: Coefficients, count: qd.i32, method: qd.template(),
+    c: Coefficients, count: qd.i32, method: qd.template(), correction: qd.template(),
 ):  # fmt: skip
-    """Move the predicted positions by the corrections (Eq. 8)."""
+    """Move the predicted positions by the corrections (Eq. 6 or 8, by its number in CORRECTIONS)."""
     for i in range(count):
         p = particles.p[i]
         dp = p * 0.0
-        for_each_neighbor(dp, add_correction, i, particles.p, scratch.dlam, grid, c, method)
-        if scratch.near[i] != 0:
-            wall = wall_density(p, scratch.near[i], solids, walls, c)
+        for_each_neighbor(dp, qd.static(CORRECTIONS[correction]), i, particles.p, scratch.dlam, grid, c, method)
+        if particles.near[i] != 0:
+            wall = wall_density(p, particles.near[i], solids, walls, c)
             for k in qd.static(range(p.n)):
                 dp[k] += scratch.dlam[i] * wall[k]
         # Within one substep a particle must not run past the solids that were marked for it.
@@ -124,8 +132,8 @@ def measure_density(
         sums = qd.Vector([0.0] * (p.n + 2))
         for_each_neighbor(sums, add_density, i, particles.p, particles.p, grid, c, method)
         rho = c.density_scale * (sums[0] + kernel(method, 0.0)[0])
-        if scratch.near[i] != 0:
-            rho += wall_density(p, scratch.near[i], solids, walls, c).w
+        if particles.near[i] != 0:
+            rho += wall_density(p, particles.near[i], solids, walls, c).w
         scratch.rho[i] = rest_density * rho
 
 

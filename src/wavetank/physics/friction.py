@@ -21,7 +21,7 @@ def apply_friction(
 ):
     """Reduce the velocities along walls by Coulomb friction."""
     for i in range(count):
-        near = scratch.near[i]
+        near = particles.near[i]
         if near != 0:
             p = lift(particles.p[i])
             v = lift(particles.v[i])

@@ -99,6 +99,7 @@ def reorder(sorted_: Particles, particles: Particles, grid: Grid, count: qd.i32)
         sorted_.p[i] = particles.p[j]
         sorted_.v[i] = particles.v[j]
         sorted_.id[i] = particles.id[j]
+        sorted_.near[i] = particles.near[j]
 
 
 @qd.kernel(fastcache=True)

@@ -53,21 +53,21 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     )  # fmt: skip
 
     predict(now, c, count, qd.Vector([*params.gravity, 0.0, 0.0][:3]))  # 1-4
-    mark_near_solids(now, scratch, solids, c, count)
-    keep_out_of_solids(now, scratch, solids, c, count)
+    mark_near_solids(now, solids, c, count)
+    keep_out_of_solids(now, solids, c, count)
 
     sort_particles(now, spare, grid, c, count)  # 5-7
     now, spare = spare, now
-    mark_near_solids(now, scratch, solids, c, count)
     find_neighbors(now, grid, c, count)
 
     clear_multipliers(scratch, count)
+    tensile = int(params.tensile_strength > 0.0)
     for relaxation, momentum in schedule(params.iterations, params.relaxation, params.slowest_mode):  # 8-19
         c = dataclasses.replace(c, relaxation=relaxation, momentum=momentum)
         solve_multipliers(scratch, now, grid, solids, walls, c, count, method)  # 9-11
-        correct_positions(spare, now, scratch, grid, solids, walls, c, count, method)  # 12-18
+        correct_positions(spare, now, scratch, grid, solids, walls, c, count, method, tensile)  # 12-18
         now.p, spare.p = spare.p, now.p
-        keep_out_of_solids(now, scratch, solids, c, count)
+        keep_out_of_solids(now, solids, c, count)
 
     update_velocities(now, c, count)  # 21
     if world.has_friction:
@@ -90,7 +90,7 @@ def update_densities(world: World, params: Parameters) -> None:
     sort_particles(world.particles, world.spare, world.grid, c, count)
     world.particles, world.spare = world.spare, world.particles
     find_neighbors(world.particles, world.grid, c, count)
-    mark_near_solids(world.particles, world.scratch, world.solids, c, count)
+    mark_near_solids(world.particles, world.solids, c, count)
     measure_density(
         world.scratch, world.particles, world.grid, world.solids, world.walls, c, count, params.rest_density, method
     )

@@ -145,7 +145,7 @@ def _three_quarter(kind: type[Camera], extent: Extent, aspect: float) -> Camera:
     lens = camera.lens(1, 1)
     right, up = _host(lens.right), _host(lens.up)
     steep = math.tan(0.5 * camera.field_of_view) / margin
-    for _ in range(8):
+    for _ in range(5):
         offset = extent.corners - target
         across, rise, ahead = offset @ right, offset @ up, offset @ toward
         need = np.maximum(np.abs(rise) / steep, np.abs(across) / (steep * aspect)) + ahead
