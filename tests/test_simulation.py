@@ -63,7 +63,7 @@ def test_ids_keep_their_particle():
     v = np.random.default_rng(1).normal(0, 3, (300, 3)).astype(np.float32)
     sim = Simulation(wt.Scene(spacing=0.01, gravity=(0, 0, 0), fluids=[wt.Points(positions=x, velocities=v)]))
     sim.advance(0.5)
-    np.testing.assert_allclose(sim.positions, x + 0.5 * v, atol=1e-4)
+    np.testing.assert_allclose(sim.positions, x + 0.5 * v, atol=5e-4)
 
 
 def test_runs_repeat_bit_for_bit():

@@ -95,7 +95,28 @@ def cylinder_distance(p, size):
     return vec4(n.x, n.y, n.z, d)
 
 
+#: The places of the shapes in `shape_distance`.
 DISTANCES = (half_space_distance, box_distance, sphere_distance, capsule_distance, cylinder_distance)
+
+
+@qd.func
+def shape_distance(shape, p, size):
+    """(gradient, distance) of the shape with that number in DISTANCES.
+
+    Spelled out: the compiler's cache sees this text, but not what the tuple holds.
+    """
+    value = vec4(0.0, 0.0, 0.0, 0.0)
+    if shape == 0:
+        value = half_space_distance(p, size)
+    elif shape == 1:
+        value = box_distance(p, size)
+    elif shape == 2:
+        value = sphere_distance(p, size)
+    elif shape == 3:
+        value = capsule_distance(p, size)
+    elif shape == 4:
+        value = cylinder_distance(p, size)
+    return value
 
 
 @qd.func
@@ -144,12 +165,7 @@ def node_distance(solids: SolidSet, node, p):
     """(gradient, distance) of one shape of a program, at the point `p` in the solid's frame."""
     turn = solids.turn[node]
     at = rotate(conjugate(turn), p - solids.offset[node])
-    size = solids.size[node]
-    op = solids.op[node]
-    value = vec4(0.0, 0.0, 0.0, 0.0)
-    for shape in qd.static(range(len(DISTANCES))):
-        if op == shape:
-            value = qd.static(DISTANCES[shape])(at, size)
+    value = shape_distance(solids.op[node], at, solids.size[node])
     n = rotate(turn, vec3(value.x, value.y, value.z))
     return vec4(n.x, n.y, n.z, value.w)
 

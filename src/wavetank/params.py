@@ -57,9 +57,11 @@ class Parameters(Model):
     support: float = parameter(2.0, 1.2, 3.0, "d", "h/d", "Support radius of the smoothing kernel.", live=False)
     kernel: KernelName = parameter("spiky", None, None, "", "W", "Smoothing kernel; poly6-spiky takes one for the density and the other for its gradient.", live=False)
     frame_time: float = parameter(1 / 60, 1e-5, 1.0, "s", "T", "Time of water in one frame.", live=False)
-    substeps: int = parameter(4, 1, 100, "", "n", "Time steps in a frame.")
+    substeps: int = parameter(4, 1, 100, "", "n", "Time steps in a frame, at least.")
+    courant: float = parameter(0.6, 0.05, 100.0, "d", "CFL", "Way that the fastest particle may go in a time step; more time steps are taken to keep it.")
+    largest_substeps: int = parameter(32, 1, 1000, "", "", "Time steps in a frame, at most: what keeps fast scenes affordable.")
     iterations: int = parameter(4, 1, 100, "", "", "Solver iterations in a time step.")
-    relaxation: float = parameter(0.625, 0.05, 1.5, "", "omega", "Share of the first Jacobi correction of a time step that is applied.")
+    relaxation: float = parameter(1.0, 0.1, 3.0, "", "omega", "First relaxation of a time step, in units of the largest that damps every mode.")
     slowest_mode: float = parameter(0.2, 0.0, 0.5, "", "a", "Lower end of the eigenvalues that four iterations damp evenly (Chebyshev); 0 is plain Jacobi.")
     force_mixing: float = parameter(0.05, 0.0, 1e4, "S_0", "eps", "Constraint force mixing (Eq. 5), relative to the sum of squared gradients in the rest lattice.")
     tensile_strength: float = parameter(0.0, 0.0, 1.0, "1/S_0", "k", "Artificial pressure against clustering (Eq. 7), relative likewise; shared by the iterations.")
@@ -104,14 +106,16 @@ LIVE = frozenset(p.name for p in PARAMETERS if p.live)
 #: Walls are plain clamps, as in the report.
 PAPER_SPACING = 0.681947
 PAPER_S0 = 1.360689
+PAPER_RELAXATION = 0.8105  # the largest stable one for that lattice: Jacobi with 1 is beyond it
 PRESETS: dict[str, dict[str, Any]] = {
     "standard": {},
     "paper": {
         "support": 1.1 / PAPER_SPACING,
         "kernel": "poly6-spiky",
         "substeps": 1,
+        "courant": 100.0,
         "iterations": 5,
-        "relaxation": 1.0,
+        "relaxation": 1.0 / PAPER_RELAXATION,
         "slowest_mode": 0.0,
         "force_mixing": 100.0 / PAPER_S0,
         "tensile_strength": 1e-4 * PAPER_S0,

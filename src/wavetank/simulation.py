@@ -15,7 +15,7 @@ from wavetank.params import LIVE
 from wavetank.physics import measure
 from wavetank.physics.neighbors import new_grid
 from wavetank.physics.smoothing import half_space_table
-from wavetank.physics.step import World, step, update_densities
+from wavetank.physics.step import World, largest_speed, step, update_densities
 from wavetank.rotations import interpolate, unit_quaternion
 from wavetank.scene import Scene
 from wavetank.state import Walls, new_particles, new_scratch, upload, vectors
@@ -47,6 +47,7 @@ class Simulation:
         members = [*(tank.walls() if tank else []), *scene.solids]
         self._names = {solid.name: number for number, solid in enumerate(members) if solid.name}
         self._poses = [(solid.origin, solid.quaternion) for solid in members]
+        self._reaches = [solid.reach() for solid in members]
         self._targets: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self.world = World(
             particles=new_particles(dim, count),
@@ -92,11 +93,12 @@ class Simulation:
 
     def _advance_frame(self, duration: float) -> None:
         began = time.perf_counter()
-        substeps = self.scene.substeps
+        limit = self._speed_limit(duration)
+        substeps = self._substeps(duration)
         for part in range(substeps):
             self._move_solids(part / substeps, (part + 1) / substeps)
             if self.count:
-                step(self.world, self.scene, duration / substeps, self._speed_limit(duration))
+                step(self.world, self.scene, duration / substeps, limit)
         for number, target in self._targets.items():
             self._poses[number] = target
         compiler.synchronize()
@@ -104,6 +106,27 @@ class Simulation:
         self.time += duration
         self.frame_number += 1
         self._outdated = True
+
+    def _substeps(self, duration: float) -> int:
+        """Return the number of time steps for `duration` [s]: the usual rate, or what the fastest needs (CFL)."""
+        scene = self.scene
+        usual = scene.substeps * duration / scene.frame_time
+        fastest = self._solid_speed(duration)
+        if self.count:
+            fastest = max(fastest, largest_speed(self.world))
+        fastest += duration * math.hypot(*scene.gravity)
+        needed = fastest * duration / (scene.courant * scene.spacing)
+        return max(1, math.ceil(usual - 1e-6), min(math.ceil(needed), scene.largest_substeps))
+
+    def _solid_speed(self, duration: float) -> float:
+        """Return the largest speed [m/s] at which any solid moves through the tank in this frame."""
+        fastest = 0.0
+        for number, (position, rotation) in self._targets.items():
+            old_position, old_rotation = self._poses[number]
+            turn = 2.0 * math.acos(min(1.0, abs(float(old_rotation @ rotation))))
+            reach = float(np.linalg.norm(self.scene.tank.size)) if self.scene.tank else self._reaches[number]
+            fastest = max(fastest, (float(np.linalg.norm(position - old_position)) + turn * reach) / duration)
+        return fastest
 
     def _speed_limit(self, duration: float) -> float:
         """Return the largest speed [m/s] that gravity, the start and the solids can have given to a particle.
@@ -113,12 +136,7 @@ class Simulation:
         """
         if self.scene.tank is None:
             return math.inf
-        for number, (position, rotation) in self._targets.items():
-            old_position, old_rotation = self._poses[number]
-            turn = 2.0 * math.acos(min(1.0, abs(float(old_rotation @ rotation))))
-            reach = float(np.linalg.norm(self.scene.tank.size))
-            way = float(np.linalg.norm(position - old_position)) + turn * reach
-            self._fastest_solid = max(self._fastest_solid, way / duration)
+        self._fastest_solid = max(self._fastest_solid, self._solid_speed(duration))
         fall = sum(2.0 * abs(g) * edge for g, edge in zip(self.scene.gravity, self.scene.tank.size, strict=True))
         given = math.sqrt(fall + self._fastest_start**2) + 2.0 * self._fastest_solid
         return self.scene.speed_limit * max(given, 1e-6)

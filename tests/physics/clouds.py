@@ -24,7 +24,7 @@ class Cloud:
         self.frame = self.sim.frame()  # sorts the particles and lists the neighbours
         self.world = self.sim.world
         # Clouds overlap far more than water does; the equations are checked without the safety stop.
-        self.c = dataclasses.replace(coefficients(self.scene, 1 / 240), largest_correction=1e9)
+        self.c = dataclasses.replace(coefficients(self.scene, 1 / 240), largest_correction=1e9, relaxation=1.0)
         self.method = method_number(self.scene)
         self.dim, self.count, self.h = dim, count, self.scene.support * d
         self.x = self.world.particles.p.to_numpy().astype(np.float64)

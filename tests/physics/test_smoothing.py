@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 from scipy import integrate
 
+import wavetank as wt
 from wavetank.compiler import qd
 from wavetank.physics import smoothing
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, lattice_density, rest_lattice, sigma
+from wavetank.physics.step import coefficients, relaxations
 
 SINGLE = [name for name, (a, b) in NAMES.items() if a == b]
 
@@ -75,6 +77,15 @@ def test_the_reports_units():
     s_0 = rest_lattice("poly6-spiky", 3, ratio).squared_gradients / 1.1**2
     assert s_0 == pytest.approx(PAPER_S0, rel=1e-5)
     assert PRESETS["paper"]["force_mixing"] * s_0 == pytest.approx(100.0, rel=1e-5)
+    paper = wt.Scene(spacing=PAPER_SPACING, preset="paper", rest_density=3.0)
+    assert relaxations(paper) == [(pytest.approx(1.0, rel=1e-3), 0.0)] * 5
+    c = coefficients(paper, 1 / 60)
+    assert c.h == pytest.approx(1.1)
+    assert c.eps == pytest.approx(100.0, rel=1e-4)
+    assert paper.particle_mass == pytest.approx(1.0, rel=0.06)  # 3 d^3; m = 1 divided by the lattice sum
+    assert c.density_scale * sigma("spiky", 3) / sigma("poly6", 3) == pytest.approx(
+        rest_lattice("poly6-spiky", 3, ratio).gradient_scale
+    )
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -103,3 +114,16 @@ def test_spiky_half_space_closed_form():
     for s in (0.1, 0.4, 0.8):
         tau = 1.0 - s
         assert smoothing.half_space_integral("spiky", 3, s) == pytest.approx(30 * (tau**5 / 20 - tau**6 / 30), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["spiky", "cubic", "poly6-spiky"])
+@pytest.mark.parametrize("ratio", [1.6, 2.0, 2.5])
+def test_stiffest_mode_bounds_every_plane_wave(name, ratio):
+    """Eigenvalue of D^-1 grad C grad C^T for exp(i k x) on the lattice: |sum_j g_j sin(k r_j)|^2 / sum_j |g_j|^2."""
+    points = smoothing._lattice(3, ratio)
+    distance = np.linalg.norm(points, axis=1)
+    g = (kernel_shape(NAMES[name][1], distance)[1] / distance)[:, None] * points
+    k = np.random.default_rng(0).uniform(-np.pi, np.pi, (5000, 3)) * ratio
+    values = np.sum((np.sin(k @ points.T) @ g) ** 2, axis=1) / np.sum(g**2)
+    stiffest = rest_lattice(name, 3, ratio).stiffest_mode
+    assert 0.97 * stiffest < values.max() <= 1.001 * stiffest

@@ -26,7 +26,7 @@ def brightness_at(image, point):
 
 def below_ball():
     """Where the sun's ray through the ball meets the floor."""
-    to_sun = np.array([float(part) for part in studio().to_sun])
+    to_sun = studio().to_sun
     return np.array(BALL) - to_sun * (BALL[1] / to_sun[1])
 
 

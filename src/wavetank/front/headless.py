@@ -77,7 +77,7 @@ def record(
             files.append(str(out / f"{name}-#####{writer.SUFFIXES[0]}"))
         _loop(sim, seconds, fps, renderer if video or frames else None, sinks, summary, console, look)
     still = out / f"{name}.png"
-    image = renderer.render(sim.frame(), **look)
+    image = Renderer(*size, supersample=2).render(sim.frame(), **look)
     write_png(still, image, {"scene": sim.scene.title, "time": f"{sim.time:.4f} s"})
     figures = summary.figures() | {"files": [*files, str(still)]}
     stats = out / "stats.json"

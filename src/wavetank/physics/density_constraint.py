@@ -64,6 +64,7 @@ def add_tensile_correction(sums: qd.template(), r, i, j, dlam: qd.template(), c:
     sums += r * ((dlam[i] + dlam[j] + s_corr) * c.gradient_scale * w[1] / qd.max(length, 1e-12))
 
 
+#: Append only, as `smoothing.KERNELS`.
 CORRECTIONS = (add_correction, add_tensile_correction)
 
 
@@ -137,19 +138,18 @@ def measure_density(
         scratch.rho[i] = rest_density * rho
 
 
-def schedule(iterations: int, relaxation: float, slowest: float) -> list[tuple[float, float]]:
+def schedule(iterations: int, slowest: float, stiffest: float) -> list[tuple[float, float]]:
     """Return (relaxation, momentum) of each iteration of a Chebyshev semi-iteration.
 
-    It damps all eigenvalues of the Jacobi matrix between a = 4 `slowest` / `iterations` and 2 / `relaxation` - a as
-    evenly as so many iterations can; with `slowest` = 0 it is Jacobi with one relaxation. (Saad 2003, "Iterative
-    Methods for Sparse Linear Systems", Algorithm 12.1.)
+    It damps all eigenvalues of the Jacobi matrix between `slowest` and `stiffest` as evenly as so many iterations can;
+    with `slowest` = 0 it is Jacobi with one relaxation, 2 / `stiffest`. (Saad 2003, "Iterative Methods for Sparse
+    Linear Systems", Algorithm 12.1.)
     """
-    theta = 1.0 / relaxation
-    delta = theta - 4.0 * slowest / iterations
-    if slowest == 0.0 or delta <= 0.0:
-        return [(relaxation, 0.0)] * iterations
+    if slowest <= 0.0 or slowest >= stiffest:
+        return [(2.0 / stiffest, 0.0)] * iterations
+    theta, delta = 0.5 * (stiffest + slowest), 0.5 * (stiffest - slowest)
     sigma = theta / delta
-    rho, result = 1.0 / sigma, [(relaxation, 0.0)]
+    rho, result = 1.0 / sigma, [(1.0 / theta, 0.0)]
     for _ in range(iterations - 1):
         following = 1.0 / (2.0 * sigma - rho)
         result.append((2.0 * following / delta, following * rho))

@@ -44,6 +44,15 @@ def accept_positions(particles: Particles, count: qd.i32):
 
 
 @qd.kernel(fastcache=True)
+def largest_square(particles: Particles, count: qd.i32) -> qd.i32:
+    """Return the bits of the largest squared speed: as integers, numbers of one sign stand in the same order."""
+    most = 0
+    for i in range(count):
+        qd.atomic_max(most, qd.bit_cast(particles.v[i].norm_sqr(), qd.i32))
+    return most
+
+
+@qd.kernel(fastcache=True)
 def forget_predictions(particles: Particles, count: qd.i32):
     """Set p = x, to measure the particles where they are."""
     for i in range(count):

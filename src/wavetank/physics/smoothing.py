@@ -64,6 +64,7 @@ def poly6_spiky(q):
     return qd.Vector([poly6(q)[0], spiky(q)[1]])
 
 
+#: Append only: compiled kernels are kept between runs under a kernel's number, and do not see what the tuple holds.
 KERNELS = (spiky, poly6, cubic, wendland, poly6_spiky)
 #: For each of KERNELS, the kernel of the density and the kernel of the gradient.
 NAMES = {
@@ -135,6 +136,7 @@ class RestLattice:
     density_scale: float  # rho / rho_0 = density_scale * sum_j w(q_ij), own particle included
     gradient_scale: float  # h grad(rho / rho_0) = gradient_scale * sum_j w'(q_ij) r_ij / |r_ij|
     squared_gradients: float  # h^2 S_0 = h^2 sum_k |grad_k C|^2
+    stiffest_mode: float  # largest eigenvalue of the Jacobi matrix D^-1 grad C grad C^T
 
 
 @functools.cache
@@ -143,9 +145,18 @@ def rest_lattice(name: str, dim: int, ratio: float) -> RestLattice:
     density_kernel, gradient_kernel = NAMES[name]
     density_scale = 1.0 / _lattice_sum(density_kernel, dim, ratio)
     gradient_scale = density_scale * sigma(gradient_kernel, dim) / sigma(density_kernel, dim)
-    _, slope = kernel_shape(gradient_kernel, np.linalg.norm(_lattice(dim, ratio), axis=1))
+    points = _lattice(dim, ratio)
+    distance = np.linalg.norm(points, axis=1)
+    _, slope = kernel_shape(gradient_kernel, distance)
     squares = float(np.sum((gradient_scale * slope) ** 2))
-    return RestLattice(density_scale, gradient_scale, squares)
+    # Plane waves exp(i k x) are the eigenvectors on a lattice; grad C is odd, so only sines stay. Waves along the axes
+    # and diagonals of the Brillouin zone hold the extremes.
+    waves = np.linspace(0.0, math.pi * ratio, 65)[:, None, None] * np.array(
+        [p for p in itertools.product((0.0, 0.5, 1.0), repeat=dim) if any(p)]
+    )
+    symbol = np.sin(waves.reshape(-1, dim) @ points.T) @ (points * (slope / distance)[:, None])
+    stiffest = float(np.max(np.sum(symbol**2, axis=1)) / np.sum(slope**2))
+    return RestLattice(density_scale, gradient_scale, squares, stiffest)
 
 
 @functools.cache

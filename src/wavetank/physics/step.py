@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 
-from wavetank.compiler import qd
 from wavetank.distance import SolidSet
 from wavetank.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids, mark_near_solids
@@ -21,7 +20,7 @@ from wavetank.physics.density_constraint import (
     solve_multipliers,
 )  # fmt: skip
 from wavetank.physics.friction import apply_friction
-from wavetank.physics.integrate import accept_positions, forget_predictions, predict, update_velocities
+from wavetank.physics.integrate import accept_positions, forget_predictions, largest_square, predict, update_velocities
 from wavetank.physics.neighbors import find_neighbors, sort_particles
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
 from wavetank.physics.viscosity import apply_viscosity
@@ -52,7 +51,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         world.particles, world.spare, world.scratch, world.grid, world.solids, world.walls,
     )  # fmt: skip
 
-    predict(now, c, count, qd.Vector([*params.gravity, 0.0, 0.0][:3]))  # 1-4
+    predict(now, c, count, np.array([*params.gravity, 0.0][:3], np.float32))  # 1-4
     mark_near_solids(now, solids, c, count)
     keep_out_of_solids(now, solids, c, count)
 
@@ -62,7 +61,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
 
     clear_multipliers(scratch, count)
     tensile = int(params.tensile_strength > 0.0)
-    for relaxation, momentum in schedule(params.iterations, params.relaxation, params.slowest_mode):  # 8-19
+    for relaxation, momentum in relaxations(params):  # 8-19
         c = dataclasses.replace(c, relaxation=relaxation, momentum=momentum)
         solve_multipliers(scratch, now, grid, solids, walls, c, count, method)  # 9-11
         correct_positions(spare, now, scratch, grid, solids, walls, c, count, method, tensile)  # 12-18
@@ -94,6 +93,24 @@ def update_densities(world: World, params: Parameters) -> None:
     measure_density(
         world.scratch, world.particles, world.grid, world.solids, world.walls, c, count, params.rest_density, method
     )
+
+
+DISORDER = {
+    2: 0.75,
+    3: 0.35,
+}  # by how much water in motion exceeds the stiffest mode of its rest lattice, measured (docs/method.md)
+
+
+def relaxations(params: Parameters) -> list[tuple[float, float]]:
+    """Return (relaxation, momentum) of each iteration; fewer iterations have to damp a narrower range of modes."""
+    rest = rest_lattice(params.kernel, params.dim, params.support)
+    stiffest = (rest.stiffest_mode + DISORDER[params.dim]) / params.relaxation
+    return schedule(params.iterations, 4.0 * params.slowest_mode / params.iterations, stiffest)
+
+
+def largest_speed(world: World) -> float:
+    """Return the largest speed [m/s] of all particles."""
+    return math.sqrt(float(np.int32(largest_square(world.particles, world.count)).view(np.float32)))
 
 
 def method_number(params: Parameters) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 
 from wavetank.errors import WavetankError
 from wavetank.view.extent import Extent, extent_of
-from wavetank.view.lens import Lens, lens_at
+from wavetank.view.lens import Lens, basis, lens_at
 
 Point = tuple[float, float, float]
 
@@ -60,11 +60,8 @@ class Camera:
 
     def lens(self, width: int, height: int) -> Lens:
         """Return this camera on the device for a picture of that many pixels."""
-        eye, target = np.array(self.eye), np.array(self.target)
-        # A pixel is square: the height alone sets the scale.
-        view = self.height or 2.0 * math.tan(0.5 * self.field_of_view)
         return lens_at(
-            eye, (target - eye) / self.distance, np.array(self.up), width, height, height / view,
+            np.array(self.eye), self._axes, width, height, self._focal(height),
             perspective=self.height is None, near=self.near,
         )  # fmt: skip
 
@@ -88,26 +85,23 @@ class Camera:
 
     def pan(self, right: float, up: float) -> "Camera":
         """Move eye and target by these shares of the visible height."""
-        lens = self.lens(1, 1)
-        shift = self.visible_height * (right * _host(lens.right) + up * _host(lens.up))
+        shift = self.visible_height * (np.array([right, up, 0.0]) @ self._axes)
         return dataclasses.replace(self, eye=_point(np.add(self.eye, shift)), target=_point(np.add(self.target, shift)))
 
     def ray(self, column: float, row: float, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         """Return origin [m] and unit direction of the ray through a place in a picture of `width` x `height` px."""
-        lens = self.lens(width, height)
-        u, v = (column - 0.5 * width) / lens.focal, (0.5 * height - row) / lens.focal
-        across = u * _host(lens.right) + v * _host(lens.up)
+        u, v = (np.array([column, row]) - [0.5 * width, 0.5 * height]) / self._focal(height)
+        across, forward = np.array([u, -v, 0.0]) @ self._axes, self._axes[2]
         if self.height is not None:
-            return np.add(self.eye, across), _host(lens.forward)
-        direction = _host(lens.forward) + across
+            return np.add(self.eye, across), forward
+        direction = forward + across
         return np.array(self.eye), direction / np.linalg.norm(direction)
 
     def project(self, points: Any, width: int, height: int) -> np.ndarray:
         """Return column and row [px] and depth [m] of `points` [n, 3], shape [n, 3]; NaN pixels behind the eye."""
-        lens = self.lens(width, height)
-        c = (np.atleast_2d(points) - self.eye) @ np.stack([_host(lens.right), _host(lens.up), _host(lens.forward)]).T
+        c = (np.atleast_2d(points) - self.eye) @ self._axes.T
         with np.errstate(divide="ignore", invalid="ignore"):
-            scale = lens.focal * (1.0 if self.height else np.where(c[:, 2] > 0.0, 1.0 / c[:, 2], np.nan))
+            scale = self._focal(height) * (1.0 if self.height else np.where(c[:, 2] > 0.0, 1.0 / c[:, 2], np.nan))
         return np.stack([0.5 * width + scale * c[:, 0], 0.5 * height - scale * c[:, 1], c[:, 2]], axis=1)
 
     @classmethod
@@ -121,6 +115,15 @@ class Camera:
         if extent.dim == 2:
             return _front(cls, extent, aspect)
         return _three_quarter(cls, extent, aspect)
+
+    @property
+    def _axes(self) -> np.ndarray:
+        """Unit vectors (right, up, forward), [3, 3]."""
+        return basis(np.subtract(self.target, self.eye), np.array(self.up))
+
+    def _focal(self, height: int) -> float:
+        """Pixels per unit of the picture plane; pixels are square, so the height alone sets it."""
+        return height / (self.height or 2.0 * math.tan(0.5 * self.field_of_view))
 
     def _looking_from(self, azimuth: float, elevation: float, distance: float) -> "Camera":
         return dataclasses.replace(self, eye=_point(np.add(self.target, distance * _direction(azimuth, elevation))))
@@ -142,8 +145,7 @@ def _three_quarter(kind: type[Camera], extent: Extent, aspect: float) -> Camera:
     margin = 1.12
     target, toward = extent.middle.copy(), _direction(FRAMING_AZIMUTH, FRAMING_ELEVATION)
     camera = kind(eye=_point(target + toward), target=_point(target))
-    lens = camera.lens(1, 1)
-    right, up = _host(lens.right), _host(lens.up)
+    right, up, _ = camera._axes
     steep = math.tan(0.5 * camera.field_of_view) / margin
     for _ in range(5):
         offset = extent.corners - target
@@ -160,10 +162,6 @@ def _three_quarter(kind: type[Camera], extent: Extent, aspect: float) -> Camera:
 def _direction(azimuth: float, elevation: float) -> np.ndarray:
     flat = math.cos(elevation)
     return np.array([flat * math.sin(azimuth), math.sin(elevation), flat * math.cos(azimuth)])
-
-
-def _host(vector: Any) -> np.ndarray:
-    return np.array([float(vector[k]) for k in range(3)])
 
 
 def _point(values: Sequence[float] | np.ndarray) -> Point:

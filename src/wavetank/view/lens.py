@@ -36,21 +36,32 @@ class Lens:
     near: qd.f32  # m: nothing nearer is drawn
 
 
-def lens_at(
-    eye: np.ndarray, forward: np.ndarray, up: np.ndarray, width: int, height: int, focal: float,
-    *, perspective: bool, near: float,
-) -> Lens:  # fmt: skip
-    """Return the lens of a picture of `width` x `height` pixels; `forward` is unit, `up` need not be normal to it."""
-    right = np.cross(forward, up)
+def vector(*parts: float) -> np.ndarray:
+    """Return a vector as a kernel argument: a numpy array, with which the compiler's cache knows the call again."""
+    return np.array(parts, np.float32)
+
+
+def basis(forward: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """Return the unit vectors (right, up, forward) of an eye, float64 [3, 3]; `up` need not be normal to `forward`."""
+    ahead = np.asarray(forward, float) / np.linalg.norm(forward)
+    right = np.cross(ahead, np.asarray(up, float) / np.linalg.norm(up))
     if np.linalg.norm(right) < 1e-6:  # looking along `up`: any right will do
-        right = np.cross(forward, [0.0, 0.0, -1.0] if abs(forward[2]) < 0.9 else [0.0, 1.0, 0.0])
-    right = right / np.linalg.norm(right)
+        right = np.cross(ahead, [0.0, 0.0, -1.0] if abs(ahead[2]) < 0.9 else [0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(right, ahead), ahead])
+
+
+def lens_at(
+    eye: np.ndarray, axes: np.ndarray, width: int, height: int, focal: float, *, perspective: bool, near: float
+) -> Lens:
+    """Return the lens at `eye` [m] with the `basis` `axes` for a picture of `width` x `height` pixels."""
+    right, up, forward = axes
     return Lens(
-        eye=vec3(*map(float, eye)),
-        right=vec3(*map(float, right)),
-        up=vec3(*map(float, np.cross(right, forward))),
-        forward=vec3(*map(float, forward)),
-        middle=vec2(0.5 * width, 0.5 * height),
+        eye=vector(*eye),
+        right=vector(*right),
+        up=vector(*up),
+        forward=vector(*forward),
+        middle=vector(0.5 * width, 0.5 * height),
         focal=float(focal),
         pixel=1.0 / float(focal),
         perspective=float(perspective),

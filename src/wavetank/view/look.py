@@ -9,7 +9,7 @@ import numpy as np
 
 from wavetank.compiler import qd
 from wavetank.view.colormaps import rgb_of, to_linear
-from wavetank.view.lens import vec3
+from wavetank.view.lens import vec3, vector
 
 
 @dataclasses.dataclass
@@ -38,9 +38,9 @@ def studio() -> Look:
     """Neutral light studio with a warm sun from behind the left shoulder: worlds in space."""
     return Look(
         to_sun=_unit(-0.72, 1.0, 0.08),
-        sun=vec3(0.97, 0.935, 0.89),
-        sky=vec3(0.44, 0.47, 0.51),
-        ground=vec3(0.30, 0.295, 0.285),
+        sun=vector(0.97, 0.935, 0.89),
+        sky=vector(0.44, 0.47, 0.51),
+        ground=vector(0.30, 0.295, 0.285),
         horizon=_linear("#dbe1e6"),
         zenith=_linear("#a3b1bd"),
         floor=_linear("#dadcdd"),
@@ -60,11 +60,11 @@ def paper() -> Look:
     """Even light on white paper: worlds in the plane."""
     return Look(
         to_sun=_unit(-0.35, 0.55, 1.0),
-        sun=vec3(0.36, 0.36, 0.36),
-        sky=vec3(0.72, 0.72, 0.72),
-        ground=vec3(0.52, 0.52, 0.54),
-        horizon=vec3(2.5, 2.5, 2.5),  # the tone mapper makes it white
-        zenith=vec3(2.5, 2.5, 2.5),
+        sun=vector(0.36, 0.36, 0.36),
+        sky=vector(0.72, 0.72, 0.72),
+        ground=vector(0.52, 0.52, 0.54),
+        horizon=vector(2.5, 2.5, 2.5),  # the tone mapper makes it white
+        zenith=vector(2.5, 2.5, 2.5),
         floor=_linear("#ffffff"),
         solid=_linear("#cda587"),
         line=_linear("#3c444b"),
@@ -78,9 +78,9 @@ def paper() -> Look:
     )
 
 
-def _linear(color: str) -> vec3:
-    return vec3(*(float(part) for part in to_linear(np.array(rgb_of(color)))))
+def _linear(color: str) -> np.ndarray:
+    return vector(*to_linear(np.array(rgb_of(color))))
 
 
-def _unit(x: float, y: float, z: float) -> vec3:
-    return vec3(*(float(part) for part in np.array([x, y, z]) / np.linalg.norm([x, y, z])))
+def _unit(x: float, y: float, z: float) -> np.ndarray:
+    return vector(x, y, z) / np.linalg.norm([x, y, z]).astype(np.float32)

@@ -1,11 +1,12 @@
 """What particles can be coloured by: one device function and one entry in `QUANTITIES` each.
 
-The device functions take what the frame knows of one particle; kernels choose one by its index in
+The device functions take what the frame knows of one particle; kernels choose one by its key in
 `DEVICE_FUNCTIONS` at compile time.
 """
 
 import dataclasses
 import math
+import zlib
 from collections.abc import Callable
 from typing import Any
 
@@ -60,7 +61,18 @@ QUANTITIES: dict[str, Quantity] = {
     "speed": Quantity(speed, "m/s", "water", _speed_limits),
     "density": Quantity(density, "kg/m^3", "balance", _density_limits),
 }
-DEVICE_FUNCTIONS = (nothing, *(quantity.value for quantity in QUANTITIES.values()))
+
+
+def key_of(name: str) -> int:
+    """Key of a quantity in `DEVICE_FUNCTIONS`, 0 for what is none.
+
+    Made from the name, not from the place in the list: the compiler's cache keeps kernels by key, and a new entry
+    must not make it serve the kernel of another.
+    """
+    return zlib.crc32(name.encode()) & 0x7FFFFFFF if name in QUANTITIES else 0
+
+
+DEVICE_FUNCTIONS = {0: nothing, **{key_of(name): quantity.value for name, quantity in QUANTITIES.items()}}
 
 
 def _round_up(value: float) -> float:

@@ -15,10 +15,10 @@ from wavetank.view.buffers import allocate
 from wavetank.view.camera import Camera
 from wavetank.view.colormaps import ENTRIES, rgb_of, table, to_linear
 from wavetank.view.extent import Extent, extent_of
-from wavetank.view.lens import Lens, lens_at, vec3
+from wavetank.view.lens import Lens, basis, lens_at, vec3
 from wavetank.view.look import paper, studio
 from wavetank.view.passes import floor, occlusion, shade, shadow, smooth, solids, spheres, tank, tonemap
-from wavetank.view.quantities import QUANTITIES
+from wavetank.view.quantities import QUANTITIES, key_of
 from wavetank.view.shot import Shot
 
 #: The picture from top to bottom: what is where, what light reaches it, how it looks, what lies over it.
@@ -116,7 +116,7 @@ class Renderer:
     def _coloring(
         self, frame: Frame, color_by: str, colormap: str | None, limits: tuple[float, float] | None
     ) -> tuple[int, tuple[float, float]]:
-        """Index and limits of the quantity; puts its colours on the device."""
+        """Key and limits of the quantity; puts its colours on the device."""
         if color_by not in QUANTITIES:
             if not str(color_by).startswith("#"):
                 raise WavetankError(
@@ -134,7 +134,7 @@ class Renderer:
             low = high = math.nan
         if not (math.isfinite(low) and math.isfinite(high) and high - low > 1e-30):
             raise WavetankError(f"render: limits = {limits} must be two finite numbers, the lower one first.")
-        return 1 + list(QUANTITIES).index(color_by), (low, high)
+        return key_of(color_by), (low, high)
 
     def _load_colors(self, name: str, colors: np.ndarray) -> None:
         if name != self._colors_name:
@@ -149,12 +149,10 @@ def _look(dim: int) -> Any:
 
 def _sun_lens(extent: Extent, to_sun: Any, texels: int) -> Lens:
     """An orthographic view of the extent from the sun, with room for what splashes out of it."""
-    toward = np.array([float(part) for part in to_sun])
+    axes = basis(-to_sun, np.array([0.0, 0.0, -1.0]))
     reach = 1.15 * extent.radius
-    return lens_at(
-        extent.middle + 10.0 * reach * toward, -toward, np.array([0.0, 0.0, -1.0]), texels, texels,
-        0.5 * texels / reach, perspective=False, near=1e-6,
-    )  # fmt: skip
+    eye = extent.middle - 10.0 * reach * axes[2]
+    return lens_at(eye, axes, texels, texels, 0.5 * texels / reach, perspective=False, near=1e-6)
 
 
 _kept: collections.OrderedDict[tuple[int, int, int], Renderer] = collections.OrderedDict()

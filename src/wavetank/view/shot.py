@@ -19,6 +19,6 @@ class Shot:
     sun: Lens  # looks at the extent from the sun
     look: Look
     radius: float  # m, of a drawn particle
-    quantity: int  # index into `quantities.DEVICE_FUNCTIONS`
+    quantity: int  # key in `quantities.DEVICE_FUNCTIONS`
     limits: tuple[float, float]  # of the quantity: first and last colour
     colors: Any  # device ndarray of vec3 [entries]: the colour map as linear RGB

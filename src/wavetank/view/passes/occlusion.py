@@ -12,15 +12,15 @@ with the probes of `probes.py`.
 
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, from_view, pixels_per_metre, point_at, vec3
-from wavetank.view.passes.probes import SPIRAL, pattern_turn, turned
+from wavetank.view.lens import Lens, from_view, pixels_per_metre, point_at, vec3, vector
+from wavetank.view.passes.probes import pattern_turn, spiral, turned
 from wavetank.view.shot import Shot
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill the second component of `light`."""
     reach = max(5.0 * shot.radius, 0.05 * shot.extent.radius)
-    lower, upper = (vec3(*map(float, corner)) for corner in (shot.extent.lower, shot.extent.upper))
+    lower, upper = vector(*shot.extent.lower), vector(*shot.extent.upper)
     look_around(
         shot.lens, lower, upper, reach, shot.look.shade_depth, buffers.probes, buffers.depth, buffers.surface,
         buffers.normal, buffers.light,
@@ -50,7 +50,7 @@ def look_around(
             turn = pattern_turn(row, column)
             hidden = 0.0
             for k in qd.static(range(probes)):
-                offset = spread * turned(turn, SPIRAL[probes][k])
+                offset = spread * turned(turn, spiral(k, probes))
                 r = qd.min(qd.max(qd.cast(row + 0.5 + offset.y, qd.i32), 0), rows - 1)
                 c = qd.min(qd.max(qd.cast(column + 0.5 + offset.x, qd.i32), 0), columns - 1)
                 v = point_at(lens, r, c, qd.min(qd.bit_cast(depth[r, c], qd.f32), 1e4)) - at

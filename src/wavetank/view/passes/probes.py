@@ -9,17 +9,18 @@ import math
 from wavetank.compiler import qd
 from wavetank.view.lens import vec2
 
-_GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 
+@qd.func
+def spiral(k: qd.template(), count: qd.template()):
+    """Point `k` of `count` evenly spread over the unit disc.
 
-def _spiral(count: int) -> tuple[tuple[float, float], ...]:
-    """Points evenly spread over the unit disc (H. Vogel, "A better way to construct the sunflower head", 1979)."""
-    polar = [(math.sqrt((k + 0.5) / count), _GOLDEN_ANGLE * k) for k in range(count)]
-    return tuple((r * math.cos(angle), r * math.sin(angle)) for r, angle in polar)
-
-
-#: SPIRAL[n]: n points of the unit disc
-SPIRAL = tuple(_spiral(count) for count in range(17))
+    H. Vogel, "A better way to construct the sunflower head" (1979). A constant of the kernel, worked out here rather
+    than in a table, because the compiler's cache sees functions but no tables.
+    """
+    return vec2(
+        qd.static(math.sqrt((k + 0.5) / count) * math.cos(2.3999632297 * k)),
+        qd.static(math.sqrt((k + 0.5) / count) * math.sin(2.3999632297 * k)),
+    )
 
 
 @qd.func
@@ -43,6 +44,6 @@ def pattern_turn(row, column):
 
 
 @qd.func
-def turned(turn, point: qd.template()):
+def turned(turn, point):
     """Point (x, y) turned by (cos, sin)."""
-    return vec2(turn.x * point[0] - turn.y * point[1], turn.y * point[0] + turn.x * point[1])
+    return vec2(turn.x * point.x - turn.y * point.y, turn.y * point.x + turn.x * point.y)

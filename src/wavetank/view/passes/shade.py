@@ -9,7 +9,7 @@ far                share of the background in what is far away             1
 
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, ray_direction, ray_origin, vec3, view_ray
+from wavetank.view.lens import Lens, ray_direction, ray_origin, vec3, vector, view_ray
 from wavetank.view.look import Look
 from wavetank.view.shot import Shot
 
@@ -18,7 +18,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     """Turn `color` into radiance."""
     middle = shot.extent.middle
     light(
-        shot.lens, shot.look, vec3(float(middle[0]), 0.0, float(middle[2])), shot.extent.radius, buffers.depth,
+        shot.lens, shot.look, vector(middle[0], 0.0, middle[2]), shot.extent.radius, buffers.depth,
         buffers.surface, buffers.normal, buffers.light, buffers.color,
     )  # fmt: skip
 

@@ -16,7 +16,7 @@ from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec2, vec3
 from wavetank.view.passes import solids, spheres
-from wavetank.view.passes.probes import SPIRAL, pattern_turn, turned
+from wavetank.view.passes.probes import pattern_turn, spiral, turned
 from wavetank.view.shot import Shot
 
 
@@ -86,7 +86,7 @@ def sun_share(sun: Lens, sun_size, wide, probes: qd.template(), depth, place, tu
     """Share 0 to 1 of the sun that is seen from a point at `depth` that the map shows at `place`."""
     below, casters = 0.0, 0
     for k in qd.static(range(5)):
-        gap = gap_at(sun_depth, place + wide * turned(turn, SPIRAL[5][k]), depth)
+        gap = gap_at(sun_depth, place + wide * turned(turn, spiral(k, 5)), depth)
         if gap > 0.0:
             below += gap
             casters += 1
@@ -96,6 +96,6 @@ def sun_share(sun: Lens, sun_size, wide, probes: qd.template(), depth, place, tu
     elif casters > 0:
         spread = qd.min(qd.max(sun_size * below / casters * sun.focal, 1.0), wide)
         for k in qd.static(range(probes)):
-            if gap_at(sun_depth, place + spread * turned(turn, SPIRAL[probes][k]), depth) > 0.0:
+            if gap_at(sun_depth, place + spread * turned(turn, spiral(k, probes)), depth) > 0.0:
                 share -= 1.0 / probes
     return qd.max(share, 0.0)

@@ -16,7 +16,7 @@ import dataclasses
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, signed_distance
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, view_ray
+from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, vector, view_ray
 from wavetank.view.shot import Shot
 
 UNBOUNDED = 1e4  # m
@@ -52,10 +52,10 @@ def window(shot: Shot) -> Window:
     if shot.frame.scene.tank is not None:
         lower, upper = list(map(float, shot.extent.lower)), list(map(float, shot.extent.upper))
     return Window(
-        lower=vec3(*(-w for w in wide)),
-        upper=vec3(*wide),
-        lower_endless=vec3(*lower),
-        upper_endless=vec3(*upper),
+        lower=vector(*(-w for w in wide)),
+        upper=vector(*wide),
+        lower_endless=vector(*lower),
+        upper_endless=vector(*upper),
         raised=shot.radius if flat else 0.0,
     )
 

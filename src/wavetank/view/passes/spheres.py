@@ -33,8 +33,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     claim(frame.x, frame.count, shot.radius, shot.lens, largest, buffers.depth, buffers.surface)
     low, high = shot.limits
     paint(
-        frame.x, frame.v, frame.rho, shot.radius, shot.lens, largest, shot.quantity, low, 1.0 / (high - low),
-        shot.colors, buffers.depth, buffers.surface, buffers.normal, buffers.color,
+        frame.x, frame.v, frame.rho, shot.lens, shot.quantity, low, 1.0 / (high - low), shot.colors,
+        buffers.depth, buffers.surface, buffers.normal, buffers.color,
     )  # fmt: skip
 
 
@@ -98,8 +98,8 @@ def claim(
 
 @qd.kernel(fastcache=True)
 def paint(
-    x: qd.types.ndarray(), v: qd.types.ndarray(), rho: qd.types.ndarray(), radius: qd.f32, lens: Lens,
-    largest: qd.f32, quantity: qd.template(), low: qd.f32, scale: qd.f32, colors: qd.types.ndarray(),
+    x: qd.types.ndarray(), v: qd.types.ndarray(), rho: qd.types.ndarray(), lens: Lens, quantity: qd.template(),
+    low: qd.f32, scale: qd.f32, colors: qd.types.ndarray(),
     depth: qd.types.ndarray(), surface: qd.types.ndarray(), normal: qd.types.ndarray(), color: qd.types.ndarray(),
 ):  # fmt: skip
     """Give every pixel of a particle its normal and the colour of its quantity."""

@@ -11,7 +11,7 @@ across the line with how much of them it covers. Marks are integers and the larg
 
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, view_ray
+from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, vector, view_ray
 from wavetank.view.look import Look
 from wavetank.view.passes.solids import box_interval
 from wavetank.view.shot import Shot
@@ -21,7 +21,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     """Draw the tank over the picture, if the world has one."""
     if shot.frame.scene.tank is None:
         return
-    lower, upper = (vec3(*map(float, corner)) for corner in (shot.extent.lower, shot.extent.upper))
+    lower, upper = vector(*shot.extent.lower), vector(*shot.extent.upper)
     width = max(1.0, buffers.rows / 420.0)
     edges = 12 if shot.frame.dim == 3 else 4
     erase(buffers.lines)
