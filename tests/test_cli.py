@@ -101,6 +101,8 @@ def test_ctrl_c_finishes_the_files(tmp_path):
         [sys.executable, "-m", "wavetank", "run", "drop-2d", "--seconds", "1000", "--size", "96x64", "--video",
          "--out", str(tmp_path), "--json"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        # A test run in the background of a shell ignores interrupts, and children inherit that.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
     deadline = time.time() + 120
     while time.time() < deadline and not any(p.stat().st_size for p in tmp_path.glob("*partial*")):

@@ -3,8 +3,10 @@
 import itertools
 import json
 import math
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -103,7 +105,7 @@ def _loop(
     )  # fmt: skip
     with progress:
         task = progress.add_task("wavetank", total=seconds or 1.0, time=sim.time, fps=0.0, count=sim.count, error=0.0)
-        try:
+        with _interruptible() as interrupted:
             for number, frame in enumerate(sim.frames(seconds, fps)):
                 image = renderer.render(frame, **look) if renderer is not None else None
                 for sink in sinks:
@@ -115,8 +117,30 @@ def _loop(
                     task, completed=sim.time - summary.begin, time=sim.time, fps=speed, count=sim.count,
                     error=summary.last["density_error_mean"],
                 )  # fmt: skip
-        except KeyboardInterrupt:
-            summary.interrupted = True
+                if interrupted.is_set():
+                    summary.interrupted = True
+                    break
+
+
+@contextmanager
+def _interruptible() -> Iterator[threading.Event]:
+    """Turn the first Ctrl-C into an event, so that the frame at hand is finished; a second one stops at once."""
+    event = threading.Event()
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before is signal.SIG_IGN:
+        yield event
+        return
+
+    def note(number: int, frame: Any) -> None:
+        if event.is_set():
+            raise KeyboardInterrupt
+        event.set()
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield event
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class _Summary:
