@@ -52,7 +52,8 @@ def test_free_fall_is_exact(dim):
     g = (0.5, -9.81, 1.0)[:dim]
     sim = Simulation(wt.Scene(spacing=0.1, gravity=g, fluids=[wt.Points(positions=[(0.0,) * dim])]))
     sim.advance(1.0)
-    n, dt = 240, 1 / 240
+    n = 60 * sim.substeps
+    dt = 1 / n
     np.testing.assert_allclose(sim.velocities[0], np.array(g) * n * dt, rtol=2e-6)
     np.testing.assert_allclose(sim.positions[0], np.array(g) * dt**2 * n * (n + 1) / 2, rtol=2e-5)
 

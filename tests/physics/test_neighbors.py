@@ -25,7 +25,7 @@ def neighbor_sets(sim: Simulation) -> list[set[int]]:
 
 def check(x: np.ndarray, spacing: float, tank=None) -> None:
     sim = Simulation(wt.Scene(spacing=spacing, tank=tank, fluids=[wt.Points(positions=x)], gravity=(0.0,) * x.shape[1]))
-    h = 2.0 * spacing
+    h = sim.scene.support * spacing
     tree = cKDTree(x.astype(np.float64))
     inside, outside = tree.query_ball_point(x, h * (1 - 1e-6)), tree.query_ball_point(x, h * (1 + 1e-6))
     for i, found in enumerate(neighbor_sets(sim)):

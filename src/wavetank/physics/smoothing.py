@@ -23,6 +23,7 @@ import numpy as np
 
 from wavetank.compiler import qd
 
+WALL_STIFFENING = 0.5  # by how much a wall's layers move with a particle half a spacing away; see `half_space`
 TABLE_SIZE = 256  # samples of the half-space integrals over s/h in [-1, 1]
 
 
@@ -176,12 +177,16 @@ def half_space(name: str, dim: int, ratio: float, s: np.ndarray) -> np.ndarray:
     """Return the share of rho_0 that a wall at the distance s h contributes: half a rest lattice that ends there.
 
     Its layers stand at s + d/2, s + 3d/2, ... from the particle, in register with it, so that half a spacing from
-    the wall the sum is that of the rest lattice to the last digit, and so is its gradient. The integral of W over the
-    half-space (`half_space_integral`) has neither property, because the lattice sum of a pointed kernel such as Spiky
-    is far from its integral.
+    the wall the sum is that of the rest lattice to the last digit. The integral of W over the half-space
+    (`half_space_integral`) does not do that, because the lattice sum of a pointed kernel such as Spiky is far from it.
+
+    In the bulk a pair pushes with both multipliers, at a wall there is only the particle's own. Layers that kept their
+    place in the wall would push with half the force, and particles would settle on the wall. Layers that mirrored the
+    particle would balance it, and are too stiff for the solver. These move half as far: WALL_STIFFENING is measured
+    (docs/method.md).
     """
     layers = np.arange(int(ratio) + 2)
-    depth = s[:, None] + (layers + 0.5) / ratio
+    depth = (s + WALL_STIFFENING / ratio * _tooth(s * ratio - 0.5))[:, None] + (layers + 0.5) / ratio
     # Closer than half a spacing behind the wall, the particle has passed the first layer; the sum stays at its peak.
     depth = np.maximum(depth, 0.0)
     plane = _lattice(dim, ratio)
@@ -189,6 +194,11 @@ def half_space(name: str, dim: int, ratio: float, s: np.ndarray) -> np.ndarray:
     away = np.sqrt(depth[:, :, None] ** 2 + np.sum(plane**2, axis=1))
     w, _ = kernel_shape(NAMES[name][0], away)
     return w.sum(axis=(1, 2)) / _lattice_sum(NAMES[name][0], dim, ratio)
+
+
+def _tooth(x: np.ndarray) -> np.ndarray:
+    """Return x around zero, back to zero at -1 and 1, and zero beyond."""
+    return np.where(np.abs(x) < 0.5, x, np.sign(x) * np.maximum(1.0 - np.abs(x), 0.0))
 
 
 def half_space_integral(name: str, dim: int, s: float) -> float:
