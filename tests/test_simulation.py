@@ -178,3 +178,14 @@ def test_a_back_end_that_is_not_there_is_an_error():
     assert "arch = 'metal' cannot be started on this machine; available:" in result.stderr
     with pytest.raises(wt.WavetankError, match="'opengl' is not a back end; use one of cpu"):
         Simulation(small(), arch="opengl")
+
+
+def test_odd_time_steps_do_not_shake_the_water():
+    """Still water sampled at any rate stays still: a tiny step must not turn density error into velocity."""
+    for fps in (59.999, 60.001, 97.0, 1000.0, 20000.0):
+        sim = Simulation(wt.Scene.load("still-tank-2d").changed(spacing=0.05, viscosity=0.3))
+        sim.advance(1.0)
+        for _ in sim.frames(0.25, fps):
+            pass
+        assert sim.time == pytest.approx(1.25, abs=0.01)
+        assert sim.stats()["speed_rms"] < 0.03, fps
