@@ -101,6 +101,28 @@ def converge(
 
 
 @app.command()
+def validate(
+    cases: Annotated[list[str], typer.Argument(metavar="[CASE]...", help="Names of cases; all without a name.")] = [],  # noqa: B006
+    quick: Annotated[bool, typer.Option("--quick", help="Coarser and shorter runs with bounds of their own.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for a picture and a table of each case.")] = None,
+    arch: Arch = "cpu",
+    as_json: Json = False,
+) -> None:
+    """Compare with measurements and exact solutions; exit code 1 if a figure is out of its bounds."""
+    from wavetank.lab.validate import out_of_bounds, table
+    from wavetank.lab.validate import validate as compare
+
+    result = compare(cases, quick=quick, out=out, arch=arch, console=console)
+    if as_json:
+        print(json.dumps(result))
+    else:
+        Console(width=None if sys.stdout.isatty() else 150).print(table(result))
+    if wrong := out_of_bounds(result):
+        total = result["passed"] + result["failed"]
+        raise WavetankError(f"{len(wrong)} of {total} figures are out of their bounds: {'; '.join(wrong)}.")
+
+
+@app.command()
 def doctor(as_json: Json = False) -> None:
     """Say what is installed, which back ends work, and how to get what is missing."""
     from wavetank.lab.doctor import examine

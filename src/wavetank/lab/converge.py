@@ -14,6 +14,7 @@ from typing import Any
 from rich.console import Console
 
 from wavetank.errors import WavetankError
+from wavetank.lab.plots import BLUE, RED, pyplot, tidy
 from wavetank.params import PAPER_SPACING
 from wavetank.scene import Scene
 from wavetank.simulation import Simulation
@@ -42,7 +43,7 @@ def converge(
         raise WavetankError(f"--seconds = {seconds} is not allowed; it must be a number above 0, at most 60.")
     if not 1 <= iterations <= 100:
         raise WavetankError(f"--iterations = {iterations} is not allowed; it must be a whole number from 1 to 100.")
-    pyplot = _pyplot()
+    plt = pyplot()
     out.mkdir(parents=True, exist_ok=True)
     say: Callable[[str], None] = console.print if console is not None else lambda text: None
     within: list[Row] = []
@@ -56,7 +57,7 @@ def converge(
     files = [out / "converge.csv", out / "converge-steps.csv", out / "converge.png"]
     _write(files[0], within)
     _write(files[1], along)
-    _plot(pyplot, files[2], within, along, scene.title)
+    _plot(plt, files[2], within, along, scene.title)
     return {
         "files": [str(path) for path in files],
         "within_a_step": {preset: [row for row in within if row["preset"] == preset][-1] for preset in PRESETS},
@@ -117,20 +118,9 @@ def _write(path: Path, rows: list[Row]) -> None:
         writer.writerows(rows)
 
 
-def _pyplot() -> Any:
-    try:
-        import matplotlib
-    except ImportError:
-        raise WavetankError("plots need matplotlib; install it with `pip install wavetank[plot]`.") from None
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    return pyplot
-
-
-def _plot(pyplot: Any, path: Path, within: list[Row], along: list[Row], title: str) -> None:
-    figure, axes = pyplot.subplots(2, 2, figsize=(10, 6.2), sharex="col", layout="constrained")
-    colors = {"paper": "#c8553d", "standard": "#1f6f8b"}
+def _plot(plt: Any, path: Path, within: list[Row], along: list[Row], title: str) -> None:
+    figure, axes = plt.subplots(2, 2, figsize=(10, 6.2), sharex="col", layout="constrained")
+    colors = {"paper": RED, "standard": BLUE}
     for column, (rows, place, label) in enumerate(
         ((within, "iteration", "iterations in one time step"), (along, "step", "time steps"))
     ):
@@ -142,12 +132,11 @@ def _plot(pyplot: Any, path: Path, within: list[Row], along: list[Row], title: s
                 axis.plot([r[place] for r in own], [r[key] for r in own], color=colors[preset], label=legend, lw=1.6)
             axis.set_ylabel(name)
             axis.xaxis.get_major_locator().set_params(integer=True)
-            axis.grid(alpha=0.25)
-            axis.spines[["top", "right"]].set_visible(False)
+            tidy(axis)
         axes[1, column].set_xlabel(label)
     axes[0, 0].set_title("Within one time step, in mid-fall", fontsize=10)
     axes[0, 1].set_title("Along the run", fontsize=10)
     axes[0, 1].legend(frameon=False, fontsize=9)
     figure.suptitle(f"{title}: densities for a rest density of 3 (dashed)", fontsize=12)
     figure.savefig(path, dpi=110)
-    pyplot.close(figure)
+    plt.close(figure)

@@ -1,0 +1,65 @@
+"""Finer particles and shorter frames move the front of a dam by less and less: the numbers converge.
+
+The dam of `martin-moyce` in two dimensions at T = 2.5, for d, d / 1.5, d / 2.25 and for the frame time, its half and
+its quarter. The foremost particle belongs to a wedge that gets thinner with d; the front is therefore the place where
+the water is a / 20 thick, in columns a / 20 wide, whatever d, and the mean over T = 2.4 .. 2.6.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from wavetank.lab.cases.case import Case, Figure, Outcome, Series
+from wavetank.lab.cases.martin_moyce import GRAVITY, A, scene
+from wavetank.lab.plots import BLUE, RED, tidy
+from wavetank.scene import Scene
+from wavetank.simulation import Simulation
+
+RATE = math.sqrt(2.0 * GRAVITY / A)  # T per second
+
+
+def run(quick: bool, arch: str) -> Outcome:
+    """Run three spacings and three frame times (quick: coarser)."""
+    coarse = 12 if quick else 20
+    cells = [coarse, round(1.5 * coarse), round(2.25 * coarse)]
+    by_space = [late_front(scene(n, 2), arch) for n in cells]
+    frame_times = [1 / 60, 1 / 120, 1 / 240]
+    by_time = [late_front(scene(cells[1], 2, frame_time=t), arch) for t in frame_times]
+    space, time = np.abs(np.diff(by_space)), np.abs(np.diff(by_time))
+    figures = [
+        Figure("spacing: second step / first", float(space[1] / space[0]), "", None, 1.0, "< 1", "convergence"),
+        Figure("frame time: second step / first", float(time[1] / time[0]), "", None, 1.0, "< 1", "convergence"),
+        Figure("spacing: last step of the front", float(by_space[2] - by_space[1]), "a", reference="0"),
+        Figure("frame time: last step of the front", float(by_time[2] - by_time[1]), "a", reference="0"),
+    ]
+
+    def draw(plot: Any) -> None:
+        left, right = plot.subplots(1, 2, sharey=True)
+        left.plot([1 / n for n in cells], by_space, "o-", color=BLUE)
+        left.set(xlabel="spacing d / a", ylabel="front Z at T = 2.5", xlim=(0, None))
+        right.plot([1e3 * t for t in frame_times], by_time, "o-", color=RED)
+        right.set(xlabel="frame time [ms]", xlim=(0, None))
+        for axis in (left, right):
+            tidy(axis)
+
+    series: Series = {"cells": cells, "front_by_spacing": by_space, "frame_time": frame_times, "front_by_time": by_time}
+    return Outcome(figures, series, draw)
+
+
+def late_front(dam: Scene, arch: str) -> float:
+    """Return the mean place of the front, in units of a, over T = 2.4 .. 2.6."""
+    sim = Simulation(dam, arch)
+    sim.advance(2.4 / RATE)
+    return float(np.mean([thick_front(f.positions, dam.spacing) / A for f in sim.frames(0.2 / RATE, 960.0)]))
+
+
+def thick_front(x: np.ndarray, spacing: float) -> float:
+    """Return the place [m] where the thickness of the water falls below a / 20, interpolated between columns."""
+    width = thin = A / 20
+    thickness = np.append(np.bincount((x[:, 0] / width).astype(int)) * spacing**2 / width, 0.0)
+    k = max(1, int(np.flatnonzero(thickness < thin)[0]))
+    return width * float(k - 0.5 + (thickness[k - 1] - thin) / (thickness[k - 1] - thickness[k]))
+
+
+CASE = Case("resolution", "Finer particles, shorter frames", run)

@@ -1,0 +1,163 @@
+"""The experiments of `wavetank validate`: what they measure with, and the quick ones against their bounds."""
+
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from wavetank import Scene, WavetankError, cli
+from wavetank.lab import validate as room
+from wavetank.lab.cases import CASES
+from wavetank.lab.cases.case import Case, Figure, Outcome, measured, surface
+from wavetank.lab.cases.cup import holds, within
+from wavetank.lab.cases.cup import scene as cups
+from wavetank.lab.cases.elliptical_drop import hull_area
+from wavetank.lab.cases.martin_moyce import A, front
+from wavetank.lab.cases.seeds import world
+from wavetank.lab.cases.standing_wave import AMPLITUDE, DEPTH, LENGTH, PERIOD, K, displaced
+
+QUICK = ["still-tank", "column", "martin-moyce", "standing-wave", "elliptical-drop", "drop", "energy", "momentum",
+         "seeds"]  # fmt: skip
+
+
+#: Figures that do not reach their bounds yet (docs/method.md, "What is still open"), kept from getting worse.
+OPEN = {
+    "still-tank: level / filled": (0.975, 1.01),
+    "martin-moyce: front, rms error": (0.0, 14.0),
+    "standing-wave: period, error": (-8.0, 4.0),
+    "elliptical-drop: area at tau = 1, error": (-4.0, 60.0),
+    "momentum: drift of angular momentum": (0.0, 1.0),
+}
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_quick_case_is_within_its_bounds(name):
+    result = room.validate([name], quick=True)
+    assert [figure for figure in room.out_of_bounds(result) if figure not in OPEN] == []
+    for figure in result["cases"][name]["figures"]:
+        low, high = OPEN.get(f"{name}: {figure['name']}", (-math.inf, math.inf))
+        assert low <= figure["value"] <= high, figure["name"]
+
+
+def test_names_and_titles_are_unique():
+    assert len({case.name for case in CASES}) == len({case.title for case in CASES}) == len(CASES)
+
+
+def test_a_figure_passes_between_its_bounds_only():
+    assert Figure("x", 1.0, "", 0.0, 1.0).passed is True
+    assert Figure("x", np.float64(1.1), "", 0.0, 1.0).passed is False
+    assert Figure("x", -5.0, "", None, 1.0).passed is True
+    assert Figure("x", math.nan, "", None, 1.0).passed is False
+    assert Figure("x", math.inf, "", 0.0).passed is False
+    assert Figure("x", math.nan, "").passed is None
+    assert Figure("x", math.nan, "").as_dict()["value"] is None
+
+
+def test_tables_of_measurements():
+    table = measured("martin_moyce_n2_2_a225in_front_table2.csv")
+    assert table["T"][0] == 0.41
+    assert table["Z"][-1] == 4.11
+    assert measured("elliptical_drop_exact.csv")["b"][10] == 2.275516
+    assert np.all(np.diff(measured("martin_moyce_n2_2_a225in_height_table6.csv")["H"]) < 0)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_level_of_a_full_lattice(dim):
+    size = (1.0, 1.0, 0.4)[:dim]
+    d = 0.1
+    axes = [(np.arange(round(edge / d)) + 0.5) * d for edge in (size[0], 0.5, *size[2:])]
+    x = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, dim)
+    assert surface(x, d, size) == pytest.approx(np.full(5 ** (dim - 1) if dim == 2 else 10, 0.5))
+    empty = x[x[:, 0] > 0.2]
+    assert np.count_nonzero(surface(empty, d, size) == 0.0) == (1 if dim == 2 else 2)
+
+
+def test_front_of_connected_water():
+    d = A / 20
+    x = np.stack(np.meshgrid((np.arange(20) + 0.5) * d, (np.arange(40) + 0.5) * d), -1).reshape(-1, 2)
+    assert front(x, d, 1.0) == pytest.approx(A)
+    assert front(np.append(x, [[1.5 * A, 0.0]], axis=0), d, 1.0) == pytest.approx(A)
+    assert front(np.append(x, [[20.5 * d, 0.0]], axis=0), d, 1.0) == pytest.approx(A + d)
+
+
+def test_start_of_the_wave_keeps_its_area_and_has_the_amplitude():
+    d = 0.01
+    x = displaced(d)
+    assert x[:, 0].min() > 0
+    assert x[:, 0].max() < LENGTH
+    assert x[:, 1].min() > 0
+    amplitude = 2 / LENGTH * d * d * np.cos(K * x[:, 0]).sum()
+    assert amplitude == pytest.approx(AMPLITUDE, rel=0.01)
+    top = x.reshape(round(LENGTH / d), round(DEPTH / d), 2)[:, -1]
+    y = np.concatenate([top[:1, 1], top[:, 1], top[-1:, 1]])
+    height = np.trapezoid(y, np.concatenate([[0.0], top[:, 0], [LENGTH]])) / LENGTH
+    assert height + d / 2 == pytest.approx(DEPTH, abs=2e-4)
+    assert pytest.approx(1.6713, abs=1e-4) == PERIOD
+
+
+def test_area_of_a_hull():
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5], [0.5, 0]], float)
+    assert hull_area(square, 0.0) == pytest.approx(1.0)
+    assert hull_area(square, 0.1) == pytest.approx(1.0 + 0.4 + math.pi * 0.01)
+
+
+def test_cups_hold_all_their_water_at_the_start():
+    x = cups().particles()[0].astype(float)
+    assert holds(x, 0.0).sum(0).min() > 500
+    assert np.all(holds(x, 0.0).sum(1) == 1)
+    assert not within(x, 0.0).any()
+    assert within(np.array([[0.25 + 0.065, 0.1, 0.15], [0.25, 0.045, 0.15], [0.65, 0.1, 0.15 - 0.065]]), 0.0).all()
+    assert not within(np.array([[0.25 + 0.1, 0.1, 0.15], [0.25, 0.035, 0.15], [0.25, 0.1, 0.15]]), 0.0).any()
+
+
+def test_random_worlds_reach_what_they_promise():
+    worlds = [world(seed) for seed in range(100)]
+    assert min(min(w.tank.size) / w.spacing for w in worlds) < 3.5
+    assert max(np.linalg.norm(w.gravity) for w in worlds) > 90
+    assert all(0 < len(w.particles()[0]) < 5000 for w in worlds)
+    assert all(isinstance(w, Scene) for w in worlds)
+
+
+def test_unknown_case_is_one_sentence():
+    with pytest.raises(WavetankError, match=r"no case named 'soup'; cases are: still-tank, column, .*\."):
+        room.validate(["soup"])
+
+
+def invented(value: float) -> Case:
+    outcome = Outcome(
+        [Figure("depth", value, "m", None, 1.0, "0", "nobody"), Figure("colour", 2.0, "")],
+        {"time": [0.0, 1.0], "level": [3.0]},
+        lambda plot: plot.subplots().plot([0, 1]),
+    )
+    return Case("invented", "Invented", lambda quick, arch: outcome)
+
+
+@pytest.mark.parametrize(("value", "code"), [(0.5, 0), (1.5, 1), (math.nan, 1)])
+def test_command(value, code, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(room, "CASES", (invented(value),))
+    monkeypatch.setattr(sys, "argv", ["wavetank", "validate", "invented", "--json", "--out", str(tmp_path)])
+    with pytest.raises(SystemExit) as leave:
+        cli.main()
+    assert (leave.value.code or 0) == code
+    printed = capsys.readouterr()
+    result = json.loads(printed.out.strip().splitlines()[-1])
+    assert (result["passed"], result["failed"]) == (1 - code, code)
+    assert [f["pass"] for f in result["cases"]["invented"]["figures"]] == [not code, None]
+    lines = [line for line in printed.err.splitlines() if line.strip()]
+    assert len(lines) == code
+    if code:
+        assert "1 of 1 figures are out of their bounds: invented: depth." in lines[0]
+    assert (tmp_path / "invented" / "invented.csv").read_text().split() == ["time,level", "0.0,3.0", "1.0,"]
+    assert (tmp_path / "invented" / "invented.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_without_a_folder_nothing_is_written(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(room, "CASES", (invented(0.5),))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["wavetank", "validate"])
+    with pytest.raises(SystemExit):
+        cli.main()
+    assert "depth" in capsys.readouterr().out
+    assert not list(tmp_path.iterdir())
