@@ -11,7 +11,7 @@ from wavetank import compiler
 
 _PACKAGES = {
     "quadrants": "", "numpy": "", "pydantic": "", "typer": "", "rich": "", "pillow": "", "av": "", "tomli-w": "",
-    "matplotlib": "plots of `wavetank converge`: pip install wavetank[plot]",
+    "matplotlib": "plots of `wavetank converge` and `validate`: pip install wavetank[plot]",
 }  # fmt: skip
 
 
