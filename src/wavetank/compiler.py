@@ -17,17 +17,12 @@ with contextlib.redirect_stdout(io.StringIO()):
 
 from wavetank.errors import WavetankError
 
-__all__ = ["BACKENDS", "available_backends", "current_backend", "qd", "start", "synchronize", "vector"]
+__all__ = ["BACKENDS", "available_backends", "current_backend", "qd", "start", "synchronize"]
 
 #: Names a user may pass as ``arch``; ``gpu`` means the best one present.
 BACKENDS = ("cpu", "gpu", "cuda", "vulkan", "metal", "amdgpu")
 _GPU_ORDER = ("cuda", "metal", "amdgpu", "vulkan")
 _current: str | None = None
-
-
-def vector(dim: int, dtype: object = None) -> object:
-    """Return the device type of a vector with `dim` components (float32 unless told)."""
-    return qd.types.vector(dim, dtype or qd.f32)
 
 
 def available_backends() -> list[str]:

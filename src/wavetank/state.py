@@ -63,7 +63,6 @@ class Coefficients:
 
     dt: qd.f32  # s
     h: qd.f32  # m, support radius
-    d: qd.f32  # m, particle spacing
     density_scale: qd.f32  # see RestLattice
     gradient_scale: qd.f32  # 1/m
     eps: qd.f32  # 1/m^2, constraint force mixing

@@ -28,6 +28,8 @@ from wavetank.physics.vorticity import confine_vorticity, find_vorticity
 from wavetank.state import Coefficients, Grid, Particles, Scratch, Walls
 
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
+#: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; measured, docs/method.md.
+DISORDER = {2: 0.75, 3: 0.35}
 
 
 @dataclasses.dataclass
@@ -95,12 +97,6 @@ def update_densities(world: World, params: Parameters) -> None:
     )
 
 
-DISORDER = {
-    2: 0.75,
-    3: 0.35,
-}  # by how much water in motion exceeds the stiffest mode of its rest lattice, measured (docs/method.md)
-
-
 def relaxations(params: Parameters) -> list[tuple[float, float]]:
     """Return (relaxation, momentum) of each iteration; fewer iterations have to damp a narrower range of modes."""
     rest = rest_lattice(params.kernel, params.dim, params.support)
@@ -129,7 +125,6 @@ def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf) -
     return Coefficients(
         dt=dt,
         h=h,
-        d=params.spacing,
         density_scale=rest.density_scale,
         gradient_scale=rest.gradient_scale / h,
         eps=params.force_mixing * s_0,
