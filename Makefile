@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test lint figures clean
+.PHONY: demo test lint figures gallery clean
 
 demo: .venv/demo-ready
 	$(BIN)/wavetank run obstacle-tank --seconds 4 --fps 30 --size 1280x720 --video --name demo --out out
@@ -25,6 +25,10 @@ lint: .venv/test-ready
 # The pictures in docs, made anew.
 figures: .venv/test-ready
 	$(BIN)/python docs/figures.py
+
+# A picture of every bundled scene: docs/gallery.md.
+gallery: .venv/test-ready
+	$(BIN)/python docs/figures.py gallery
 
 clean:
 	rm -rf .venv out

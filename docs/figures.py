@@ -1,34 +1,108 @@
-"""Make the pictures of README and docs anew: `make figures`, a few minutes on two cores."""
+"""Make the pictures of README and docs anew: `make figures` and `make gallery`, some minutes on two cores.
+
+python docs/figures.py            the pictures of README.md and docs/look.md, and the plot of docs/method.md
+python docs/figures.py gallery    docs/gallery.md with a picture of every bundled scene
+"""
 
 import shutil
+import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from PIL import Image
 
 import wavetank as wt
+from wavetank.front.still import SHOWN_AT, USUAL_TIME
 from wavetank.lab.converge import converge
+from wavetank.view.camera import Camera
 from wavetank.view.renderer import Renderer
+from wavetank.view.style import QUALITIES
 
 DOCS = Path(__file__).parent
-SHOTS = {
-    "obstacle-tank": (wt.Scene.load("obstacle-tank"), 0.55),
-    "double-dam-2d": (wt.Scene.load("double-dam-2d").changed(spacing=0.008), 0.45),
-    "drop": (wt.Scene.load("drop").changed(spacing=0.02), 0.35),
+#: name -> scene, time [s], options of the picture
+SHOTS: dict[str, tuple[wt.Scene, float, dict[str, Any]]] = {
+    "obstacle-tank": (wt.Scene.load("obstacle-tank").changed(spacing=0.02), 0.62, {}),
+    "obstacle-tank-particles": (wt.Scene.load("obstacle-tank"), 0.55, {"view": "particles"}),
+    "obstacle-tank-slice": (wt.Scene.load("obstacle-tank"), 0.55, {"view": "slice"}),
+    "double-dam-2d": (wt.Scene.load("double-dam-2d").changed(spacing=0.008), 0.45, {}),
+    "drop": (wt.Scene.load("drop").changed(spacing=0.02), 0.42, {}),
+    "still-tank": (wt.Scene.load("still-tank"), 1.0, {}),
+    "oil-and-water": (wt.Scene.load("oil-and-water"), 0.9, {}),
+    "lock-exchange": (wt.Scene.load("lock-exchange"), 1.2, {}),
+    "honey": (wt.Scene.load("honey"), 0.5, {}),
+    "weightless-drop": (wt.Scene.load("weightless-drop"), 0.5, {}),
 }
+#: the finest spacing of a picture of the gallery, in m per m of the tank's diagonal
+GALLERY_SPACING = {2: 0.005, 3: 0.0125}
+#: The report's Figure 1, without and with foam, and what the diffuse particles make of the same moment.
+FOAM_LOOKS = ((0.0, "#2482d0"), (0.0, "foam"), (1.0, "#2482d0"))
 
 
-def main() -> None:
-    """Write every picture."""
-    for name, (scene, moment) in SHOTS.items():
+def foam_figures() -> None:
+    """Write the pictures of docs/foam.md."""
+    pictures = []
+    for amount, colors in FOAM_LOOKS:
+        sim = wt.Simulation(wt.Scene.load("obstacle-tank").changed(spacing=0.02, foam=amount))
+        sim.advance(0.85)
+        pictures.append(Renderer(640, 480, supersample=2).render(sim.frame(), color_by=colors, legend=False))
+    Image.fromarray(np.hstack(pictures)).save(DOCS / "foam-rule.jpg", quality=88, optimize=True)
+    sim = wt.Simulation(wt.Scene.load("dam-break").changed(spacing=0.018))
+    sim.advance(1.35)
+    image = Renderer(1280, 720, supersample=2).render(sim.frame())
+    Image.fromarray(image).save(DOCS / "foam.jpg", quality=88, optimize=True)
+
+
+def picture(sim: wt.Simulation, path: Path, width: int, height: int, quality: str = "film", **options: Any) -> None:
+    """Write a JPG of a world."""
+    supersample, samples = QUALITIES[quality]
+    renderer = Renderer(width, height, supersample)
+    camera = Camera.framing(sim.scene, width / height).zoom(0.96)
+    image = renderer.render(sim.frame(), camera, samples=samples, legend="view" in options, **options)
+    Image.fromarray(image).save(path, quality=86, optimize=True, progressive=True)
+
+
+def figures(names: list[str]) -> None:
+    """Write the pictures of README and docs, or those of these names alone."""
+    for name in names or SHOTS:
+        scene, moment, options = SHOTS[name]
         sim = wt.Simulation(scene)
         sim.advance(moment)
-        image = Renderer(1280, 720, supersample=2).render(sim.frame())
-        Image.fromarray(image).save(DOCS / f"{name}.jpg", quality=88, optimize=True)
+        picture(sim, DOCS / f"{name}.jpg", 1280, 720, "standard" if options else "film", **options)
+        if name == "drop":
+            picture(sim, DOCS / "drop-draft.jpg", 1280, 720, "draft")
+    if names:
+        return
+    foam_figures()
     with tempfile.TemporaryDirectory() as folder:
         converge(wt.Scene.load("obstacle-tank"), Path(folder), seconds=1.5)
         shutil.copy(Path(folder) / "converge.png", DOCS / "converge.png")
 
 
+def gallery(names: list[str]) -> None:
+    """Write a picture of every bundled scene, or of these alone, and the page that shows all."""
+    folder = DOCS / "gallery"
+    folder.mkdir(exist_ok=True)
+    rows = []
+    for name in wt.bundled_scenes():
+        scene = wt.Scene.load(name)
+        size = sum(edge**2 for edge in scene.tank.size) ** 0.5 if scene.tank else 1.0
+        scene = scene.changed(spacing=min(scene.spacing, round(GALLERY_SPACING[scene.dim] * size, 4)))
+        moment, count = SHOWN_AT.get(name, USUAL_TIME), len(scene.particles()[0])
+        if name in names or not names:
+            sim = wt.Simulation(scene)
+            sim.advance(moment)
+            picture(sim, folder / f"{name}.jpg", 960, 540)
+            print(name, count, flush=True)
+        rows.append(
+            f"## {scene.title}\n\n![{scene.title}](gallery/{name}.jpg)\n\n"
+            f"`wavetank render {name} --at {moment:g} --set spacing={scene.spacing:g} --quality film`"
+            f" ({count:,} particles)\n"
+        )
+    head = "# Gallery\n\nEvery bundled scene, drawn by the command below its picture; made by `make gallery`.\n\n"
+    (DOCS / "gallery.md").write_text(head + "\n".join(rows), encoding="utf-8")
+
+
 if __name__ == "__main__":
-    main()
+    gallery(sys.argv[2:]) if sys.argv[1:2] == ["gallery"] else figures(sys.argv[1:])

@@ -24,7 +24,7 @@ def pictures(path: Path) -> list:
 def test_run_writes_what_was_asked_for(tmp_path):
     result = wavetank(
         "run", "drop-2d", "--seconds", "0.2", "--fps", "20", "--size", "160x90", "--out", str(tmp_path / "a" / "b"),
-        "--video", "--frames", "--export", "npz", "--export", "ply", "--set", "viscosity=0.2", "--json",
+        "--video", "--gif", "--frames", "--export", "npz", "--export", "ply", "--set", "viscosity=0.2", "--json",
     )  # fmt: skip
     assert result.returncode == 0, result.stderr
     figures = json.loads(result.stdout.strip().splitlines()[-1])
@@ -33,6 +33,7 @@ def test_run_writes_what_was_asked_for(tmp_path):
     assert figures["interrupted"] is False
     out = tmp_path / "a" / "b"
     assert pictures(out / "drop-2d.mp4") == [(90, 160, 3)] * 5
+    assert (out / "drop-2d.gif").read_bytes()[:3] == b"GIF"
     for suffix in ("png", "npz", "ply"):
         assert len(list(out.glob(f"drop-2d-0*.{suffix}"))) == 5
     assert json.loads((out / "stats.json").read_text()) == figures
@@ -58,7 +59,24 @@ def test_run_writes_what_was_asked_for(tmp_path):
         (("run", "drop", "--color-by", "taste"), ["'taste'", "speed"]),
         (("run", "drop", "--arch", "opengl"), ["'opengl'", "cpu"]),
         (("run", "drop", "--arch", "metal"), ["'metal'", "available"]),
+        (("run", "drop", "--view", "glass"), ["'glass'", "water, particles, slice, foam"]),
+        (("run", "drop", "--gif", "--fps", "60"), ["--gif", "50"]),
+        (("render", "no-such-scene"), ["no-such-scene", "obstacle-tank"]),
+        (("render", "no-such.npz"), ["no-such.npz"]),
+        (("render", "drop", "--view", "glass"), ["'glass'", "water, particles, slice, foam"]),
+        (("render", "drop", "--quality", "best"), ["'best'", "draft, standard, film"]),
+        (("render", "drop", "--at", "-1"), ["--at = -1.0"]),
+        (("render", "drop", "--at", "nan"), ["--at = nan"]),
+        (("render", "drop-2d", "--at", "0", "--eye", "1,2"), ["--eye = '1,2'", "2,1,3"]),
+        (("render", "drop-2d", "--at", "0", "--width", "0"), ["width = 0", "8192"]),
+        (("render", "drop", "--out", "none/x.png"), ["no folder"]),
+        (("render", "drop", "--out", "x.bmp"), [".png"]),
         (("converge", "drop-2d", "--iterations", "0"), ["--iterations = 0"]),
+        (("play", "no-such-scene"), ["no-such-scene", "obstacle-tank"]),
+        (("play", "drop-2d", "--record", "no-folder/x.toml"), ["--record", "folder"]),
+        (("play", "drop-2d", "--host", "256.1.1.1", "--no-browser"), ["--host 256.1.1.1"]),
+        (("play", "drop-2d", "--most", "10", "--no-browser"), ["at most 10"]),
+        (("replay", "no-such-file.toml"), ["no-such-file.toml", "cannot be read"]),
     ],
 )
 def test_a_mistake_is_one_line_and_leaves_nothing(arguments, words, tmp_path):
@@ -70,6 +88,34 @@ def test_a_mistake_is_one_line_and_leaves_nothing(arguments, words, tmp_path):
     for word in words:
         assert word in lines[0]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_render_draws_scenes_and_states(tmp_path):
+    from PIL import Image
+
+    from wavetank import Scene, Simulation
+
+    small = ("--width", "96", "--height", "54", "--quality", "draft")
+    result = wavetank("render", "drop-2d", "--at", "0.1", *small, "--out", str(tmp_path / "a.png"), "--timings")
+    assert result.returncode == 0, result.stderr
+    assert "flatten" in result.stdout
+    with Image.open(tmp_path / "a.png") as picture:
+        assert picture.size == (96, 54)
+        assert picture.text["scene"] == "A drop falls into a pool"
+        assert picture.text["time"] == "0.1000 s"
+        assert picture.text["view"] == "water"
+    sim = Simulation(Scene.load("drop-2d"))
+    sim.advance(0.1)
+    sim.save(tmp_path / "state.npz")
+    state = str(tmp_path / "state.npz")
+    result = wavetank("render", state, *small, "--view", "slice", "--out", str(tmp_path / "b.png"), "--json")
+    figures = json.loads(result.stdout)
+    assert (figures["time"], figures["view"], figures["particles"]) == (pytest.approx(0.1), "slice", 512)
+    assert wavetank("render", state, *small, "--out", str(tmp_path / "c.png")).returncode == 0
+    with Image.open(tmp_path / "a.png") as first, Image.open(tmp_path / "c.png") as again:
+        assert first.tobytes() == again.tobytes()
+    assert "0.1 s" in wavetank("render", state, "--at", "0.05", "--out", str(tmp_path / "d.png")).stderr
+    assert not (tmp_path / "d.png").exists()
 
 
 def test_a_broken_scene_file_is_one_line(tmp_path):
@@ -122,6 +168,7 @@ def test_ctrl_c_finishes_the_files(tmp_path):
 def test_scenes_and_schema(tmp_path):
     listed = json.loads(wavetank("scenes", "--json").stdout)
     assert {"obstacle-tank", "dam-break", "double-dam", "still-tank", "drop", "drop-2d"} <= set(listed)
+    assert listed["levels"]["over-the-wall"]["goal"]
     schema = json.loads(wavetank("scenes", "--schema").stdout)
     assert schema["properties"]["viscosity"]["maximum"] == 1.0
     assert "obstacle-tank" in wavetank("scenes").stdout

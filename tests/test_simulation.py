@@ -50,7 +50,8 @@ def test_any_number_of_particles(dim, count):
 def test_free_fall_is_exact(dim):
     """Symplectic Euler of a free particle: v = g n dt, x = x0 + g dt^2 n (n + 1) / 2, to rounding."""
     g = (0.5, -9.81, 1.0)[:dim]
-    sim = Simulation(wt.Scene(spacing=0.1, gravity=g, fluids=[wt.Points(positions=[(0.0,) * dim])]))
+    world = wt.Scene(spacing=0.1, courant=100, gravity=g, fluids=[wt.Points(positions=[(0.0,) * dim])])
+    sim = Simulation(world)
     sim.advance(1.0)
     n = 60 * sim.substeps
     dt = 1 / n
@@ -189,3 +190,86 @@ def test_odd_time_steps_do_not_shake_the_water():
             pass
         assert sim.time == pytest.approx(1.25, abs=0.01)
         assert sim.stats()["speed_rms"] < 0.03, fps
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_particles_come_and_go_and_the_others_keep_their_ids(dim):
+    sim = Simulation(small(dim))
+    first = sim.frame().ids
+    sim.advance(0.05)
+    new = sim.add(np.full((3, dim), 0.35) + 0.04 * np.arange(3)[:, None] * np.eye(dim)[0], np.ones((3, dim)))
+    assert new.tolist() == [len(first), len(first) + 1, len(first) + 2]
+    assert sim.count == len(first) + 3
+    place = dict(zip(sim.frame().ids.tolist(), sim.positions.tolist(), strict=True))
+    assert sim.remove(first[::2]) == len(first[::2])
+    assert sim.remove(first[::2]) == 0
+    np.testing.assert_array_equal(sim.frame().ids, [*first[1::2], *new])
+    for number, at in zip(sim.frame().ids.tolist(), sim.positions.tolist(), strict=True):
+        assert place[number] == at
+    sim.advance(0.2)
+    assert np.isfinite(sim.positions).all()
+    assert sim.add(np.full((1, dim), 0.37)) == new[-1] + 1, "an id is not used again"
+    sim.remove(sim.frame().ids)
+    assert sim.count == 0
+    sim.advance(0.05)
+
+
+def test_a_world_grows_without_a_trace():
+    """Room made on the way changes nothing: the same water as with all of it from the start."""
+    scene = small()
+    late, early = Simulation(scene), Simulation(scene)
+    early._make_room(10 * early.count)
+    for sim in (late, early):
+        sim.advance(0.1)
+        sim.add(np.array([[0.5, 0.35 + 0.001 * k, 0.05 + 0.04 * k] for k in range(4)]))
+        sim.advance(0.1)
+    np.testing.assert_array_equal(late.positions, early.positions)
+
+
+def test_bad_particles_are_refused():
+    sim = Simulation(small())
+    for x in (np.zeros((2, 2)), np.full((1, 3), np.nan), np.zeros(3)):
+        with pytest.raises(wt.WavetankError, match="positions"):
+            sim.add(x)
+    assert sim.count == len(small().particles()[0])
+
+
+def test_a_state_keeps_all_that_tools_left_behind(tmp_path):
+    sim = Simulation(small())
+    sim.advance(0.05)
+    sim.remove(sim.frame().ids[::7])
+    sim.add([[0.5, 0.3, 0.1]])
+    center = np.array([0.1, 0.1, 0.1])
+    sim.paint_inside(center, center, 0.08, 0x7F00FF00)
+    sim.freeze_inside(center, center, 0.06)
+    name = sim.add_solid(wt.Sphere(center=(0.45, 0.1, 0.15), radius=0.06), grow=0.2)
+    sim.advance(0.1)
+    sim.save(tmp_path / "state.npz")
+    again = Simulation.restore(tmp_path / "state.npz")
+    assert name in again.solids.names
+    for world in (sim, again):
+        world.advance(0.15)
+        world.add([[0.55, 0.35, 0.2]])
+        world.advance(0.05)
+    for what in ("ids", "positions", "velocities", "dyes"):
+        np.testing.assert_array_equal(getattr(again.frame(), what), getattr(sim.frame(), what))
+    assert again.world.frozen == sim.world.frozen > 0
+
+
+def test_solids_come_and_go():
+    sim = Simulation(small(solids=[wt.Box(center=(0.5, 0.1, 0.15), size=(0.1, 0.2, 0.1))]))
+    assert sim.solids.names[6:] == ["solid 1"]
+    name = sim.add_solid(wt.Sphere(center=(0.15, 0.15, 0.15), radius=0.09), grow=0.2)
+    assert name == "solid 2"
+    sim.advance(0.3)
+    distance = np.linalg.norm(sim.positions - [0.15, 0.15, 0.15], axis=1)
+    assert distance.min() > 0.09
+    sim.remove_solid("solid 1")
+    sim.move("solid 2", position=(0.2, 0.2, 0.15))
+    sim.step()
+    assert sim.solids.poses[6][0].tolist() == [0.2, 0.2, 0.15]
+    for wrong in ("solid 1", "tank x lower"):
+        with pytest.raises(wt.WavetankError):
+            sim.remove_solid(wrong)
+    with pytest.raises(wt.WavetankError, match="components"):
+        sim.add_solid(wt.Sphere(center=(0.1, 0.1), radius=0.1))

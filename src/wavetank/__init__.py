@@ -17,6 +17,8 @@ from wavetank.scene import Scene, Tank, bundled_scenes
 from wavetank.solids import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
 
 if TYPE_CHECKING:
+    from wavetank.front.notebook import show
+    from wavetank.session import Session
     from wavetank.simulation import Simulation
     from wavetank.view.camera import Camera
     from wavetank.view.renderer import render
@@ -25,8 +27,8 @@ __version__ = _version("wavetank")
 
 __all__ = [
     "PARAMETERS", "PRESETS", "Ball", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference", "HalfSpace",
-    "Intersection", "Points", "Scene", "Simulation", "Sphere", "Tank", "Union", "WavetankError", "bundled_scenes",
-    "render",
+    "Intersection", "Points", "Scene", "Session", "Simulation", "Sphere", "Tank", "Union", "WavetankError",
+    "bundled_scenes", "render", "show",
 ]  # fmt: skip
 
 
@@ -36,6 +38,14 @@ def __getattr__(name: str) -> Any:
         from wavetank.simulation import Simulation
 
         return Simulation
+    if name == "Session":
+        from wavetank.session import Session
+
+        return Session
+    if name == "show":
+        from wavetank.front.notebook import show
+
+        return show
     if name == "Camera":
         from wavetank.view.camera import Camera
 

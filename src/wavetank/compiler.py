@@ -9,6 +9,8 @@ import contextlib
 import io
 import os
 import warnings
+from collections.abc import Callable, Iterator
+from typing import Any
 
 os.environ.setdefault("QD_LOG_LEVEL", "error")
 # The compiler prints a banner on import; a library should be silent.
@@ -17,7 +19,7 @@ with contextlib.redirect_stdout(io.StringIO()):
 
 from wavetank.errors import WavetankError
 
-__all__ = ["BACKENDS", "available_backends", "current_backend", "qd", "start", "synchronize"]
+__all__ = ["BACKENDS", "available_backends", "current_backend", "qd", "start", "synchronize", "watched"]
 
 #: Names a user may pass as ``arch``; ``gpu`` means the best one present.
 BACKENDS = ("cpu", "gpu", "cuda", "vulkan", "metal", "amdgpu")
@@ -77,6 +79,26 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
 def synchronize() -> None:
     """Wait until the device has finished everything launched so far."""
     qd.sync()
+
+
+@contextlib.contextmanager
+def watched(around: Callable[[str, str, Callable[[], Any]], Any]) -> Iterator[None]:
+    """Launch every kernel through `around` while the context lasts, to count or to time.
+
+    ``around(module, name, launch)`` names the kernel and returns what ``launch()`` returns.
+    """
+    from quadrants.lang.kernel import Kernel
+
+    call = Kernel.__call__
+
+    def watch(self: Any, *args: Any, **kwargs: Any) -> Any:
+        return around(self.func.__module__, self.func.__name__, lambda: call(self, *args, **kwargs))
+
+    Kernel.__call__ = watch
+    try:
+        yield
+    finally:
+        Kernel.__call__ = call
 
 
 def _supported(name: str) -> bool:

@@ -13,6 +13,7 @@ class Fluid(Model):
     """What every fluid has."""
 
     velocity: Vector | None = None  # m/s, at the start; at rest where None
+    material: str | None = None  # one of the scene's materials; the scene's own parameters where None
 
     def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
         """Name every vector of this fluid, to check that all live in one dimension."""

@@ -5,6 +5,7 @@ in the reference, and whether it may change while the water moves (live) or need
 """
 
 import dataclasses
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
@@ -44,6 +45,8 @@ def parameter(
     return Field(default=default, description=sentence, json_schema_extra=note, **limits)
 
 
+SURFACE_TENSION = 0.0728  # N/m, of water against air at 20 degrees Celsius
+
 KernelName = Literal["spiky", "poly6", "cubic", "wendland", "poly6-spiky"]
 
 
@@ -57,8 +60,9 @@ class Parameters(Model):
     support: float = parameter(1.9, 1.2, 3.0, "d", "h/d", "Support radius of the smoothing kernel.", live=False)
     kernel: KernelName = parameter("spiky", None, None, "", "W", "Smoothing kernel; poly6-spiky takes one for the density and the other for its gradient.", live=False)
     frame_time: float = parameter(1 / 60, 1e-5, 1.0, "s", "T", "Time of water in one frame.", live=False)
-    substeps: int = parameter(5, 1, 100, "", "n", "Time steps in a frame, at least.")
+    substeps: int = parameter(4, 1, 100, "", "n", "Time steps in a frame, at least.")
     courant: float = parameter(0.6, 0.05, 100.0, "d", "CFL", "Way that the fastest particle may go in a time step; more time steps are taken to keep it.")
+    wave_courant: float = parameter(0.35, 0.05, 100.0, "d", "", "Way that the fastest gravity wave, sqrt(g depth), may go in a time step: how much deep water may compress.")
     largest_substeps: int = parameter(32, 1, 1000, "", "", "Time steps in a frame, at most: what keeps fast scenes affordable.")
     iterations: int = parameter(4, 1, 100, "", "", "Solver iterations in a time step.")
     relaxation: float = parameter(1.0, 0.1, 3.0, "", "omega", "First relaxation of a time step, in units of the largest that damps every mode.")
@@ -68,12 +72,23 @@ class Parameters(Model):
     tensile_exponent: float = parameter(4.0, 1.0, 8.0, "", "n", "Exponent of the artificial pressure (Eq. 7).")
     tensile_distance: float = parameter(0.3, 0.05, 0.95, "h", "dq", "Distance at which the artificial pressure is k (Eq. 7).")
     attraction: float = parameter(0.0, 0.0, 1.0, "", "", "Share of negative pressure that is kept; 0 keeps none, so that water parts freely.")
-    viscosity: float = parameter(0.05, 0.0, 1.0, "", "c", "XSPH viscosity (Eq. 11), dimensionless; the share of one step at 240 steps a second.")
+    viscosity: float = parameter(0.08, 0.0, 1.0, "", "c", "XSPH viscosity (Eq. 11), dimensionless; the share of one step at 240 steps a second.")
+    dynamic_viscosity: float = parameter(0.0, 0.0, 1e6, "Pa s", "mu", "Dynamic viscosity of fluids whose material names none, solved implicitly; honey has 10.")
+    viscosity_iterations: int = parameter(60, 1, 1000, "", "", "Iterations of the implicit viscosity in a time step, at most; fewer are taken where fewer do.")
+    no_slip: float = parameter(1.0, 0.0, 1.0, "", "", "Share of the viscous drag of solids that is felt; 1 is no-slip, 0 lets the fluid slide.")
+    surface_tension: float = parameter(0.0, 0.0, 10.0, "N/m", "sigma", "Surface tension of fluids whose material names none; water has 0.072.")
+    contact_angle: float = parameter(90.0, 0.0, 180.0, "deg", "theta", "Angle at which fluids whose material names none meet a solid, where there is tension; 0 wets.")
     vorticity: float = parameter(0.0, 0.0, 100.0, "m/s", "eps_w", "Vorticity confinement (Eq. 10).")
+    vorticity_coherence: float = parameter(0.7, 0.0, 1.0, "", "", "How far neighbours must turn alike for vorticity confinement; 0 confines noise too, as Eq. 10 does.")
     friction: float = parameter(0.0, 0.0, 1.0, "", "mu", "Coulomb friction of walls and of solids that name none.", live=False)
     speed_limit: float = parameter(1.0, 0.1, 1e6, "", "", "Largest speed, in units of what gravity and moving solids can give in this tank.")
     wall_density: float = parameter(1.0, 0.0, 1.0, "", "", "Share of the density that walls contribute; 0 leaves plain clamps.")
     wall_gap: float = parameter(0.25, 0.0, 0.5, "d", "", "Distance that particle centres keep from walls.")
+    foam: float = parameter(1.0, 0.0, 100.0, "", "", "Amount of spray, foam and bubbles that moving water makes; 0 makes none.")
+    foam_lifetime: float = parameter(2.0, 0.01, 1000.0, "s", "", "Mean time from the birth of spray, foam and bubbles to their end.")
+    foam_capacity: int = parameter(200000, 1, 4000000, "", "", "Room for spray, foam and bubbles; the fuller it is, the less is made.", live=False)
+    foam_seed: int = parameter(0, 0, 2147483647, "", "", "Another number makes other random choices where foam is born.", live=False)
+    foam_threshold: float = parameter(1000.0, 0.001, 1e9, "", "We", "Weber number rho v^2 d / sigma from which a water particle counts as foam (the report's rule).")
 # fmt: on
 
     @property
@@ -85,6 +100,11 @@ class Parameters(Model):
     def particle_mass(self) -> float:
         """Mass of a particle, rho_0 d^dim [kg] (per metre of depth in a 2-D world)."""
         return float(self.rest_density * self.spacing**self.dim)
+
+    @property
+    def foaming_speed(self) -> float:
+        """Speed [m/s] at which the Weber number of a particle, rho_0 v^2 d / sigma, reaches `foam_threshold`."""
+        return math.sqrt(self.foam_threshold * SURFACE_TENSION / (self.rest_density * self.spacing))
 
 
 PARAMETERS: tuple[Parameter, ...] = tuple(
@@ -114,6 +134,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "kernel": "poly6-spiky",
         "substeps": 1,
         "courant": 100.0,
+        "wave_courant": 100.0,
         "iterations": 5,
         "relaxation": 1.0 / PAPER_RELAXATION,
         "slowest_mode": 0.0,
@@ -124,6 +145,15 @@ PRESETS: dict[str, dict[str, Any]] = {
         "attraction": 1.0,
         "viscosity": 0.03,
         "vorticity": 0.01,
+        "vorticity_coherence": 0.0,
         "wall_density": 0.0,
+        "foam": 0.0,
     },
+}
+
+#: Operating points of the method: what `quality` puts in place of the defaults. Figures of each: docs/method.md.
+QUALITIES: dict[str, dict[str, Any]] = {
+    "draft": {"substeps": 2, "iterations": 3, "wave_courant": 0.6, "courant": 0.9},
+    "standard": {},
+    "high": {"substeps": 4, "wave_courant": 0.2, "courant": 0.4},
 }

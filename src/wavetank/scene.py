@@ -1,5 +1,6 @@
 """A scene: plain validated data that says what a world is made of, from Python or from a TOML file."""
 
+import functools
 import importlib.resources
 import json
 import math
@@ -14,8 +15,11 @@ from pydantic import BeforeValidator, ValidationError, model_validator
 
 from wavetank.errors import WavetankError
 from wavetank.fluids import AnyFluid, Points
+from wavetank.forces import AnyForce
+from wavetank.goal import Goal
+from wavetank.materials import COLORS, Material, Properties
 from wavetank.model import Model, Size, sentence
-from wavetank.params import PRESETS, Parameters
+from wavetank.params import PRESETS, QUALITIES, Parameters
 from wavetank.solids import AnySolid, HalfSpace, Solid
 
 MAX_PARTICLES = 100_000_000
@@ -50,16 +54,18 @@ class Scene(Parameters):
 
     title: str = ""
     preset: Literal["standard", "paper"] = "standard"
+    quality: Literal["draft", "standard", "high"] = "standard"
     tank: Tank | None = None
     fluids: Annotated[list[AnyFluid], BeforeValidator(lambda v: _tagged(v, "block"))] = []
+    materials: list[Material] = []
     solids: Annotated[list[AnySolid], BeforeValidator(lambda v: _tagged(v, "box"))] = []
+    forces: list[AnyForce] = []
+    goal: Goal | None = None
 
     @model_validator(mode="before")
     @classmethod
     def _from_preset(cls, values: Any) -> Any:
-        if isinstance(values, dict) and isinstance(values.get("preset"), str):
-            return {**PRESETS.get(values["preset"], {}), **values}
-        return values
+        return {**_chosen(values), **values} if isinstance(values, dict) else values
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":
@@ -73,10 +79,7 @@ class Scene(Parameters):
                 )
         self._check_count()
         self._check_inside()
-        names = [solid.name for solid in self.solids if solid.name]
-        twice = next((name for name in names if names.count(name) > 1), None)
-        if twice is not None:
-            raise ValueError(f"solids: the name {twice!r} is used twice; a name must be unique.")
+        self._check_names()
         return self
 
     def assign(self, name: str, value: Any) -> None:
@@ -98,10 +101,12 @@ class Scene(Parameters):
 
     def _vectors(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         yield "gravity", self.gravity
-        for kind, members in (("fluids", self.fluids), ("solids", self.solids)):
+        for kind, members in (("fluids", self.fluids), ("solids", self.solids), ("forces", self.forces)):
             for number, member in enumerate(members):
                 for name, vector in member.vectors():
                     yield f"{kind}[{number}].{name}", tuple(vector)
+        for name, vector in self.goal.vectors() if self.goal else ():
+            yield f"goal.{name}", tuple(vector)
 
     def _check_count(self) -> None:
         count = sum(fluid.estimate(self.spacing) for fluid in self.fluids)
@@ -130,12 +135,84 @@ class Scene(Parameters):
                     f"it must lie between {_numbers(np.zeros(self.dim))} and {_numbers(self.tank.size)}."
                 )
 
+    def _check_names(self) -> None:
+        for kind, members in (("solids", self.solids), ("materials", self.materials)):
+            names = [member.name for member in members if member.name]
+            twice = next((name for name in names if names.count(name) > 1), None)
+            if twice is not None:
+                raise ValueError(f"{kind}: the name {twice!r} is used twice; a name must be unique.")
+        if any(not material.name for material in self.materials):
+            raise ValueError("materials: every material needs a name, so that a fluid can ask for it.")
+        known = [material.name for material in self.materials]
+        askers = [(f"fluids[{number}]", fluid.material) for number, fluid in enumerate(self.fluids)]
+        askers += [
+            (f"goal.aims[{k}]", aim.material or None) for k, aim in enumerate(self.goal.aims if self.goal else [])
+        ]
+        for where, material in askers:
+            if material is not None and material not in known:
+                raise ValueError(
+                    f"{where}.material = {material!r} is not one of the scene's materials; "
+                    f"they are: {', '.join(known) or 'none; add one under [[materials]]'}."
+                )
+
+    def palette(self) -> list[Material]:
+        """Return the materials by their numbers: 0 is the scene's own fluid, then `materials` in their order.
+
+        Every one has a colour.
+        """
+        own = Material(name="fluid")
+        return [
+            material if material.color else material.model_copy(update={"color": COLORS[number % len(COLORS)]})
+            for number, material in enumerate([own, *self.materials])
+        ]
+
+    def properties(self) -> list[Properties]:
+        """Return the properties of the materials by their numbers."""
+        return [material.properties(self) for material in self.palette()]
+
+    def materials_of(self, kinds: np.ndarray) -> dict[int, Material]:
+        """Return the materials with these numbers."""
+        palette = self.palette()
+        return {number: palette[number] for number in np.unique(kinds).tolist()}
+
+    def checked_kinds(self, numbers: Any, count: int) -> np.ndarray:
+        """Return the numbers of the materials of `count` particles, int32; those of the first fluid for None.
+
+        Raises `WavetankError` for numbers that are not in the palette.
+        """
+        if numbers is None:
+            first = self.fluids[0].material if self.fluids else None
+            usual = 0 if first is None else 1 + [material.name for material in self.materials].index(first)
+            return np.full(count, usual, np.int32)
+        kind = np.asarray(numbers, np.int32)
+        if kind.shape != (count,) or not np.isin(kind, np.arange(len(self.materials) + 1)).all():
+            raise WavetankError(
+                f"materials must be {count} numbers, from 0 for the scene's own fluid to {len(self.materials)}."
+            )
+        return kind
+
+    def kinds(self) -> np.ndarray:
+        """Return the number of the material of each particle, int32 [n], in the order of `particles`."""
+        names = [material.name for material in self.palette()[1:]]
+        parts = [
+            np.full(len(x), 0 if fluid.material is None else 1 + names.index(fluid.material), np.int32)
+            for fluid, (x, _) in zip(self.fluids, self._lattices(), strict=True)
+        ]
+        return np.concatenate([np.empty(0, np.int32), *parts])
+
     def particles(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions [m] and velocities [m/s], float32 [n, dim], of the fluids outside of the solids.
 
         Where fluids overlap, the first one wins.
         """
-        positions, velocities = [np.empty((0, self.dim))], [np.empty((0, self.dim))]
+        parts = self._lattices()
+        positions = np.concatenate([np.empty((0, self.dim)), *(x for x, _ in parts)])
+        velocities = np.concatenate([np.empty((0, self.dim)), *(v for _, v in parts)])
+        return positions.astype(np.float32), velocities.astype(np.float32)
+
+    def _lattices(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Positions and velocities of each fluid."""
+        parts = []
         for number, fluid in enumerate(self.fluids):
             x = fluid.particles(self.spacing)
             v = np.zeros_like(x) if fluid.velocity is None else np.tile(np.array(fluid.velocity, float), (len(x), 1))
@@ -146,37 +223,48 @@ class Scene(Parameters):
                 for other in self.fluids[:number]:
                     taken |= other.contains(x)
                 x, v = x[~taken], v[~taken]
-            positions.append(x)
-            velocities.append(v)
-        return np.concatenate(positions).astype(np.float32), np.concatenate(velocities).astype(np.float32)
+            parts.append((x, v))
+        return parts
 
     # --- files ---
 
     @classmethod
     def load(cls, name: str | Path) -> "Scene":
         """Read a bundled scene by name, or a TOML file by path."""
-        text, origin = _read(name)
+        return cls.from_text(*_read(name))
+
+    @classmethod
+    def from_text(cls, text: str, origin: str = "scene") -> "Scene":
+        """Read the text of a TOML file; a mistake in it is told with `origin` in front."""
         try:
             table = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             raise WavetankError(f"{origin}: this is not TOML: {error}.") from None
-        return cls.parse(table, origin)
+        scene: Scene = cls.parse(table, origin)
+        return scene
 
     def save(self, path: str | Path) -> None:
         """Write this scene as TOML; a file of that name is replaced in one move."""
         target = Path(path)
         partial = target.with_name(target.name + ".partial")
-        partial.write_text(tomli_w.dumps(self.table()), encoding="utf-8")
+        partial.write_text(self.text(), encoding="utf-8")
         partial.replace(target)
+
+    def text(self) -> str:
+        """Return this scene as TOML."""
+        return tomli_w.dumps(self.table())
 
     def table(self) -> dict[str, Any]:
         """Return what was set (not the defaults) as plain data that `parse` reads back to an equal scene."""
-        result = _set_values(self) | {name: getattr(self, name) for name in PRESETS[self.preset]}
+        result = _set_values(self) | {name: getattr(self, name) for name in _chosen(self.__dict__)}
         return {key: result[key] for key in sorted(result, key=lambda k: isinstance(result[k], list | dict))}
 
     def changed(self, **values: Any) -> "Scene":
-        """Return a copy with these keys changed, validated as a whole."""
-        return type(self).parse({**self.table(), **values})
+        """Return a copy with these keys changed, validated as a whole; a new preset or quality replaces the old."""
+        table = self.table()
+        if values.keys() & {"preset", "quality"}:
+            table = {k: v for k, v in table.items() if (k, v) not in _chosen(self.__dict__).items()}
+        return type(self).parse({**table, **values})
 
     def scaled(self, factor: float) -> "Scene":
         """Return the same scene with every length multiplied by `factor` (velocities and gravity stay)."""
@@ -194,6 +282,13 @@ class Scene(Parameters):
         return type(self).parse(walk(self.table()))
 
 
+def _chosen(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the parameters that the preset and the quality among `values` stand for."""
+    preset, quality = values.get("preset", "standard"), values.get("quality", "standard")
+    known = isinstance(preset, str) and isinstance(quality, str)
+    return {**PRESETS.get(preset, {}), **QUALITIES.get(quality, {})} if known else {}
+
+
 def _set_values(value: Any) -> Any:
     """Reduce a model to plain data: the keys that differ from their defaults, and the shape that names a kind."""
     if isinstance(value, np.ndarray):
@@ -206,15 +301,26 @@ def _set_values(value: Any) -> Any:
     for name, field in type(value).model_fields.items():
         member = getattr(value, name)
         default = None if isinstance(member, np.ndarray) else field.default
-        if name == "shape" or (member is not None and (isinstance(member, np.ndarray) or member != default)):
+        if name in ("shape", "kind") or (member is not None and (isinstance(member, np.ndarray) or member != default)):
             result[name] = _set_values(member)
     return result
 
 
 def bundled_scenes() -> list[str]:
-    """Names of the scenes that come with the package, sorted."""
-    folder = importlib.resources.files("wavetank") / "scenes"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    """Names of the scenes that come with the package, sorted; levels not among them."""
+    return _names("scenes")
+
+
+@functools.cache
+def bundled_levels() -> tuple[str, ...]:
+    """Names of the levels that come with the package, in the order in which they are played."""
+    goals = {name: Scene.load(name).goal for name in _names("levels")}
+    return tuple(sorted(goals, key=lambda name: (goal.number if (goal := goals[name]) else 0, name)))
+
+
+def _names(folder: str) -> list[str]:
+    entries = (importlib.resources.files("wavetank") / folder).iterdir()
+    return sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml"))
 
 
 def scene_schema() -> str:
@@ -223,12 +329,14 @@ def scene_schema() -> str:
 
 
 def _read(name: str | Path) -> tuple[str, str]:
-    if str(name) in (bundled := bundled_scenes()):
-        return (importlib.resources.files("wavetank") / "scenes" / f"{name}.toml").read_text("utf-8"), str(name)
+    for folder in ("scenes", "levels"):
+        if str(name) in _names(folder):
+            return (importlib.resources.files("wavetank") / folder / f"{name}.toml").read_text("utf-8"), str(name)
     path = Path(name)
     if not path.is_file():
         raise WavetankError(
-            f"scene {str(name)!r} is neither a file nor a bundled scene; bundled are: {', '.join(bundled)}."
+            f"scene {str(name)!r} is neither a file nor a bundled scene; bundled are: {', '.join(_names('scenes'))}; "
+            f"levels: {', '.join(_names('levels'))}."
         )
     try:
         return path.read_text("utf-8"), str(path)

@@ -8,17 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from wavetank import compiler, solids
+from wavetank import compiler
 from wavetank.errors import WavetankError
+from wavetank.forces import Force
 from wavetank.frame import Frame
+from wavetank.moving_solids import MovingSolids
 from wavetank.params import LIVE
-from wavetank.physics import measure
+from wavetank.physics import measure, population
+from wavetank.physics.diffuse.pool import pool_from, pool_rows
+from wavetank.physics.diffuse.update import update_diffuse
 from wavetank.physics.neighbors import new_grid
 from wavetank.physics.smoothing import half_space_table
-from wavetank.physics.step import World, largest_speed, step, update_densities
-from wavetank.rotations import interpolate, unit_quaternion
-from wavetank.scene import Scene
-from wavetank.state import Walls, new_particles, new_scratch, upload, vectors
+from wavetank.physics.step import World, capillary_speed, capillary_substeps, step, update_densities
+from wavetank.physics.time_step import largest_speed, pool_depth, substeps
+from wavetank.scene import MAX_PARTICLES, Scene
+from wavetank.snapshot import Snapshot, put_snapshot, read_snapshot, take_snapshot, write_snapshot
+from wavetank.solids import Solid
+from wavetank.state import KINDS, Fluids, Walls, new_particles, new_scratch, upload, vectors
 
 
 class Simulation:
@@ -33,39 +39,42 @@ class Simulation:
     def reset(self) -> None:
         """Put everything back to the start of the scene."""
         positions, velocities = self.scene.particles()
-        self._fill(positions, velocities, np.arange(len(positions)))
+        self.solids = MovingSolids(self._walls(), self.scene.solids, self.scene.friction)
+        self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
+        self._passing: list[Force] = []  # these in the next one only
+        self._next_id, self._fastest_start, self._fastest_solid, self._fastest_force = 0, 0.0, 0.0, 0.0
+        self._fill(len(positions))
+        self.add(positions, velocities, materials=self.scene.kinds())
+        box = positions if len(positions) else np.zeros((1, self.scene.dim))
+        self._start_box = (box.min(axis=0), box.max(axis=0))
         self.time, self.frame_number, self._owed = 0.0, 0, 0.0
-        self._seconds_per_frame = math.nan
+        self.time_steps = 1  # of the last frame
+        self.seconds_per_frame = math.nan
 
-    def _fill(self, positions: np.ndarray, velocities: np.ndarray, ids: np.ndarray) -> None:
-        scene, count, dim = self.scene, len(positions), self.scene.dim
+    def _fill(self, capacity: int) -> None:
+        """Make an empty world with room for `capacity` particles."""
+        scene, dim = self.scene, self.scene.dim
         h = scene.support * scene.spacing
-        tank = scene.tank
         table = half_space_table(scene.kernel, dim, scene.support)
         walls = Walls(vectors(2, len(table)))
         upload(walls.table, table)
-        members = [*(tank.walls() if tank else []), *scene.solids]
-        self._names = {solid.name: number for number, solid in enumerate(members) if solid.name}
-        self._poses = [(solid.origin, solid.quaternion) for solid in members]
-        self._reaches = [solid.reach() for solid in members]
-        self._targets: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        size = scene.tank.size if scene.tank else None
         self.world = World(
-            particles=new_particles(dim, count),
-            spare=new_particles(dim, count),
-            scratch=new_scratch(count),
-            grid=new_grid(dim, count, tank.size if tank else None, h, _list_room(dim, scene.support)),
-            solids=solids.build(members, 2 * dim if tank else 0, scene.friction),
+            particles=new_particles(dim, capacity),
+            spare=new_particles(dim, capacity),
+            scratch=new_scratch(capacity),
+            grid=new_grid(dim, capacity, size, h, _list_room(dim, scene.support)),
+            solids=self.solids.device,
             walls=walls,
-            count=count,
-            has_friction=scene.friction > 0.0 or any(solid.friction for solid in members),
+            fluids=Fluids(capacity, rows=vectors(4, len(scene.materials) + 1)),
+            materials={},
+            count=0,
+            has_friction=self.solids.has_friction,
         )
-        upload(self.world.particles.x, positions)
-        upload(self.world.particles.p, positions)
-        upload(self.world.particles.v, velocities)
-        upload(self.world.particles.id, ids)
-        self._fastest_start = float(np.linalg.norm(velocities, axis=1).max(initial=0.0))
-        self._fastest_solid = 0.0
-        self._outdated = True
+        self._capacity, self._outdated = capacity, True
+
+    def _walls(self) -> list[Solid]:
+        return self.scene.tank.walls() if self.scene.tank else []
 
     # --- time ---
 
@@ -100,55 +109,58 @@ class Simulation:
             self.advance(max(0.0, start + number / fps - self.time - self._owed))
             yield self.frame()
 
+    def push(self, force: Force) -> None:
+        """Let a force act during the next frame only."""
+        self._passing.append(force)
+
     def _advance_frame(self, duration: float) -> None:
         began = time.perf_counter()
         limit = self._speed_limit(duration)
-        substeps = self._substeps(duration)
-        for part in range(substeps):
-            self._move_solids(part / substeps, (part + 1) / substeps)
+        parts = self.time_steps = self._substeps(duration)
+        self.solids.grow(duration)
+        for part in range(parts):
+            self.solids.move_to(part / parts, (part + 1) / parts)
             if self.count:
-                step(self.world, self.scene, duration / substeps, limit)
-        for number, target in self._targets.items():
-            self._poses[number] = target
+                for force in (*self.forces, *self._passing):
+                    force.apply(self.world.particles, self.count, duration / parts, self.time + duration * part / parts)
+                step(self.world, self.scene, duration / parts, limit)
+        self.solids.move_to(0.0, 1.0)
+        update_diffuse(self.world, self.scene, duration, self.frame_number)
+        self._passing = []
+        self.solids.arrive()
         compiler.synchronize()
-        self._seconds_per_frame = time.perf_counter() - began
+        self.seconds_per_frame = time.perf_counter() - began
         self.time += duration
         self.frame_number += 1
         self._outdated = True
 
     def _substeps(self, duration: float) -> int:
-        """Return the number of time steps for `duration` [s]: the usual rate, or what the fastest needs (CFL)."""
-        scene = self.scene
-        usual = scene.substeps * duration / scene.frame_time
-        fastest = self._solid_speed(duration)
-        if self.count:
-            fastest = max(fastest, largest_speed(self.world))
-        fastest += duration * math.hypot(*scene.gravity)
-        needed = fastest * duration / (scene.courant * scene.spacing)
-        return max(1, math.ceil(usual - 1e-6), min(math.ceil(needed), scene.largest_substeps))
+        """Return the number of time steps for `duration` [s]."""
+        scene, particles, count = self.scene, self.world.particles, self.count
+        box = (np.zeros(scene.dim), np.array(scene.tank.size)) if scene.tank else self._start_box
+        speed = max(self._solid_speed(duration), largest_speed(particles, count))
+        speed += duration * sum(force.largest_acceleration() for force in (*self.forces, *self._passing))
+        capillary = min(capillary_substeps(self.world, scene, duration), scene.largest_substeps)
+        return max(capillary, substeps(scene, duration, speed, pool_depth(particles, count, scene.gravity, *box)))
 
     def _solid_speed(self, duration: float) -> float:
         """Return the largest speed [m/s] at which any solid moves through the tank in this frame."""
-        fastest = 0.0
-        for number, (position, rotation) in self._targets.items():
-            old_position, old_rotation = self._poses[number]
-            turn = 2.0 * math.acos(min(1.0, abs(float(old_rotation @ rotation))))
-            reach = float(np.linalg.norm(self.scene.tank.size)) if self.scene.tank else self._reaches[number]
-            fastest = max(fastest, (float(np.linalg.norm(position - old_position)) + turn * reach) / duration)
-        return fastest
+        return self.solids.largest_speed(duration, self.scene.tank.size if self.scene.tank else None)
 
     def _speed_limit(self, duration: float) -> float:
         """Return the largest speed [m/s] that gravity, the start and the solids can have given to a particle.
 
-        That is the speed of a free fall through the tank, above the fastest particle at the start and the fastest
-        solid so far. Without a tank a fall has no end, and neither has the limit.
+        That is the speed of a free fall through the tank, above the fastest particle at the start, the fastest solid
+        and the strongest forces so far. Without a tank a fall has no end, and neither has the limit.
         """
         if self.scene.tank is None:
             return math.inf
         self._fastest_solid = max(self._fastest_solid, self._solid_speed(duration))
         fall = sum(2.0 * abs(g) * edge for g, edge in zip(self.scene.gravity, self.scene.tank.size, strict=True))
-        given = math.sqrt(fall + self._fastest_start**2) + 2.0 * self._fastest_solid
-        return self.scene.speed_limit * max(given, 1e-6)
+        pushes = sum(force.largest_speed() for force in (*self.forces, *self._passing))
+        self._fastest_force = max(self._fastest_force, pushes)
+        given = math.sqrt(fall + self._fastest_start**2) + 2.0 * self._fastest_solid + self._fastest_force
+        return self.scene.speed_limit * max(given + capillary_speed(self.world, self.scene), 1e-6)
 
     # --- solids ---
 
@@ -156,38 +168,119 @@ class Simulation:
         """Set the pose that the solid `name` reaches at the end of the next frame; its velocity follows.
 
         `position` [m] is that of the solid's frame (the centre of a box), `rotation` a quaternion (w, x, y, z) or an
-        angle about z [rad]; None keeps what is.
+        angle about z [rad]; None keeps what is. A solid without a name is called "solid 1" and so on.
         """
-        if name not in self._names:
-            known = ", ".join(sorted(n for n in self._names if not n.startswith("tank "))) or "none"
-            raise WavetankError(f"there is no solid named {name!r}; named solids: {known}.")
-        number = self._names[name]
-        old_position, old_rotation = self._targets.get(number, self._poses[number])
-        point = np.array(old_position, float)
-        if position is not None:
-            values = np.asarray(position, float)
-            if values.shape != (self.scene.dim,) or not np.isfinite(values).all():
-                raise WavetankError(f"position = {position} must be {self.scene.dim} finite numbers.")
-            point[: self.scene.dim] = values
-        self._targets[number] = (point, old_rotation if rotation is None else unit_quaternion(rotation))
+        self.solids.aim(name, position, rotation, self.scene.dim)
 
-    def _move_solids(self, begin: float, end: float) -> None:
-        """Put the solids' poses at the shares `begin` and `end` of the frame on the device."""
-        if not self._targets:
-            return
-        where = [*self._poses]
-        for number, (position, rotation) in self._targets.items():
-            where[number] = (position, rotation)
-        for share, positions, rotations in (
-            (begin, self.world.solids.old_position, self.world.solids.old_rotation),
-            (end, self.world.solids.position, self.world.solids.rotation),
-        ):
-            pairs = list(zip(self._poses, where, strict=True))
-            upload(positions, np.array([a[0] + share * (b[0] - a[0]) for a, b in pairs], np.float32))
-            upload(rotations, np.array([interpolate(a[1], b[1], share) for a, b in pairs], np.float32))
-        if begin == 0.0 and all(np.array_equal(a[0], b[0]) and np.array_equal(a[1], b[1])
-                                for a, b in zip(self._poses, where, strict=True)):  # fmt: skip
-            self._targets = {}
+    def add_solid(self, solid: Solid, grow: float = 0.0) -> str:
+        """Put a solid into the world and return its name.
+
+        With `grow` [s] it swells to its size within that time and pushes the water where it appears aside.
+        """
+        self.scene.assign("solids", [*self.scene.solids, solid])
+        name = self.solids.add(solid, grow)
+        self._renew_solids()
+        return name
+
+    def remove_solid(self, name: str) -> None:
+        """Take the solid `name` out of the world; the water closes behind it."""
+        number = self.solids.find(name) - self.solids.tank_count
+        if number < 0:
+            raise WavetankError(f"{name!r} is a wall of the tank, which stays; only other solids can be removed.")
+        self.scene.assign("solids", [solid for k, solid in enumerate(self.scene.solids) if k != number])
+        self.solids.remove(number + self.solids.tank_count)
+        self._renew_solids()
+
+    def _renew_solids(self) -> None:
+        self.world.solids, self.world.has_friction = self.solids.device, self.solids.has_friction
+        self._outdated = True
+
+    # --- particles that come and go ---
+
+    def add(self, positions: Any, velocities: Any = None, dyes: Any = None, materials: Any = None) -> np.ndarray:
+        """Add particles at `positions` [m], shape [n, dim], with `velocities` [m/s] and return their new ids, [n].
+
+        `materials` are numbers in `Scene.palette`, [n]; that of the scene's first fluid where None.
+        Where there is room is for the caller to know: see `free_places`. Raises `WavetankError` for wrong shapes.
+        """
+        x = np.asarray(positions, np.float32)
+        v = np.zeros_like(x) if velocities is None else np.asarray(velocities, np.float32)
+        dye = np.zeros(len(x), np.int32) if dyes is None else np.asarray(dyes, np.int32)
+        material = self.scene.checked_kinds(materials, len(x))
+        shape = (len(x), self.scene.dim)
+        if x.shape != shape or v.shape != shape or dye.shape != shape[:1]:
+            raise WavetankError(
+                f"positions have shape {list(x.shape)}, velocities {list(v.shape)}; both must be [n, {self.scene.dim}]."
+            )
+        if not (np.isfinite(x).all() and np.isfinite(v).all()):
+            raise WavetankError("positions and velocities of new particles must be finite numbers.")
+        count = self.count + len(x)
+        if count > MAX_PARTICLES:
+            raise WavetankError(f"{count:,} particles are more than the {MAX_PARTICLES:,} that are allowed.")
+        if count > self._capacity:
+            # Half as much again, so that a hose does not make a new world in every frame.
+            self._make_room(max(count, self._capacity * 3 // 2))
+        if len(x):
+            population.append(self.world.particles, self.count, x, v, dye, material, self._next_id)
+            self.world.materials |= self.scene.materials_of(material)
+        ids = np.arange(self._next_id, self._next_id + len(x))
+        self.world.count, self._next_id, self._outdated = count, self._next_id + len(x), True
+        self._fastest_start = max(self._fastest_start, float(np.linalg.norm(v, axis=1).max(initial=0.0)))
+        return ids
+
+    def remove(self, ids: Any) -> int:
+        """Remove the particles with these ids and return how many there were; the others keep theirs."""
+        gone = np.isin(self.world.particles.id.to_numpy()[: self.count], np.asarray(ids))
+        return self._keep(~gone)
+
+    def remove_inside(self, start: np.ndarray, end: np.ndarray, radius: float) -> int:
+        """Remove the particles within `radius` [m] of the segment between two points [3]; return how many."""
+        return self._keep(~population.inside_capsule(self.world.particles, self.count, start, end, radius))
+
+    def free_places(self, places: np.ndarray, gap: float, wall: float) -> np.ndarray:
+        """Say which `places` [n, dim] keep the distances `gap` [m] to all particles and `wall` to all solids."""
+        return population.free_places(places, self.world.particles, self.world.solids, self.count, gap, wall)
+
+    def paint_inside(self, start: np.ndarray, end: np.ndarray, radius: float, dye: int) -> None:
+        """Dye the particles in that capsule; 0 washes them."""
+        if self.count:
+            population.paint_capsule(self.world.particles, self.count, start, end, radius, dye)
+
+    def freeze_inside(self, start: np.ndarray, end: np.ndarray, radius: float, frozen: bool = True) -> None:
+        """Turn the particles in that capsule to ice that keeps its place, or back to water."""
+        if self.count:
+            self.world.frozen = population.freeze_capsule(
+                self.world.particles, self.count, start, end, radius, int(frozen)
+            )
+
+    def _keep(self, keep: np.ndarray) -> int:
+        removed = int(len(keep) - keep.sum())
+        if removed:
+            population.keep_only(self.world.particles, self.world.spare, self.world.grid, keep)
+            self.world.particles, self.world.spare = self.world.spare, self.world.particles
+            self.world.count -= removed
+            self._outdated = True
+        return removed
+
+    def _make_room(self, capacity: int) -> None:
+        """Move to a world with room for more particles."""
+        before = self.world
+        self._fill(capacity)
+        self.world.particles = population.at_capacity(before.particles, self.scene.dim, capacity)
+        self.world.count, self.world.frozen, self.world.materials = before.count, before.frozen, before.materials
+        if before.pool is not None:
+            rows = pool_rows(before.pool, self.scene.dim)
+            self.world.pool = pool_from(rows, before.pool.born, before.pool.capacity, self.scene.dim, capacity)
+
+    # --- states ---
+
+    def snapshot(self) -> Snapshot:
+        """Return this instant as host arrays, for `resume`."""
+        return take_snapshot(self)
+
+    def resume(self, snapshot: Snapshot) -> None:
+        """Go back (or on) to an instant; parameters and forces stay as they are now."""
+        put_snapshot(self, snapshot)
 
     # --- what is there ---
 
@@ -211,25 +304,52 @@ class Simulation:
         """Densities [kg/m^3], float32 [count], ordered by particle id; walls count as water of rest density."""
         return self.frame().densities
 
-    def frame(self) -> Frame:
-        """Return this instant for a viewer or an exporter; valid until the water moves on."""
-        self._measure()
+    @property
+    def foam_positions(self) -> np.ndarray:
+        """Positions [m] of spray, foam and bubbles, float32 [n, dim], in the order of their birth."""
+        return self.frame().foam_positions
+
+    @property
+    def foam_kinds(self) -> np.ndarray:
+        """What they are, int32 [n]: 1 spray, 2 foam, 3 bubble."""
+        return self.frame().foam_kinds
+
+    @property
+    def foam_ages(self) -> np.ndarray:
+        """Time since their birth [s], float32 [n]."""
+        return self.frame().foam_ages
+
+    def frame(self, measured: bool = True) -> Frame:
+        """Return this instant for a viewer or an exporter; valid until the water moves on.
+
+        Without `measured` its densities are those of some moment before, and no time is spent on them.
+        """
+        if measured:
+            self._measure()
         world = self.world
         return Frame(
             scene=self.scene, number=self.frame_number, time=self.time, count=world.count, x=world.particles.x,
-            v=world.particles.v, rho=world.scratch.rho, id=world.particles.id, solids=world.solids,
+            v=world.particles.v, rho=world.scratch.rho, id=world.particles.id, material=world.particles.material,
+            solids=world.solids,
+            diffuse=world.pool.now if world.pool else None, foam_count=world.pool.count if world.pool else 0,
+            dye=world.particles.dye,
         )  # fmt: skip
 
     def stats(self) -> dict[str, float]:
-        """Measure this instant; see `physics.measure.statistics` for the keys."""
+        """Measure this instant; see `physics.measure.statistics` for the keys, and foam in numbers of particles."""
         frame = self.frame()
         neighbors = self.world.grid.number.to_numpy()[: self.count]
-        figures = measure.statistics(frame.positions, frame.velocities, frame.densities, neighbors, self.scene)
+        figures = measure.statistics(
+            frame.positions, frame.velocities, frame.densities, neighbors, self.scene, frame.rest_densities
+        )
         return {
             "time": self.time,
             "frame": self.frame_number,
             **figures,
-            "milliseconds_per_frame": 1e3 * self._seconds_per_frame,
+            **{KINDS[kind]: int(np.sum(frame.foam_kinds == kind)) for kind in (1, 2, 3)},
+            "foaming": int(frame.foaming.sum()),
+            "substeps": self.time_steps,
+            "milliseconds_per_frame": 1e3 * self.seconds_per_frame,
         }
 
     def _measure(self) -> None:
@@ -259,40 +379,14 @@ class Simulation:
 
     def save(self, path: str | Path) -> None:
         """Write the whole state to an .npz file, replaced in one move; `restore` continues from it exactly."""
-        frame, target = self.frame(), Path(path)
-        partial = target.with_name(target.name + ".partial")
-        with partial.open("wb") as file:
-            np.savez(
-                file, format=1, scene=self.scene.model_dump_json(exclude={"fluids"}), positions=frame.positions,
-                velocities=frame.velocities, time=self.time, frame_number=self.frame_number, owed=self._owed,
-                solid_positions=np.array([p[0] for p in self._poses]).reshape(-1, 3),
-                solid_rotations=np.array([p[1] for p in self._poses]).reshape(-1, 4),
-                moving=np.array(sorted(self._targets), int),
-                targets=np.array([np.concatenate(self._targets[k]) for k in sorted(self._targets)]).reshape(-1, 7),
-            )  # fmt: skip
-        partial.replace(target)
+        write_snapshot(path, self.snapshot(), self.scene.model_dump_json(exclude={"fluids"}))
 
     @classmethod
     def restore(cls, path: str | Path, arch: str = "cpu") -> "Simulation":
         """Continue from a file that `save` wrote, bit for bit on the same back end."""
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                data = {name: file[name] for name in file.files}
-            scene = Scene.model_validate_json(str(data["scene"]))
-            self = cls(scene, arch)
-            self._fill(data["positions"], data["velocities"], np.arange(len(data["positions"])))
-            self.time, self.frame_number = float(data["time"]), int(data["frame_number"])
-            self._owed = float(data["owed"])
-            self._poses = list(zip(data["solid_positions"], data["solid_rotations"], strict=True))
-            self._targets = {int(k): (row[:3], row[3:]) for k, row in zip(data["moving"], data["targets"], strict=True)}
-        except (OSError, KeyError, ValueError) as error:
-            raise WavetankError(f"{path}: this is not a state that `Simulation.save` wrote: {error}.") from None
-        solid_set = self.world.solids
-        for positions, rotations in (
-            (solid_set.position, solid_set.rotation), (solid_set.old_position, solid_set.old_rotation),
-        ):  # fmt: skip
-            upload(positions, data["solid_positions"].astype(np.float32))
-            upload(rotations, data["solid_rotations"].astype(np.float32))
+        snapshot, text = read_snapshot(path, lambda text: Scene.model_validate_json(text).solids)
+        self = cls(Scene.model_validate_json(text), arch)
+        self.resume(snapshot)
         return self
 
 

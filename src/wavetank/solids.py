@@ -79,6 +79,18 @@ class Solid(Model):
         return []
 
 
+def moved(solid: Solid, position: np.ndarray, rotation: np.ndarray) -> Solid:
+    """Return the same solid with its frame at `position` [m], shape [3], turned by the quaternion `rotation`."""
+    shift = position - solid.origin
+    keys = [name for name in ("center", "start", "end", "point") if name in type(solid).model_fields]
+    places = {name: tuple(float(a + b) for a, b in zip(getattr(solid, name), shift, strict=False)) for name in keys}
+    result: Solid = type(solid).model_validate({
+        **{name: getattr(solid, name) for name in type(solid).model_fields}, **places,
+        "rotation": tuple(map(float, unit_quaternion([*rotation]))),
+    })  # fmt: skip
+    return result
+
+
 class Box(Solid):
     """A box; in a 2-D world a rectangle."""
 
@@ -328,6 +340,18 @@ def build(solids: Sequence[Solid], tank_count: int, friction: float) -> SolidSet
         count=len(solids),
         tank_count=tank_count,
     )
+
+
+def resize(device: SolidSet, solids: Sequence[Solid], scales: Sequence[float]) -> None:
+    """Put the solids on the device at these shares of their sizes, around their origins."""
+    nodes = [(node, scale) for solid, scale in zip(solids, scales, strict=True) for node in solid.program()]
+    for array, values in (
+        (device.size, [scale * node.size for node, scale in nodes]),
+        (device.offset, [scale * node.offset for node, scale in nodes]),
+    ):
+        host = np.zeros_like(array.to_numpy())
+        host[: len(values)] = values
+        array.from_numpy(host)
 
 
 def _point(vector: Sequence[float]) -> np.ndarray:

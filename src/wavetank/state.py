@@ -19,8 +19,11 @@ class Particles:
     x: qd.types.ndarray()  # vec [capacity], m: position at the start of the substep
     p: qd.types.ndarray()  # vec [capacity], m: predicted position, Algorithm 1's x*
     v: qd.types.ndarray()  # vec [capacity], m/s
-    id: qd.types.ndarray()  # i32 [capacity]: number of the particle, 0 .. count - 1
+    id: qd.types.ndarray()  # i32 [capacity]: name of the particle for life; those of removed ones are not used again
+    material: qd.types.ndarray()  # i32 [capacity]: number of its material
     near: qd.types.ndarray()  # i32 [capacity]: bit k is set where solid k is near, bit 30 for all solids from 30 on
+    dye: qd.types.ndarray()  # i32 [capacity]: 0 or strength << 24 | red << 16 | green << 8 | blue, strength 1 .. 127
+    frozen: qd.types.ndarray()  # i32 [capacity]: 1 where a particle is ice and keeps its place
 
 
 @dataclasses.dataclass
@@ -31,6 +34,7 @@ class Scratch:
     lam: qd.types.ndarray()  # f32 [capacity], m^2: multiplier, the sum over the iterations of a substep
     dlam: qd.types.ndarray()  # f32 [capacity], m^2: its change in the last iteration
     omega: qd.types.ndarray()  # vec3 [capacity], 1/s: vorticity
+    weight: qd.types.ndarray()  # f32 [capacity]: largest rest density of all fluids over its own; 1 where all are equal
 
 
 @dataclasses.dataclass
@@ -51,10 +55,70 @@ class Grid:
 
 
 @dataclasses.dataclass
+class Diffuse:
+    """Spray, foam and bubbles, packed at the front in the order of their birth."""
+
+    x: qd.types.ndarray()  # vec [capacity], m
+    v: qd.types.ndarray()  # vec [capacity], m/s
+    kind: qd.types.ndarray()  # i32 [capacity]: 1 spray, 2 foam, 3 bubble; see KINDS
+    age: qd.types.ndarray()  # f32 [capacity], s
+    life: qd.types.ndarray()  # f32 [capacity], s: age at which it ends
+    id: qd.types.ndarray()  # i32 [capacity]: number of the birth
+
+
+@dataclasses.dataclass
+class Births:
+    """What a frame's births need and forget."""
+
+    normal: qd.types.ndarray()  # vec [water capacity]: outward unit normal of the water's surface, zero inside
+    first: qd.types.ndarray()  # i32 [water capacity + 1]: births of each water particle, then the first of its places
+    kept: qd.types.ndarray()  # i32 [capacity + 1]: 1 for who lives on, then its next place
+    blocks: qd.types.ndarray()  # i32 [blocks]: partial sums of the scan
+
+
+@dataclasses.dataclass
+class Air:
+    """Scalars of a frame of spray, foam and bubbles, from the scene's parameters; see `physics/diffuse/`."""
+
+    dt: qd.f32  # s, of the frame
+    speed: qd.f32  # m/s: U
+    made: qd.f32  # births of a water particle in this frame where all potentials are one
+    lifetime: qd.f32  # s
+    spread: qd.f32  # m: how far from the way of its water particle one is born
+    share: qd.f32  # makes the sum of Poly6 around a point one in the bulk
+    mean: qd.f32  # makes the sum of 1 - q around a particle one in the bulk
+    spray_keep: qd.f32  # share of the velocity relative to the air that is left after dt
+    spray_path: qd.f32  # s: way per relative velocity in dt
+    spray_bend: qd.f32  # s^2: way per acceleration in dt
+    bubble_keep: qd.f32
+    bubble_path: qd.f32
+    bubble_bend: qd.f32
+    frame: qd.i32  # number of the frame
+    seed: qd.i32
+
+
+@dataclasses.dataclass
 class Walls:
     """What a flat wall adds to the density: see `half_space_table`."""
 
     table: qd.types.ndarray()  # vec2 [samples]: I(s) and A(s) at s / h from -1 to 1
+
+
+@dataclasses.dataclass
+class Fluids:
+    """What several, thick or cohesive fluids need on the device; a world pays for what it uses."""
+
+    capacity: int
+    rows: Any  # vec4 [materials]: inverse mass over the smallest, viscosity [Pa s], tension [N/m], wetting (0 to 1)
+    written: np.ndarray | None = None  # what `rows` holds
+    weighed: bool = False  # whether Scratch.weight differs from 1
+    arrays: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    def array(self, name: str) -> Any:
+        """Return the vec4 [capacity] of that name, made when it is first asked for."""
+        if name not in self.arrays:
+            self.arrays[name] = vectors(4, self.capacity)
+        return self.arrays[name]
 
 
 @dataclasses.dataclass
@@ -74,9 +138,17 @@ class Coefficients:
     largest_correction: qd.f32  # m, of one iteration
     viscosity: qd.f32  # share per substep
     vorticity: qd.f32  # m/s
+    coherence: qd.f32
+    calm: qd.f32  # 1/s, vorticity of water at rest
     speed_limit: qd.f32  # m/s
     wall_density: qd.f32
     wall_gap: qd.f32  # m
+    skin: qd.f32 = 0.0  # m^(dim - 2), see physics/tension.py
+    cohesion: qd.f32 = 0.0  # m^(dim - 2), likewise
+
+
+#: What a particle is, by its number in files and on the device.
+KINDS = ("water", "spray", "foam", "bubble")
 
 
 def vectors(dim: int, capacity: int) -> Any:
@@ -104,10 +176,17 @@ def upload(array: Any, values: np.ndarray) -> None:
 def new_particles(dim: int, capacity: int) -> Particles:
     """Allocate particles that all rest at the origin."""
     x, p, v = (vectors(dim, capacity) for _ in range(3))
-    return Particles(x, p, v, id=integers(capacity), near=integers(capacity))
+    return Particles(x, p, v, *(integers(capacity) for _ in range(5)))
 
 
 def new_scratch(capacity: int) -> Scratch:
     """Allocate the scratch arrays."""
-    rho, lam, dlam = (scalars(capacity) for _ in range(3))
-    return Scratch(rho, lam, dlam, omega=vectors(3, capacity))
+    rho, lam, dlam, weight = (scalars(capacity) for _ in range(4))
+    weight.fill(1.0)
+    return Scratch(rho, lam, dlam, omega=vectors(3, capacity), weight=weight)
+
+
+def new_diffuse(dim: int, capacity: int) -> Diffuse:
+    """Allocate room for spray, foam and bubbles."""
+    x, v = vectors(dim, capacity), vectors(dim, capacity)
+    return Diffuse(x, v, integers(capacity), scalars(capacity), scalars(capacity), integers(capacity))

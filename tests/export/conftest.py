@@ -13,6 +13,11 @@ def frame(request):
         positions=random.normal(size=(count, dim)).astype(np.float32),
         velocities=random.normal(size=(count, dim)).astype(np.float32) * 1e-3,
         densities=random.uniform(900, 1100, count).astype(np.float32),
+        materials=random.integers(0, 3, count).astype(np.int32),
+        foam_positions=random.normal(size=(5, dim)).astype(np.float32),
+        foam_velocities=random.normal(size=(5, dim)).astype(np.float32),
+        foam_kinds=np.array([1, 2, 3, 2, 1], np.int32), foam_ages=random.uniform(0, 2, 5).astype(np.float32),
+        foam_ids=np.array([3, 8, 9, 11, 2**31 - 1], np.int32),
     )  # fmt: skip
 
 
@@ -20,4 +25,9 @@ def frame(request):
 def nothing():
     """An instant without particles."""
     empty = np.zeros((0, 3), np.float32)
-    return SimpleNamespace(dim=3, count=0, time=0.0, number=0, positions=empty, velocities=empty, densities=empty[:, 0])
+    return SimpleNamespace(
+        dim=3, count=0, time=0.0, number=0, positions=empty, velocities=empty, densities=empty[:, 0],
+        materials=np.zeros(0, np.int32),
+        foam_positions=empty, foam_velocities=empty, foam_kinds=np.zeros(0, np.int32), foam_ages=empty[:, 0],
+        foam_ids=np.zeros(0, np.int32),
+    )  # fmt: skip

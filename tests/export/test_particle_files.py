@@ -5,15 +5,17 @@ from wavetank.errors import WavetankError
 from wavetank.export import EXPORTERS, exporter_for, exporter_named, suffixes
 from wavetank.export.csv import read_csv, write_csv
 from wavetank.export.npz import read_npz, write_npz
-from wavetank.export.ply import COLUMNS, read_ply, write_ply
+from wavetank.export.ply import COLUMNS, FOAM_COLUMNS, read_foam, read_ply, write_ply
 
 
 def test_npz_brings_everything_back(tmp_path, frame):
     write_npz(tmp_path / "a.npz", frame)
     back = read_npz(tmp_path / "a.npz")
-    for name in ("positions", "velocities", "densities"):
+    for name in ("positions", "velocities", "densities", "foam_positions", "foam_velocities", "foam_kinds",
+                 "foam_ages", "foam_ids"):  # fmt: skip
         assert (back[name] == getattr(frame, name)).all()
-        assert back[name].dtype == np.float32
+        assert back[name].dtype == getattr(frame, name).dtype
+    assert (back["materials"] == frame.materials).all()
     assert back["time"] == frame.time
     assert back["number"] == frame.number
 
@@ -22,11 +24,19 @@ def test_csv_brings_every_bit_back(tmp_path, frame):
     write_csv(tmp_path / "a.csv", frame)
     back = read_csv(tmp_path / "a.csv")
     axes = "xyz"[: frame.dim]
-    assert list(back) == ["id", *axes, *("v" + axis for axis in axes), "density"]
-    assert back["id"].tolist() == list(range(frame.count))
-    assert (np.stack([back[axis] for axis in axes], 1).astype(np.float32) == frame.positions).all()
-    assert (np.stack([back["v" + axis] for axis in axes], 1).astype(np.float32) == frame.velocities).all()
-    assert (back["density"].astype(np.float32) == frame.densities).all()
+    assert list(back) == ["id", *axes, *("v" + axis for axis in axes), "density", "kind", "age", "material"]
+    table = {name: column[back["kind"] == 0] for name, column in back.items()}
+    assert table["id"].tolist() == list(range(frame.count))
+    assert (np.stack([table[axis] for axis in axes], 1).astype(np.float32) == frame.positions).all()
+    assert (np.stack([table["v" + axis] for axis in axes], 1).astype(np.float32) == frame.velocities).all()
+    assert (table["density"].astype(np.float32) == frame.densities).all()
+    foam = {name: column[back["kind"] > 0] for name, column in back.items()}
+    assert foam["id"].tolist() == frame.foam_ids.tolist()
+    assert foam["kind"].tolist() == frame.foam_kinds.tolist()
+    assert (np.stack([foam[axis] for axis in axes], 1).astype(np.float32) == frame.foam_positions).all()
+    assert (np.stack([foam["v" + axis] for axis in axes], 1).astype(np.float32) == frame.foam_velocities).all()
+    assert (foam["age"].astype(np.float32) == frame.foam_ages).all()
+    assert (table["material"] == frame.materials).all()
 
 
 def test_ply_brings_every_bit_back(tmp_path, frame):
@@ -37,6 +47,13 @@ def test_ply_brings_every_bit_back(tmp_path, frame):
         for name, values in (("xyz"[k], frame.positions), ("v" + "xyz"[k], frame.velocities)):
             assert (back[name] == (values[:, k] if k < frame.dim else 0.0)).all()
     assert (back["density"] == frame.densities).all()
+    assert (back["material"] == frame.materials).all()
+    foam = read_foam(tmp_path / "a.ply")
+    for k in range(3):
+        for name, values in (("xyz"[k], frame.foam_positions), ("v" + "xyz"[k], frame.foam_velocities)):
+            assert (foam[name] == (values[:, k] if k < frame.dim else 0.0)).all()
+    for name, values in (("age", frame.foam_ages), ("kind", frame.foam_kinds), ("id", frame.foam_ids)):
+        assert (foam[name] == values).all()
 
 
 def test_ply_has_the_header_that_readers_expect(tmp_path, frame):
@@ -45,8 +62,10 @@ def test_ply_has_the_header_that_readers_expect(tmp_path, frame):
     lines = header.decode("ascii").split("\n")
     assert lines[:2] == ["ply", "format binary_little_endian 1.0"]
     assert f"element vertex {frame.count}" in lines
-    assert [line.split()[-1] for line in lines if line.startswith("property float")] == list(COLUMNS)
-    assert len(body) == 4 * len(COLUMNS) * frame.count
+    assert f"element foam {len(frame.foam_ids)}" in lines
+    properties = [line.split()[-1] for line in lines if line.startswith("property")]
+    assert properties == [*COLUMNS, *FOAM_COLUMNS]
+    assert len(body) == 4 * (len(COLUMNS) * frame.count + len(FOAM_COLUMNS) * len(frame.foam_ids))
 
 
 @pytest.mark.parametrize("suffix", suffixes("particles"))

@@ -16,11 +16,11 @@ def solve(cloud: Cloud) -> None:
     world, count = cloud.world, cloud.count
     clear_multipliers(world.scratch, count)
     solve_multipliers(
-        world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, cloud.method
+        world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, cloud.method, 0
     )
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, world.walls, cloud.c, count,
-        cloud.method, int(cloud.scene.tensile_strength > 0),
+        cloud.method, int(cloud.scene.tensile_strength > 0), 0,
     )  # fmt: skip
 
 
@@ -48,13 +48,15 @@ def test_multiplier_eq_5(dim, kernel):
     np.testing.assert_allclose(cloud.world.scratch.lam.to_numpy(), expected, atol=1e-4 * np.abs(expected).max())
 
 
-def test_only_compression_is_corrected_by_default():
-    cloud = Cloud(3)
+@pytest.mark.parametrize("attraction", [0.0, 0.2])
+def test_only_a_share_of_expansion_is_corrected(attraction):
+    cloud = Cloud(3, attraction=attraction)
     solve(cloud)
     lam = cloud.world.scratch.lam.to_numpy()
-    expected = np.minimum(multipliers(cloud), 0.0)
-    assert (expected < 0).any()
-    assert (expected == 0).any()
+    newton = multipliers(cloud)
+    expected = np.where(newton > 0, attraction * newton, newton)
+    assert (newton < 0).any()
+    assert (newton > 0).any()
     np.testing.assert_allclose(lam, expected, atol=1e-4 * np.abs(expected).max())
 
 
@@ -98,7 +100,7 @@ def test_vorticity_eq_9(dim, kernel):
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_vorticity_confinement_eq_10(dim):
-    cloud = Cloud(dim, vorticity=2.0)
+    cloud = Cloud(dim, vorticity=2.0, vorticity_coherence=0.0)
     world = cloud.world
     find_vorticity(world.scratch, world.particles, world.grid, cloud.c, cloud.count, cloud.method)
     omega = world.scratch.omega.to_numpy().astype(np.float64)

@@ -9,6 +9,7 @@ from wavetank.view.buffers import SOLID
 from wavetank.view.camera import Camera
 from wavetank.view.passes import solids, spheres
 from wavetank.view.renderer import Renderer
+from wavetank.view.style import Style
 
 WIDTH, HEIGHT = 120, 90
 FRONT = Camera(eye=(0.5, 0.5, 3.0), target=(0.5, 0.5, 0.5), height=1.5)
@@ -17,7 +18,7 @@ FRONT = Camera(eye=(0.5, 0.5, 3.0), target=(0.5, 0.5, 0.5), height=1.5)
 def buffers_of(frame, camera):
     """The buffers after particles and solids."""
     renderer = Renderer(WIDTH, HEIGHT)
-    shot = renderer.shot(frame, camera, "speed", None, None, 0.5)
+    shot = renderer.shot(frame, camera, Style(radius=0.5))
     for draw in (spheres.draw, solids.draw):
         draw(shot, renderer.buffers)
     return renderer.buffers

@@ -8,6 +8,7 @@ from wavetank.view.buffers import NOTHING
 from wavetank.view.camera import Camera
 from wavetank.view.passes import spheres
 from wavetank.view.renderer import Renderer
+from wavetank.view.style import Style
 
 WIDTH, HEIGHT, RADIUS = 120, 90, 0.05
 
@@ -32,7 +33,7 @@ def entry_depths(camera, center, radius=RADIUS):
 def drawn(frame, camera):
     """(depth, surface) of the spheres pass, [height, width]."""
     renderer = Renderer(WIDTH, HEIGHT)
-    shot = renderer.shot(frame, camera, "speed", None, None, RADIUS / frame.scene.spacing)
+    shot = renderer.shot(frame, camera, Style(radius=RADIUS / frame.scene.spacing))
     spheres.draw(shot, renderer.buffers)
     return renderer.buffers.depth.to_numpy().view(np.float32), renderer.buffers.surface.to_numpy()
 

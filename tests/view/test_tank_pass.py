@@ -11,7 +11,7 @@ WIDTH, HEIGHT = 160, 120
 
 def lines_of(frame, camera):
     renderer = Renderer(WIDTH, HEIGHT)
-    renderer.render(frame, camera=camera, legend=False)
+    renderer.render(frame, camera=camera, view="particles", legend=False)
     return renderer.buffers.lines.to_numpy()
 
 
@@ -77,4 +77,4 @@ def test_an_edge_through_the_eye_does_no_harm(make_frame, tank_scene):
 def test_no_tank_no_lines(make_frame):
     frame = make_frame(Scene(spacing=0.05), [])
     renderer = Renderer(WIDTH, HEIGHT)
-    assert len(np.unique(renderer.render(frame, legend=False).reshape(-1, 3), axis=0)) < 200
+    assert len(np.unique(renderer.render(frame, view="particles", legend=False).reshape(-1, 3), axis=0)) < 200

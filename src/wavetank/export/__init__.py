@@ -12,9 +12,9 @@ from pathlib import Path
 from types import ModuleType
 
 from wavetank.errors import WavetankError
-from wavetank.export import csv, mp4, npz, ply, png
+from wavetank.export import csv, gif, mp4, npz, ply, png
 
-EXPORTERS: tuple[ModuleType, ...] = (png, mp4, npz, csv, ply)
+EXPORTERS: tuple[ModuleType, ...] = (png, mp4, npz, csv, ply, gif)
 
 
 def suffixes(kind: str | None = None) -> tuple[str, ...]:

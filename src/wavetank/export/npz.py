@@ -12,11 +12,17 @@ KIND = "particles"
 
 
 def write_npz(path: str | Path, frame: Frame) -> None:
-    """Write positions [m], velocities [m/s], densities [kg/m^3], ordered by particle id, time [s] and frame number."""
+    """Write positions [m], velocities [m/s], densities [kg/m^3], materials, ordered by particle id; time [s], number.
+
+    Spray, foam and bubbles follow: `foam_positions`, `foam_velocities`, `foam_kinds` (1 spray, 2 foam, 3 bubble),
+    `foam_ages` [s] and `foam_ids`, which stay with a particle from file to file.
+    """
     with replacing(path) as partial, partial.open("wb") as file:
         np.savez_compressed(
             file, positions=frame.positions, velocities=frame.velocities, densities=frame.densities,
-            time=np.float64(frame.time), number=np.int64(frame.number),
+            materials=frame.materials, time=np.float64(frame.time), number=np.int64(frame.number),
+            foam_positions=frame.foam_positions, foam_velocities=frame.foam_velocities, foam_kinds=frame.foam_kinds,
+            foam_ages=frame.foam_ages, foam_ids=frame.foam_ids,
         )  # fmt: skip
 
 

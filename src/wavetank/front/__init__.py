@@ -1,1 +1,1 @@
-"""Ways to watch a world: headless files now, window and browser later."""
+"""Ways to watch a world and to lay hands on it: files without a screen, a page in a browser, a notebook."""

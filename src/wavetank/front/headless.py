@@ -17,11 +17,13 @@ from rich.text import Text
 
 from wavetank.errors import WavetankError
 from wavetank.export import exporter_named
+from wavetank.export.gif import LARGEST_RATE, GifWriter
 from wavetank.export.mp4 import VideoWriter
 from wavetank.export.png import write_png
 from wavetank.frame import Frame
 from wavetank.simulation import Simulation
 from wavetank.view.renderer import Renderer
+from wavetank.view.style import QUALITIES, quality_named
 
 Sink = Callable[[int, Frame, Any], None]  # takes the number of a frame, the frame and its picture (or None)
 
@@ -46,6 +48,8 @@ def record(
     size: tuple[int, int] = (1280, 720),
     name: str = "run",
     video: bool = True,
+    gif: bool = False,
+    quality: str = "draft",
     frames: bool = False,
     exports: Sequence[str] = (),
     console: Console | None = None,
@@ -59,8 +63,12 @@ def record(
         raise WavetankError(f"--seconds = {seconds} is not allowed; it must be a number from 0 to 86400.")
     if not 1.0 <= fps <= 240.0:
         raise WavetankError(f"--fps = {fps} is not allowed; it must be a number from 1 to 240.")
+    if gif and fps > LARGEST_RATE:
+        raise WavetankError(f"--fps = {fps} is too fast for --gif; at most {LARGEST_RATE:g}.")
     writers = [exporter_named(format_) for format_ in exports]
-    renderer = Renderer(*size)
+    supersample, samples = QUALITIES[quality_named(quality)]
+    look = {**look, "samples": samples}
+    renderer = Renderer(*size, supersample)
     renderer.render(sim.frame(), **look)  # what is wrong with the look shows before anything is written
     out.mkdir(parents=True, exist_ok=True)
     files: list[str] = []
@@ -71,15 +79,19 @@ def record(
             film = stack.enter_context(VideoWriter(out / f"{name}.mp4", *size, fps))
             sinks.append(lambda number, frame, image: film.write(image))
             files.append(str(out / f"{name}.mp4"))
+        if gif:
+            loop = stack.enter_context(GifWriter(out / f"{name}.gif", *size, fps))
+            sinks.append(lambda number, frame, image: loop.write(image))
+            files.append(str(out / f"{name}.gif"))
         if frames:
             sinks.append(lambda number, frame, image: write_png(out / f"{name}-{number:05d}.png", image))
             files.append(str(out / f"{name}-#####.png"))
         for writer in writers:
             sinks.append(_particle_sink(writer, out, name))
             files.append(str(out / f"{name}-#####{writer.SUFFIXES[0]}"))
-        _loop(sim, seconds, fps, renderer if video or frames else None, sinks, summary, console, look)
+        _loop(sim, seconds, fps, renderer if video or gif or frames else None, sinks, summary, console, look)
     still = out / f"{name}.png"
-    image = Renderer(*size, supersample=2).render(sim.frame(), **look)
+    image = Renderer(*size, 2 if quality == "draft" else supersample).render(sim.frame(), **look)
     write_png(still, image, {"scene": sim.scene.title, "time": f"{sim.time:.4f} s"})
     figures = summary.figures() | {"files": [*files, str(still)]}
     stats = out / "stats.json"
@@ -141,6 +153,43 @@ def _interruptible() -> Iterator[threading.Event]:
         yield event
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def replay_session(
+    path: Path, *, video: Path | None = None, fps: float = 60.0, size: tuple[int, int] = (1280, 720), arch: str = "",
+    console: Console | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Do a recorded session again, with a video if `video` is given, and return what came out.
+
+    The video follows the recorded camera and shows one frame of the session in each of its own, so slow motion is slow.
+    """
+    from wavetank.recording import Recording, digest, replay
+    from wavetank.view.choices import options
+
+    if not 1.0 <= fps <= 240.0:
+        raise WavetankError(f"--fps = {fps} is not allowed; it must be a number from 1 to 240.")
+    recording = Recording.load(path)
+    session = None
+    with ExitStack() as stack:
+        film = stack.enter_context(VideoWriter(video, *size, fps)) if video is not None else None
+        renderer: Renderer | None = None
+        progress = stack.enter_context(Progress(console=console or Console(stderr=True), transient=True))
+        task = progress.add_task("replay", total=recording.frames)
+        interrupted = stack.enter_context(_interruptible())
+        for session in replay(recording, arch or recording.arch, str(path)):
+            session.aspect = size[0] / size[1]
+            if film is not None:
+                renderer = renderer or Renderer(*size)
+                look = options(session.view, session.color_by)
+                film.write(renderer.render(session.sim.frame(), session.camera, **look))
+            progress.update(task, completed=session.ticks)
+            if interrupted.is_set():
+                raise WavetankError(f"{path}: the replay was stopped after {session.ticks} frames.")
+    assert session is not None
+    return {
+        "frames": session.ticks, "seconds_of_water": session.sim.time, "count": session.sim.count,
+        "arch": session.sim.arch, "same": digest(session) == recording.digest, "digest": digest(session),
+    }  # fmt: skip
 
 
 class _Summary:

@@ -11,6 +11,9 @@ from wavetank import compiler
 
 _PACKAGES = {
     "quadrants": "", "numpy": "", "pydantic": "", "typer": "", "rich": "", "pillow": "", "av": "", "tomli-w": "",
+    **dict.fromkeys(
+        ("imgui-bundle", "moderngl", "glfw"), "the window of `wavetank play`: pip install wavetank[window]"
+    ),
     "matplotlib": "plots of `wavetank converge` and `validate`: pip install wavetank[plot]",
 }  # fmt: skip
 

@@ -3,7 +3,7 @@
 python -m wavetank.lab.reference > docs/parameters.md
 """
 
-from wavetank.params import PARAMETERS, PRESETS
+from wavetank.params import PARAMETERS, PRESETS, QUALITIES
 
 
 def parameters_page() -> str:
@@ -29,11 +29,13 @@ def parameters_page() -> str:
         symbol = f"`{p.symbol}`" if p.symbol else ""
         live = "yes" if p.live else "reset"
         lines.append(f"| `{p.name}` | {symbol} | {default} | {low_high} | {p.unit} | {live} | {p.sentence} |")
-    lines += ["", "## Presets", ""]
-    for name, values in PRESETS.items():
-        settings = ", ".join(f"`{key} = {value:.4g}`" if isinstance(value, float) else f"`{key} = {value}`"
-                             for key, value in values.items())  # fmt: skip
-        lines.append(f"- `preset = {name}`: {settings or 'the defaults above'}.")
+    for key, title, choices in (("preset", "Presets", PRESETS), ("quality", "Qualities", QUALITIES)):
+        lines += ["", f"## {title}", ""]
+        for name, values in choices.items():
+            settings = ", ".join(
+                f"`{k} = {v:.4g}`" if isinstance(v, float) else f"`{k} = {v}`" for k, v in values.items()
+            )
+            lines.append(f'- `{key} = "{name}"`: {settings or "the defaults above"}.')
     return "\n".join(lines) + "\n"
 
 

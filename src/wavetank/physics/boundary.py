@@ -86,31 +86,50 @@ def follow(k, at, end, solids: SolidSet, gap):
     return end
 
 
-@qd.kernel(fastcache=True)
-def keep_out_of_solids(particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
-    """Move the predicted positions out of the solids, as reached from the positions before, in the solids' motion.
+@qd.func
+def stopped(origin, target, near, solids: SolidSet, gap):
+    """Return where the way from `origin` to `target` ends outside of the marked solids, in their motion.
 
     The tank comes last: it is convex from inside, so its word holds. Where one solid moved a particle all are asked
     once more.
     """
+    turns = solids.count
+    for turn in range(2 * solids.count):
+        k = solids.count - 1 - turn % solids.count
+        if turn < turns and is_near(near, k) == 1:
+            rotation = solids.rotation[k]
+            end = to_local(solids.position[k], rotation, target)
+            at = to_local(solids.old_position[k], solids.old_rotation[k], origin)
+            # A way no longer than the distance at its end has not touched the solid.
+            if local_distance(solids, k, end).w < qd.max(gap, (end - at).norm()):
+                out = follow(k, at, end, solids, gap)
+                if (out - end).norm() > 0.0:
+                    target = solids.position[k] + rotate(rotation, out)
+                    turns = 2 * solids.count
+    return target
+
+
+@qd.func
+def near_solids(x, p, solids: SolidSet, h):
+    """Bits of the solids that a particle on its way from `x` to `p` may touch or feel, and a little beyond."""
+    near = 0
+    for k in range(solids.count):
+        turn = (solids.rotation[k] - solids.old_rotation[k]).norm()
+        margin = 1.2 * h + (p - x).norm() + (solids.position[k] - solids.old_position[k]).norm()
+        margin += 2.0 * turn * qd.min(solids.reach[k], (p - solids.position[k]).norm())
+        if (p - solids.position[k]).norm() < solids.reach[k] + margin:
+            if signed_distance(solids, k, p).w < margin:
+                near |= 1 << qd.min(k, 30)
+    return near
+
+
+@qd.kernel(fastcache=True)
+def keep_out_of_solids(particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
+    """Move the predicted positions out of the solids, as reached from the positions before."""
     for i in range(count):
         near = particles.near[i]
         if near != 0:
-            origin = lift(particles.x[i])
-            target = lift(particles.p[i])
-            turns = solids.count
-            for turn in range(2 * solids.count):
-                k = solids.count - 1 - turn % solids.count
-                if turn < turns and is_near(near, k) == 1:
-                    rotation = solids.rotation[k]
-                    end = to_local(solids.position[k], rotation, target)
-                    at = to_local(solids.old_position[k], solids.old_rotation[k], origin)
-                    # A way no longer than the distance at its end has not touched the solid.
-                    if local_distance(solids, k, end).w < qd.max(c.wall_gap, (end - at).norm()):
-                        out = follow(k, at, end, solids, c.wall_gap)
-                        if (out - end).norm() > 0.0:
-                            target = solids.position[k] + rotate(rotation, out)
-                            turns = 2 * solids.count
+            target = stopped(lift(particles.x[i]), lift(particles.p[i]), near, solids, c.wall_gap)
             p = particles.p[i]
             for axis in qd.static(range(p.n)):
                 p[axis] = target[axis]
@@ -121,14 +140,4 @@ def keep_out_of_solids(particles: Particles, solids: SolidSet, c: Coefficients, 
 def mark_near_solids(particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
     """Mark for every particle the solids that it may touch or feel on its way and a little beyond."""
     for i in range(count):
-        x = lift(particles.x[i])
-        p = lift(particles.p[i])
-        near = 0
-        for k in range(solids.count):
-            turn = (solids.rotation[k] - solids.old_rotation[k]).norm()
-            margin = 1.2 * c.h + (p - x).norm() + (solids.position[k] - solids.old_position[k]).norm()
-            margin += 2.0 * turn * qd.min(solids.reach[k], (p - solids.position[k]).norm())
-            if (p - solids.position[k]).norm() < solids.reach[k] + margin:
-                if signed_distance(solids, k, p).w < margin:
-                    near |= 1 << qd.min(k, 30)
-        particles.near[i] = near
+        particles.near[i] = near_solids(lift(particles.x[i]), lift(particles.p[i]), solids, c.h)

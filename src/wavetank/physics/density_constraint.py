@@ -21,6 +21,8 @@ Where we differ, and why:
 - The iterations form a Chebyshev semi-iteration (`schedule`) instead of plain Jacobi: at equal work the error of deep
   water halves, and the first step is under-relaxed, without which Jacobi overshoots.
 - Walls add to density and gradient (`boundary.py`), with the particle's own multiplier only.
+- Fluids of different density share the constraint, which counts volumes, not masses (`mixture.py`); their corrections
+  are weighted with inverse masses.
 
 Chebyshev for Jacobi solvers of constraints: Wang 2015 (10.1145/2816795.2818063); the projection of the summed
 multiplier: Moreau and Jean's projected iteration, as in Tonge et al. 2012 (10.1145/2185520.2185601).
@@ -64,6 +66,21 @@ def add_tensile_correction(sums: qd.template(), r, i, j, dlam: qd.template(), c:
     sums += r * ((dlam[i] + dlam[j] + s_corr) * c.gradient_scale * w[1] / qd.max(length, 1e-12))
 
 
+@qd.func
+def add_weighted_density(sums: qd.template(), r, i, j, w: qd.template(), c: Coefficients, method: qd.template()):
+    """`add_density` for fluids of different density: squared gradients count with the inverse masses `w`."""
+    length = r.norm()
+    value = kernel(method, length / c.h)
+    slope = c.gradient_scale * value[1]
+    sums[0] += value[0]
+    direction = r * (slope / qd.max(length, 1e-12))
+    for k in qd.static(range(r.n)):
+        sums[1 + k] += direction[k]
+    sums[1 + r.n] += w[j] * slope * slope
+
+
+#: By `mixed`; append only, as `smoothing.KERNELS`.
+DENSITIES = (add_density, add_weighted_density)
 #: Append only, as `smoothing.KERNELS`.
 CORRECTIONS = (add_correction, add_tensile_correction)
 
@@ -71,14 +88,14 @@ CORRECTIONS = (add_correction, add_tensile_correction)
 @qd.kernel(fastcache=True)
 def solve_multipliers(
     scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
-    count: qd.i32, method: qd.template(),
+    count: qd.i32, method: qd.template(), mixed: qd.template(),
 ):  # fmt: skip
     """Estimate densities (Eq. 1) and move the multipliers towards the solution (Eq. 5)."""
     for i in range(count):
         p = particles.p[i]
         dim = qd.static(p.n)
         sums = qd.Vector([0.0] * (dim + 2))
-        for_each_neighbor(sums, add_density, i, particles.p, particles.p, grid, c, method)
+        for_each_neighbor(sums, qd.static(DENSITIES[mixed]), i, particles.p, scratch.weight, grid, c, method)
         rho = c.density_scale * (sums[0] + kernel(method, 0.0)[0])
         own = 0.0
         wall = vec4(0.0, 0.0, 0.0, 0.0)
@@ -88,7 +105,10 @@ def solve_multipliers(
             own += (sums[1 + k] + wall[k]) ** 2
         rho += wall.w
         constraint = rho - 1.0  # Eq. 2
-        newton = -constraint / (sums[dim + 1] + own + c.eps)  # Eq. 5
+        squares = sums[dim + 1] + own + c.eps
+        if qd.static(mixed):
+            squares = sums[dim + 1] + scratch.weight[i] * (own + c.eps)
+        newton = -constraint / squares  # Eq. 5
         lam = scratch.lam[i] + c.relaxation * newton + c.momentum * scratch.dlam[i]
         if lam > 0.0:
             lam *= c.attraction
@@ -107,7 +127,7 @@ def clear_multipliers(scratch: Scratch, count: qd.i32):
 @qd.kernel(fastcache=True)
 def correct_positions(
     corrected: Particles, particles: Particles, scratch: Scratch, grid: Grid, solids: SolidSet, walls: Walls,
-    c: Coefficients, count: qd.i32, method: qd.template(), correction: qd.template(),
+    c: Coefficients, count: qd.i32, method: qd.template(), correction: qd.template(), mixed: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by the corrections (Eq. 6 or 8, by its number in CORRECTIONS)."""
     for i in range(count):
@@ -118,6 +138,8 @@ def correct_positions(
             wall = wall_density(p, particles.near[i], solids, walls, c)
             for k in qd.static(range(p.n)):
                 dp[k] += scratch.dlam[i] * wall[k]
+        if qd.static(mixed):
+            dp *= scratch.weight[i]
         # Within one substep a particle must not run past the solids that were marked for it.
         corrected.p[i] = p + dp * qd.min(1.0, c.largest_correction / qd.max(dp.norm(), 1e-12))
 
@@ -125,17 +147,17 @@ def correct_positions(
 @qd.kernel(fastcache=True)
 def measure_density(
     scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
-    count: qd.i32, rest_density: qd.f32, method: qd.template(),
+    count: qd.i32, largest_density: qd.f32, method: qd.template(),
 ):  # fmt: skip
     """Estimate the densities [kg/m^3] at the positions p (Eq. 1), walls included."""
     for i in range(count):
         p = particles.p[i]
         sums = qd.Vector([0.0] * (p.n + 2))
-        for_each_neighbor(sums, add_density, i, particles.p, particles.p, grid, c, method)
+        for_each_neighbor(sums, add_density, i, particles.p, scratch.weight, grid, c, method)
         rho = c.density_scale * (sums[0] + kernel(method, 0.0)[0])
         if particles.near[i] != 0:
             rho += wall_density(p, particles.near[i], solids, walls, c).w
-        scratch.rho[i] = rest_density * rho
+        scratch.rho[i] = largest_density * rho / scratch.weight[i]
 
 
 def schedule(iterations: int, slowest: float, stiffest: float) -> list[tuple[float, float]]:

@@ -29,7 +29,13 @@ def apply_friction(
                 if is_near(near, k) == 1 and solids.friction[k] > 0.0:
                     value = signed_distance(solids, k, p)
                     n = vec3(value.x, value.y, value.z)
-                    push = qd.abs(scratch.lam[i]) * wall_share(walls, value.w, c.h)[1] * c.wall_density / c.h
+                    push = (
+                        scratch.weight[i]
+                        * qd.abs(scratch.lam[i])
+                        * wall_share(walls, value.w, c.h)[1]
+                        * c.wall_density
+                        / c.h
+                    )
                     relative = v - surface_velocity(solids, k, p, c.dt)
                     slip = relative - n * n.dot(relative)
                     v -= slip * qd.min(1.0, solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12))

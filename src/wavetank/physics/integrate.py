@@ -10,6 +10,18 @@ def free_motion(x, v, c: Coefficients):
     return x + c.dt * v
 
 
+@qd.func
+def accelerate(particles: Particles, i, v, c: Coefficients):
+    """Give particle i the velocity `v` after its position was predicted, and move the prediction with it.
+
+    Written as a difference of two free motions: a change of velocity below the rounding of a position is then not
+    taken for a push when the velocities are read off the positions again.
+    """
+    x = particles.x[i]
+    particles.p[i] += free_motion(x, v, c) - free_motion(x, particles.v[i], c)
+    particles.v[i] = v
+
+
 @qd.kernel(fastcache=True)
 def predict(particles: Particles, c: Coefficients, count: qd.i32, gravity: qd.types.vector(3, qd.f32)):
     """Accelerate and move freely: Algorithm 1, lines 2-3."""
@@ -41,15 +53,6 @@ def accept_positions(particles: Particles, count: qd.i32):
     """Set x = p: Algorithm 1, line 23."""
     for i in range(count):
         particles.x[i] = particles.p[i]
-
-
-@qd.kernel(fastcache=True)
-def largest_square(particles: Particles, count: qd.i32) -> qd.i32:
-    """Return the bits of the largest squared speed: as integers, numbers of one sign stand in the same order."""
-    most = 0
-    for i in range(count):
-        qd.atomic_max(most, qd.bit_cast(particles.v[i].norm_sqr(), qd.i32))
-    return most
 
 
 @qd.kernel(fastcache=True)

@@ -5,7 +5,7 @@ import numpy as np
 from wavetank.params import Parameters
 
 
-def density_error(densities: np.ndarray, rest_density: float) -> np.ndarray:
+def density_error(densities: np.ndarray, rest_density: float | np.ndarray) -> np.ndarray:
     """Return the compression of each particle, max(rho / rho_0 - 1, 0), float64 [n].
 
     A free surface lacks neighbours, so its density reads low without being wrong; only too much density is an error
@@ -14,14 +14,14 @@ def density_error(densities: np.ndarray, rest_density: float) -> np.ndarray:
     return np.maximum(densities.astype(np.float64) / rest_density - 1.0, 0.0)
 
 
-def kinetic_energy(velocities: np.ndarray, mass: float) -> float:
+def kinetic_energy(velocities: np.ndarray, mass: float | np.ndarray) -> float:
     """Return the sum of m v^2 / 2 [J] (per metre of depth in a 2-D world)."""
-    return 0.5 * mass * float(np.sum(velocities.astype(np.float64) ** 2))
+    return 0.5 * float(np.sum(mass * np.sum(velocities.astype(np.float64) ** 2, axis=1)))
 
 
-def potential_energy(positions: np.ndarray, mass: float, gravity: tuple[float, ...]) -> float:
+def potential_energy(positions: np.ndarray, mass: float | np.ndarray, gravity: tuple[float, ...]) -> float:
     """Return the sum of -m g x [J], zero at the origin (per metre of depth in a 2-D world)."""
-    return -mass * float(np.sum(positions.astype(np.float64) @ np.array(gravity)))
+    return -float(np.sum(mass * (positions.astype(np.float64) @ np.array(gravity))))
 
 
 def statistics(
@@ -30,11 +30,13 @@ def statistics(
     densities: np.ndarray,
     neighbors: np.ndarray,
     params: Parameters,
+    rest_densities: np.ndarray,
 ) -> dict[str, float]:
     """Return the figures of an instant as plain numbers; every array has one row for each particle."""
     count = len(positions)
+    mass = rest_densities * params.spacing**params.dim
+    error = density_error(densities, rest_densities) if count else np.zeros(1)
     densities = densities if count else np.array([0.0], np.float32)
-    error = density_error(densities, params.rest_density)
     speed = np.linalg.norm(velocities.astype(np.float64), axis=1)
     return {
         "count": count,
@@ -43,8 +45,8 @@ def statistics(
         "density_error_mean": float(error.mean()),
         "density_error_p99": float(np.percentile(error, 99)),
         "density_error_max": float(error.max()),
-        "kinetic_energy": kinetic_energy(velocities, params.particle_mass),
-        "potential_energy": potential_energy(positions, params.particle_mass, params.gravity),
+        "kinetic_energy": kinetic_energy(velocities, mass),
+        "potential_energy": potential_energy(positions, mass, params.gravity),
         "speed_max": float(speed.max(initial=0.0)),
         "speed_rms": float(np.sqrt(np.mean(speed**2))) if count else 0.0,
         "neighbors_mean": float(neighbors.mean()) if count else 0.0,

@@ -99,7 +99,10 @@ def reorder(sorted_: Particles, particles: Particles, grid: Grid, count: qd.i32)
         sorted_.p[i] = particles.p[j]
         sorted_.v[i] = particles.v[j]
         sorted_.id[i] = particles.id[j]
+        sorted_.material[i] = particles.material[j]
         sorted_.near[i] = particles.near[j]
+        sorted_.dye[i] = particles.dye[j]
+        sorted_.frozen[i] = particles.frozen[j]
 
 
 @qd.kernel(fastcache=True)
@@ -148,6 +151,32 @@ def for_each_neighbor(
         j = grid.list[i, n]
         r = p_i - p[j]
         visit(sums, r, i, j, data, c, method)
+
+
+@qd.func
+def for_each_around(
+    sums: qd.template(), visit: qd.template(), point, p: qd.template(), data: qd.template(), grid: Grid, c: Coefficients
+):
+    """Call ``visit(sums, r, j, data, c)`` for every particle j in the cells around any `point`, r = point - p_j [m].
+
+    The visitor weighs with the distance itself: particles beyond h come as well.
+    """
+    cell = cell_of(grid, point, c.h)
+    for row in range(qd.static(9 if point.n == 3 else 3)):
+        layer = grid.nx * (row % 3 - 1)
+        if qd.static(point.n == 3):
+            layer += grid.nx * grid.ny * (row // 3 - 1)
+        low = (cell + layer - 1) % grid.cells
+        # A row that runs over the last cell goes on at the first.
+        over = qd.max(low + 3 - grid.cells, 0)
+        for part in range(1 + qd.min(over, 1)):
+            begin = grid.start[low]
+            end = grid.start[low + 3 - over]
+            if part == 1:
+                begin = 0
+                end = grid.start[over]
+            for j in range(begin, end):
+                visit(sums, point - p[j], j, data, c)
 
 
 def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, room: int) -> Grid:

@@ -120,6 +120,11 @@ def _lattice(dim: int, ratio: float) -> np.ndarray:
     return points[np.linalg.norm(points, axis=1) < 1.0]
 
 
+def rest_points(dim: int, ratio: float) -> np.ndarray:
+    """Return the neighbours of a particle in the rest lattice within h = `ratio` d, [n, dim] in spacings."""
+    return _lattice(dim, ratio) * ratio
+
+
 def lattice_density(name: str, dim: int, ratio: float) -> float:
     """Return the density of the rest lattice in units of m / d^dim (1 for a perfect kernel)."""
     return sigma(name, dim) / ratio**dim * _lattice_sum(name, dim, ratio)

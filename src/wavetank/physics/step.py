@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from wavetank.distance import SolidSet
+from wavetank.materials import Material
 from wavetank.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids, mark_near_solids
 from wavetank.physics.density_constraint import (
@@ -19,17 +20,23 @@ from wavetank.physics.density_constraint import (
     schedule,
     solve_multipliers,
 )  # fmt: skip
+from wavetank.physics.diffuse.pool import Pool
 from wavetank.physics.friction import apply_friction
-from wavetank.physics.integrate import accept_positions, forget_predictions, largest_square, predict, update_velocities
+from wavetank.physics.implicit_viscosity import is_thick, solve_viscosity
+from wavetank.physics.integrate import accept_positions, forget_predictions, predict, update_velocities
+from wavetank.physics.mixture import Blend, blend, fill_table, pack_weights, stiffening, weigh
 from wavetank.physics.neighbors import find_neighbors, sort_particles
+from wavetank.physics.population import hold_frozen, stop_frozen
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
-from wavetank.physics.viscosity import apply_viscosity
+from wavetank.physics.tension import apply_tension, limited_tensions, substeps_for
+from wavetank.physics.viscosity import apply_mixed_viscosity, apply_viscosity
 from wavetank.physics.vorticity import confine_vorticity, find_vorticity
-from wavetank.state import Coefficients, Grid, Particles, Scratch, Walls
+from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, Walls
 
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
 #: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; measured, docs/method.md.
 DISORDER = {2: 0.75, 3: 0.35}
+CALM = 0.1  # of sqrt(g / h), the rate of the shortest waves: water that turns slower counts as calm
 
 
 @dataclasses.dataclass
@@ -42,8 +49,12 @@ class World:
     grid: Grid
     solids: SolidSet
     walls: Walls
+    fluids: Fluids
+    materials: dict[int, Material]  # in use, by their numbers
     count: int
     has_friction: bool
+    frozen: int = 0  # particles that are ice
+    pool: Pool | None = None  # of spray, foam and bubbles; made when the first are
 
 
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
@@ -60,15 +71,21 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     sort_particles(now, spare, grid, c, count)  # 5-7
     now, spare = spare, now
     find_neighbors(now, grid, c, count)
+    kinds = prepare_fluids(world, now, params, dt)
+    if act_on_fluids(world, now, kinds, params, c):
+        mark_near_solids(now, solids, c, count)
+        keep_out_of_solids(now, solids, c, count)
 
     clear_multipliers(scratch, count)
     tensile = int(params.tensile_strength > 0.0)
-    for relaxation, momentum in relaxations(params):  # 8-19
+    for relaxation, momentum in relaxations(params, kinds.density_ratio):  # 8-19
         c = dataclasses.replace(c, relaxation=relaxation, momentum=momentum)
-        solve_multipliers(scratch, now, grid, solids, walls, c, count, method)  # 9-11
-        correct_positions(spare, now, scratch, grid, solids, walls, c, count, method, tensile)  # 12-18
+        solve_multipliers(scratch, now, grid, solids, walls, c, count, method, kinds.mixed)  # 9-11
+        correct_positions(spare, now, scratch, grid, solids, walls, c, count, method, tensile, kinds.mixed)  # 12-18
         now.p, spare.p = spare.p, now.p
         keep_out_of_solids(now, solids, c, count)
+        if world.frozen:
+            hold_frozen(now, count)
 
     update_velocities(now, c, count)  # 21
     if world.has_friction:
@@ -77,8 +94,15 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         find_vorticity(scratch, now, grid, c, count, method)  # 22
         confine_vorticity(now, scratch, grid, c, count, method)
     if params.viscosity > 0.0:
-        apply_viscosity(spare, now, grid, c, count, method)
+        if kinds.mixed:
+            packed = world.fluids.array("packed")
+            pack_weights(packed, now, scratch, count)
+            apply_mixed_viscosity(spare, now, packed, grid, c, count, method)
+        else:
+            apply_viscosity(spare, now, grid, c, count, method)
         now.v, spare.v = spare.v, now.v
+    if world.frozen:
+        stop_frozen(now, count)
     accept_positions(now, count)  # 23
 
     world.particles, world.spare = now, spare
@@ -92,21 +116,55 @@ def update_densities(world: World, params: Parameters) -> None:
     world.particles, world.spare = world.spare, world.particles
     find_neighbors(world.particles, world.grid, c, count)
     mark_near_solids(world.particles, world.solids, c, count)
+    kinds = prepare_fluids(world, world.particles, params, params.frame_time)
     measure_density(
-        world.scratch, world.particles, world.grid, world.solids, world.walls, c, count, params.rest_density, method
+        world.scratch, world.particles, world.grid, world.solids, world.walls, c, count, kinds.largest_density, method
     )
 
 
-def relaxations(params: Parameters) -> list[tuple[float, float]]:
+def act_on_fluids(world: World, particles: Particles, kinds: Blend, params: Parameters, c: Coefficients) -> bool:
+    """Let tension and viscosity act on velocities and predictions, and say whether there was any."""
+    tense, thick = kinds.surface_tension > 0.0, is_thick(kinds, c, params.dim, params.support)
+    if tense:
+        apply_tension(
+            particles, world.scratch, world.fluids, world.grid, world.solids, c, kinds, world.count, params.support
+        )
+    if thick:
+        solve_viscosity(
+            particles, world.scratch, world.fluids, world.grid, world.solids, c, kinds, world.count, params.support,
+            params.no_slip, params.viscosity_iterations,
+        )  # fmt: skip
+    return tense or thick
+
+
+def prepare_fluids(world: World, particles: Particles, params: Parameters, dt: float) -> Blend:
+    """Look up the fluids of `world` for a substep of `dt` [s]; weigh the sorted `particles` if densities differ."""
+    kinds = blend(world.materials, params)
+    fill_table(world.fluids, kinds, limited_tensions(kinds, params.dim, params.support, params.spacing, dt))
+    if kinds.mixed:
+        weigh(world.scratch, particles, world.fluids.rows, world.count)
+    elif world.fluids.weighed:
+        world.scratch.weight.fill(1.0)
+    world.fluids.weighed = bool(kinds.mixed)
+    return kinds
+
+
+def relaxations(params: Parameters, density_ratio: float = 1.0) -> list[tuple[float, float]]:
     """Return (relaxation, momentum) of each iteration; fewer iterations have to damp a narrower range of modes."""
     rest = rest_lattice(params.kernel, params.dim, params.support)
-    stiffest = (rest.stiffest_mode + DISORDER[params.dim]) / params.relaxation
+    stiffest = (rest.stiffest_mode + DISORDER[params.dim] + stiffening(density_ratio)) / params.relaxation
     return schedule(params.iterations, 4.0 * params.slowest_mode / params.iterations, stiffest)
 
 
-def largest_speed(world: World) -> float:
-    """Return the largest speed [m/s] of all particles."""
-    return math.sqrt(float(np.int32(largest_square(world.particles, world.count)).view(np.float32)))
+def capillary_substeps(world: World, params: Parameters, duration: float) -> int:
+    """Return the number of time steps in `duration` [s] that surface tension needs."""
+    return substeps_for(blend(world.materials, params), params.dim, params.support, params.spacing, duration)
+
+
+def capillary_speed(world: World, params: Parameters) -> float:
+    """Return the speed [m/s] at which a sheet one spacing thick draws back (Taylor 1959, Culick 1960)."""
+    fluids = blend(world.materials, params).fluids.values()
+    return math.sqrt(max(2.0 * f.surface_tension / (f.density * params.spacing) for f in fluids))
 
 
 def method_number(params: Parameters) -> int:
@@ -136,6 +194,8 @@ def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf) -
         largest_correction=h / params.iterations,
         viscosity=min(1.0, params.viscosity * REFERENCE_RATE * dt),
         vorticity=params.vorticity,
+        coherence=params.vorticity_coherence,
+        calm=CALM * math.sqrt(math.hypot(*params.gravity) / h),
         speed_limit=speed_limit,
         wall_density=params.wall_density,
         wall_gap=params.wall_gap * params.spacing,

@@ -5,6 +5,12 @@ Macklin and Müller 2013; Eq. 9 and 10 of the report. In a 2-D world the vortici
     code     symbol        meaning                                                    unit
     omega    omega_i       vorticity                                                  1/s
     eta      grad |omega|  gradient of its size                                       1/(m s)
+    share    s             how far a particle turns as its neighbours do              1
+
+Where we differ, and why: N has length one even where eta is noise, so that Eq. 10 stirs water at rest. Noise differs
+from particle to particle, a vortex does not: |sum w omega_j| / sum w |omega_j| is 1 in a vortex and about 1 / sqrt(n)
+for n neighbours that turn at random. Below `vorticity_coherence` of it there is no force, nor where the water turns
+slower than the smallest waves do (`CALM` in step.py); a coherence of 0 leaves Eq. 10 as it is.
 """
 
 from wavetank.compiler import qd
@@ -29,8 +35,14 @@ def add_vorticity(sums: qd.template(), r, i, j, v: qd.template(), c: Coefficient
 
 @qd.func
 def add_eta(sums: qd.template(), r, i, j, omega: qd.template(), c: Coefficients, method: qd.template()):
-    """Add neighbour j to grad |omega|."""
-    sums += (omega[j].norm() - omega[i].norm()) * gradient(r, c, method)
+    """Add neighbour j to (grad |omega|, sum_j w omega_j, sum_j w |omega_j|)."""
+    size = omega[j].norm()
+    slope = (size - omega[i].norm()) * gradient(r, c, method)
+    w = kernel(method, r.norm() / c.h)[0]
+    for k in qd.static(range(3)):
+        sums[k] += slope[k]
+        sums[3 + k] += w * omega[j][k]
+    sums[6] += w * size
 
 
 @qd.kernel(fastcache=True)
@@ -48,12 +60,22 @@ def find_vorticity(
 def confine_vorticity(
     particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, method: qd.template()
 ):
-    """Push around every vortex: dv = dt eps_w (N x omega), N = eta / |eta| (Eq. 10)."""
+    """Push around every vortex: dv = dt eps_w s (N x omega), N = eta / |eta| (Eq. 10)."""
     for i in range(count):
-        eta = vec3(0.0, 0.0, 0.0)
-        for_each_neighbor(eta, add_eta, i, particles.p, scratch.omega, grid, c, method)
+        omega = scratch.omega[i]
+        sums = qd.Vector([0.0] * 7)
+        for_each_neighbor(sums, add_eta, i, particles.p, scratch.omega, grid, c, method)
+        eta = vec3(sums[0], sums[1], sums[2])
         n = eta / qd.max(eta.norm(), 1e-6)
-        force = n.cross(scratch.omega[i])
+        mean = vec3(sums[3], sums[4], sums[5])
+        agreement = mean.norm() / qd.max(sums[6], 1e-12)
+        if mean.dot(omega) < 0.0:
+            agreement = 0.0
+        share = 1.0
+        if c.coherence > 0.0:
+            share = qd.min(qd.max((agreement - c.coherence) / qd.max(1.0 - c.coherence, 1e-3), 0.0), 1.0)
+            share *= qd.min(qd.max(omega.norm() / qd.max(c.calm, 1e-9) - 1.0, 0.0), 1.0)
+        force = share * n.cross(omega)
         v = particles.v[i]
         for k in qd.static(range(v.n)):
             v[k] += c.dt * c.vorticity * force[k]

@@ -29,11 +29,13 @@ class Buffers:
     color: Any  # vec3 [rows, columns], linear RGB: albedo until the shade pass, radiance from then on
     light: Any  # vec2 [rows, columns]: share of the sun, share of the sky that reaches the surface
     rough_light: Any  # vec2 [rows, columns]: the same while it is being smoothed
+    foam: Any  # i32 [height, width, 2]: optical depth of foam in 1/256, and the part of it that the sun reaches
     lines: Any  # i32 [rows, columns]: coverage by the tank's edges, 0 to 255
     sun_depth: Any  # i32 [texels, texels]: bits of the depth [m] of what the sun sees first
     solid_box: Any  # i32 [4]: first and last column, first and last row that may show a solid
     curve: Any  # i32 [entries]: sRGB byte of linear light 0 to 1, in equal steps
     picture: Any  # i32 [words]: the finished picture, three sRGB bytes a pixel, row by row
+    water: Any  # WaterBuffers once a picture of water was taken
     supersample: int  # computed pixels per pixel of the picture, in each direction
     probes: int  # of light per computed pixel: fewer where more pixels are averaged
 
@@ -75,11 +77,13 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
         color=qd.ndarray(vec3, shape=shape),
         light=qd.ndarray(vec2, shape=shape),
         rough_light=qd.ndarray(vec2, shape=shape),
+        foam=qd.ndarray(qd.i32, shape=(height, width, 2)),
         lines=qd.ndarray(qd.i32, shape=shape),
         sun_depth=qd.ndarray(qd.i32, shape=(texels, texels)),
         solid_box=qd.ndarray(qd.i32, shape=(4,)),
         curve=curve,
         picture=qd.ndarray(qd.i32, shape=(3 * -(-height * width // 4),)),
+        water=None,
         supersample=supersample,
         probes=8 if supersample == 1 else 4,
     )

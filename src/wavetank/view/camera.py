@@ -83,9 +83,9 @@ class Camera:
         offset = np.subtract(self.eye, self.target) * (distance / self.distance)
         return dataclasses.replace(self, eye=_point(np.add(self.target, offset)))
 
-    def pan(self, right: float, up: float) -> "Camera":
+    def pan(self, right: float, up: float, ahead: float = 0.0) -> "Camera":
         """Move eye and target by these shares of the visible height."""
-        shift = self.visible_height * (np.array([right, up, 0.0]) @ self._axes)
+        shift = self.visible_height * (np.array([right, up, ahead]) @ self._axes)
         return dataclasses.replace(self, eye=_point(np.add(self.eye, shift)), target=_point(np.add(self.target, shift)))
 
     def ray(self, column: float, row: float, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:

@@ -18,6 +18,8 @@ COLORMAPS: dict[str, tuple[str, ...]] = {
     "viridis": ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30", "#fde725"),
     "ember": ("#1b1033", "#4a1a5f", "#86235f", "#c13b4a", "#e96a37", "#f6a53f", "#f9e08a"),
     "balance": ("#1f3f8f", "#4477bd", "#8fb4dc", "#eceef0", "#eba98e", "#cf5f4c", "#8c1c2f"),
+    # The report's foam: water of one colour, white from the middle on, without a step between.
+    "foam": ("#2482d0",) * (ENTRIES // 2) + ("#ffffff",) * (ENTRIES // 2),
 }
 
 # Linear sRGB to cone responses, and their cube roots to Oklab (Ottosson 2020).
@@ -42,6 +44,13 @@ def table(name: str) -> np.ndarray:
     if name not in COLORMAPS:
         raise WavetankError(f"colormap = {name!r} is not known; use one of {', '.join(COLORMAPS)}.")
     return _table(name)
+
+
+def bands(colors: tuple[str, ...]) -> np.ndarray:
+    """Return bands of equal width of the `colors` as linear RGB, float32 [ENTRIES, 3]."""
+    place = np.arange(ENTRIES) * len(colors) // ENTRIES
+    linear: np.ndarray = to_linear(np.array([rgb_of(color) for color in colors]))[place].astype(np.float32)
+    return linear
 
 
 @functools.cache

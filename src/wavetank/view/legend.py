@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -24,6 +25,25 @@ def draw_bar(picture: np.ndarray, colors: np.ndarray, limits: tuple[float, float
     plate = _bar(colors.tobytes(), limits, label, unit, int(max(0.2 * picture.shape[1], 8 * unit)))
     _lay(picture, plate, picture.shape[0] - plate.shape[0] - unit, unit)
     return int(plate.shape[1]) + unit
+
+
+def draw_keys(picture: np.ndarray, colors: Mapping[str, str]) -> int:
+    """Draw a patch of colour and its name for each of `colors` into the lower left corner of `picture`, in place.
+
+    Returns the first column to its right that is free.
+    """
+    if not _has_room(picture):
+        return 0
+    unit, font = _unit(picture), _font(_unit(picture))
+    widths = [int(font.getlength(name)) + 3 * unit for name in colors]
+    plate = _plate(sum(widths) + unit, 2 * unit)
+    pen, at = ImageDraw.Draw(plate), unit
+    for (name, color), width in zip(colors.items(), widths, strict=True):
+        pen.rectangle((at, unit // 2, at + unit, unit // 2 + unit), fill=color, outline=INK)
+        pen.text((at + 3 * unit // 2, unit), name, INK, font, anchor="lm")
+        at += width
+    _lay(picture, np.asarray(plate), picture.shape[0] - plate.height - unit, unit)
+    return plate.width + unit
 
 
 def write_time(picture: np.ndarray, time: float, count: int, column: int = 0) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from wavetank.compiler import qd
 from wavetank.view.colormaps import rgb_of, to_linear
+from wavetank.view.extent import Extent
 from wavetank.view.lens import vec3, vector
 
 
@@ -32,6 +33,12 @@ class Look:
     gloss: qd.f32  # strength of the highlight on particles and solids
     sun_size: qd.f32  # tangent of the sun's angular radius: softness of shadows
     shade_depth: qd.f32  # strength of ambient occlusion, about 1
+    lamp: vec3  # radiance of the studio's lamps, which only water mirrors
+    glow: vec3  # radiance of light that comes back out of deep water
+    sparkle: qd.f32  # strength of the sun's image in the water
+    veil: qd.f32  # share of the sun that a surface of water keeps from what is below
+    caustic: qd.f32  # strength of the light that bulges of water gather
+    tile: qd.f32  # m: edge of the floor's tiles, 0 for none
 
 
 def studio() -> Look:
@@ -53,7 +60,24 @@ def studio() -> Look:
         gloss=0.18,
         sun_size=0.10,
         shade_depth=2.0,
+        lamp=vector(1.5, 1.55, 1.6),
+        glow=vector(0.55, 0.75, 0.85),
+        sparkle=3.0,
+        veil=0.25,
+        caustic=0.5,
+        tile=0.0,
     )
+
+
+def pool() -> Look:
+    """A tiled floor in the open: worlds in space, seen as water."""
+    look = studio()
+    look.sun, look.sky = vector(1.25, 1.16, 1.02), vector(0.42, 0.50, 0.60)
+    look.ground = vector(0.30, 0.31, 0.31)
+    look.horizon, look.zenith = _linear("#d9e4ec"), _linear("#4f7ba6")
+    look.floor, look.solid, look.line = _linear("#b9bcb9"), _linear("#e09a5c"), _linear("#eef4f7")
+    look.tile, look.sun_size = 0.1, 0.04
+    return look
 
 
 def paper() -> Look:
@@ -75,7 +99,29 @@ def paper() -> Look:
         gloss=0.0,
         sun_size=0.0,
         shade_depth=1.0,
+        lamp=vector(0.5, 0.55, 0.6),
+        glow=vector(0.35, 0.55, 0.70),
+        sparkle=0.0,
+        veil=0.0,
+        caustic=0.0,
+        tile=0.0,
     )
+
+
+WATER = {2: "#3a8cc2", 3: "#4aa6c8"}  # what white becomes behind so much water as is usual in the world
+
+
+def usual_depth(extent: Extent) -> float:
+    """Depth of water [m] at which its colour is the one it is named by."""
+    return 0.75 * extent.radius if extent.dim == 3 else extent.spacing
+
+
+def fluid_optics(color: str | None, extent: Extent) -> tuple[np.ndarray, float, np.ndarray]:
+    """Absorption and scattering [1/m] of a fluid, and the tint of its depth, from the colour that it gives to white."""
+    usual = usual_depth(extent)
+    seen = np.clip(to_linear(np.array(rgb_of(color or WATER[extent.dim]))), 0.02, 0.98)
+    scattering = (0.5 if extent.dim == 3 else 0.9) / usual
+    return (-np.log(seen) / usual).astype(np.float32), float(scattering), (seen**0.6).astype(np.float32)
 
 
 def _linear(color: str) -> np.ndarray:

@@ -17,19 +17,25 @@ Limits = tuple[float, float]
 
 
 @qd.func
-def speed(x, v, rho):
+def speed(x, v, rho, kind):
     """Speed |v| [m/s]."""
     return v.norm()
 
 
 @qd.func
-def density(x, v, rho):
+def density(x, v, rho, kind):
     """Density rho [kg/m^3]."""
     return rho
 
 
 @qd.func
-def nothing(x, v, rho):
+def material(x, v, rho, kind):
+    """Number of the material."""
+    return qd.cast(kind, qd.f32)
+
+
+@qd.func
+def nothing(x, v, rho, kind):
     """Zero: every particle has the first colour of the table."""
     return 0.0
 
@@ -44,7 +50,23 @@ def _speed_limits(scene: Any) -> Limits:
 
 def _density_limits(scene: Any) -> Limits:
     """A twentieth below and above the rest density."""
-    return 0.95 * scene.rest_density, 1.05 * scene.rest_density
+    densities = [fluid.density for fluid in scene.properties()]
+    return 0.95 * min(densities), 1.05 * max(densities)
+
+
+def _material_limits(scene: Any) -> Limits:
+    """Half a number below the first and above the last, so that every material has a band of equal width."""
+    return -0.5, len(scene.palette()) - 0.5
+
+
+def _palette(scene: Any) -> tuple[str, ...]:
+    """The materials' own colours."""
+    return tuple(material.color for material in scene.palette())
+
+
+def _foam_limits(scene: Any) -> Limits:
+    """Zero to twice the speed from which water counts as foam: the map changes to white in its middle."""
+    return 0.0, 2.0 * scene.foaming_speed
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,11 +77,19 @@ class Quantity:
     unit: str
     colormap: str
     limits: Callable[[Any], Limits]  # of the scene, so that the colours of a film do not jump
+    palette: Callable[[Any], tuple[str, ...]] | None = None  # colours of bands instead of a colour map
+
+
+def usual(scene: Any) -> str:
+    """Return the quantity that tells most about `scene`: the material where fluids name one, else the speed."""
+    return "material" if any(fluid.material for fluid in scene.fluids) else "speed"
 
 
 QUANTITIES: dict[str, Quantity] = {
     "speed": Quantity(speed, "m/s", "water", _speed_limits),
     "density": Quantity(density, "kg/m^3", "balance", _density_limits),
+    "material": Quantity(material, "", "viridis", _material_limits, _palette),
+    "foam": Quantity(speed, "m/s", "foam", _foam_limits),
 }
 
 

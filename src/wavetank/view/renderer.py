@@ -1,42 +1,34 @@
 """Pictures of a world: a list of passes over shared buffers."""
 
 import collections
+import dataclasses
 import functools
 import math
+import time
 from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import current_backend, qd
+from wavetank.compiler import current_backend, qd, synchronize
 from wavetank.errors import WavetankError
 from wavetank.frame import Frame
 from wavetank.view import legend as legends
 from wavetank.view.buffers import allocate
 from wavetank.view.camera import Camera
-from wavetank.view.colormaps import ENTRIES, rgb_of, table, to_linear
+from wavetank.view.colormaps import ENTRIES, table
 from wavetank.view.extent import Extent, extent_of
-from wavetank.view.lens import Lens, basis, lens_at, vec3
-from wavetank.view.look import paper, studio
-from wavetank.view.passes import floor, occlusion, shade, shadow, smooth, solids, spheres, tank, tonemap
-from wavetank.view.quantities import QUANTITIES, key_of
+from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
+from wavetank.view.look import Look, fluid_optics, paper, pool, studio, usual_depth
+from wavetank.view.passes import tonemap
+from wavetank.view.quantities import QUANTITIES, usual
 from wavetank.view.shot import Shot
+from wavetank.view.style import Style
+from wavetank.view.views import Pass
+from wavetank.view.water_buffers import sun_texels
 
-#: The picture from top to bottom: what is where, what light reaches it, how it looks, what lies over it.
-PASSES = (
-    spheres.draw,
-    solids.draw,
-    floor.draw,
-    shadow.draw,
-    occlusion.draw,
-    smooth.draw,
-    shade.draw,
-    tank.draw,
-    tonemap.draw,
-)
 LARGEST_SIDE, LARGEST_SUPERSAMPLE = 8192, 4
-KEPT_RENDERERS = 4
-#: Of a drawn particle [d] in 2-D and 3-D worlds: what has no depth should close its gaps.
-RADIUS = {2: 0.62, 3: 0.55}
+KEPT_RENDERERS, KEPT_SAMPLES = 4, 2**24
+POINT_SUN = 0.004  # tangent of the sun's radius where many suns are averaged
 
 
 class Renderer:
@@ -55,96 +47,119 @@ class Renderer:
         self.buffers = allocate(self.width, self.height, self.supersample)
         self._colors = qd.ndarray(vec3, shape=(ENTRIES,))
         self._colors_name = ""
+        self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
 
     def render(
-        self,
-        frame: Frame,
-        camera: Camera | None = None,
-        color_by: str = "speed",
-        colormap: str | None = None,
-        limits: tuple[float, float] | None = None,
-        legend: bool = True,
-        radius: float | None = None,
+        self, frame: Frame, camera: Camera | None = None, *, timings: dict[str, float] | None = None, **options: Any
     ) -> np.ndarray:
         """Return a picture of `frame`, uint8 [height, width, 3].
 
-        `color_by` is one of `QUANTITIES` or a colour ``#rrggbb``; `limits` are the values of the first and the last
-        colour; `radius` of a drawn particle is in particle spacings, about a half if not given. Raises
+        `options` are the fields of `Style`; `timings`, a dict, receives the milliseconds of each pass. Raises
         `WavetankError` for what is not allowed.
         """
-        shot = self.shot(frame, camera, color_by, colormap, limits, radius)
-        for draw in PASSES:
-            draw(shot, self.buffers)
+        style = Style(**options)
+        shot = self.shot(frame, camera, style)
+        self._run(style.kind.once, shot, timings)
+        if style.samples == 1:
+            self._run((*style.kind.passes, tonemap.draw), shot, timings)
+        else:
+            self._average(style, shot, timings)
         picture = self.buffers.host_picture()
-        if legend:
-            self._write_legend(picture, shot, color_by, colormap)
+        if style.legend and style.kind.coloured:
+            _write_legend(picture, shot, style, self.supersample)
         return picture
 
-    def _write_legend(self, picture: np.ndarray, shot: Shot, color_by: str, colormap: str | None) -> None:
-        column = 0
-        if color_by in QUANTITIES:
-            quantity = QUANTITIES[color_by]
-            colors = table(colormap or quantity.colormap)
-            column = legends.draw_bar(picture, colors, shot.limits, f"{color_by} [{quantity.unit}]")
-        legends.write_time(picture, shot.frame.time, shot.frame.count, column)
-        if shot.lens.perspective == 0.0:
-            legends.draw_scale(picture, shot.lens.focal / self.supersample)
-
-    def shot(
-        self, frame: Frame, camera: Camera | None, color_by: str, colormap: str | None,
-        limits: tuple[float, float] | None, radius: float | None,
-    ) -> Shot:  # fmt: skip
-        """Check what is asked for and return what the passes need to know."""
-        radius = RADIUS[frame.dim] if radius is None else radius
-        if not (isinstance(radius, int | float) and math.isfinite(radius) and 0.0 < radius <= 10.0):
-            raise WavetankError(f"render: radius = {radius!r} must be a number of spacings above 0, at most 10.")
+    def shot(self, frame: Frame, camera: Camera | None = None, style: Style | None = None) -> Shot:
+        """Return what the passes need to know of a picture."""
+        style = style or Style()
         extent = extent_of(frame.scene)
         camera = camera or Camera.framing_extent(extent, self.width / self.height)
-        quantity, limits = self._coloring(frame, color_by, colormap, limits)
+        look = _look(extent.dim, style.kind.coloured)
+        quantity, limits, name, colors = style.coloring(frame)
+        if name != self._colors_name:
+            self._colors.from_numpy(np.ascontiguousarray(colors, np.float32))
+            self._colors_name = name
+        absorption, scattering, tint = fluid_optics(None if style.kind.coloured else style.color_by, extent)
         return Shot(
             frame=frame,
             extent=extent,
             lens=camera.lens(self.buffers.columns, self.buffers.rows),
-            sun=_sun_lens(extent, _look(extent.dim).to_sun, self.buffers.texels),
-            look=_look(extent.dim),
-            radius=radius * extent.spacing,
+            sun=_sun_lens(extent, look.to_sun, self.buffers.texels),
+            water_sun=_sun_lens(extent, look.to_sun, sun_texels(extent)),
+            look=look,
+            radius=style.particle_radius(extent),
             quantity=quantity,
             limits=limits,
             colors=self._colors,
+            absorption=absorption,
+            scattering=scattering,
+            tint=tint,
+            usual=usual_depth(extent),
+            plane=style.plane(extent),
         )
 
-    def _coloring(
-        self, frame: Frame, color_by: str, colormap: str | None, limits: tuple[float, float] | None
-    ) -> tuple[int, tuple[float, float]]:
-        """Key and limits of the quantity; puts its colours on the device."""
-        if color_by not in QUANTITIES:
-            if not str(color_by).startswith("#"):
-                raise WavetankError(
-                    f"render: color_by = {color_by!r} is not known; use one of {', '.join(QUANTITIES)}, "
-                    "or a colour such as '#3f99da'."
-                )
-            self._load_colors(color_by, np.tile(to_linear(np.array(rgb_of(color_by))), (ENTRIES, 1)))
-            return 0, (0.0, 1.0)
-        quantity = QUANTITIES[color_by]
-        name = colormap or quantity.colormap
-        self._load_colors(name, table(name))
-        try:
-            low, high = (float(limit) for limit in limits or quantity.limits(frame.scene))
-        except (TypeError, ValueError):
-            low = high = math.nan
-        if not (math.isfinite(low) and math.isfinite(high) and high - low > 1e-30):
-            raise WavetankError(f"render: limits = {limits} must be two finite numbers, the lower one first.")
-        return key_of(color_by), (low, high)
+    def _run(self, passes: tuple[Pass, ...], shot: Shot, timings: dict[str, float] | None) -> None:
+        for draw in passes:
+            began = time.perf_counter()
+            draw(shot, self.buffers)
+            if timings is not None:
+                synchronize()
+                name = draw.__module__.rpartition(".")[2]
+                timings[name] = timings.get(name, 0.0) + 1e3 * (time.perf_counter() - began)
 
-    def _load_colors(self, name: str, colors: np.ndarray) -> None:
-        if name != self._colors_name:
-            self._colors.from_numpy(np.ascontiguousarray(colors, np.float32))
-            self._colors_name = name
+    def _average(self, style: Style, shot: Shot, timings: dict[str, float] | None) -> None:
+        """Take many pictures, each moved by less than a pixel and lit by another point of the sun, and average them."""
+        if self._total is None:
+            self._total = qd.ndarray(vec3, shape=(self.buffers.rows, self.buffers.columns))
+        for number in range(style.samples):
+            self._run(style.kind.passes, self._moved(shot, number), timings)
+            tonemap.collect(self.buffers.color, self._total, 1.0 / (number + 1))
+        tonemap.draw_collected(self._total, self.buffers)
+
+    def _moved(self, shot: Shot, number: int) -> Shot:
+        """Return the shot of one sample: low-discrepancy points in a pixel and on the sun."""
+        across, down, angle, reach = (_radical_inverse(number + 1, prime) for prime in (2, 3, 5, 7))
+        axes = basis(-shot.look.to_sun, np.array([0.0, 0.0, -1.0]))
+        wide, turn = shot.look.sun_size * math.sqrt(reach), 2.0 * math.pi * angle
+        to_sun = shot.look.to_sun + wide * (math.cos(turn) * axes[0] + math.sin(turn) * axes[1])
+        to_sun = vector(*(to_sun / np.linalg.norm(to_sun)))
+        return dataclasses.replace(
+            shot,
+            lens=dataclasses.replace(shot.lens, middle=shot.lens.middle + vector(across - 0.5, down - 0.5)),
+            sun=_sun_lens(shot.extent, to_sun, self.buffers.texels),
+            water_sun=_sun_lens(shot.extent, to_sun, sun_texels(shot.extent)),
+            look=dataclasses.replace(shot.look, to_sun=to_sun, sun_size=min(POINT_SUN, shot.look.sun_size)),
+        )
+
+
+def _radical_inverse(number: int, prime: int) -> float:
+    """Halton's sequence: the digits of `number` in a base, mirrored at the point."""
+    value, share = 0.0, 1.0
+    while number:
+        share /= prime
+        number, digit = divmod(number, prime)
+        value += share * digit
+    return value
+
+
+def _write_legend(picture: np.ndarray, shot: Shot, style: Style, supersample: int) -> None:
+    column, color_by = 0, style.color_by or usual(shot.frame.scene)
+    if color_by in QUANTITIES and QUANTITIES[color_by].palette and not style.colormap:
+        column = legends.draw_keys(picture, shot.frame.fluids_present)
+    elif color_by in QUANTITIES:
+        quantity = QUANTITIES[color_by]
+        colors = table(style.colormap or quantity.colormap)
+        column = legends.draw_bar(picture, colors, shot.limits, f"{color_by} [{quantity.unit}]")
+    legends.write_time(picture, shot.frame.time, shot.frame.count, column)
+    if shot.lens.perspective == 0.0:
+        legends.draw_scale(picture, shot.lens.focal / supersample)
 
 
 @functools.cache
-def _look(dim: int) -> Any:
-    return studio() if dim == 3 else paper()
+def _look(dim: int, coloured: bool) -> Look:
+    if dim == 2:
+        return paper()
+    return studio() if coloured else pool()
 
 
 def _sun_lens(extent: Extent, to_sun: Any, texels: int) -> Lens:
@@ -158,17 +173,34 @@ def _sun_lens(extent: Extent, to_sun: Any, texels: int) -> Lens:
 _kept: collections.OrderedDict[tuple[int, int, int], Renderer] = collections.OrderedDict()
 
 
-def render(world: Any, width: int = 1280, height: int = 720, *, supersample: int = 2, **options: Any) -> np.ndarray:
+def render(
+    world: Any, width: int = 1280, height: int = 720, *, supersample: int | None = None, **options: Any
+) -> np.ndarray:
     """Return a picture of a `Frame`, or of anything with a ``frame()``, uint8 [height, width, 3].
 
-    `options` are those of `Renderer.render`. Renderers of the last few sizes are kept.
+    `options` are those of `Renderer.render`: a view by name, a camera and the fields of `Style`. Without a number
+    `supersample` is 2, or 1 for pictures of more than 16 million pixels. Renderers of the last few sizes are kept.
     """
     frame = world.frame() if hasattr(world, "frame") else world
     if not (hasattr(frame, "scene") and hasattr(frame, "x")):
         raise WavetankError(f"render: a {type(world).__name__} cannot be drawn; give a simulation or a frame.")
+    if supersample is None:
+        supersample = affordable(width, height, 2)
     key = (width, height, supersample)
-    renderer = _kept.pop(key, None) or Renderer(width, height, supersample)
-    _kept[key] = renderer
-    while len(_kept) > KEPT_RENDERERS:
+    renderer = _kept.pop(key, None)
+    # Large ones go first, so that two of them are never alive at once.
+    while _kept and (len(_kept) >= KEPT_RENDERERS or sum(_samples(k) for k in (*_kept, key)) > KEPT_SAMPLES):
         _kept.popitem(last=False)
+    renderer = renderer or Renderer(width, height, supersample)
+    _kept[key] = renderer
     return renderer.render(frame, **options)
+
+
+def affordable(width: Any, height: Any, supersample: int) -> int:
+    """Return `supersample`, or 1 where the picture alone has more than 16 million pixels (some 3 GB of arrays)."""
+    sizes = isinstance(width, int | np.integer) and isinstance(height, int | np.integer)
+    return supersample if sizes and width * height <= KEPT_SAMPLES else 1
+
+
+def _samples(key: tuple[int, int, int]) -> int:
+    return key[0] * key[1] * key[2] ** 2

@@ -1,21 +1,29 @@
 """Experiments of `wavetank validate`: one file per case, each with a `CASE`, listed in `CASES`."""
 
 from wavetank.lab.cases import (
+    buckling,
+    calm_vorticity,
     column,
     cup,
     drop,
     elliptical_drop,
     energy,
+    gravity_current,
+    layers,
+    lock_exchange,
     martin_moyce,
     momentum,
     resolution,
     seeds,
+    shear_wave,
     standing_wave,
     still_tank,
+    tension_drop,
 )
 from wavetank.lab.cases.case import Case
 
 CASES: tuple[Case, ...] = (
     still_tank.CASE, column.CASE, martin_moyce.CASE, standing_wave.CASE, elliptical_drop.CASE, drop.CASE, energy.CASE,
-    momentum.CASE, cup.CASE, seeds.CASE, resolution.CASE,
+    momentum.CASE, cup.CASE, seeds.CASE, resolution.CASE, layers.CASE, lock_exchange.CASE, shear_wave.CASE,
+    gravity_current.CASE, buckling.CASE, tension_drop.CASE, calm_vorticity.CASE,
 )  # fmt: skip

@@ -9,13 +9,28 @@ from wavetank.view.shot import Shot
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Draw the floor where it is nearer than what is there; a 2-D world has none."""
     if shot.frame.dim == 3:
-        lay(shot.lens, shot.look.floor, buffers.depth, buffers.surface, buffers.normal, buffers.color)
+        lay(shot.lens, shot.look.floor, shot.look.tile, buffers.depth, buffers.surface, buffers.normal, buffers.color)
+
+
+@qd.func
+def pixels_across(lens: Lens, t, direction):
+    """Length [m] of floor that a pixel shows, along and across averaged."""
+    wide = lens.pixel * (1.0 + lens.perspective * (t - 1.0))
+    return wide * qd.sqrt(direction.norm() / qd.max(-direction.y, 1e-3))
+
+
+@qd.func
+def joint_cover(place, grain):
+    """Share of a pixel of `grain` tiles that the joint nearest to `place` covers."""
+    off = qd.abs(place - qd.floor(place + 0.5))
+    half, inverse = 0.018, 1.0 / grain
+    return qd.min(qd.max((half - off) * inverse + 0.5, 0.0), qd.min(1.0, 2.0 * half * inverse))
 
 
 @qd.kernel(fastcache=True)
 def lay(
-    lens: Lens, albedo: vec3, depth: qd.types.ndarray(), surface: qd.types.ndarray(), normal: qd.types.ndarray(),
-    color: qd.types.ndarray(),
+    lens: Lens, albedo: vec3, tile: qd.f32, depth: qd.types.ndarray(), surface: qd.types.ndarray(),
+    normal: qd.types.ndarray(), color: qd.types.ndarray(),
 ):  # fmt: skip
     """Intersect every view ray with y = 0."""
     for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
@@ -28,3 +43,10 @@ def lay(
                 surface[row, column] = -2  # FLOOR
                 normal[row, column] = vec3(0.0, 1.0, 0.0)
                 color[row, column] = albedo
+                if tile > 0.0:
+                    at = origin + t * direction
+                    # Joints fade where a pixel holds more than a few tiles.
+                    per = 1.0 / tile
+                    grain = pixels_across(lens, t, direction) * per
+                    joint = joint_cover(at.x * per, grain) + joint_cover(at.z * per, grain)
+                    color[row, column] = albedo * (1.0 - 0.45 * qd.min(joint, 1.0))

@@ -10,6 +10,8 @@ with the probes of `probes.py`.
     reach     r        radius of the neighbourhood                   m
 """
 
+from typing import Any
+
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, from_view, pixels_per_metre, point_at, vec3, vector
@@ -19,22 +21,29 @@ from wavetank.view.shot import Shot
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill the second component of `light`."""
+    look(shot, buffers, buffers.light, 1)
+
+
+def look(shot: Shot, buffers: Buffers, light: Any, step: int) -> None:
+    """Fill the second component of `light`, which holds every `step`-th row and column."""
     reach = max(5.0 * shot.radius, 0.05 * shot.extent.radius)
     lower, upper = vector(*shot.extent.lower), vector(*shot.extent.upper)
     look_around(
-        shot.lens, lower, upper, reach, shot.look.shade_depth, buffers.probes, buffers.depth, buffers.surface,
-        buffers.normal, buffers.light,
+        shot.lens, lower, upper, reach, shot.look.shade_depth, buffers.probes, step, buffers.depth,
+        buffers.surface, buffers.normal, light,
     )  # fmt: skip
 
 
 @qd.kernel(fastcache=True)
 def look_around(
     lens: Lens, lower: vec3, upper: vec3, reach: qd.f32, strength: qd.f32, probes: qd.template(),
-    depth: qd.types.ndarray(), surface: qd.types.ndarray(), normal: qd.types.ndarray(), light: qd.types.ndarray(),
+    step: qd.i32, depth: qd.types.ndarray(), surface: qd.types.ndarray(), normal: qd.types.ndarray(),
+    light: qd.types.ndarray(),
 ):  # fmt: skip
     """Sum up what stands in the way of the sky around every visible point."""
     rows, columns = depth.shape[0], depth.shape[1]
-    for row, column in qd.ndrange(rows, columns):
+    for own_row, own_column in qd.ndrange(light.shape[0], light.shape[1]):
+        row, column = own_row * step, own_column * step
         what = surface[row, column]
         t = qd.min(qd.bit_cast(depth[row, column], qd.f32), 1e4)
         at = point_at(lens, row, column, t)
@@ -47,7 +56,7 @@ def look_around(
             world = normal[row, column]
             n = vec3(lens.right.dot(world), lens.up.dot(world), lens.forward.dot(world))
             spread = qd.min(reach * pixels_per_metre(lens, t), 0.25 * rows)
-            turn = pattern_turn(row, column)
+            turn = pattern_turn(own_row, own_column)
             hidden = 0.0
             for k in qd.static(range(probes)):
                 offset = spread * turned(turn, spiral(k, probes))
@@ -58,4 +67,4 @@ def look_around(
                 # Nothing beyond the neighbourhood counts, or a far wall would darken a near edge.
                 fade = qd.max(1.0 - square, 0.0)
                 hidden += fade * qd.max(v.dot(n) - 0.002 * t, 0.0) / (square + 0.01)
-            light[row, column].y = qd.max(1.0 - strength * hidden / (probes * reach), 0.0)
+            light[own_row, own_column].y = qd.max(1.0 - strength * hidden / (probes * reach), 0.0)

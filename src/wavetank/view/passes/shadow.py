@@ -12,6 +12,8 @@ smooth pass averages that pattern away.
     away, lift         way along the normal that avoids self-shadow         m
 """
 
+from typing import Any
+
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec2, vec3
@@ -21,19 +23,34 @@ from wavetank.view.shot import Shot
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
-    """Fill the first component of `light`; a 2-D world has no shadows."""
+    """Fill the first component of `light` with the shadows of particles and solids; a 2-D world has none."""
     if shot.frame.dim == 2:
         fill(buffers.light)
         return
-    frame, texels = shot.frame, buffers.texels
     spheres.clear_depth(buffers.sun_depth)
-    spheres.splat(frame.x, frame.count, shot.radius, shot.sun, float(texels), buffers.sun_depth)
-    if frame.solids.count > frame.solids.tank_count:
-        solids.bound(frame.solids, shot.sun, buffers.texels, buffers.texels, buffers.solid_box)
-        solids.trace_depth(frame.solids, solids.window(shot), shot.sun, buffers.solid_box, buffers.sun_depth)
+    frame = shot.frame
+    spheres.splat(frame.x, frame.count, shot.radius, shot.sun, float(buffers.texels), buffers.sun_depth)
+    of_solids(shot, buffers, buffers.light, 1)
+
+
+def draw_solids(shot: Shot, buffers: Buffers) -> None:
+    """Fill the first component of `light` with the shadows of solids alone."""
+    if shot.frame.dim == 2:
+        fill(buffers.light)
+    else:
+        spheres.clear_depth(buffers.sun_depth)
+        of_solids(shot, buffers, buffers.light, 1)
+
+
+def of_solids(shot: Shot, buffers: Buffers, light: Any, step: int) -> None:
+    """Add the solids to the sun's depth map and fill `light`, which holds every `step`-th row and column, from it."""
+    solid_set, texels = shot.frame.solids, buffers.texels
+    if solid_set.count > solid_set.tank_count:
+        solids.bound(solid_set, shot.sun, texels, texels, buffers.solid_box)
+        solids.trace_depth(solid_set, solids.window(shot), shot.sun, buffers.solid_box, buffers.sun_depth)
     receive(
-        shot.lens, shot.sun, shot.look.to_sun, shot.look.sun_size, 0.3 * shot.radius, buffers.probes,
-        buffers.sun_depth, buffers.depth, buffers.surface, buffers.normal, buffers.light,
+        shot.lens, shot.sun, shot.look.to_sun, shot.look.sun_size, 0.3 * shot.radius, buffers.probes, step,
+        buffers.sun_depth, buffers.depth, buffers.surface, buffers.normal, light,
     )  # fmt: skip
 
 
@@ -57,12 +74,13 @@ def gap_at(sun_depth: qd.template(), place, depth):
 @qd.kernel(fastcache=True)
 def receive(
     lens: Lens, sun: Lens, to_sun: vec3, sun_size: qd.f32, lift: qd.f32, probes: qd.template(),
-    sun_depth: qd.types.ndarray(), depth: qd.types.ndarray(), surface: qd.types.ndarray(),
+    step: qd.i32, sun_depth: qd.types.ndarray(), depth: qd.types.ndarray(), surface: qd.types.ndarray(),
     normal: qd.types.ndarray(), light: qd.types.ndarray(),
 ):  # fmt: skip
-    """Compare every visible point with the sun's depth map."""
+    """Compare visible points with the sun's depth map: those of every `step`-th row and column."""
     texels = sun_depth.shape[0]
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
+    for own_row, own_column in qd.ndrange(light.shape[0], light.shape[1]):
+        row, column = own_row * step, own_column * step
         share = 0.0  # what faces away from the sun is dark without a look
         if surface[row, column] != 0x7FFFFFFF and normal[row, column].dot(to_sun) > -0.4:  # NOTHING
             share = 1.0
@@ -77,8 +95,8 @@ def receive(
             # The cone in which something as high as a few tenths of the map could stand in the way.
             wide = 0.25 * sun_size * texels
             if qd.min(place.x, place.y) > -wide and qd.max(place.x, place.y) < texels + wide:
-                share = sun_share(sun, sun_size, wide, probes, c.z, place, pattern_turn(row, column), sun_depth)
-        light[row, column] = vec2(share, 1.0)
+                share = sun_share(sun, sun_size, wide, probes, c.z, place, pattern_turn(own_row, own_column), sun_depth)
+        light[own_row, own_column] = vec2(share, 1.0)
 
 
 @qd.func

@@ -18,7 +18,17 @@ drawn.
 from wavetank.compiler import qd
 from wavetank.distance import lift
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, ball_depth, box_of_ball, from_view, pixels_per_metre, point_at, to_view, view_ray
+from wavetank.view.lens import (
+    Lens,
+    ball_depth,
+    box_of_ball,
+    from_view,
+    pixels_per_metre,
+    point_at,
+    to_view,
+    vec3,
+    view_ray,
+)
 from wavetank.view.quantities import DEVICE_FUNCTIONS
 from wavetank.view.shot import Shot
 
@@ -33,7 +43,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     claim(frame.x, frame.count, shot.radius, shot.lens, largest, buffers.depth, buffers.surface)
     low, high = shot.limits
     paint(
-        frame.x, frame.v, frame.rho, shot.lens, shot.quantity, low, 1.0 / (high - low), shot.colors,
+        frame.x, frame.v, frame.rho, frame.material, frame.dye, shot.lens, shot.quantity, low, 1.0 / (high - low),
+        shot.colors,
         buffers.depth, buffers.surface, buffers.normal, buffers.color,
     )  # fmt: skip
 
@@ -96,10 +107,21 @@ def claim(
                             qd.atomic_min(surface[row, column], i)
 
 
+@qd.func
+def dyed(clear_color, dye):
+    """The linear colour of a particle with that dye: strength << 24 | red << 16 | green << 8 | blue, in sRGB."""
+    color = clear_color
+    if dye != 0:
+        own = vec3((dye >> 16) & 255, (dye >> 8) & 255, dye & 255) / 255.0
+        color += (own**2.2 - color) * (((dye >> 24) & 127) / 127.0)
+    return color
+
+
 @qd.kernel(fastcache=True)
 def paint(
-    x: qd.types.ndarray(), v: qd.types.ndarray(), rho: qd.types.ndarray(), lens: Lens, quantity: qd.template(),
-    low: qd.f32, scale: qd.f32, colors: qd.types.ndarray(),
+    x: qd.types.ndarray(), v: qd.types.ndarray(), rho: qd.types.ndarray(), material: qd.types.ndarray(),
+    dye: qd.types.ndarray(), lens: Lens,
+    quantity: qd.template(), low: qd.f32, scale: qd.f32, colors: qd.types.ndarray(),
     depth: qd.types.ndarray(), surface: qd.types.ndarray(), normal: qd.types.ndarray(), color: qd.types.ndarray(),
 ):  # fmt: skip
     """Give every pixel of a particle its normal and the colour of its quantity."""
@@ -109,8 +131,8 @@ def paint(
             c = to_view(lens, lift(x[i]))
             t = qd.bit_cast(depth[row, column], qd.f32)
             normal[row, column] = from_view(lens, (point_at(lens, row, column, t) - c).normalized(1e-12))
-            share = (qd.static(DEVICE_FUNCTIONS[quantity])(x[i], v[i], rho[i]) - low) * scale
+            share = (qd.static(DEVICE_FUNCTIONS[quantity])(x[i], v[i], rho[i], material[i]) - low) * scale
             last = colors.shape[0] - 1
             entry = qd.cast(qd.min(qd.max(share, 0.0), 1.0) * last + 0.5, qd.i32)
             # Once more as an integer: a quantity that is no number must still be a colour.
-            color[row, column] = colors[qd.min(qd.max(entry, 0), last)]
+            color[row, column] = dyed(colors[qd.min(qd.max(entry, 0), last)], dye[i])

@@ -9,27 +9,51 @@ across the line with how much of them it covers. Marks are integers and the larg
     slack              depth by which a line wins against what it touches     m
 """
 
+from typing import Any
+
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, vector, view_ray
 from wavetank.view.look import Look
 from wavetank.view.passes.solids import box_interval
 from wavetank.view.shot import Shot
+from wavetank.view.water_buffers import water_of
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Draw the tank over the picture, if the world has one."""
-    if shot.frame.scene.tank is None:
-        return
+    if shot.frame.scene.tank is not None:
+        lower, upper = _mark_over(shot, buffers, buffers.depth)
+        blend(shot.lens, shot.look, lower, upper, buffers.depth, buffers.lines, buffers.color)
+
+
+def draw_behind(shot: Shot, buffers: Buffers) -> None:
+    """Draw the tank into the backdrop that the water refracts."""
+    if shot.frame.scene.tank is not None:
+        lower, upper = _mark_over(shot, buffers, buffers.depth)
+        behind = water_of(buffers, shot).behind
+        blend(shot.lens, shot.look, lower, upper, buffers.depth, buffers.lines, behind)
+
+
+def draw_front(shot: Shot, buffers: Buffers) -> None:
+    """Draw those edges once more that lie in front of the water; the others shine through it."""
+    if shot.frame.scene.tank is not None:
+        water = water_of(buffers, shot)
+        _mark_over(shot, buffers, water.depth)
+        blend_front(shot.look, buffers.depth, water.depth, buffers.lines, buffers.color)
+
+
+def _mark_over(shot: Shot, buffers: Buffers, depth: Any) -> tuple[Any, Any]:
+    """Mark the edges that `depth` does not hide; returns the corners of the tank."""
     lower, upper = vector(*shot.extent.lower), vector(*shot.extent.upper)
     width = max(1.0, buffers.rows / 420.0)
     edges = 12 if shot.frame.dim == 3 else 4
     erase(buffers.lines)
     mark(
         shot.lens, lower, upper, edges, max(buffers.rows, buffers.columns) + 2, width, 2.0 * shot.radius,
-        buffers.depth, buffers.lines,
+        depth, buffers.lines,
     )  # fmt: skip
-    blend(shot.lens, shot.look, lower, upper, buffers.depth, buffers.lines, buffers.color)
+    return lower, upper
 
 
 @qd.kernel(fastcache=True)
@@ -131,3 +155,15 @@ def blend(
                 result = look.horizon
         cover = look.line_strength * lines[row, column] / 255.0
         color[row, column] = result + cover * (look.line - result)
+
+
+@qd.kernel(fastcache=True)
+def blend_front(
+    look: Look, depth: qd.types.ndarray(), water_depth: qd.types.ndarray(), lines: qd.types.ndarray(),
+    color: qd.types.ndarray(),
+):  # fmt: skip
+    """Lay lines over the water."""
+    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
+        if lines[row, column] > 0 and water_depth[row, column] < depth[row, column]:
+            cover = look.line_strength * lines[row, column] / 255.0
+            color[row, column] += cover * (look.line - color[row, column])

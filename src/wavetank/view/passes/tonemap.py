@@ -4,6 +4,8 @@ Khronos PBR Neutral tone mapper (2024): colours below 0.8 keep their hue, so tha
 brighter ones lose saturation on their way to white.
 """
 
+from typing import Any
+
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import vec3
@@ -12,7 +14,33 @@ from wavetank.view.shot import Shot
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill `picture` from `color`."""
-    develop(buffers.color, buffers.supersample, buffers.curve, buffers.picture)
+    develop(buffers.color, buffers.supersample, 0, _groups(buffers), buffers.curve, buffers.picture)
+
+
+def _groups(buffers: Buffers) -> int:
+    """Threes of words in a picture."""
+    return int(buffers.picture.shape[0]) // 3
+
+
+def collect(color: Any, total: Any, share: float) -> None:
+    """Add `share` of a picture, tone-mapped, to `total`; a share of 1 starts anew, so that the mean is kept."""
+    add(color, total, share)
+
+
+def draw_collected(total: Any, buffers: Buffers) -> None:
+    """Fill `picture` from what was collected."""
+    develop(total, buffers.supersample, 1, _groups(buffers), buffers.curve, buffers.picture)
+
+
+@qd.kernel(fastcache=True)
+def add(color: qd.types.ndarray(), total: qd.types.ndarray(), share: qd.f32):
+    """Move `total` by `share` of the way to the tone-mapped `color`."""
+    for row, column in qd.ndrange(color.shape[0], color.shape[1]):
+        mapped = neutral(color[row, column])
+        before = total[row, column]
+        if share == 1.0:
+            before = mapped
+        total[row, column] = before + share * (mapped - before)
 
 
 @qd.func
@@ -36,26 +64,41 @@ def neutral(color):
 
 
 @qd.kernel(fastcache=True)
-def develop(color: qd.types.ndarray(), samples: qd.i32, curve: qd.types.ndarray(), picture: qd.types.ndarray()):
+def develop(
+    color: qd.types.ndarray(), samples: qd.i32, mapped: qd.i32, groups: qd.i32, curve: qd.types.ndarray(),
+    picture: qd.types.ndarray(),
+):  # fmt: skip
     """Write the picture from `samples`^2 samples a pixel; `curve` encodes linear light as sRGB bytes.
 
     Four pixels of three bytes fill three words, so that the words in memory are the bytes of the picture.
     """
     columns = color.shape[1] // samples
     pixels = color.shape[0] // samples * columns
-    for group in range(picture.shape[0] // 3):
-        word = qd.Vector([0, 0, 0])
+    # As an argument: portable back ends cannot divide before they start a loop.
+    for group in range(groups):
+        first, second, third = 0, 0, 0
         for k in qd.static(range(4)):
             pixel = qd.min(4 * group + k, pixels - 1)
             total = vec3(0.0, 0.0, 0.0)
             for m in range(samples):
                 for n in range(samples):
-                    total += neutral(color[pixel // columns * samples + m, pixel % columns * samples + n])
+                    sample = color[pixel // columns * samples + m, pixel % columns * samples + n]
+                    if mapped == 0:
+                        sample = neutral(sample)
+                    total += sample
             last = curve.shape[0] - 1
             place = total * (last / (samples * samples)) + 0.5
             for channel in qd.static(range(3)):
-                byte = 3 * k + channel
+                byte = qd.static(3 * k + channel)
                 entry = qd.min(qd.max(qd.cast(place[channel], qd.i32), 0), last)
-                word[byte // 4] |= curve[entry] << (8 * (byte % 4))
-        for k in qd.static(range(3)):
-            picture[3 * group + k] = word[k]
+                bits = curve[entry] << (8 * (byte % 4))
+                # Spelled out: an operator in place on part of a vector is more than every back end can do.
+                if qd.static(byte // 4 == 0):
+                    first = first | bits
+                elif qd.static(byte // 4 == 1):
+                    second = second | bits
+                else:
+                    third = third | bits
+        picture[3 * group] = first
+        picture[3 * group + 1] = second
+        picture[3 * group + 2] = third

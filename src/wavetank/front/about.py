@@ -1,0 +1,115 @@
+"""What page and window draw their controls from: taken from the declarations, so that nothing is said twice."""
+
+import functools
+import math
+from typing import Any
+
+import numpy as np
+
+from wavetank.fluids import Points
+from wavetank.front.picture import Painter
+from wavetank.params import PARAMETERS, Parameters
+from wavetank.scene import Scene, bundled_levels, bundled_scenes
+from wavetank.session import Session
+from wavetank.tools import TOOLS, describe
+from wavetank.view.choices import colorings, views
+from wavetank.view.extent import ENDLESS, extent_of
+
+EVERYDAY = ("gravity", "viscosity", "vorticity", "iterations", "substeps", "spacing")  # shown first
+
+
+def everything(session: Session) -> dict[str, Any]:
+    """Return all that a page draws controls from; sent once to each viewer."""
+    return {
+        "type": "hello",
+        "parameters": [_parameter(p) for p in PARAMETERS],
+        "tools": [describe(tool) for tool in TOOLS],
+        "scenes": scenes(),
+        "views": views(),
+        "colorings": colorings(),
+        **world(session),
+    }
+
+
+def world(session: Session) -> dict[str, Any]:
+    """Return what changes with the scene and its parameters."""
+    scene, extent = session.sim.scene, extent_of(session.sim.scene)
+    return {
+        "title": scene.title,
+        "dim": scene.dim,
+        "size": float((extent.upper - extent.lower).max()),
+        "arch": session.sim.arch,
+        "values": {p.name: getattr(scene, p.name) for p in PARAMETERS},
+        "view": session.view or views()[0],
+        "color_by": session.color_by,
+    }
+
+
+def status(session: Session, painter: Painter) -> dict[str, Any]:
+    """Return what changes all the time."""
+    pace, times = session.pace, session.history.times
+    return {
+        "time": session.sim.time, "frame": session.sim.frame_number, "ticks": session.ticks,
+        "count": session.sim.count, "paused": session.paused, "speed": session.speed,
+        "pace": pace.measured if not session.paused else 0.0, "fps": pace.frames_per_second,
+        "late": pace.is_late(session.speed) and not session.paused,
+        "picture_ms": 1e3 * painter.seconds, "frame_ms": 1e3 * session.sim.seconds_per_frame,
+        "running": list(session.running), "held": [tool.name for tool, _ in session.hands.values()],
+        "past": [times[0], max(times[-1], session.sim.time)] if times else [0.0, 0.0],
+        "bookmarks": list(session.history.bookmarks), "height": session.camera.visible_height,
+    }  # fmt: skip
+
+
+def figures(session: Session) -> dict[str, float]:
+    """Measure the water; that costs a search for neighbours."""
+    stats = session.sim.stats()
+    names = ("density_error_mean", "density_error_max", "kinetic_energy", "potential_energy", "speed_max")
+    return {name: float(stats[name]) for name in names}
+
+
+def _parameter(p: Any) -> dict[str, Any]:
+    choices: list[str] = []
+    if isinstance(p.default, str):
+        choices = list(getattr(Parameters.model_fields[p.name].annotation, "__args__", ()))
+    return {
+        "name": p.name, "default": p.default, "low": p.low, "high": p.high, "unit": p.unit, "symbol": p.symbol,
+        "sentence": p.sentence, "live": p.live, "everyday": p.name in EVERYDAY, "choices": choices,
+        "whole": isinstance(p.default, int),
+    }  # fmt: skip
+
+
+@functools.cache
+def scenes() -> list[dict[str, Any]]:
+    """Return name, title, number of particles and outline of every bundled level and scene; levels have a goal."""
+    return [_outline(name, Scene.load(name)) for name in (*bundled_levels(), *bundled_scenes())]
+
+
+def _outline(name: str, scene: Scene) -> dict[str, Any]:
+    """A scene as a few boxes and balls, which the page draws as a thumbnail."""
+    extent = extent_of(scene)
+    shapes: list[dict[str, Any]] = []
+    colors = {material.name: material.color for material in scene.palette()[1:]}
+    for fluid in scene.fluids:
+        if isinstance(fluid, Points) and not len(fluid.positions):
+            continue
+        shapes.append({"what": "water", "round": fluid.shape == "ball", **_box(*fluid.bounds())})
+        shapes[-1]["color"] = colors.get(fluid.material or "", "")
+    for solid in scene.solids:
+        if solid.reach() < ENDLESS:
+            half = np.array(getattr(solid, "size", (2.0 * solid.reach() / math.sqrt(3.0),) * 3)[:3]) / 2.0
+            half = np.concatenate([half, np.zeros(3 - len(half))])
+            is_round = solid.shape in ("sphere", "capsule")
+            shapes.append({"what": "solid", "round": is_round, **_box(solid.origin - half, solid.origin + half)})
+    return {
+        "name": name, "title": scene.title or name, "dim": scene.dim, "count": round(_count(scene)), "shapes": shapes,
+        "lower": extent.lower.tolist(), "upper": extent.upper.tolist(), "goal": scene.goal.text if scene.goal else "",
+    }  # fmt: skip
+
+
+def _count(scene: Scene) -> float:
+    return sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
+
+
+def _box(lower: np.ndarray, upper: np.ndarray) -> dict[str, Any]:
+    pad = np.zeros(3 - len(lower))
+    return {"lower": [*map(float, lower), *pad], "upper": [*map(float, upper), *pad]}

@@ -1,0 +1,134 @@
+"""A session in a thread of its own, for a front that must never wait for the water.
+
+Commands go in, pictures and figures come out.
+"""
+
+import concurrent.futures
+import dataclasses
+import queue
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from wavetank.commands import Command
+from wavetank.errors import WavetankError
+from wavetank.front.about import figures, status, world
+from wavetank.front.picture import Painter
+from wavetank.session import Session
+
+STATUS_EVERY = 0.1  # s
+FIGURES_SHARE = 0.03  # of the time goes into measuring
+FIGURES_EVERY, FIGURES_SELDOM = 0.2, 2.0  # s between two measurements, at least and at most
+CALM = 0.25  # s without a change after which a sharp picture is worth it
+
+
+@dataclasses.dataclass(frozen=True)
+class Shown:
+    """What a front draws: it never reads the session itself, which another thread is changing."""
+
+    image: np.ndarray | None = None  # uint8 [height, width, 3]
+    number: int = 0  # of the picture
+    status: dict[str, Any] = dataclasses.field(default_factory=dict)
+    world: dict[str, Any] = dataclasses.field(default_factory=dict)
+    figures: dict[str, float] = dataclasses.field(default_factory=dict)
+    measured: int = 0  # how often figures were taken
+
+
+class Engine:
+    """Turns a session and paints it until `stop`. `submit` and `do` may be called from any thread."""
+
+    def __init__(self, session: Session) -> None:
+        self.session, self.painter = session, Painter(session)
+        session.smooth = True
+        self.shown = Shown(status=status(session, self.painter), world=world(session))
+        self.notes: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self.failure: BaseException | None = None
+        self.size = self.painter.asked  # px of the place for the picture; the front sets it
+        self.detail = "auto"
+        self._jobs: queue.SimpleQueue[tuple[Callable[[], Any], concurrent.futures.Future[Any]]] = queue.SimpleQueue()
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="wavetank water", daemon=True)
+        self._painted, self._painted_at, self._sharp = -1, 0.0, False
+        self._next_status = self._next_figures = 0.0
+        self._measured_at = -1
+
+    def start(self) -> None:
+        """Let the water move."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and wait for it, as long as a first frame may take to compile: the world is then ours."""
+        self._stopped.set()
+        self.session.wake()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def do(self, kind: type[Command], **fields: Any) -> None:
+        """Submit a command; one that is not allowed becomes a note."""
+        try:
+            self.session.submit(kind.parse(fields))
+        except WavetankError as error:
+            self.notes.put(str(error))
+
+    def ask(self, job: Callable[[], Any]) -> concurrent.futures.Future[Any]:
+        """Have something done between two frames."""
+        future: concurrent.futures.Future[Any] = concurrent.futures.Future()
+        self._jobs.put((job, future))
+        self.session.wake()
+        return future
+
+    def _run(self) -> None:
+        try:
+            while not self._stopped.is_set():
+                self._turn()
+                self.session.rest(0.05)
+            self.session.drain()  # what was done while the last frame was computed belongs to the recording
+        except BaseException as error:  # the front's thread raises it again
+            self.failure = error
+
+    def _turn(self) -> None:
+        while not self._jobs.empty():
+            job, future = self._jobs.get()
+            try:
+                future.set_result(job())
+            except Exception as error:  # it belongs to who asked; the water goes on
+                future.set_exception(error)
+        self.painter.detail = self.detail
+        if self.size != self.painter.asked:
+            self.painter.want(*self.size)
+        self.session.turn()
+        now = time.perf_counter()
+        self._paint(now)
+        if now >= self._next_status:
+            self._next_status = now + STATUS_EVERY
+            self._tell(now)
+
+    def _paint(self, now: float) -> None:
+        changed = self.session.changes != self._painted
+        calm = not changed and not self._sharp and self.painter.is_reduced and now - self._painted_at > CALM
+        if not changed and not calm:
+            return
+        self._painted, self._painted_at, self._sharp = self.session.changes, now, calm
+        image = self.painter.paint(sharp=calm)
+        self.shown = dataclasses.replace(self.shown, image=image, number=self.shown.number + 1)
+
+    def _tell(self, now: float) -> None:
+        session = self.session
+        notes, session.notes = session.notes, []
+        for sentence in notes:
+            self.notes.put(sentence)
+        measured = self.shown.figures
+        count = self.shown.measured
+        # The first frames and pictures are compiled on the way; what they took would flatten every curve.
+        if now >= self._next_figures and session.ticks != self._measured_at and session.ticks > 2:
+            self._measured_at = session.ticks
+            began = time.perf_counter()
+            measured, count = figures(session), count + 1
+            took = time.perf_counter() - began
+            self._next_figures = now + min(FIGURES_SELDOM, max(FIGURES_EVERY, took / FIGURES_SHARE))
+        self.shown = dataclasses.replace(
+            self.shown, status=status(session, self.painter), world=world(session), figures=measured, measured=count
+        )

@@ -1,0 +1,97 @@
+"""Who may come in: the right token, the right Host, an Origin of our own. All else is refused before it is looked at.
+
+A page of another site can make a browser talk to 127.0.0.1, and a name that is made to point here can make it look
+like our own page. The token keeps both out; Host and Origin say so early.
+"""
+
+import hmac
+import http.cookies
+import secrets
+import urllib.parse
+from collections.abc import Iterable
+from typing import Any
+
+OPEN_PATHS = ("/page/",)  # style and scripts, the same for everyone
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+HEADERS = {
+    "content-security-policy": "default-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
+    "frame-ancestors 'self' http://127.0.0.1:* http://localhost:*; base-uri 'none'; form-action 'none'",
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cache-control": "no-store",
+}
+
+
+class Gate:
+    """ASGI middleware in front of everything."""
+
+    def __init__(self, app: Any, host: str, port: int, token: str | None = None) -> None:
+        self.app, self.port = app, port
+        self.token = token or secrets.token_urlsafe(18)
+        self.cookie = f"wavetank_{port}"
+        # Beyond loopback this machine has names that we do not know; there the token alone decides.
+        self.hosts = {f"{name}:{port}" for name in (*LOOPBACK, host)} if is_loopback(host) else None
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        """Let a request pass or refuse it (ASGI)."""
+        if scope["type"] not in ("http", "websocket"):
+            return
+        headers = {key.decode("latin-1"): value.decode("latin-1") for key, value in scope["headers"]}
+        if not self._is_welcome(scope, headers):
+            await _refuse(scope, receive, send)
+            return
+        if scope["type"] == "http":
+            send = self._with_headers(send, scope)
+        await self.app(scope, receive, send)
+
+    def _is_welcome(self, scope: Any, headers: dict[str, str]) -> bool:
+        host, origin = headers.get("host", ""), headers.get("origin")
+        if self.hosts is not None and host.lower() not in self.hosts:
+            return False
+        if origin is not None and urllib.parse.urlsplit(origin).netloc.lower() != host.lower():
+            return False
+        # Browsers always name the origin of a socket; what does not is no browser and needs the token all the same.
+        if scope["type"] == "http" and scope["path"].startswith(OPEN_PATHS):
+            return True
+        return any(hmac.compare_digest(given.encode(), self.token.encode()) for given in self._tokens(scope, headers))
+
+    def _tokens(self, scope: Any, headers: dict[str, str]) -> Iterable[str]:
+        query = urllib.parse.parse_qs(scope.get("query_string", b"").decode("latin-1"))
+        yield from query.get("token", [])
+        try:
+            cookies = http.cookies.SimpleCookie(headers.get("cookie", ""))
+        except http.cookies.CookieError:
+            return
+        if self.cookie in cookies:
+            yield cookies[self.cookie].value
+
+    def _with_headers(self, send: Any, scope: Any) -> Any:
+        async def wrapped(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                extra = dict(HEADERS)
+                if scope["path"] == "/":
+                    extra["set-cookie"] = f"{self.cookie}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+                names = {key.encode() for key in extra}
+                kept = [(key, value) for key, value in message["headers"] if key.lower() not in names]
+                message["headers"] = kept + [(key.encode(), value.encode()) for key, value in extra.items()]
+            await send(message)
+
+        return wrapped
+
+
+def is_loopback(host: str) -> bool:
+    """Say whether only this machine can reach a server that listens on `host`."""
+    return host in ("localhost", "::1", "[::1]") or host.startswith("127.")
+
+
+async def _refuse(scope: Any, receive: Any, send: Any) -> None:
+    if scope["type"] == "websocket":
+        await receive()
+        await send({"type": "websocket.close", "code": 1008})
+        return
+    body = b"wavetank: this page opens with the link that the program printed, token included.\n"
+    await send({
+        "type": "http.response.start", "status": 403,
+        "headers": [(b"content-type", b"text/plain; charset=utf-8"), (b"content-length", str(len(body)).encode())],
+    })  # fmt: skip
+    await send({"type": "http.response.body", "body": body})

@@ -1,0 +1,87 @@
+// Scenes as small drawings; any scene file can be dropped on the page.
+
+import { find, make, note } from "./make.js";
+import { on, send } from "./link.js";
+
+let current = "";
+
+/** A drawing of boxes and balls: flat for 2-D, from above the corner for 3-D. */
+function draw(canvas, scene) {
+  const [width, height] = [canvas.width, canvas.height];
+  const g = canvas.getContext("2d");
+  const flat = scene.dim === 2;
+  const project = flat ? ([x, y]) => [x, -y] : ([x, y, z]) => [0.9 * x + 0.42 * z, -y + 0.3 * z - 0.12 * x];
+  const corners = ({ lower: a, upper: b }) => [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [k & 1 ? b[0] : a[0], k & 2 ? b[1] : a[1], k & 4 ? b[2] : a[2]]);
+  const places = corners(scene).map(project);
+  const [xs, ys] = [places.map((p) => p[0]), places.map((p) => p[1])];
+  const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+  const scale = Math.min(0.84 * width / (right - left), 0.78 * height / (bottom - top));
+  const to = (p) => { const [x, y] = project(p); return [width / 2 + (x - (left + right) / 2) * scale, height / 2 + (y - (top + bottom) / 2) * scale]; };
+  const face = (shape, ks, style) => {
+    const all = corners(shape);
+    g.beginPath();
+    ks.forEach((k, n) => g[n ? "lineTo" : "moveTo"](...to(all[k])));
+    g.closePath(); g.fillStyle = style; g.fill();
+  };
+  const order = [...scene.shapes].sort((a, b) => a.lower[2] + a.lower[0] * 0.1 - b.lower[2] - b.lower[0] * 0.1);
+  for (const shape of order) {
+    const [front, up, side] = shape.color ? Array(3).fill(shape.color) : shape.what === "water" ? ["#2a92d4", "#6cc7f6", "#1d70a8"] : ["#c99a73", "#e6c19f", "#a27852"];
+    if (shape.round) {
+      const middle = to(shape.lower.map((v, k) => (v + shape.upper[k]) / 2));
+      g.beginPath(); g.arc(...middle, 0.5 * scale * (shape.upper[1] - shape.lower[1]), 0, 7);
+      g.fillStyle = front; g.fill();
+    } else if (flat) face(shape, [0, 1, 3, 2], front);
+    else { face(shape, [1, 5, 7, 3], side); face(shape, [2, 3, 7, 6], up); face(shape, [4, 5, 7, 6], front); }
+  }
+  g.strokeStyle = "#7d93a1"; g.lineWidth = 1.4; g.lineJoin = "round";
+  const all = corners(scene);
+  const edges = flat ? [[0, 1], [1, 3], [3, 2], [2, 0]] : [[0, 1], [1, 5], [5, 4], [4, 0], [2, 3], [3, 7], [7, 6], [6, 2], [0, 2], [1, 3], [5, 7], [4, 6]];
+  for (const [a, b] of edges) { g.beginPath(); g.moveTo(...to(all[a])); g.lineTo(...to(all[b])); g.stroke(); }
+}
+
+function build({ scenes, title, dim }) {
+  const card = (scene) => {
+    const canvas = make("canvas", { width: 264, height: 198 });
+    draw(canvas, scene);
+    const stars = scene.goal ? make("em", { data: { level: scene.name } }) : null;
+    return make("button", { title: scene.goal || `${scene.title}: ${scene.dim}-D, ${scene.count.toLocaleString("en")} particles`, data: { title: `${scene.dim} ${scene.title}`, scene: scene.name }, onclick: () => { send({ do: "load", name: scene.name }); send({ do: "pause", on: false }); } },
+      canvas, make("span", { textContent: scene.title }), make("small", { textContent: `${scene.dim}-D · ${scene.count.toLocaleString("en")}` }), stars);
+  };
+  const heading = (textContent) => make("h3", { textContent });
+  const [levels, others] = [scenes.filter((scene) => scene.goal), scenes.filter((scene) => !scene.goal)];
+  const file = make("input", { type: "file", accept: ".toml", hidden: true, onchange: () => open(file.files[0]) });
+  const pick = make("button", { className: "quiet", textContent: "Open a scene file …", onclick: () => file.click() });
+  pick.style.gridColumn = "1 / -1"; pick.style.padding = "9px";
+  find("scenes").replaceChildren(heading("Levels"), ...levels.map(card), heading("Scenes"), ...others.map(card), pick, file, make("p", { textContent: "Or drop a scene's TOML file anywhere on this page." }));
+  named({ title, dim });
+}
+
+function named({ title, dim }) {
+  current = `${dim} ${title}`;
+  find("title").textContent = title || "Scene";
+  for (const card of find("scenes").querySelectorAll("button[data-scene]")) card.classList.toggle("now", card.dataset.title === current);
+}
+
+async function open(file) {
+  if (!file) return;
+  if (file.size > 2_000_000) { note(`${file.name} is too large for a scene file.`); return; }
+  send({ do: "load", text: await file.text() });
+}
+
+on("hello", build);
+on("status", ({ world, scores }) => {
+  if (world) named(world);
+  for (const place of find("scenes").querySelectorAll("em")) {
+    const stars = scores[place.dataset.level]?.stars ?? 0, text = "★".repeat(stars) + "☆".repeat(3 - stars);
+    if (place.textContent !== text) place.textContent = text;
+  }
+});
+
+let depth = 0;
+addEventListener("dragenter", (event) => { event.preventDefault(); depth += 1; find("drop-here").hidden = false; });
+addEventListener("dragleave", () => { depth -= 1; if (depth <= 0) { depth = 0; find("drop-here").hidden = true; } });
+addEventListener("dragover", (event) => event.preventDefault());
+addEventListener("drop", (event) => {
+  event.preventDefault(); depth = 0; find("drop-here").hidden = true;
+  open(event.dataTransfer.files[0]);
+});

@@ -1,0 +1,66 @@
+// Time: play, step, back, the scrubber with its bookmarks, the pace.
+
+import { find, icon, make, pretty } from "./make.js";
+import { on, send } from "./link.js";
+
+const SPEEDS = [1 / 16, 1 / 8, 1 / 4, 1 / 2, 1, 2];
+const NAMES = ["1⁄16 ×", "⅛ ×", "¼ ×", "½ ×", "1 ×", "2 ×"];
+const now = { time: 0, paused: false, speed: 1, past: [0, 0], bookmarks: [] };
+const scrub = find("scrub"), speed = find("speed");
+const marks = new Map(); // bookmark -> time at which it was set, as seen here
+let held = 0;
+
+speed.append(...SPEEDS.map((value, k) => make("option", { value, textContent: NAMES[k] })));
+speed.value = 1;
+speed.onchange = () => send({ do: "speed", factor: Number(speed.value) });
+
+export const time = {
+  toggle: () => send({ do: "pause", on: !now.paused }),
+  step: () => send({ do: "step" }),
+  back: () => send({ do: "rewind", time: Math.max(0, now.time - 1) }),
+  reset: () => { send({ do: "reset" }); send({ do: "pause", on: false }); },
+  faster: (by) => send({ do: "speed", factor: SPEEDS[Math.min(SPEEDS.length - 1, Math.max(0, closest(now.speed) + by))] }),
+  bookmark: () => {
+    const name = `${pretty(now.time, 3)} s`;
+    marks.set(name, now.time);
+    send({ do: "bookmark", name });
+  },
+};
+
+const closest = (value) => SPEEDS.reduce((best, other, k) => (Math.abs(other - value) < Math.abs(SPEEDS[best] - value) ? k : best), 0);
+
+for (const [id, act] of Object.entries({ play: time.toggle, step: time.step, back: time.back, reset: time.reset, bookmark: time.bookmark })) find(id).onclick = act;
+
+scrub.oninput = () => {
+  held = performance.now();
+  if (!now.paused) send({ do: "pause", on: true });
+  send({ do: "rewind", time: Number(scrub.value) });
+};
+
+let drawn = "", icon_ = null;
+on("status", (status) => {
+  Object.assign(now, status);
+  const [from, to] = [status.past[0], Math.max(status.past[1], status.time, status.past[0] + 0.1)];
+  if (performance.now() - held > 400) {
+    Object.assign(scrub, { min: from, max: to, value: status.time });
+    scrub.style.setProperty("--share", `${100 * (status.time - from) / (to - from)}%`);
+  }
+  find("clock").replaceChildren(make("b", { textContent: status.time.toFixed(2) }), " s");
+  if (icon_ !== status.paused) {
+    icon_ = status.paused;
+    find("play").replaceChildren(icon(icon_ ? "M8 5v14l11-7z" : "M7 5h3.500v14H7zM13.500 5H17v14h-3.500z"));
+    find("play").title = icon_ ? "Play (space)" : "Pause (space)";
+  }
+  if (document.activeElement !== speed) speed.value = SPEEDS[closest(status.speed)];
+  const list = JSON.stringify([status.bookmarks, from, to]);
+  if (list === drawn) return;
+  drawn = list;
+  find("bookmarks").replaceChildren(...status.bookmarks.map((name) => {
+    const at = marks.get(name) ?? parseFloat(name);
+    const flag = make("button", { title: `${name}: click to go there, right click to forget it`, "aria-label": `Bookmark ${name}` });
+    flag.style.left = `${100 * Math.min(1, Math.max(0, ((at || 0) - from) / (to - from)))}%`;
+    flag.onclick = () => send({ do: "bookmark", name, action: "go" });
+    flag.oncontextmenu = (event) => { event.preventDefault(); send({ do: "bookmark", name, action: "forget" }); };
+    return flag;
+  }));
+});

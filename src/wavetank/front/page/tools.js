@@ -1,0 +1,75 @@
+// The rail of tools, the card with the options of the one in hand, and those that go on by themselves.
+
+import { find, icon, make, words } from "./make.js";
+import { on, send } from "./link.js";
+import { control } from "./slider.js";
+
+const LOOK = {
+  name: "look", label: "Look", key: "l", options: [], cursor: false,
+  sentence: "Drag to turn the view. With any tool: right button or two fingers turn, wheel or pinch zooms, middle button or Shift moves.",
+  icon: "M2 12c3-5 6.500-7 10-7s7 2 10 7c-3 5-6.500 7-10 7s-7-2-10-7zM12 9a3 3 0 1 1 0 6 3 3 0 0 1 0-6",
+};
+const chosen = new Map(); // options by tool
+const buttons = new Map();
+export const hand = { tool: LOOK, options: {} };
+export let tools = [LOOK];
+
+export function choose(name) {
+  const tool = tools.find((other) => other.name === name) ?? LOOK;
+  hand.tool = tool;
+  hand.options = chosen.get(tool.name) ?? {};
+  chosen.set(tool.name, hand.options);
+  for (const [other, button] of buttons) button.setAttribute("aria-pressed", other === tool.name);
+  buttons.get(tool.name)?.scrollIntoView({ block: "nearest", inline: "nearest" });
+  find("picture").classList.toggle("look", tool === LOOK);
+  card(tool);
+}
+
+let allowed = null; // by the level: tools and their fixed options
+let folded = matchMedia("(max-width: 760px)").matches;
+
+function card(tool) {
+  const box = find("tool-card");
+  const fixed = allowed?.[tool.name] ?? {};
+  const options = tool.options.filter((about) => !(about.name in fixed)).map((about) =>
+    control(about, hand.options[about.name] ?? about.default, (v) => { hand.options[about.name] = v; }).element);
+  const fold = make("button", { className: "quiet fold", title: "Fold" }, icon("M6 15l6-6 6 6"));
+  fold.onclick = () => { folded = !folded; box.classList.toggle("folded", folded); };
+  box.replaceChildren(make("h2", { textContent: tool.label }), fold, make("p", { textContent: tool.sentence }), ...options);
+  box.classList.toggle("folded", folded);
+  box.hidden = false;
+}
+
+on("hello", ({ tools: list }) => {
+  tools = [LOOK, ...list];
+  buttons.clear();
+  find("tools").replaceChildren(...tools.map((tool) => {
+    const button = make("button", { title: `${tool.label}${tool.key ? ` (${tool.key.toUpperCase()})` : ""}: ${tool.sentence}`, "aria-pressed": false, data: { tool: tool.name } },
+      icon(tool.icon), make("span", { textContent: tool.label }));
+    button.onclick = () => choose(tool.name);
+    buttons.set(tool.name, button);
+    return button;
+  }));
+  rules = "";
+  choose(hand.tool === LOOK && !chosen.size ? "push" : hand.tool.name);
+});
+
+let told = "", rules = "";
+on("status", ({ running, game }) => {
+  // A level has its own tools; what it fixes has no slider.
+  const now = JSON.stringify(game?.tools ?? null);
+  if (now !== rules) {
+    rules = now;
+    allowed = game?.tools ?? null;
+    for (const [name, button] of buttons) button.hidden = Boolean(allowed) && name !== "look" && !(name in allowed);
+    choose(allowed ? Object.keys(allowed)[0] : hand.tool.name);
+  }
+  if (running.join() === told) return;
+  told = running.join();
+  for (const [name, button] of buttons) button.classList.toggle("on", running.includes(name));
+  find("running").replaceChildren(...running.map((name) =>
+    make("button", { textContent: `${words(name)}  ✕`, title: "Stop it", onclick: () => send({ do: "tool-stop", tool: name }) })));
+});
+
+/** Whether the level, if there is one, has this tool. */
+export const allows = (name) => !allowed || name === "look" || name in allowed;

@@ -1,0 +1,56 @@
+// The panel of parameters: drawn from their declarations; what is live acts at once, the rest waits for a reset.
+
+import { find, make } from "./make.js";
+import { on, send } from "./link.js";
+import { control } from "./slider.js";
+import { dial } from "./dial.js";
+
+const controls = new Map();
+const pending = new Map();
+let touched = new Map(); // when a value was last set here: what comes back late must not pull the slider
+
+function set(about, value) {
+  touched.set(about.name, performance.now());
+  if (about.live) send({ do: "set", name: about.name, value });
+  else { pending.set(about.name, value); showPending(); }
+}
+
+function showPending() {
+  find("pending").hidden = pending.size === 0;
+  find("pending").querySelector("p").textContent = [...pending].map(([name, value]) => `${name.replaceAll("_", " ")} = ${value}`).join(", ");
+}
+
+find("pending").querySelector("button").onclick = () => {
+  send({ do: "reset", parameters: Object.fromEntries(pending) });
+  pending.clear();
+  showPending();
+};
+
+function build({ parameters, values }) {
+  const everyday = find("everyday"), more = find("more").querySelector("div");
+  everyday.replaceChildren(); more.replaceChildren(); controls.clear();
+  for (const about of [...parameters].sort((a, b) => (b.name === "gravity") - (a.name === "gravity"))) {
+    let made;
+    if (about.name === "gravity") made = dial((v) => set(about, v));
+    else {
+      const range = about.name === "spacing" ? { low: values.spacing / 2, high: values.spacing * 2, default: null } : {};
+      made = control({ ...about, ...range }, values[about.name], (v) => set(about, v));
+      if (!about.live) made.element.querySelector("label").append(make("small", { textContent: "reset" }));
+    }
+    controls.set(about.name, made);
+    (about.everyday ? everyday : more).append(made.element);
+  }
+}
+
+let declared = null, shown = "";
+function update(world) {
+  const { values, title, dim } = world;
+  if (`${title} ${dim}` !== shown) { shown = `${title} ${dim}`; pending.clear(); showPending(); build({ parameters: declared, values }); return; }
+  const now = performance.now();
+  for (const [name, made] of controls) {
+    if (!pending.has(name) && now - (touched.get(name) ?? -1e9) > 600) made.show(values[name]);
+  }
+}
+
+on("hello", (hello) => { declared = hello.parameters; shown = `${hello.title} ${hello.dim}`; build(hello); });
+on("status", ({ world }) => { if (world) update(world); });

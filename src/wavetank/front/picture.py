@@ -1,0 +1,84 @@
+"""Pictures for a page: as large as the machine can afford, sharp when time stands still, packed as JPEG."""
+
+import io
+import math
+import time
+
+import numpy as np
+from PIL import Image
+
+from wavetank.session import Session
+from wavetank.view.choices import options
+from wavetank.view.renderer import Renderer
+
+AFFORD = 0.03  # s that a picture may take while the water moves
+LARGEST = 1600 * 900  # pixels
+SMALLEST = 32  # px
+STEP = 8  # px: sizes are multiples of this
+SMALLEST_SHARE = 0.5  # of width and height
+QUALITY = 84  # of JPEG
+
+
+class Painter:
+    """Takes the pictures of one session."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.asked = self.wanted = (960, 540)  # px
+        self.detail = "auto"  # auto, full or half
+        self.seconds = 0.0  # that the last picture took
+        self.last_size = (0, 0)  # px, of the last picture
+        self._share = 1.0
+        self._renderers: dict[tuple[int, int], Renderer] = {}
+
+    def want(self, width: int, height: int) -> None:
+        """Set the size of the place where the picture is shown [px]."""
+        self.asked = (width, height)
+        shrink = min(1.0, math.sqrt(LARGEST / (width * height)))
+        self.wanted = (max(SMALLEST, int(width * shrink)), max(SMALLEST, int(height * shrink)))
+        self.session.aspect = self.wanted[0] / self.wanted[1]
+        self.session.changes += 1
+
+    @property
+    def is_reduced(self) -> bool:
+        """Whether the last picture had fewer pixels than there is room for."""
+        return self.detail == "auto" and self._share < 0.99
+
+    @property
+    def _needs_densities(self) -> bool:
+        """Whether this picture is worth a search for neighbours: only where densities are seen."""
+        return options(self.session.view, self.session.color_by).get("color_by") == "density"
+
+    def paint(self, sharp: bool = False) -> np.ndarray:
+        """Return a picture of the present, uint8 [height, width, 3]; `sharp` whatever it costs."""
+        share = {"auto": 1.0 if sharp else self._share, "full": 1.0, "half": 0.5}[self.detail]
+        width, height = (max(SMALLEST, int(side * share) // STEP * STEP) for side in self.wanted)
+        self.last_size = (width, height)
+        began = time.perf_counter()
+        image = self._renderer(width, height).render(
+            self.session.sim.frame(measured=self._needs_densities), self.session.camera, legend=False,
+            **options(self.session.view, self.session.color_by),
+        )  # fmt: skip
+        self.seconds = time.perf_counter() - began
+        self.session.picture_seconds += 0.2 * (self.seconds - self.session.picture_seconds)
+        if self.detail == "auto" and not sharp:
+            # Half of the way to what would take the time that is affordable; small corrections are not worth a change.
+            wanted = share * math.sqrt(AFFORD / max(self.seconds, 1e-4))
+            if not 0.85 < wanted / share < 1.3 or (wanted > share and share < 1.0 and wanted / share > 1.15):
+                self._share = min(1.0, max(SMALLEST_SHARE, 0.5 * (share + wanted)))
+        return image
+
+    def _renderer(self, width: int, height: int) -> Renderer:
+        key = (width, height)
+        renderer = self._renderers.pop(key, None) or Renderer(width, height)
+        self._renderers[key] = renderer
+        while len(self._renderers) > 4:
+            del self._renderers[next(iter(self._renderers))]
+        return renderer
+
+
+def jpeg(image: np.ndarray) -> bytes:
+    """Pack a picture."""
+    stream = io.BytesIO()
+    Image.fromarray(image).save(stream, "JPEG", quality=QUALITY)
+    return stream.getvalue()

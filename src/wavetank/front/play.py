@@ -1,0 +1,151 @@
+"""`wavetank play`: a session, a front for it, and its recording at the end."""
+
+import contextlib
+import os
+import signal
+import sys
+import threading
+import webbrowser
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from wavetank.errors import WavetankError
+from wavetank.front.gate import is_loopback
+from wavetank.recording import Recording
+from wavetank.scene import Scene
+from wavetank.session import Session
+
+
+def play(
+    scene: Scene, arch: str, *, window: bool = False, web: bool = False, host: str = "127.0.0.1",
+    port: int | None = None, browser: bool = True, record: Path | None = None, most: int = 200_000,
+) -> None:  # fmt: skip
+    """Open a window where there can be one, else serve the page and say why; `window` insists, `web` never tries.
+
+    Who asks for a port or another host asks for the page. Raises `WavetankError` where `window` cannot be had.
+    """
+    if window and web:
+        raise WavetankError("--window and --web exclude each other; give one of them, or none for what fits.")
+    if not web and (window or (host == "127.0.0.1" and port is None and browser)):
+        reason = why_no_window()
+        if reason is None:
+            play_in_window(scene, arch, record=record, most=most)
+            return
+        if window:
+            raise WavetankError(f"--window: {reason}.")
+        print(f"no window: {reason}; here is the page instead", flush=True)
+    play_in_browser(scene, arch, host=host, port=port, browser=browser, record=record, most=most)
+
+
+def why_no_window() -> str | None:
+    """Return why there can be no window here, and how to get one; None where there can."""
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        return "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)"
+    try:
+        import glfw
+        import imgui_bundle  # noqa: F401
+        import moderngl  # noqa: F401
+    except ModuleNotFoundError as error:
+        return f"the package {str(error.name).replace('_', '-')} is missing (pip install 'wavetank[window]')"
+    except ImportError as error:
+        library = str(error).partition(":")[0]
+        return f"the library {library} is missing (on Debian and Ubuntu: apt-get install libgl1 libegl1 libx11-6)"
+    glfw.ERROR_REPORTING = "ignore"
+    try:
+        if not glfw.init():
+            return f"the display cannot be opened ({_complaint(glfw)})"
+        glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
+        glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
+        glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
+        trial = glfw.create_window(16, 16, "wavetank", None, None)
+        if not trial:
+            return f"there is no OpenGL 3.3 (on Debian and Ubuntu: apt-get install libgl1-mesa-dri; {_complaint(glfw)})"
+        glfw.destroy_window(trial)
+    finally:
+        glfw.terminate()
+    return None
+
+
+def _complaint(glfw: Any) -> str:
+    text = glfw.get_error()[1]
+    return (text.decode(errors="replace") if isinstance(text, bytes) else str(text)).rstrip(".")
+
+
+def play_in_window(scene: Scene, arch: str, *, record: Path | None = None, most: int = 200_000) -> None:
+    """Play in a window until it is closed."""
+    from wavetank.front.window.window import Window
+
+    _check_folder(record)
+    window = Window(Session(scene, arch, most_particles=most))
+    with _ends_with(window.stop):
+        try:
+            window.open()
+            window.run()
+        finally:
+            window.close()
+            _keep(record, window.engine.session, scene)
+
+
+def _check_folder(record: Path | None) -> None:
+    if record is not None and not record.resolve().parent.is_dir():
+        raise WavetankError(f"--record {record}: the folder {record.resolve().parent} is not there; make it first.")
+
+
+def _keep(record: Path | None, session: Session, start: Scene) -> None:
+    if record is not None:
+        Recording.of(session, start).save(record)
+        print(f"session written to {record}", flush=True)
+
+
+def play_in_browser(
+    scene: Scene, arch: str, *, host: str = "127.0.0.1", port: int | None = None, browser: bool = True,
+    record: Path | None = None, most: int = 200_000,
+) -> None:  # fmt: skip
+    """Serve a page until Ctrl-C and print one line with its address, token included."""
+    from wavetank.front.web import WebFront
+
+    _check_folder(record)
+    session = Session(scene, arch, most_particles=most)
+    front = WebFront(session, host, port)
+    with _ends_with(front.stop):
+        front.start()
+        where = "" if is_loopback(host) else " (anyone with this link can steer; it is not encrypted)"
+        print(f"wavetank plays at {front.url}{where}; Ctrl-C ends it", flush=True)
+        if browser:
+            threading.Thread(target=webbrowser.open, args=(front.url,), daemon=True).start()
+        try:
+            front.run()
+        finally:
+            front.stop()
+            _keep(record, session, scene)
+
+
+def with_particles(scene: Scene, wanted: int) -> Scene:
+    """Return the scene with a spacing that makes about so many particles."""
+    count = sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
+    if not count:
+        return scene
+    return scene.changed(spacing=float(f"{scene.spacing * (count / wanted) ** (1.0 / scene.dim):.3g}"))
+
+
+@contextlib.contextmanager
+def _ends_with(stop: Any) -> Iterator[None]:
+    """Turn the first Ctrl-C, and being asked to end, into a call of `stop`; a second Ctrl-C ends at once."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    asked = threading.Event()
+
+    def note(number: int, frame: Any) -> None:
+        if asked.is_set():
+            raise KeyboardInterrupt
+        asked.set()
+        threading.Thread(target=stop, daemon=True).start()
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, action in before.items():
+            signal.signal(number, action)

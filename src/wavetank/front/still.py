@@ -1,0 +1,85 @@
+"""One picture of a scene or of a saved state."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+from wavetank import __version__
+from wavetank.errors import WavetankError
+from wavetank.export import exporter_for
+from wavetank.export.replacing import partial_path
+from wavetank.scene import Scene
+from wavetank.simulation import Simulation
+from wavetank.view.camera import Camera
+from wavetank.view.renderer import Renderer, affordable
+from wavetank.view.style import QUALITIES, Style, quality_named
+
+USUAL_TIME = 0.5  # s: when a scene is shown unless told
+#: the same for bundled scenes whose best moment is another one
+SHOWN_AT = {"still-tank": 1.0, "still-tank-2d": 1.0, "drop": 0.42, "drop-2d": 0.35, "obstacle-tank": 0.62}
+
+
+def take(
+    world: str, scene: Scene | None, path: Path, width: int, height: int, *, at: float | None = None,
+    arch: str = "cpu", quality: str = "standard", eye: str | None = None, target: str | None = None,
+    timings: bool = False, **options: Any,
+) -> dict[str, Any]:  # fmt: skip
+    """Write a picture with its scene, time and view as metadata, and return what it cost.
+
+    `world` is the name of `scene`, or without one the file of a saved state. With `timings` a second picture is
+    taken, pass by pass, after the kernels are compiled.
+    """
+    writer = exporter_for(path, "picture")
+    partial_path(path)  # what is wrong shows before the work
+    supersample, samples = QUALITIES[quality_named(quality)]
+    style = {**options, "samples": samples}
+    view = Style(**style).kind
+    sim = _open(world, scene, at, arch)
+    camera = _camera_of(sim, eye, target, width / max(height, 1))
+    renderer, frame = Renderer(width, height, affordable(width, height, supersample)), sim.frame()
+    began = time.perf_counter()
+    image = renderer.render(frame, camera, **style)
+    figures: dict[str, Any] = {
+        "file": str(path), "scene": sim.scene.title, "time": sim.time, "view": view.name, "particles": sim.count,
+        "seconds_to_draw": time.perf_counter() - began, "arch": sim.arch,
+    }  # fmt: skip
+    if timings:
+        measured: dict[str, float] = {}
+        figures["milliseconds"] = measured
+        renderer.render(frame, camera, timings=measured, **style)
+    about = {"scene": sim.scene.title, "time": f"{sim.time:.4f} s", "view": view.name, "particles": sim.count}
+    writer.write(path, image, about | {"Software": f"wavetank {__version__}"})
+    return figures
+
+
+def _open(world: str, scene: Scene | None, at: float | None, arch: str) -> Simulation:
+    """Return the world at the time `at` [s]."""
+    sim = Simulation(scene, arch=arch) if scene is not None else Simulation.restore(world, arch=arch)
+    if at is None:
+        at = SHOWN_AT.get(world, USUAL_TIME) if scene is not None else sim.time
+    if not sim.time - 1e-9 <= at <= 86400.0:
+        raise WavetankError(
+            f"--at = {at} is not allowed; {world} starts at {sim.time:g} s, so it must be a number from there to 86400."
+        )
+    sim.advance(max(0.0, at - sim.time))
+    return sim
+
+
+def _camera_of(sim: Simulation, eye: str | None, target: str | None, aspect: float) -> Camera | None:
+    """Return the camera that two texts of the form ``2,1,3`` ask for, or None for the usual one."""
+    if eye is None and target is None:
+        return None
+    usual = Camera.framing(sim.scene, aspect)
+    return Camera(
+        eye=_point("eye", eye) if eye else usual.eye,
+        target=_point("target", target) if target else usual.target,
+        height=usual.height,
+    )
+
+
+def _point(name: str, text: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise WavetankError(f"--{name} = {text!r} is not allowed; write three numbers [m], as in 2,1,3.") from None
+    return x, y, z

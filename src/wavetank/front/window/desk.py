@@ -1,0 +1,123 @@
+"""What the person at the window has chosen: tool, options, page of the panel, parameters that wait for a reset."""
+
+import dataclasses
+import time
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+from wavetank.front.about import everything
+from wavetank.front.engine import Engine
+from wavetank.front.window.icons import LOOK
+from wavetank.scene import Scene
+from wavetank.tools import TOOLS, describe
+
+LOOK_TOOL = {
+    "name": "look", "label": "Look", "key": "l", "icon": LOOK, "options": [], "cursor": False,
+    "sentence": "Drag to turn the view. With any tool: the right button turns, the wheel zooms, the middle button or "
+    "Shift moves; W A S D Q E fly while the right button is down.",
+}  # fmt: skip
+PATIENCE = 0.6  # s for which a value set here is shown before what the simulation says
+LONGEST_SCENE = 2_000_000  # bytes of a dropped file
+KEPT = 600  # points of a curve
+
+
+@dataclasses.dataclass
+class Desk:
+    """All that the parts of the window share."""
+
+    engine: Engine
+    start_scene: Scene
+    tools: list[dict[str, Any]] = dataclasses.field(default_factory=lambda: [LOOK_TOOL, *map(describe, TOOLS)])
+    tool: str = "push"
+    chosen: dict[str, dict[str, Any]] = dataclasses.field(default_factory=dict)  # options by tool
+    pending: dict[str, Any] = dataclasses.field(default_factory=dict)  # parameters that wait for a reset
+    panel: bool = True
+    help: bool = False
+    filter: str = ""
+    notes: list[tuple[str, float]] = dataclasses.field(default_factory=list)  # with the time at which they go
+    curves: dict[str, deque[float]] = dataclasses.field(default_factory=dict)
+    places: dict[str, tuple[float, float, float, float]] = dataclasses.field(default_factory=dict)  # of controls [px]
+    _touched: dict[str, tuple[float, Any]] = dataclasses.field(default_factory=dict)
+    _measured: int = 0
+
+    def __post_init__(self) -> None:
+        """Read the declarations."""
+        self.declared = everything(self.engine.session)
+
+    @property
+    def hand(self) -> dict[str, Any]:
+        """The tool in hand."""
+        return next(tool for tool in self.tools if tool["name"] == self.tool)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What was chosen of its options; the rest is as declared."""
+        return self.chosen.setdefault(self.tool, {})
+
+    @property
+    def status(self) -> dict[str, Any]:
+        """What changes all the time."""
+        return self.engine.shown.status
+
+    @property
+    def world(self) -> dict[str, Any]:
+        """What changes with the scene."""
+        return self.engine.shown.world
+
+    def value(self, name: str) -> Any:
+        """Return a parameter as it was last set here, or as it is."""
+        if name in self.pending:
+            return self.pending[name]
+        when, value = self._touched.get(name, (-1e9, None))
+        return value if time.perf_counter() - when < PATIENCE else self.world["values"][name]
+
+    def set(self, about: dict[str, Any], value: Any) -> None:
+        """Set a live parameter; one that is not waits for a reset."""
+        from wavetank.commands import SetParameter
+
+        if not about["live"]:
+            self.pending[about["name"]] = value
+            return
+        self._touched[about["name"]] = (time.perf_counter(), value)
+        self.engine.do(SetParameter, name=about["name"], value=value)
+
+    def say(self, sentence: str) -> None:
+        """Show a sentence for as long as it takes to read."""
+        if sentence not in [note for note, _ in self.notes]:
+            self.notes = [*self.notes[-3:], (sentence, time.perf_counter() + 2.5 + 0.045 * len(sentence))]
+
+    def pass_time(self) -> None:
+        """Collect notes and the points of the curves."""
+        while not self.engine.notes.empty():
+            self.say(self.engine.notes.get())
+        self.notes = [note for note in self.notes if note[1] > time.perf_counter()]
+        shown = self.engine.shown
+        if shown.measured != self._measured:
+            self._measured = shown.measured
+            if self.curves.get("time") and shown.status["time"] < self.curves["time"][-1]:
+                self.curves.clear()  # rewound, or another scene
+            for name, value in {
+                "time": shown.status["time"], **shown.figures, "frame_ms": shown.status["frame_ms"],
+                "picture_ms": shown.status["picture_ms"],
+            }.items():  # fmt: skip
+                self.curves.setdefault(name, deque(maxlen=KEPT)).append(value)
+
+    def open(self, path: Path) -> None:
+        """Begin the scene of a file; what is wrong with it becomes a note."""
+        from wavetank.commands import LoadScene, Pause
+
+        try:
+            if path.stat().st_size > LONGEST_SCENE:
+                self.say(f"{path.name} is too large for a scene file.")
+                return
+            text = path.read_text("utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            self.say(f"{path.name} cannot be read: {error}.")
+            return
+        if not text:
+            self.say(f"{path.name} is empty; drop the TOML file of a scene.")
+            return
+        self.pending.clear()
+        self.engine.do(LoadScene, text=text)
+        self.engine.do(Pause, on=False)

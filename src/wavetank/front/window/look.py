@@ -1,0 +1,114 @@
+"""How the window looks: colours, spacing, fonts, and the few things it draws by hand."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from imgui_bundle import ImVec2, ImVec4, hello_imgui, imgui, implot
+
+from wavetank.front.window.icons import lines
+
+FONT = 15.0  # px at usual density
+GROUND, PANEL, RAISED, HOVER, LINE = "#0c1115", "#131a20", "#1b242c", "#25313b", "#24303a"
+TEXT, SOFT, ACCENT, ACCENT_GROUND = "#e3ebf0", "#8fa3b0", "#59c8ff", "#123447"
+WARM, WARM_GROUND = "#ffb866", "#3a2a14"
+
+
+def rgba(color: str, alpha: float = 1.0) -> ImVec4:
+    """Return a colour ``#rrggbb``."""
+    red, green, blue = (int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+    return ImVec4(red, green, blue, alpha)
+
+
+def ink(color: str, alpha: float = 1.0) -> int:
+    """Return a colour ``#rrggbb`` as draw lists take it."""
+    return int(imgui.color_convert_float4_to_u32(rgba(color, alpha)))
+
+
+def load_fonts() -> None:
+    """Load Roboto, which comes with imgui-bundle; its glyphs are made when they are needed, for any pixel density."""
+    hello_imgui.load_font("fonts/Roboto/Roboto-Regular.ttf", FONT)
+
+
+def set_style() -> None:
+    """Set colours and spacing."""
+    style, c = imgui.get_style(), imgui.Col_
+    style.window_rounding = style.child_rounding = style.popup_rounding = 10.0
+    style.frame_rounding = style.grab_rounding = 6.0
+    style.window_border_size = style.popup_border_size = 1.0
+    style.frame_border_size = style.tab_bar_border_size = style.tab_border_size = 0.0
+    style.window_padding, style.frame_padding, style.item_spacing = ImVec2(12, 10), ImVec2(8, 4), ImVec2(8, 7)
+    style.grab_min_size, style.scrollbar_size, style.scrollbar_rounding = 5.0, 9.0, 6.0
+    for which, color, alpha in (
+        (c.text, TEXT, 1), (c.text_disabled, SOFT, 1), (c.window_bg, PANEL, 1), (c.child_bg, PANEL, 0),
+        (c.popup_bg, "#10171d", 0.97), (c.border, LINE, 1), (c.frame_bg, RAISED, 1), (c.frame_bg_hovered, HOVER, 1),
+        (c.frame_bg_active, HOVER, 1), (c.button, RAISED, 1), (c.button_hovered, HOVER, 1),
+        (c.button_active, ACCENT_GROUND, 1), (c.slider_grab, ACCENT, 0.65), (c.slider_grab_active, "#86d8ff", 1),
+        (c.check_mark, ACCENT, 1), (c.header, ACCENT_GROUND, 1), (c.header_hovered, HOVER, 1),
+        (c.header_active, ACCENT_GROUND, 1), (c.tab, PANEL, 0), (c.tab_hovered, HOVER, 1), (c.tab_selected, RAISED, 1),
+        (c.tab_selected_overline, ACCENT, 0), (c.scrollbar_bg, PANEL, 0), (c.scrollbar_grab, "#33424e", 1),
+        (c.separator, LINE, 1), (c.text_selected_bg, ACCENT, 0.35), (c.modal_window_dim_bg, GROUND, 0.6),
+        (c.nav_cursor, ACCENT, 0),
+    ):  # fmt: skip
+        style.set_color_(which, rgba(color, alpha))
+    plots, p = implot.get_style(), implot.Col_
+    for part, tint, share in (
+        (p.frame_bg, PANEL, 0), (p.plot_bg, GROUND, 0.55), (p.plot_border, LINE, 1), (p.axis_grid, SOFT, 0.14),
+        (p.axis_text, SOFT, 1), (p.legend_bg, PANEL, 0), (p.legend_border, PANEL, 0), (p.inlay_text, SOFT, 1),
+    ):  # fmt: skip
+        plots.set_color_(part, rgba(tint, share))
+    plots.plot_padding = ImVec2(4, 6)
+    plots.label_padding = ImVec2(4, 3)
+
+
+def draw_icon(draw: Any, path: str, at: ImVec2, size: float, color: int, weight: float = 1.6) -> None:
+    """Draw a line icon in a square of `size` px whose upper left corner is `at`."""
+    for line in lines(path):
+        places = [ImVec2(at.x + size / 24 * x, at.y + size / 24 * y) for x, y in line]
+        draw.add_polyline(places, color, max(1.0, weight * size / 24), 0)
+
+
+def chip(text: str, *, warm: bool = False) -> None:
+    """Draw a short text on a round ground."""
+    size, draw, at = imgui.calc_text_size(text), imgui.get_window_draw_list(), imgui.get_cursor_screen_pos()
+    end = ImVec2(at.x + size.x + 20, at.y + size.y + 6)
+    draw.add_rect_filled(at, end, ink(WARM_GROUND if warm else ACCENT_GROUND), 20.0)
+    draw.add_text(ImVec2(at.x + 10, at.y + 3), ink(WARM if warm else ACCENT), text)
+    imgui.dummy(ImVec2(size.x + 20, size.y + 6))
+
+
+def title(text: str) -> None:
+    """Write a small heading."""
+    imgui.dummy(ImVec2(0, 2))
+    imgui.text_colored(rgba(SOFT), text)
+
+
+def pills(names: Sequence[tuple[str, str]], chosen: str) -> str | None:
+    """Draw a row of choices that wraps; return the one that was clicked."""
+    clicked = None
+    right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
+    for n, (value, text) in enumerate(names):
+        wide = imgui.calc_text_size(text).x + 2 * imgui.get_style().frame_padding.x
+        if n and imgui.get_item_rect_max().x + imgui.get_style().item_spacing.x + wide < right:
+            imgui.same_line()
+        if button(text, on=value == chosen):
+            clicked = value
+    return clicked
+
+
+def button(text: str, *, on: bool = False, wide: float = 0.0) -> bool:
+    """Draw a button, with the accent's colours where it is on."""
+    imgui.push_style_color(imgui.Col_.button, rgba(ACCENT_GROUND if on else RAISED))
+    imgui.push_style_color(imgui.Col_.text, rgba(ACCENT if on else TEXT))
+    clicked = imgui.button(text, ImVec2(wide, 0))
+    imgui.pop_style_color(2)
+    return bool(clicked)
+
+
+def hint(text: str) -> None:
+    """Show a sentence while the pointer rests on the item before."""
+    if text and imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
+        imgui.begin_tooltip()
+        imgui.push_text_wrap_pos(22 * imgui.get_font_size())
+        imgui.text_unformatted(text)
+        imgui.pop_text_wrap_pos()
+        imgui.end_tooltip()

@@ -1,0 +1,193 @@
+"""The window itself: opens it, lays it out, shows the picture of the water, and keeps the beat."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+import glfw
+import moderngl
+from imgui_bundle import ImVec2, glfw_utils, hello_imgui, imgui, implot
+
+from wavetank.front.engine import Engine
+from wavetank.front.window import keys, timeline
+from wavetank.front.window.desk import Desk
+from wavetank.front.window.look import (
+    ACCENT,
+    ACCENT_GROUND,
+    GROUND,
+    RAISED,
+    SOFT,
+    draw_icon,
+    hint,
+    ink,
+    load_fonts,
+    rgba,
+    set_style,
+)
+from wavetank.front.window.panels import panel
+from wavetank.front.window.stage import Stage
+from wavetank.session import Session
+
+BEAT = 1.0 / 60.0  # s: between two pictures of the window
+GAP = 8.0  # px between its parts
+
+
+class Window:
+    """A window on one session. Everything here belongs to the thread that opened it; the water has its own."""
+
+    def __init__(self, session: Session, size: tuple[int, int] = (1440, 900)) -> None:
+        self.engine = Engine(session)
+        self.desk = Desk(self.engine, session.scene)
+        self.stage = Stage(self.desk)
+        self.frames = 0
+        self._texture: Any = None
+        self._shown = 0  # number of the picture in the texture
+        self._context: Any = None
+        self._params = self._settings(size)
+        self._stopped = False
+
+    def open(self) -> None:
+        """Open the window and let the water move."""
+        hello_imgui.manual_render.setup_from_runner_params(self._params)
+        self._context = moderngl.create_context()
+        glfw.set_drop_callback(glfw_utils.glfw_window_hello_imgui(), self._dropped)  # type: ignore[arg-type]
+        self.engine.start()
+
+    def run(self) -> None:
+        """Draw until the window is closed or `stop` is called."""
+        while not self._params.app_shall_exit and not self._stopped:
+            began = time.perf_counter()
+            self.draw()
+            # Sleeping lets the water's thread compute, which waiting for the screen inside the driver would not.
+            time.sleep(max(0.001, BEAT - (time.perf_counter() - began)))
+
+    def draw(self) -> None:
+        """Draw the window once; what happened in the water's thread is raised here."""
+        if self.engine.failure is not None:
+            raise self.engine.failure
+        hello_imgui.manual_render.render()
+        self.frames += 1
+
+    def stop(self) -> None:
+        """Ask `run` to end."""
+        self._stopped = True
+
+    def close(self) -> None:
+        """Stop the water and close the window."""
+        self.engine.stop()
+        if self._context is not None:
+            if self._texture is not None:
+                self._texture.release()
+            implot.destroy_context()
+            hello_imgui.manual_render.tear_down()
+            self._context = None
+
+    def screenshot(self) -> Any:
+        """Return what the window shows, uint8 [height, width, 3], from the framebuffer after `draw`."""
+        import numpy as np
+
+        width, height = glfw.get_framebuffer_size(glfw_utils.glfw_window_hello_imgui())
+        screen = self._context.detect_framebuffer(0)
+        raw = screen.read(viewport=(0, 0, width, height), components=3, alignment=1)
+        return np.frombuffer(raw, np.uint8).reshape(height, width, 3)[::-1]
+
+    def _settings(self, size: tuple[int, int]) -> Any:
+        params = hello_imgui.RunnerParams()
+        params.app_window_params.window_title = "wavetank"
+        params.app_window_params.window_geometry.size = size
+        params.app_window_params.restore_previous_geometry = False
+        params.imgui_window_params.default_imgui_window_type = hello_imgui.DefaultImGuiWindowType.no_default_window
+        params.imgui_window_params.background_color = rgba(GROUND)
+        params.ini_disable = True
+        # The picture is finished: multisampling would only blur it, and cost. Water does not idle.
+        params.renderer_backend_options.open_gl_options = hello_imgui.OpenGlOptions()
+        params.renderer_backend_options.open_gl_options.anti_aliasing_samples = 0
+        params.fps_idling.enable_idling = False
+        params.fps_idling.vsync_to_monitor = False
+        params.callbacks.load_additional_fonts = load_fonts
+        params.callbacks.setup_imgui_style = self._style
+        params.callbacks.show_gui = self._gui
+        return params
+
+    def _style(self) -> None:
+        implot.create_context()
+        set_style()
+
+    def _dropped(self, window: Any, paths: Any) -> None:
+        self.desk.open(Path(paths[0]))
+
+    # --- one picture ---
+
+    def _gui(self) -> None:
+        self.desk.pass_time()
+        self._upload()
+        em, room = imgui.get_font_size(), imgui.get_io().display_size
+        rail, side, top, bottom = 9.0 * em, 22.5 * em if self.desk.panel else 0.0, 2.6 * em, 3.7 * em
+        wide = room.x - rail - 3 * GAP - (side + GAP if side else 0.0)
+        texture = imgui.ImTextureRef(self._texture.glo) if self._texture is not None else None
+        stage = (ImVec2(2 * GAP + rail, top), ImVec2(max(64.0, wide), max(64.0, room.y - top - bottom - 2 * GAP)))
+        if self._part("header", ImVec2(GAP, 0), ImVec2(room.x - 2 * GAP, top), bare=True):
+            timeline.header(self.desk, imgui.get_io().framerate)
+        imgui.end()
+        if self._part("tools", ImVec2(GAP, top), ImVec2(rail, room.y - top - GAP)):
+            self._tools()
+        imgui.end()
+        self.stage.draw(texture, *stage)
+        if self._part("time", ImVec2(2 * GAP + rail, room.y - GAP - bottom), ImVec2(stage[1].x, bottom)):
+            timeline.footer(self.desk)
+        imgui.end()
+        if side:
+            if self._part("panel", ImVec2(room.x - GAP - side, top), ImVec2(side, room.y - top - GAP)):
+                panel(self.desk)
+            imgui.end()
+        keys.draw_help(self.desk)
+        keys.typed(self.desk)
+
+    def _part(self, name: str, at: ImVec2, size: ImVec2, *, bare: bool = False) -> bool:
+        imgui.set_next_window_pos(at)
+        imgui.set_next_window_size(size)
+        flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
+        flags |= imgui.WindowFlags_.no_bring_to_front_on_focus | imgui.WindowFlags_.no_nav
+        if bare:
+            flags |= imgui.WindowFlags_.no_background
+        return bool(imgui.begin(name, None, int(flags))[0])
+
+    def _tools(self) -> None:
+        """The rail of tools, two in a row."""
+        em = imgui.get_font_size()
+        draw, gap = imgui.get_window_draw_list(), 4.0
+        wide = 0.5 * (imgui.get_content_region_avail().x - gap)
+        running = self.desk.status["running"]
+        for n, tool in enumerate(self.desk.tools):
+            if n % 2:
+                imgui.same_line(0, gap)
+            at = imgui.get_cursor_screen_pos()
+            size = ImVec2(wide, 3.5 * em)
+            if imgui.invisible_button(tool["name"], size):
+                self.desk.tool = tool["name"]
+            end = ImVec2(at.x + size.x, at.y + size.y)
+            self.desk.places[f"tool.{tool['name']}"] = (at.x, at.y, end.x, end.y)
+            hint(f"{tool['label']} ({tool['key'].upper()}): {tool['sentence']}")
+            on, hovered = tool["name"] == self.desk.tool, imgui.is_item_hovered()
+            if on or hovered:
+                draw.add_rect_filled(at, end, ink(ACCENT_GROUND if on else RAISED), 9.0)
+            if tool["name"] in running:
+                draw.add_rect(at, end, ink(ACCENT), 9.0)
+            color = ink(ACCENT if on else SOFT)
+            draw_icon(draw, tool["icon"], ImVec2(at.x + 0.5 * (wide - 1.4 * em), at.y + 0.45 * em), 1.4 * em, color)
+            text = imgui.calc_text_size(tool["label"])
+            draw.add_text(ImVec2(at.x + 0.5 * (wide - text.x), end.y - 1.4 * em), color, tool["label"])
+
+    def _upload(self) -> None:
+        """Bring a new picture of the water into the texture."""
+        shown = self.engine.shown
+        if shown.image is None or shown.number == self._shown:
+            return
+        self._shown = shown.number
+        height, width = shown.image.shape[:2]
+        if self._texture is None or self._texture.size != (width, height):
+            if self._texture is not None:
+                self._texture.release()
+            self._texture = self._context.texture((width, height), 3, alignment=1)
+            self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self._texture.write(shown.image.tobytes())

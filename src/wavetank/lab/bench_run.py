@@ -1,0 +1,106 @@
+"""What `wavetank bench` does with its options: which measurement, which tables."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from wavetank.errors import WavetankError
+from wavetank.lab.bench import SCENES, SIZES, bench
+from wavetank.lab.bench_tables import comparison_table, figures_table, load_result, save_result, start_table
+from wavetank.lab.startup import start_up
+
+__all__ = ["Order", "perform", "save_result"]
+
+PEER_SIZE, PEER_SECONDS, SECONDS = 60_000, 1.0, 0.5
+
+
+@dataclasses.dataclass(frozen=True)
+class Order:
+    """The options as they were given."""
+
+    scenes: list[str]
+    sizes: str
+    seconds: float | None
+    repeats: int
+    threads: int | None
+    peers: bool
+    roofline: bool
+    start_up: bool
+    compare: Path | None
+    arch: str
+
+
+def perform(order: Order, say: Callable[[str], None]) -> tuple[dict[str, Any], list[Table]]:
+    """Measure what was ordered; return the figures as plain data, and tables that show them.
+
+    Raises `WavetankError` for options that do not go together or are out of range.
+    """
+    if order.peers + order.roofline + (order.compare is not None) > 1:
+        raise WavetankError("--peers, --roofline and --compare are three things; give one of them.")
+    names, sizes = split(order.scenes, order.sizes)
+    if order.peers:
+        return _peers(order, names, sizes, say)
+    if order.roofline:
+        from wavetank.lab.roofline import roofline, roofline_table
+
+        result = roofline(
+            names[0] if names else SCENES[0], sizes[0] if sizes else SIZES[-1], arch=order.arch,
+            seconds=0.2 if order.seconds is None else order.seconds, repeats=order.repeats, threads=order.threads,
+            say=say,
+        )  # fmt: skip
+        return result, roofline_table(result)
+    earlier = load_result(order.compare) if order.compare else None
+    result = bench(
+        names or SCENES, sizes or SIZES, arch=order.arch, seconds=SECONDS if order.seconds is None else order.seconds,
+        repeats=order.repeats, threads=order.threads, say=say,
+    )  # fmt: skip
+    tables = [figures_table(result)]
+    if order.start_up:
+        say("start-up: a cold process, then warm ones")
+        result["start_up"] = start_up(order.arch)
+        tables.append(start_table(result["start_up"]))
+    if earlier is not None:
+        tables.append(comparison_table(earlier, result))
+    return result, tables
+
+
+def split(words: list[str], sizes: str) -> tuple[list[str], list[int]]:
+    """Return names of scenes and sizes; a bare whole number among the words is one more size."""
+    numbers = [part for part in sizes.replace(",", " ").split() if part]
+    for number in numbers:
+        if not number.isdigit():
+            raise WavetankError(f"--sizes = {sizes!r} is not allowed; write whole numbers, as in --sizes 10000,100000.")
+    more = [word for word in words if word.isdigit()]
+    return [word for word in words if not word.isdigit()], [int(number) for number in [*numbers, *more]]
+
+
+def _peers(
+    order: Order, names: list[str], sizes: list[int], say: Callable[[str], None]
+) -> tuple[dict[str, Any], list[Table]]:
+    from wavetank.lab.peers.compare import compare_peers
+
+    if names or len(sizes) > 1 or order.arch != "cpu":
+        raise WavetankError("--peers compares one dam break on the CPU; give at most one of --sizes, and no scene.")
+    result = compare_peers(
+        sizes[0] if sizes else PEER_SIZE, seconds=PEER_SECONDS if order.seconds is None else order.seconds,
+        repeats=order.repeats, threads=order.threads, say=say,
+    )  # fmt: skip
+    found = result["peers"]
+    table = Table(
+        "against SPlisHSPlasH", "ours / theirs", "[low, high]", "ours", "theirs", "density error, ours; theirs"
+    )
+    for title, one, name in (
+        ("PBF, M particle-iterations/s", found["splishsplash_pbf"], "particle_iterations_per_second"),
+        ("DFSPH at 1 %, s of water per s", found["splishsplash_dfsph"]["at_1pct"], "water_per_second"),
+        ("DFSPH at 0.1 %, s of water per s", found["splishsplash_dfsph"]["at_0.1pct"], "water_per_second"),
+    ):
+        factor = 1e-6 if name.startswith("particle") else 1.0
+        table.add_row(
+            title, f"{one['ratio']:.2f}", f"[{one['low']:.2f}, {one['high']:.2f}]",
+            *(f"{factor * one[side][name]:.4g}" for side in ("ours", "theirs")),
+            "; ".join(f"{100 * one[side]['density_error_mean']:.3f} %" for side in ("ours", "theirs")),
+        )  # fmt: skip
+    return result, [table]

@@ -1,0 +1,78 @@
+"""Lock exchange: a heavy and a light fluid side by side change places in two gravity currents.
+
+Benjamin 1968, J. Fluid Mech. 31, 209, doi:10.1017/S0022112068000133: a current that fills half the depth H without
+losing energy runs at U = 0.5 sqrt(g' H), g' = g (1 - rho_light / rho_heavy); experiments with full-depth locks give
+0.46 to 0.5: Shin, Dalziel and Linden 2004, J. Fluid Mech. 521, 1, doi:10.1017/S002211200400165X. The light current runs
+under a free surface here. Speeds are fitted between 0.3 H and 1.3 H from the lock; particles are counted in the lower
+third for the heavy current and in the upper third for the light one, the eighth from the front.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from wavetank.lab.cases.case import Case, Figure, Outcome
+from wavetank.lab.plots import BLUE, RED, tidy
+from wavetank.scene import Scene
+from wavetank.simulation import Simulation
+
+DEPTH, LENGTH, RATIO, EIGHTH = 0.3, 1.4, 0.8, 8
+SOURCE = "Benjamin 1968; Shin et al. 2004"
+
+
+def run(quick: bool, arch: str) -> Outcome:
+    """Open the lock and follow both fronts (quick: coarser)."""
+    d = DEPTH / (16 if quick else 32)
+    reduced = 9.81 * (1.0 - RATIO)
+    unit = math.sqrt(reduced * DEPTH)  # m/s, of which the Froude number is a share
+    table = {
+        "spacing": d,
+        "tank": {"size": [LENGTH, 1.3 * DEPTH]},
+        "materials": [{"name": "heavy", "density": 1000.0}, {"name": "light", "density": 1000.0 * RATIO}],
+        "fluids": [
+            {"lower": [0, 0], "upper": [LENGTH / 2, DEPTH], "material": "heavy"},
+            {"lower": [LENGTH / 2, 0], "upper": [LENGTH, DEPTH], "material": "light"},
+        ],
+    }
+    sim = Simulation(Scene.parse(table), arch)
+    times: list[float] = []
+    fronts: dict[str, list[float]] = {"heavy": [], "light": []}
+    for frame in sim.frames(4.5 * DEPTH / unit, 20.0 * unit / DEPTH):
+        x, kind = frame.positions.astype(float), frame.materials
+        below, above = (kind == 1) & (x[:, 1] < DEPTH / 3), (kind == 2) & (x[:, 1] > 2 * DEPTH / 3)
+        times.append(sim.time * unit / DEPTH)
+        fronts["heavy"].append((np.sort(x[below, 0])[-EIGHTH] - LENGTH / 2) / DEPTH)
+        fronts["light"].append((LENGTH / 2 - np.sort(x[above, 0])[EIGHTH - 1]) / DEPTH)
+    froude = {name: speed(np.array(times), np.array(front)) for name, front in fronts.items()}
+    mean = 0.5 * (froude["heavy"] + froude["light"])
+    low = 0.3 if quick else 0.4
+    figures = [
+        Figure("Froude number, mean of both fronts", mean, "", low, 0.55, "0.46 .. 0.5", SOURCE),
+        Figure("Froude number of the heavy front", froude["heavy"], "", reference="0.46 .. 0.5", source=SOURCE),
+        Figure("Froude number of the light front", froude["light"], "", reference="0.46 .. 0.5", source=SOURCE),
+    ]
+
+    def draw(plot: Any) -> None:
+        left, right = plot.subplots(1, 2, width_ratios=(2, 3))
+        for name, color in (("heavy", BLUE), ("light", RED)):
+            left.plot(times, fronts[name], color=color, label=f"{name}, Fr = {froude[name]:.2f}")
+        ticks = np.array([1.0, 3.5])
+        left.plot(ticks, 0.5 * ticks - 0.3, "k:", lw=1, label="Fr = 0.5")
+        left.set(xlabel="t sqrt(g' / H)", ylabel="front / H")
+        left.legend(frameon=False)
+        tidy(left)
+        for number, color in ((1, BLUE), (2, RED)):
+            right.plot(x[kind == number, 0], x[kind == number, 1], ".", color=color, ms=2)
+        right.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+
+    return Outcome(figures, {"time": times, **fronts}, draw)
+
+
+def speed(times: np.ndarray, front: np.ndarray) -> float:
+    """Return the slope of the front over time where it is between 0.3 and 1.3."""
+    chosen = (front > 0.3) & (front < 1.3)
+    return float(np.polyfit(times[chosen], front[chosen], 1)[0]) if chosen.sum() > 2 else math.nan
+
+
+CASE = Case("lock-exchange", "Lock exchange", run)

@@ -1,0 +1,239 @@
+"""How near each kernel comes to what the machine can do: a roofline (Williams, Waterman and Patterson 2009,
+10.1145/1498765.1498785).
+
+Three ceilings are measured with small kernels of the same compiler on the same threads, fastest of several tries:
+
+- copy: bytes per second of a copy, read and written counted, of arrays as large as the run's own, and of large ones;
+- arithmetic: multiplications and additions per second of independent chains that stay in registers;
+- walk: neighbours per second of a loop over the run's own lists that does nothing but add up the ways to them, which
+  every pass over lists has to pay.
+
+`COSTS` says what a kernel has to move and to compute: every array element once, neighbours' positions not at all
+(they come from the cache), divisions and roots as one operation. The shortest possible time is the larger of bytes /
+copy and operations / arithmetic; the share reached is that over the measured time.
+"""
+
+import dataclasses
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rich.table import Table
+
+from wavetank import compiler
+from wavetank.compiler import qd
+from wavetank.errors import WavetankError
+from wavetank.lab.bench import check, measured, sized, timed
+from wavetank.lab.counts import water_bytes
+from wavetank.lab.machine import load, machine
+from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.physics.step import coefficients
+from wavetank.scene import Scene
+from wavetank.simulation import Simulation
+from wavetank.state import Coefficients, Grid, Particles, scalars
+
+LARGE = 1 << 26  # numbers in each of two arrays that no cache holds
+CHAINS = 1 << 20
+OPERATIONS = 4 * 32 * 2  # of one chain element, see `spin`
+TRIES = 9
+
+
+@dataclasses.dataclass(frozen=True)
+class Cost:
+    """What one launch takes in a 3-D world: for each particle, each listed pair, each distance test."""
+
+    vectors: int = 0  # read or written for each particle
+    words: int = 0
+    pair_words: int = 0
+    operations: int = 0  # for each particle
+    pair_operations: int = 0
+    test_operations: int = 0
+
+
+#: By the name of the kernel. Vectors are three words of four bytes.
+COSTS: dict[str, Cost] = {
+    "predict": Cost(vectors=4, operations=12),  # x, v twice, p
+    "mark_near_solids": Cost(vectors=2, words=1, operations=150),
+    "keep_out_of_solids": Cost(words=1),  # nearly all particles are far from every wall
+    "count_cells": Cost(vectors=1, words=3, operations=6),
+    "place_particles": Cost(words=7),
+    "reorder": Cost(vectors=6, words=5),
+    "list_neighbors": Cost(vectors=1, words=3, pair_words=1, test_operations=9),
+    "clear_multipliers": Cost(words=2),
+    "solve_multipliers": Cost(vectors=1, words=6, pair_words=1, operations=25, pair_operations=26),
+    "correct_positions": Cost(vectors=2, words=3, pair_words=1, operations=12, pair_operations=24),
+    "update_velocities": Cost(vectors=4, operations=24),
+    "apply_viscosity": Cost(vectors=3, words=1, pair_words=1, operations=7, pair_operations=22),
+    "find_vorticity": Cost(vectors=3, words=1, pair_words=1, pair_operations=38),
+    "confine_vorticity": Cost(vectors=4, words=1, pair_words=1, operations=25, pair_operations=36),
+    "accept_positions": Cost(vectors=2),
+}
+
+
+@qd.kernel(fastcache=True)
+def copy(target: qd.types.ndarray(), source: qd.types.ndarray(), count: qd.i32):
+    """Copy the first `count` numbers."""
+    for i in range(count):
+        target[i] = source[i]
+
+
+@qd.kernel(fastcache=True)
+def spin(values: qd.types.ndarray(), count: qd.i32, a: qd.f32, b: qd.f32):
+    """Multiply and add in four independent chains of 32 for each number."""
+    for i in range(count):
+        x = values[i]
+        y = x + 1.0
+        z = x + 2.0
+        w = x + 3.0
+        for _ in qd.static(range(32)):
+            x = x * a + b
+            y = y * a + b
+            z = z * a + b
+            w = w * a + b
+        values[i] = x + y + z + w
+
+
+@qd.func
+def add_way(sums: qd.template(), r, i, j, data: qd.template(), c: Coefficients, method: qd.template()):
+    """Add up the ways to the neighbours: the least that a pass over the lists can do."""
+    sums += r
+
+
+@qd.kernel(fastcache=True)
+def walk(total: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32):
+    """Go once over all neighbour lists."""
+    for i in range(count):
+        way = particles.p[i] * 0.0
+        for_each_neighbor(way, add_way, i, particles.p, particles.p, grid, c, 0)
+        total[i] = way.norm_sqr()
+
+
+def roofline(
+    name: str,
+    size: int,
+    *,
+    arch: str = "cpu",
+    seconds: float = 0.2,
+    repeats: int = 3,
+    threads: int | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> dict[str, Any]:
+    """Measure the ceilings and every kernel of a run, and return times, rates and shares as plain data.
+
+    Raises `WavetankError` for a 2-D scene, whose operations `COSTS` does not count.
+    """
+    check(seconds, repeats)
+    started = compiler.start(arch, threads=threads)
+    scene = sized(Scene.load(name), size)
+    if scene.dim != 3:
+        raise WavetankError(
+            f"--roofline: {name} is a 2-D world; operations are counted for 3-D ones, give one of them."
+        )
+    say(f"{name}, {size:,} particles: measuring")
+    busy, run = load(), measured(scene, arch, seconds)
+    ceilings = measure_ceilings(scene, arch)
+    passes = []
+    for turn in range(repeats):
+        say(f"pass {turn + 1} of {repeats}")
+        passes.append(timed(scene, arch, run["frames"], turn))
+    kernels = {}
+    for key in sorted({key for taken in passes for key in taken["kernels"]}):
+        stage, kernel = key.split(": ")
+        taken = [one["kernels"][key] for one in passes if key in one["kernels"]]
+        if kernel in COSTS and stage not in ("foam", "render"):
+            seconds_each, launches = (statistics.median(pair[k] for pair in taken) for k in (0, 1))
+            kernels[kernel] = {"stage": stage, **share(COSTS[kernel], run, launches, seconds_each, ceilings)}
+    return {
+        "machine": machine(started, threads),
+        "settings": {"scene": name, "size": size, "seconds": seconds, "load_before": busy},
+        "particles": run["particles"],
+        "ceilings": ceilings,
+        "kernels": kernels,
+        "stages": by_stage(kernels),
+    }
+
+
+def measure_ceilings(scene: Scene, arch: str) -> dict[str, float]:
+    """Return copy [bytes/s] at the run's own size and at a large one, arithmetic [1/s], walk [pairs/s]."""
+    sim = Simulation(scene, arch)
+    sim.step()
+    sim.frame()
+    world, count = sim.world, sim.count
+    own = min(LARGE, max(1024, water_bytes(sim) // 8))
+    target, source, c = scalars(LARGE), scalars(LARGE), coefficients(scene, scene.frame_time)
+    source.fill(1.0)
+    lists = int(world.grid.number.to_numpy()[:count].sum())
+    return {
+        "copy": 8.0 * own / _fastest(lambda: copy(target, source, own)),
+        "copy_large": 8.0 * LARGE / _fastest(lambda: copy(target, source, LARGE)),
+        "arithmetic": CHAINS * OPERATIONS / _fastest(lambda: spin(target, CHAINS, 0.999, 0.001)),
+        "walk": lists / _fastest(lambda: walk(target, world.particles, world.grid, c, count)),
+    }
+
+
+def share(
+    cost: Cost, run: dict[str, Any], launches: float, seconds: float, ceilings: dict[str, float]
+) -> dict[str, Any]:
+    """Return what a kernel reaches in a frame in which it is launched so often and takes so many seconds."""
+    n = run["particles"] * launches
+    listed = n * run["pairs_per_particle"]
+    moved = 4.0 * (n * (3 * cost.vectors + cost.words) + listed * cost.pair_words)
+    computed = n * (cost.operations + run["tests_per_particle"] * cost.test_operations) + listed * cost.pair_operations
+    limits = {"memory": moved / ceilings["copy"], "arithmetic": computed / ceilings["arithmetic"]}
+    bound = max(limits, key=lambda key: limits[key])
+    return {
+        "ms": 1e3 * seconds,
+        "least_ms": 1e3 * limits[bound],
+        "bytes_per_second": moved / seconds,
+        "operations_per_second": computed / seconds,
+        "bound": bound,
+        "share": limits[bound] / seconds,
+        "walk_ms": 1e3 * listed / ceilings["walk"] if cost.pair_operations else None,
+    }
+
+
+def by_stage(kernels: dict[str, dict[str, Any]]) -> dict[str, dict[str, float]]:
+    """Return milliseconds, least milliseconds and the share of each stage."""
+    stages: dict[str, dict[str, float]] = {}
+    for figures in kernels.values():
+        stage = stages.setdefault(figures["stage"], {"ms": 0.0, "least_ms": 0.0})
+        stage["ms"] += figures["ms"]
+        stage["least_ms"] += figures["least_ms"]
+    return {name: {**stage, "share": stage["least_ms"] / stage["ms"]} for name, stage in stages.items()}
+
+
+def roofline_table(result: dict[str, Any]) -> list[Table]:
+    """Return the ceilings, and a line for each kernel."""
+    top = result["ceilings"]
+    ceilings = Table("ceiling", "measured")
+    ceilings.add_row("copy, arrays as large as the run's", f"{top['copy'] / 1e9:.1f} GB/s")
+    ceilings.add_row("copy, large arrays", f"{top['copy_large'] / 1e9:.1f} GB/s")
+    ceilings.add_row("multiply and add", f"{top['arithmetic'] / 1e9:.1f} G operations/s")
+    ceilings.add_row("walk over the neighbour lists", f"{top['walk'] / 1e6:.0f} M pairs/s")
+    table = Table("stage", "kernel", "ms per frame", "GB/s", "G operations/s", "of its ceiling", "bare walk / time")
+    stage = ""
+    for name, row in sorted(result["kernels"].items(), key=lambda item: (item[1]["stage"], -item[1]["ms"])):
+        total = result["stages"][row["stage"]]
+        if row["stage"] != stage:
+            stage = row["stage"]
+            table.add_row(stage, "", f"{total['ms']:.2f}", "", "", f"{100 * total['share']:.0f} %", "")
+        table.add_row(
+            "", name, f"{row['ms']:.2f}", f"{row['bytes_per_second'] / 1e9:.1f}",
+            f"{row['operations_per_second'] / 1e9:.1f}", f"{100 * row['share']:.0f} % {row['bound']}",
+            "" if row["walk_ms"] is None else f"{100 * row['walk_ms'] / row['ms']:.0f} %",
+        )  # fmt: skip
+    return [ceilings, table]
+
+
+def _fastest(work: Callable[[], Any]) -> float:
+    """Return the seconds of the fastest of several tries after a first one."""
+    work()
+    times: Sequence[float] = []
+    for _ in range(TRIES):
+        compiler.synchronize()
+        began = time.perf_counter()
+        work()
+        compiler.synchronize()
+        times = [*times, time.perf_counter() - began]
+    return min(times)

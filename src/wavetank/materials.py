@@ -1,0 +1,56 @@
+"""Materials as plain data: what a fluid is made of, in SI units."""
+
+import dataclasses
+import re
+from typing import Annotated
+
+from pydantic import Field, field_validator
+
+from wavetank.model import Model, Positive
+from wavetank.params import Parameters
+
+#: Colours of fluids that name none, in the order of the materials of a scene.
+COLORS = ("#2f7fd0", "#e0a526", "#c8553d", "#3c9a6b", "#8a63b8", "#6b7885")
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Angle = Annotated[float, Field(ge=0, le=180, allow_inf_nan=False)]
+
+
+class Material(Model):
+    """A kind of fluid. What is not given is that of the scene."""
+
+    name: str = ""
+    density: Positive | None = None  # kg/m^3
+    viscosity: NotNegative | None = None  # Pa s, dynamic
+    surface_tension: NotNegative | None = None  # N/m, towards air
+    contact_angle: Angle | None = None  # deg, on solids in air: 0 wets, 180 repels
+    color: str | None = None  # '#rrggbb'
+
+    @field_validator("color")
+    @classmethod
+    def _is_color(cls, value: str | None) -> str | None:
+        if value is not None and not re.fullmatch("#[0-9a-fA-F]{6}", value):
+            raise ValueError(f"colour {value!r} is not allowed; write it as '#rrggbb', for example '#e0a526'.")
+        return value
+
+    def properties(self, params: Parameters) -> "Properties":
+        """Return the values that hold with the scene's parameters `params`."""
+
+        def own(value: float | None, otherwise: float) -> float:
+            return otherwise if value is None else value
+
+        return Properties(
+            density=own(self.density, params.rest_density),
+            viscosity=own(self.viscosity, params.dynamic_viscosity),
+            surface_tension=own(self.surface_tension, params.surface_tension),
+            contact_angle=own(self.contact_angle, params.contact_angle),
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Properties:
+    """The values of a material that the solver needs."""
+
+    density: float  # kg/m^3
+    viscosity: float  # Pa s
+    surface_tension: float  # N/m
+    contact_angle: float  # deg

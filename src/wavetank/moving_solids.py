@@ -1,0 +1,142 @@
+"""The solids of a running world: their names, where they are, where they are going, and their way to the device."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wavetank import solids
+from wavetank.errors import WavetankError
+from wavetank.rotations import interpolate, unit_quaternion
+from wavetank.solids import Solid
+from wavetank.state import upload
+
+Pose = tuple[np.ndarray, np.ndarray]  # position [m], shape [3], and rotation (w, x, y, z)
+SMALLEST = 0.02  # size at which a growing solid starts, of its full size
+
+
+class MovingSolids:
+    """Solids by name; the first `tank_count` are the walls of the tank."""
+
+    def __init__(self, walls: Sequence[Solid], others: Sequence[Solid], friction: float) -> None:
+        self.tank_count, self.friction = len(walls), friction
+        self.members = [*walls, *others]
+        self.names: list[str] = []
+        for solid in self.members:
+            self.names.append(self._free_name(solid.name))
+        self.poses: list[Pose] = [(solid.origin, solid.quaternion) for solid in self.members]
+        self.targets: dict[int, Pose] = {}  # at the end of the next frame
+        self.growing: dict[int, tuple[float, float]] = {}  # age and time to grow [s]
+        self.rebuild()
+
+    def rebuild(self) -> None:
+        """Put all on the device anew, at rest where they are."""
+        self.device = solids.build(self.members, self.tank_count, self.friction)
+        self.has_friction = self.friction > 0.0 or any(solid.friction for solid in self.members)
+        self.reaches = [solid.reach() for solid in self.members]
+        self._resize()
+        self._upload(0.0, 0.0)
+
+    def add(self, solid: Solid, grow: float) -> str:
+        """Add a solid that swells to its size within `grow` [s]; return its name."""
+        self.members.append(solid)
+        self.names.append(self._free_name(solid.name))
+        self.poses.append((solid.origin, solid.quaternion))
+        if grow > 0.0:
+            self.growing[len(self.members) - 1] = (0.0, grow)
+        self.rebuild()
+        return self.names[-1]
+
+    def remove(self, number: int) -> None:
+        """Take a solid away."""
+
+        def without(numbered: dict[int, Any]) -> dict[int, Any]:
+            return {k - (k > number): value for k, value in numbered.items() if k != number}
+
+        for column in (self.members, self.names, self.poses):
+            del column[number]
+        self.targets, self.growing = without(self.targets), without(self.growing)
+        self.rebuild()
+
+    def find(self, name: str) -> int:
+        """Return the number of a solid; raise `WavetankError` for an unknown name."""
+        if name not in self.names:
+            known = ", ".join(sorted(self.names[self.tank_count :])) or "none"
+            raise WavetankError(f"there is no solid named {name!r}; named solids: {known}.")
+        return self.names.index(name)
+
+    def aim(self, name: str, position: Sequence[float] | None, rotation: Any, dim: int) -> None:
+        """Set the pose that a solid reaches at the end of the next frame; None keeps what is."""
+        number = self.find(name)
+        old_position, old_rotation = self.targets.get(number, self.poses[number])
+        point = np.array(old_position, float)
+        if position is not None:
+            values = np.asarray(position, float)
+            if values.shape != (dim,) or not np.isfinite(values).all():
+                raise WavetankError(f"position = {position} must be {dim} finite numbers.")
+            point[:dim] = values
+        self.targets[number] = (point, old_rotation if rotation is None else unit_quaternion(rotation))
+
+    def largest_speed(self, duration: float, tank_size: Sequence[float] | None) -> float:
+        """Return the largest speed [m/s] at which any solid moves through the tank in a frame of `duration` [s]."""
+        fastest = 0.0
+        for number, (position, rotation) in self.targets.items():
+            old_position, old_rotation = self.poses[number]
+            turn = 2.0 * math.acos(min(1.0, abs(float(old_rotation @ rotation))))
+            reach = self.reaches[number] if tank_size is None else float(np.linalg.norm(tank_size))
+            fastest = max(fastest, (float(np.linalg.norm(position - old_position)) + turn * reach) / duration)
+        for number, (_, time) in self.growing.items():
+            fastest = max(fastest, min(self.reaches[number], 1e3) / time)
+        return fastest
+
+    def move_to(self, begin: float, end: float) -> None:
+        """Put the poses at the shares `begin` and `end` of the frame on the device."""
+        if not self.targets:
+            return
+        self._upload(begin, end)
+        resting = all(
+            np.array_equal(a, b)
+            for number, target in self.targets.items()
+            for a, b in zip(self.poses[number], target, strict=True)
+        )
+        if begin == 0.0 and resting:
+            self.targets = {}
+
+    def arrive(self) -> None:
+        """End a frame: what was aimed at is where the solids are."""
+        for number, target in self.targets.items():
+            self.poses[number] = target
+
+    def grow(self, duration: float) -> None:
+        """Let new solids swell for `duration` [s]."""
+        if self.growing:
+            self.growing = {k: (age + duration, time) for k, (age, time) in self.growing.items()}
+            self._resize()
+            self.growing = {k: (age, time) for k, (age, time) in self.growing.items() if age < time}
+
+    def _resize(self) -> None:
+        if self.growing:
+            scales = [1.0] * len(self.members)
+            for number, (age, time) in self.growing.items():
+                scales[number] = min(1.0, max(age / time, SMALLEST))
+            solids.resize(self.device, self.members, scales)
+
+    def _upload(self, begin: float, end: float) -> None:
+        if not self.poses:
+            return
+        where = [self.targets.get(number, pose) for number, pose in enumerate(self.poses)]
+        pairs = list(zip(self.poses, where, strict=True))
+        for share, positions, rotations in (
+            (begin, self.device.old_position, self.device.old_rotation),
+            (end, self.device.position, self.device.rotation),
+        ):
+            upload(positions, np.array([a[0] + share * (b[0] - a[0]) for a, b in pairs], np.float32))
+            upload(rotations, np.array([interpolate(a[1], b[1], share) for a, b in pairs], np.float32))
+
+    def _free_name(self, name: str) -> str:
+        """Return `name`, or the first free one of "solid 1", "solid 2" and so on."""
+        number = 1
+        while not name or name in self.names:
+            name, number = f"solid {number}", number + 1
+        return name

@@ -1,0 +1,137 @@
+"""Places for spray, foam and bubbles: who lives on moves up, births are appended, in an order that never depends on
+threads.
+
+Survivors keep their order and newborns follow in that of their water particles: both places are prefix sums.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from wavetank.compiler import qd
+from wavetank.distance import SolidSet, lift
+from wavetank.physics.boundary import near_solids, stopped
+from wavetank.physics.diffuse.motion import kind_in, water_at
+from wavetank.physics.diffuse.noise import stream, uniform
+from wavetank.state import Air, Births, Coefficients, Diffuse, Grid, Particles, integers, new_diffuse, upload, vectors
+
+SCAN_BLOCK = 1024
+#: What a saved state holds of spray, foam and bubbles, and the array of it.
+ROWS = {
+    "foam_positions": "x", "foam_velocities": "v", "foam_kinds": "kind", "foam_ages": "age", "foam_lives": "life",
+    "foam_ids": "id",
+}  # fmt: skip
+
+
+@dataclasses.dataclass
+class Pool:
+    """All spray, foam and bubbles of a world."""
+
+    now: Diffuse
+    spare: Diffuse
+    births: Births
+    capacity: int
+    count: int = 0
+    born: int = 0  # since the start; the number of the next one
+
+
+def new_pool(dim: int, capacity: int, water: int) -> Pool:
+    """Allocate an empty pool beside room for `water` particles."""
+    births = Births(
+        normal=vectors(dim, water), first=integers(water + 1), kept=integers(capacity + 1),
+        blocks=integers(-(-max(capacity, water) // SCAN_BLOCK)),
+    )  # fmt: skip
+    return Pool(new_diffuse(dim, capacity), new_diffuse(dim, capacity), births, capacity)
+
+
+def pool_rows(pool: Pool | None, dim: int) -> dict[str, np.ndarray]:
+    """Return all that is in a pool as host arrays by name, empty ones without a pool."""
+    pool = pool or new_pool(dim, 0, 0)
+    return {name: getattr(pool.now, array).to_numpy()[: pool.count] for name, array in ROWS.items()}
+
+
+def pool_from(rows: dict[str, np.ndarray], born: int, capacity: int, dim: int, water: int) -> Pool | None:
+    """Return a pool with these rows beside room for `water` particles; None where there was none."""
+    if born < 0 or "foam_kinds" not in rows:
+        return None
+    pool = new_pool(dim, capacity, water)
+    for name, array in ROWS.items():
+        upload(getattr(pool.now, array), rows[name])
+    pool.count, pool.born = len(rows["foam_kinds"]), born
+    return pool
+
+
+@qd.kernel(fastcache=True)
+def scan(values: qd.types.ndarray(), blocks: qd.types.ndarray(), count: qd.i32):
+    """Replace the first `count` values by the sums of those before them, and write the total behind."""
+    for b in range((count + 1023) // 1024):
+        total = 0
+        for k in range(b * 1024, qd.min((b + 1) * 1024, count)):
+            total += values[k]
+        blocks[b] = total
+    qd.loop_config(serialize=True)
+    for _ in range(1):
+        total = 0
+        for b in range((count + 1023) // 1024):
+            own = blocks[b]
+            blocks[b] = total
+            total += own
+        values[count] = total
+    for b in range((count + 1023) // 1024):
+        total = blocks[b]
+        for k in range(b * 1024, qd.min((b + 1) * 1024, count)):
+            own = values[k]
+            values[k] = total
+            total += own
+
+
+@qd.kernel(fastcache=True)
+def compact(packed: Diffuse, diffuse: Diffuse, births: Births, count: qd.i32):
+    """Copy those who live on to the front, in their order."""
+    for i in range(count):
+        place = births.kept[i]
+        if births.kept[i + 1] > place:
+            packed.x[place] = diffuse.x[i]
+            packed.v[place] = diffuse.v[i]
+            packed.kind[place] = diffuse.kind[i]
+            packed.age[place] = diffuse.age[i]
+            packed.life[place] = diffuse.life[i]
+            packed.id[place] = diffuse.id[i]
+
+
+@qd.kernel(fastcache=True)
+def bear(
+    diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients, a: Air,
+    count: qd.i32, old: qd.i32, born: qd.i32,
+) -> qd.types.vector(2, qd.i32):  # fmt: skip
+    """Append the newborn, each around the way that its water particle came; return the number of all and of births.
+
+    Ihmsen et al. 2012, Sec. 3.2: a cylinder along the velocity. Here it lies behind the water particle rather than
+    ahead, because the water has been moved already; velocities fan out with the distance from its axis.
+    """
+    room = diffuse.age.shape[0]
+    for i in range(count):
+        for place in range(births.first[i], births.first[i + 1]):
+            slot = births.kept[old] + place
+            if slot < room:
+                state = stream(a.seed, a.frame, water.id[i])
+                k = 1 + 8 * (place - births.first[i])
+                v = water.v[i]
+                ahead = v / qd.max(v.norm(), 1e-12)
+                aside = v * 0.0
+                for axis in qd.static(range(v.n)):
+                    aside[axis] = 2.0 * uniform(state, k + axis) - 1.0
+                aside -= ahead * aside.dot(ahead)
+                x = water.x[i] - (a.dt * uniform(state, k + 3)) * v + a.spread * aside
+                near = near_solids(lift(water.x[i]), lift(x), solids, c.h)
+                if near != 0:
+                    out = stopped(lift(water.x[i]), lift(x), near, solids, c.wall_gap)
+                    for axis in qd.static(range(x.n)):
+                        x[axis] = out[axis]
+                diffuse.x[slot] = x
+                diffuse.v[slot] = v + (0.25 * v.norm()) * aside
+                diffuse.kind[slot] = kind_in(water_at(x, near, water, grid, solids, c, a)[0])
+                diffuse.age[slot] = 0.0
+                diffuse.life[slot] = a.lifetime * (0.5 + uniform(state, k + 4))
+                diffuse.id[slot] = born + place
+    return qd.Vector([qd.min(births.kept[old] + births.first[count], room), births.first[count]])

@@ -1,0 +1,112 @@
+"""Where water makes foam: trapped air, wave crests and kinetic energy.
+
+Ihmsen, Akinci, Akinci and Teschner 2012, "Unified spray, foam and bubbles for particle-based fluids"
+(10.1007/s00371-012-0697-9); equation numbers are theirs.
+
+    code       symbol      meaning                                                              unit
+    c_h        g           h times the gradient of the density over rest density                1
+    normal     n_i         outward unit normal of the surface, zero inside                      1
+    speed      U           sqrt(g L), L the edge of a cube of all the water                     m/s
+    trapped    v_i^diff    approach of the neighbours, weighted mean over the support           U
+    crest      kappa_i     bend of a convex surface, likewise                                   1
+    energy                 v_i^2 / U^2                                                          1
+    limited    Phi         ramp from 0 to 1 between two thresholds (Eq. 1)                      1
+
+Where we differ, and why:
+- Every potential is a pure number. Sums over neighbours are divided by the integral of their weight, velocities by the
+  speed U of water that falls by its own size; births are counted per U / L. So the same splash makes the same foam in a
+  cup and in a harbour, and at twice the resolution it makes as many births per particle of the surface.
+- The wall's own gradient is part of the normal, so that water on a wall shows no surface towards it.
+- One amount serves both sources; the paper has a factor for each. Crests count twice, and still bear few.
+"""
+
+from wavetank.compiler import qd
+from wavetank.distance import SolidSet
+from wavetank.physics.boundary import wall_density
+from wavetank.physics.density_constraint import add_density
+from wavetank.physics.diffuse.noise import stream, uniform
+from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.state import Air, Births, Coefficients, Grid, Particles, Walls
+
+
+@qd.func
+def limited(value, low, high):
+    """Ramp from 0 at `low` to 1 at `high`: Eq. 1."""
+    return (qd.min(value, high) - qd.min(value, low)) / (high - low)
+
+
+@qd.func
+def add_approach(sums: qd.template(), r, i, j, v: qd.template(), c: Coefficients, method: qd.template()):
+    """Add neighbour j to sum |v_ij| (1 - v_ij^ . x_ij^) W: Eq. 2; twice the speed head-on, nothing for what parts."""
+    length = qd.max(r.norm(), 1e-12)
+    difference = v[i] - v[j]
+    sums += (difference.norm() - difference.dot(r) / length) * qd.max(1.0 - length / c.h, 0.0)
+
+
+@qd.func
+def add_bend(sums: qd.template(), r, i, j, normal: qd.template(), c: Coefficients, method: qd.template()):
+    """Add neighbour j to sum (1 - n_i . n_j) W over the surface below the tangent plane: Eq. 4 to 6."""
+    n = normal[j]
+    if n.norm_sqr() > 0.0 and r.dot(normal[i]) > 0.0:
+        sums += (1.0 - n.dot(normal[i])) * qd.max(1.0 - r.norm() / c.h, 0.0)
+
+
+@qd.func
+def outward_normal(
+    i, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, method: qd.template()
+):
+    """Unit normal of the water's surface at particle `i`, zero inside the water: the density falls along it."""
+    p = particles.p[i]
+    sums = qd.Vector([0.0] * (p.n + 2))
+    for_each_neighbor(sums, add_density, i, particles.p, particles.p, grid, c, method)
+    n = p * 0.0
+    for k in qd.static(range(p.n)):
+        n[k] = -sums[1 + k]
+    if particles.near[i] != 0:
+        wall = wall_density(p, particles.near[i], solids, walls, c)
+        for k in qd.static(range(p.n)):
+            n[k] -= wall[k]
+    steepness = n.norm()
+    # Half of what a flat surface has; disorder inside the water stays below.
+    return n / steepness if c.h * steepness > 0.5 else p * 0.0
+
+
+@qd.kernel(fastcache=True)
+def find_surface(
+    births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
+    count: qd.i32, method: qd.template(),
+):  # fmt: skip
+    """Set the normals of the surface, except where the water is too slow to matter for a crest."""
+    for i in range(count):
+        n = particles.p[i] * 0.0
+        if particles.v[i].norm_sqr() > 0.01 * a.speed * a.speed:
+            n = outward_normal(i, particles, grid, solids, walls, c, method)
+        births.normal[i] = n
+
+
+@qd.func
+def potential(i, births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air, method: qd.template()):
+    """Births of water particle `i` where one of the most agitated makes one: Phi_k (Phi_ta + 2 Phi_wc), Eq. 8."""
+    v = particles.v[i]
+    n = births.normal[i]
+    result = 0.0
+    energy = limited(v.norm_sqr() / (a.speed * a.speed), 0.05, 0.5)
+    if energy > 0.0:
+        trapped = qd.Vector([0.0])
+        for_each_neighbor(trapped, add_approach, i, particles.p, particles.v, grid, c, method)
+        result = limited(trapped[0] * a.mean / a.speed, 0.12, 0.5)
+        if n.dot(v) > 0.6 * v.norm():  # Eq. 7: only where the surface moves outwards
+            crest = qd.Vector([0.0])
+            for_each_neighbor(crest, add_bend, i, particles.p, births.normal, grid, c, method)
+            result += 2.0 * limited(crest[0] * a.mean, 0.2, 0.6)
+    return energy * result
+
+
+@qd.kernel(fastcache=True)
+def count_births(
+    births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air, count: qd.i32, method: qd.template()
+):
+    """Draw how many each water particle bears in this frame."""
+    for i in range(count):
+        expected = a.made * potential(i, births, particles, grid, c, a, method)
+        births.first[i] = qd.cast(expected + uniform(stream(a.seed, a.frame, particles.id[i]), 0), qd.i32)

@@ -1,0 +1,84 @@
+"""A frame of spray, foam and bubbles, after the water's own steps; nothing of it acts back on the water."""
+
+import math
+
+import numpy as np
+
+from wavetank.params import Parameters
+from wavetank.physics.diffuse.motion import move
+from wavetank.physics.diffuse.pool import bear, compact, new_pool, scan
+from wavetank.physics.diffuse.potentials import count_births, find_surface
+from wavetank.physics.smoothing import sigma
+from wavetank.physics.step import World, coefficients, method_number
+from wavetank.state import Air
+
+RATE = 24.0  # births of a most agitated water particle in the time L / U, at foam = 1
+SPRAY_DRAG = 0.25  # U / L: the terminal speed of spray is U / 0.25
+BUBBLE_RISE = 0.1  # U
+BUBBLE_PULL = 2.0  # g
+SPREAD = 1.0  # d
+
+
+def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> None:
+    """Move what there is by `dt` [s] and add what the water makes in this frame."""
+    if world.pool is None:
+        if params.foam == 0.0 or not world.count:
+            return
+        world.pool = new_pool(params.dim, params.foam_capacity, world.particles.id.shape[0])
+    pool, water, grid, solids, count = world.pool, world.particles, world.grid, world.solids, world.count
+    c, method = coefficients(params, dt), method_number(params)
+    a = air(params, count, pool.count / pool.capacity, dt, frame)
+    gravity = np.array([*params.gravity, 0.0][:3], np.float32)
+
+    move(pool.now, pool.births, water, grid, solids, c, a, pool.count, gravity)
+    scan(pool.births.kept, pool.births.blocks, pool.count)
+    compact(pool.spare, pool.now, pool.births, pool.count)
+    pool.now, pool.spare = pool.spare, pool.now
+
+    makes = count if a.made > 0.0 else 0
+    if makes:
+        find_surface(pool.births, water, grid, solids, world.walls, c, a, count, method)
+        count_births(pool.births, water, grid, c, a, count, method)
+    scan(pool.births.first, pool.births.blocks, makes)
+    total, births = bear(pool.now, pool.births, water, grid, solids, c, a, makes, pool.count, pool.born)
+    pool.count, pool.born = int(total), (pool.born + int(births)) % 2**31
+
+
+def air(params: Parameters, water: int, filled: float, dt: float, frame: int) -> Air:
+    """Return the scalars of a frame of `dt` [s] for `water` particles and a pool of which the share `filled` is full.
+
+    L is the edge of a cube (2-D: a square) of all the water and U = sqrt(g L) its speed; in a world without gravity
+    U = 0: nothing is made there, spray keeps its velocity and bubbles take that of the water.
+    """
+    ratio, dim = params.support, params.dim
+    gravity = math.hypot(*params.gravity)
+    length = params.spacing * max(water, 1) ** (1.0 / dim)
+    speed = math.sqrt(gravity * length)
+    rate = speed / length
+    # A fuller pool takes less, evenly everywhere, rather than all of what comes first.
+    room = min(1.0, 2.0 * (1.0 - filled))
+    drag = _decay(SPRAY_DRAG * rate, dt)
+    follow = _decay(BUBBLE_PULL * gravity / (BUBBLE_RISE * speed) if speed > 0.0 else math.inf, dt)
+    return Air(
+        dt=dt,
+        speed=speed,
+        made=params.foam * room * RATE * rate * dt,
+        lifetime=params.foam_lifetime,
+        spread=SPREAD * params.spacing,
+        share=sigma("poly6", dim) / ratio**dim,
+        mean=1.0 / (math.pi / 3.0 * ratio**dim),
+        spray_keep=drag[0], spray_path=drag[1], spray_bend=drag[2],
+        bubble_keep=follow[0], bubble_path=follow[1], bubble_bend=follow[2],
+        frame=frame, seed=params.foam_seed,
+    )  # fmt: skip
+
+
+def _decay(k: float, dt: float) -> tuple[float, float, float]:
+    """Return (keep, path, bend) of linear drag at the rate `k` [1/s] over `dt` [s]; see `motion.py`."""
+    if k * dt < 1e-4:  # the series: differences of nearly equal numbers lose their digits
+        return 1.0 - k * dt, dt * (1.0 - 0.5 * k * dt), dt * dt * (0.5 - k * dt / 6.0)
+    if math.isinf(k):
+        return 0.0, 0.0, 0.0
+    keep = math.exp(-k * dt)
+    path = (1.0 - keep) / k
+    return keep, path, (dt - path) / k

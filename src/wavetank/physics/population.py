@@ -1,0 +1,162 @@
+"""Particles come, go, take dye and turn to ice: what tools and scripts do to a world between its steps.
+
+Every region is a capsule: all points within `radius` of the segment from `start` to `end`, which is a ball where both
+are one point. Nothing here depends on the order of particles on the device, which the next sort makes anew; neither
+does it on threads, as every particle or place is judged by itself.
+
+    code     symbol   meaning                                   unit
+    start             one end of the segment                    m
+    end               its other end                             m
+    gap               distance that free places keep            m
+"""
+
+import numpy as np
+
+from wavetank.compiler import qd
+from wavetank.distance import SolidSet, lift, signed_distance, vec3
+from wavetank.physics.neighbors import reorder
+from wavetank.state import Grid, Particles, integers, new_particles, upload, vectors
+
+_FIELDS = ("x", "p", "v", "id", "material", "near", "dye", "frozen")
+
+
+@qd.func
+def in_capsule(point, start, end, radius):
+    """Say whether `point` is within `radius` of the segment."""
+    way = end - start
+    share = qd.min(qd.max((point - start).dot(way) / qd.max(way.norm_sqr(), 1e-20), 0.0), 1.0)
+    return (point - start - share * way).norm_sqr() < radius * radius
+
+
+@qd.kernel(fastcache=True)
+def mark_capsule(
+    marks: qd.types.ndarray(), particles: Particles, count: qd.i32, start: vec3, end: vec3, radius: qd.f32
+):
+    """Mark the particles inside with 1, the others with 0."""
+    for i in range(count):
+        marks[i] = qd.cast(in_capsule(lift(particles.x[i]), start, end, radius), qd.i32)
+
+
+@qd.kernel(fastcache=True)
+def paint_capsule(particles: Particles, count: qd.i32, start: vec3, end: vec3, radius: qd.f32, dye: qd.i32):
+    """Dye the particles inside."""
+    for i in range(count):
+        if in_capsule(lift(particles.x[i]), start, end, radius):
+            particles.dye[i] = dye
+
+
+@qd.kernel(fastcache=True)
+def freeze_capsule(
+    particles: Particles, count: qd.i32, start: vec3, end: vec3, radius: qd.f32, frozen: qd.i32
+) -> qd.i32:
+    """Turn the particles inside to ice (1) or water (0); return how many are ice in all."""
+    total = 0
+    for i in range(count):
+        if in_capsule(lift(particles.x[i]), start, end, radius):
+            particles.frozen[i] = frozen
+            particles.v[i] *= 1.0 - frozen
+        qd.atomic_add(total, particles.frozen[i])
+    return total
+
+
+@qd.kernel(fastcache=True)
+def hold_frozen(particles: Particles, count: qd.i32):
+    """Put ice back where it was at the start of the substep."""
+    for i in range(count):
+        if particles.frozen[i] == 1:
+            particles.p[i] = particles.x[i]
+
+
+@qd.kernel(fastcache=True)
+def stop_frozen(particles: Particles, count: qd.i32):
+    """Take the velocity from ice."""
+    for i in range(count):
+        if particles.frozen[i] == 1:
+            particles.v[i] *= 0.0
+
+
+@qd.kernel(fastcache=True)
+def append_rows(
+    particles: Particles, first: qd.i32, x: qd.types.ndarray(), v: qd.types.ndarray(), dye: qd.types.ndarray(),
+    material: qd.types.ndarray(), count: qd.i32, first_id: qd.i32,
+):  # fmt: skip
+    """Write `count` new particles from place `first` on, with ids from `first_id` on."""
+    for i in range(count):
+        particles.x[first + i] = x[i]
+        particles.p[first + i] = x[i]
+        particles.v[first + i] = v[i]
+        particles.id[first + i] = first_id + i
+        particles.near[first + i] = 0
+        particles.dye[first + i] = dye[i]
+        particles.material[first + i] = material[i]
+        particles.frozen[first + i] = 0
+
+
+@qd.kernel(fastcache=True)
+def find_taken(
+    taken: qd.types.ndarray(), places: qd.types.ndarray(), particles: Particles, solids: SolidSet, middle: vec3,
+    reach: qd.f32, gap: qd.f32, wall: qd.f32, count: qd.i32, number: qd.i32,
+):  # fmt: skip
+    """Mark places, all within `reach` of `middle`, nearer than `gap` to a particle or `wall` to a solid."""
+    for k in range(number):
+        taken[k] = 0
+        for solid in range(solids.count):
+            if signed_distance(solids, solid, lift(places[k])).w < wall:
+                taken[k] = 1
+    for i in range(count):
+        if (lift(particles.x[i]) - middle).norm() < reach + gap:
+            for k in range(number):
+                if (particles.x[i] - places[k]).norm() < gap:
+                    taken[k] = 1
+
+
+def inside_capsule(particles: Particles, count: int, start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:
+    """Say for every particle, in device order, whether it is inside, bool [count]."""
+    if not count:
+        return np.zeros(0, bool)
+    marks = integers(count)
+    mark_capsule(marks, particles, count, start, end, radius)
+    result: np.ndarray = marks.to_numpy()[:count] == 1
+    return result
+
+
+def free_places(
+    places: np.ndarray, particles: Particles, solids: SolidSet, count: int, gap: float, wall: float
+) -> np.ndarray:
+    """Say which of the places [n, dim] are no nearer than `gap` [m] to particles and `wall` to solids, bool [n]."""
+    if not len(places):
+        return np.zeros(0, bool)
+    device, taken = vectors(places.shape[1], len(places)), integers(len(places))
+    upload(device, places)
+    middle = np.zeros(3, np.float32)
+    middle[: places.shape[1]] = places.mean(axis=0)
+    reach = float(np.linalg.norm(places - places.mean(axis=0), axis=1).max())
+    find_taken(taken, device, particles, solids, middle, reach, gap, wall, count, len(places))
+    result: np.ndarray = taken.to_numpy()[: len(places)] == 0
+    return result
+
+
+def append(
+    particles: Particles, count: int, x: np.ndarray, v: np.ndarray, dye: np.ndarray, material: np.ndarray, first_id: int
+) -> None:
+    """Write new particles behind the first `count`; there must be room."""
+    rows = len(x)
+    arrays = [vectors(x.shape[1], rows), vectors(x.shape[1], rows), integers(rows), integers(rows)]
+    for array, values in zip(arrays, (x, v, dye, material), strict=True):
+        upload(array, values)
+    append_rows(particles, count, *arrays, rows, first_id)
+
+
+def keep_only(particles: Particles, spare: Particles, grid: Grid, keep: np.ndarray) -> None:
+    """Copy the particles where `keep`, bool [count] in device order, to the front of `spare`."""
+    chosen = np.flatnonzero(keep)
+    upload(grid.order, chosen)
+    reorder(spare, particles, grid, len(chosen))
+
+
+def at_capacity(particles: Particles, dim: int, capacity: int) -> Particles:
+    """Return a copy with room for `capacity` particles."""
+    larger = new_particles(dim, capacity)
+    for name in _FIELDS:
+        upload(getattr(larger, name), getattr(particles, name).to_numpy()[:capacity])
+    return larger

@@ -1,0 +1,236 @@
+"""Surface tension and adhesion: a skin that pulls along the surface, and solids that attract the fluid.
+
+The skin is the continuum surface stress of Lafaurie et al. 1994 (10.1006/jcph.1994.1123),
+Pi = sigma (|g| 1 - g g / |g|) with the gradient g of the density, as a pairwise force of smoothed particles (Hu
+and Adams 2006, 10.1016/j.jcp.2005.09.001):
+
+    F_i = -sum_j A w(q_ij) (Pi_i + Pi_j) n - sum_j B (|g_i| + |g_j|) f(q_ij) n
+
+The second term, cohesion (Akinci et al. 2013, "Versatile Surface Tension and Adhesion for SPH Fluids",
+10.1145/2508363.2508395), holds the skin on the fluid. Both change sign with i and j: momentum is exact.
+
+    code       symbol         meaning                                                         unit
+    n          n              unit vector from j to i                                         1
+    surface    g, sigma       h times the gradient of the relative density, and the tension   1, N/m
+    skin       A              what makes the stress of a flat lattice surface sigma           m^(dim - 2)
+    cohesion   B              bond of a pair over h                                           m^(dim - 2)
+    wetting    (1 + cos t)/2  work of adhesion over 2 sigma (Young and Dupre)                 1
+
+Where we differ, and why:
+- A follows from the rest lattice by the virial of a flat surface, times a measured factor (`CALIBRATION`), so that
+  sigma is in N/m. Inside, where g is noise,
+  it is cut off (`QUIET`), and nothing pulls.
+- Cohesion acts at the surface alone. Attraction inside presses the particles into a crystal that does not flow: a drop
+  made of it keeps its corners. `COHESION` is the smallest share that keeps the skin whole; docs/materials.md.
+- Solids pull like half a rest lattice of the fluid times `wetting`, from a table of the distance.
+- The tension is limited to what a time step can carry, and `substeps_for` asks for the time steps that the real one
+  needs; so nothing explodes where the budget of time steps ends.
+- A fluid feels its interface to one of weaker tension with the difference of both (Antonow 1907).
+"""
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+
+from wavetank.compiler import qd
+from wavetank.distance import SolidSet, lift, signed_distance, vec3, vec4
+from wavetank.physics.boundary import is_near
+from wavetank.physics.integrate import accelerate
+from wavetank.physics.mixture import Blend
+from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars, upload
+
+COHESION = 0.2  # share of the bond that alone would give the tension
+#: Brings the measured period of an oscillating drop to Rayleigh's: curved surfaces pull otherwise than flat ones.
+CALIBRATION = {2: 1.35, 3: 0.62}
+QUIET = 0.2  # of the top layer's |g|: what is less is no surface
+MEAN_COSINE = {2: 1.0 / math.pi, 3: 0.25}  # of max(cos, 0) over all directions
+
+
+# --- the rest lattice, on the host ---
+
+
+@dataclasses.dataclass(frozen=True)
+class FlatSurface:
+    """Sums over a flat surface of the rest lattice, lengths in d."""
+
+    gradient_scale: float  # g = gradient_scale * sum_j 20 q t^3 n
+    quiet: float  # |g| below which there is no surface
+    stress: float  # of the skin for A = 1
+    bond: float  # e / (sigma d^(dim - 1)): the bond of a pair whose missing bonds cost sigma
+    stiffness: float  # sum_lattice -f'(q)
+
+
+@functools.cache
+def flat_surface(dim: int, ratio: float) -> FlatSurface:
+    """Return the sums for the support radius `ratio` d."""
+    x = rest_points(dim, ratio)
+    r = np.linalg.norm(x, axis=1)
+    q = r / ratio
+    t = 1.0 - q
+    gradient_scale = 1.0 / float(1.0 + np.sum(t**4 * (1.0 + 4.0 * q)))
+    up = np.rint(x[:, 0]).astype(int)
+    layers = range(int(ratio) + 2)
+    missing = np.array([np.sum((20.0 * q * t**3 * x[:, 0] / r)[up > layer]) for layer in layers]) * gradient_scale
+    quiet = QUIET * float(missing[0])
+    g = np.maximum(missing - quiet, 0.0)
+    # The stress along the surface is half the sum of force times distance (virial), pair by pair.
+    stress = 0.0
+    for layer in layers:
+        other = layer - up
+        pairs = (other >= 0) & (other < len(g))
+        stress += 0.5 * float(np.sum((q * t**2 * x[:, 1] ** 2 / r)[pairs] * (g[layer] + g[other[pairs]])))
+    bond = 2.0 / (MEAN_COSINE[dim] * float(np.sum((1.0 - q**3) * r)))
+    return FlatSurface(gradient_scale, quiet, stress, bond, float(np.sum(6.0 * q)))
+
+
+@functools.cache
+def adhesion_table(dim: int, ratio: float) -> np.ndarray:
+    """Sample the pull of a flat wall, over e / h, at s / h from 0 to 1, float32 [TABLE_SIZE + 1]."""
+    depth = np.linspace(0.0, 1.0, TABLE_SIZE + 1)[:, None, None] * ratio + np.arange(int(ratio) + 2)[:, None] + 0.5
+    plane = rest_points(dim, ratio)
+    plane = np.vstack([np.zeros(dim), plane[np.abs(plane[:, 0]) < 1e-12]])[:, 1:]
+    r = np.sqrt(depth**2 + np.sum(plane**2, axis=1))
+    force = np.where(r < ratio, 3.0 * (r / ratio) ** 2 * depth / r, 0.0)
+    table: np.ndarray = np.sum(force, axis=(1, 2)).astype(np.float32)
+    return table
+
+
+def largest_tension(density: float, dim: int, ratio: float, d: float, dt: float) -> float:
+    """Return the tension [N/m] whose bonds turn the stiffest particle by one radian in a step of `dt` [s]."""
+    flat = flat_surface(dim, ratio)
+    return density * d**3 * (ratio / dt) ** 2 / (flat.bond * flat.stiffness)
+
+
+def limited_tensions(kinds: Blend, dim: int, ratio: float, d: float, dt: float) -> dict[int, float]:
+    """Return the tension [N/m] of each material, limited for a time step of `dt` [s]."""
+    return {
+        number: min(fluid.surface_tension, largest_tension(fluid.density, dim, ratio, d, dt))
+        for number, fluid in kinds.fluids.items()
+    }
+
+
+def substeps_for(kinds: Blend, dim: int, ratio: float, d: float, duration: float) -> int:
+    """Return how many time steps within `duration` [s] let every fluid have its full tension."""
+    shares = [
+        fluid.surface_tension / largest_tension(fluid.density, dim, ratio, d, duration)
+        for fluid in kinds.fluids.values()
+    ]
+    return max(1, math.ceil(math.sqrt(max(shares))))
+
+
+# --- on the device ---
+
+
+@qd.func
+def add_gradient(sums: qd.template(), r, i, j, tension: qd.template(), c: Coefficients, method: qd.template()):
+    """Add neighbour j to -sum_j 20 q t^3 n (Wendland C2); of another fluid only as far as its tension reaches."""
+    t = qd.max(1.0 - r.norm() / c.h, 0.0)
+    sums -= r * (20.0 * t * t * t / c.h * qd.min(1.0, tension[j] / qd.max(tension[i], 1e-20)))
+
+
+@qd.func
+def add_pull(sums: qd.template(), r, i, j, surface: qd.template(), c: Coefficients, method: qd.template()):
+    """Add neighbour j to the force on i, over the scale of the force: (skin, cohesion) are in c."""
+    a = surface[i]
+    b = surface[j]
+    length = r.norm()
+    q = length / c.h
+    n = lift(r) / qd.max(length, 1e-12)
+    g_a = vec3(a.x, a.y, a.z)
+    g_b = vec3(b.x, b.y, b.z)
+    size_a = qd.max(g_a.norm(), 1e-9)
+    size_b = qd.max(g_b.norm(), 1e-9)
+    stress = n * (size_a + size_b) - g_a * (g_a.dot(n) / size_a) - g_b * (g_b.dot(n) / size_b)
+    t = qd.max(1.0 - q, 0.0)
+    force = c.skin * q * t * t * stress + c.cohesion * 3.0 * q * q * (size_a + size_b) * n
+    tension = qd.min(a.w, b.w)
+    for k in qd.static(range(r.n)):
+        sums[k] -= tension * force[k]
+
+
+@qd.kernel(fastcache=True)
+def find_tensions(tension: qd.types.ndarray(), particles: Particles, rows: qd.types.ndarray(), count: qd.i32):
+    """Write the tension of every particle."""
+    for i in range(count):
+        tension[i] = rows[particles.material[i]][2]
+
+
+@qd.kernel(fastcache=True)
+def find_surface(
+    surface: qd.types.ndarray(), tension: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients,
+    count: qd.i32, scale: qd.f32, quiet: qd.f32,
+):  # fmt: skip
+    """Find where the surface is and which way it faces: g, without what is noise."""
+    for i in range(count):
+        g = particles.p[i] * 0.0
+        for_each_neighbor(g, add_gradient, i, particles.p, tension, grid, c, 0)
+        size = scale * g.norm()
+        g3 = lift(g) * (scale * qd.max(size - quiet, 0.0) / qd.max(size, 1e-12))
+        surface[i] = vec4(g3.x, g3.y, g3.z, tension[i])
+
+
+@qd.kernel(fastcache=True)
+def attract(
+    pulled: qd.types.ndarray(), surface: qd.types.ndarray(), particles: Particles, scratch: Scratch,
+    rows: qd.types.ndarray(), grid: Grid, solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, count: qd.i32,
+    rate: qd.f32, adhesion: qd.f32,
+):  # fmt: skip
+    """Find the velocities after the pull of neighbours and solids; `rate` is dt over the largest mass of a particle."""
+    for i in range(count):
+        p = particles.p[i]
+        force = p * 0.0
+        for_each_neighbor(force, add_pull, i, particles.p, surface, grid, c, 0)
+        if particles.near[i] != 0:
+            last = table.shape[0] - 1
+            wetting = adhesion * surface[i].w * rows[particles.material[i]][3]
+            for k in range(solids.count):
+                if is_near(particles.near[i], k) == 1:
+                    value = signed_distance(solids, k, lift(p))
+                    if value.w < c.h:
+                        t = qd.min(qd.max(value.w / c.h, 0.0), 1.0) * last
+                        m = qd.min(qd.cast(t, qd.i32), last - 1)
+                        n = vec3(value.x, value.y, value.z)
+                        share = wetting * (table[m] + (table[m + 1] - table[m]) * (t - m))
+                        for axis in qd.static(range(p.n)):
+                            force[axis] -= share * n[axis]
+        v = lift(particles.v[i] + force * (rate * scratch.weight[i]))
+        pulled[i] = vec4(v.x, v.y, v.z, 0.0)
+
+
+@qd.kernel(fastcache=True)
+def take_pull(particles: Particles, pulled: qd.types.ndarray(), c: Coefficients, count: qd.i32):
+    """Adopt the velocities that `attract` found, and move the predicted positions with them."""
+    for i in range(count):
+        v = particles.v[i]
+        for k in qd.static(range(v.n)):
+            v[k] = pulled[i][k]
+        accelerate(particles, i, v, c)
+
+
+def apply_tension(
+    particles: Particles, scratch: Scratch, fluids: Fluids, grid: Grid, solids: SolidSet, c: Coefficients,
+    kinds: Blend, count: int, ratio: float,
+) -> None:  # fmt: skip
+    """Let surfaces and solids pull the fluid for one substep; `ratio` is h / d."""
+    dim, d = particles.x.element_shape[0], c.h / ratio
+    if "adhesion table" not in fluids.arrays:
+        fluids.arrays["adhesion table"] = scalars(TABLE_SIZE + 1)
+        upload(fluids.arrays["adhesion table"], adhesion_table(dim, ratio))
+        fluids.arrays["tension"] = scalars(fluids.capacity)
+    pulled, surface = fluids.array("packed"), fluids.array("normal")
+    tension, table = fluids.arrays["tension"], fluids.arrays["adhesion table"]
+    flat = flat_surface(dim, ratio)
+    adhesion = flat.bond * d ** (dim - 2) / ratio
+    pull = CALIBRATION[dim]
+    c = dataclasses.replace(
+        c, skin=pull * (1.0 - COHESION) * d ** (dim - 2) / flat.stress, cohesion=pull * COHESION * adhesion
+    )
+    find_tensions(tension, particles, fluids.rows, count)
+    find_surface(surface, tension, particles, grid, c, count, flat.gradient_scale, flat.quiet)
+    rate = c.dt / (kinds.largest_density * d**dim)
+    attract(pulled, surface, particles, scratch, fluids.rows, grid, solids, table, c, count, rate, adhesion)
+    take_pull(particles, pulled, c, count)

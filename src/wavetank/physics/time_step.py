@@ -1,0 +1,81 @@
+"""How long a time step may be: the fastest particle and the fastest wave go a share of a spacing.
+
+The first is the usual Courant condition. The second is what keeps deep water stiff. A few iterations carry pressure a
+few spacings far: water answers a load as if sound went at c = beta d / dt, with beta near 4 for four iterations,
+whatever the depth. Water of depth H then compresses by g H / (2 c^2) on average, as in weakly compressible SPH, and
+where that is more than a few per cent, columns fall into themselves, bounce and boil. With w = sqrt(g H) dt / d the
+compression is (w / beta)^2 / 2: w is all there is to bound (docs/method.md). `largest_substeps` is a budget for fast
+scenes only, because a jet that is followed in too long steps is merely crude.
+
+    code     symbol    meaning                                                   unit
+    speed    v         speed of the fastest particle or solid                    m/s
+    depth    H         depth of a level pool that has the water's energy         m
+    courant  CFL       v dt / d, at most                                         1
+    wave     w         sqrt(g H) dt / d, at most                                 1
+"""
+
+import math
+
+import numpy as np
+
+from wavetank.compiler import qd
+from wavetank.params import Parameters
+from wavetank.state import Particles
+
+LEVELS = 64  # whole steps of height that are summed; their rounding cancels
+
+
+def substeps(params: Parameters, duration: float, speed: float, depth: float) -> int:
+    """Return the number of time steps for `duration` [s], at least the usual rate."""
+    gravity = math.hypot(*params.gravity)
+    usual = params.substeps * duration / params.frame_time
+    for_speed = (speed + duration * gravity) * duration / (params.courant * params.spacing)
+    for_waves = math.sqrt(gravity * depth) * duration / (params.wave_courant * params.spacing)
+    return max(1, *(math.ceil(n - 1e-6) for n in (usual, min(for_speed, params.largest_substeps), for_waves)))
+
+
+def largest_speed(particles: Particles, count: int) -> float:
+    """Return the largest speed [m/s] of the first `count` particles, 0 without any."""
+    return math.sqrt(float(np.int32(largest_square(particles, count)).view(np.float32))) if count else 0.0
+
+
+def pool_depth(
+    particles: Particles, count: int, gravity: tuple[float, ...], lower: np.ndarray, upper: np.ndarray
+) -> float:
+    """Return twice the mean height [m], against gravity, above the lowest point of the box `lower` to `upper` [m]."""
+    strength = math.hypot(*gravity)
+    if not (count and strength):
+        return 0.0
+    up = -np.array(gravity) / strength
+    ends = np.stack([lower, upper]) * up
+    height = float(np.abs(ends[1] - ends[0]).sum())
+    if not height:
+        return 0.0
+    total = summed_levels(
+        particles, count, np.array([*up, 0.0][:3], np.float32), float(ends.min(axis=0).sum()), height / LEVELS
+    )
+    return max(0.0, 2.0 * height / LEVELS * total / count)
+
+
+@qd.kernel(fastcache=True)
+def largest_square(particles: Particles, count: qd.i32) -> qd.i32:
+    """Return the bits of the largest squared speed: as integers, numbers of one sign stand in the same order."""
+    most = 0
+    for i in range(count):
+        qd.atomic_max(most, qd.bit_cast(particles.v[i].norm_sqr(), qd.i32))
+    return most
+
+
+@qd.kernel(fastcache=True)
+def summed_levels(
+    particles: Particles, count: qd.i32, up: qd.types.vector(3, qd.f32), base: qd.f32, step: qd.f32
+) -> qd.i32:
+    """Sum the heights along `up` above `base`, each in whole steps of `step` [m]: whole numbers repeat in any order."""
+    levels = 0
+    for i in range(count):
+        x = particles.x[i]
+        height = -base
+        for k in qd.static(range(x.n)):
+            height += up[k] * x[k]
+        qd.atomic_add(levels, qd.cast(qd.round(height / step), qd.i32))
+    return levels

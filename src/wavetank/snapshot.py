@@ -1,0 +1,164 @@
+"""A whole running world as plain arrays: what saving, rewinding and bookmarks keep, to the last bit."""
+
+import dataclasses
+import json
+import zlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wavetank.errors import WavetankError
+from wavetank.moving_solids import MovingSolids, Pose
+from wavetank.physics.diffuse.pool import pool_from, pool_rows
+from wavetank.solids import Solid
+from wavetank.state import upload
+
+if TYPE_CHECKING:
+    from wavetank.simulation import Simulation
+
+ARRAYS = ("x", "v", "id", "dye", "frozen", "material")  # of the particles, in device order
+NUMBERS = (
+    "time", "frame_number", "owed", "next_id", "frozen_count", "fastest_start", "fastest_solid", "fastest_force",
+    "capacity", "start_box", "foam_born", "foam_capacity",
+)  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
+class Snapshot:
+    """One instant of a world, on the host."""
+
+    numbers: dict[str, Any]  # see NUMBERS
+    arrays: dict[str, np.ndarray]  # of the particles, see ARRAYS, and of foam, names that begin with foam_
+    solids: list[Solid]  # but for the walls of the tank
+    names: list[str]
+    poses: list[Pose]  # of all solids, the walls of the tank first, as names, targets and growing
+    targets: dict[int, Pose]
+    growing: dict[int, tuple[float, float]]
+
+    @property
+    def time(self) -> float:
+        """Seconds of water since the start [s]."""
+        return float(self.numbers["time"])
+
+    @property
+    def frame_number(self) -> int:
+        """Frames since the start."""
+        return int(self.numbers["frame_number"])
+
+
+def take_snapshot(sim: "Simulation") -> Snapshot:
+    """Return this instant of a running world."""
+    particles, moving, pool = sim.world.particles, sim.solids, sim.world.pool
+    return Snapshot(
+        numbers={
+            "time": sim.time, "frame_number": sim.frame_number, "owed": sim._owed, "next_id": sim._next_id,
+            "frozen_count": sim.world.frozen, "fastest_start": sim._fastest_start,
+            "fastest_solid": sim._fastest_solid, "fastest_force": sim._fastest_force, "capacity": sim._capacity,
+            "start_box": [end.tolist() for end in sim._start_box], "foam_born": pool.born if pool else -1,
+            "foam_capacity": pool.capacity if pool else 0,
+        },
+        arrays={name: getattr(particles, name).to_numpy()[: sim.count] for name in ARRAYS}
+        | pool_rows(pool, sim.scene.dim),
+        solids=[*sim.scene.solids], names=[*moving.names], poses=[*moving.poses], targets={**moving.targets},
+        growing={**moving.growing},
+    )  # fmt: skip
+
+
+def put_snapshot(sim: "Simulation", snapshot: Snapshot) -> None:
+    """Make an instant the present of a running world; its parameters and forces stay as they are now."""
+    numbers = snapshot.numbers
+    sim.scene.assign("solids", snapshot.solids)
+    sim.solids = MovingSolids(sim._walls(), snapshot.solids, sim.scene.friction)
+    sim.solids.names, sim.solids.poses = [*snapshot.names], [*snapshot.poses]
+    sim.solids.targets, sim.solids.growing = {**snapshot.targets}, {**snapshot.growing}
+    sim.solids.rebuild()
+    if numbers["capacity"] > sim._capacity:
+        sim._fill(int(numbers["capacity"]))
+    sim._renew_solids()
+    for name in ARRAYS:
+        upload(getattr(sim.world.particles, name), snapshot.arrays[name])
+    sim.world.materials = sim.scene.materials_of(snapshot.arrays["material"])
+    sim.world.count, sim.world.frozen = len(snapshot.arrays["id"]), int(numbers["frozen_count"])
+    sim.world.pool = pool_from(
+        snapshot.arrays, numbers["foam_born"], numbers["foam_capacity"], sim.scene.dim, sim._capacity
+    )
+    sim.time, sim.frame_number, sim._owed = numbers["time"], snapshot.frame_number, numbers["owed"]
+    sim._next_id, sim._passing = max(sim._next_id, int(numbers["next_id"])), []
+    sim._fastest_start, sim._fastest_solid = numbers["fastest_start"], numbers["fastest_solid"]
+    sim._fastest_force = numbers["fastest_force"]
+    sim._start_box = (np.array(numbers["start_box"][0]), np.array(numbers["start_box"][1]))
+
+
+class Packed:
+    """A snapshot in little memory."""
+
+    def __init__(self, snapshot: Snapshot) -> None:
+        self.rest = dataclasses.replace(snapshot, arrays={})
+        self.kinds = {name: (array.dtype, array.shape) for name, array in snapshot.arrays.items()}
+        self.bytes = {name: zlib.compress(_planes(array), 1) for name, array in snapshot.arrays.items()}
+
+    @property
+    def size(self) -> int:
+        """Bytes taken, about."""
+        return sum(len(part) for part in self.bytes.values()) + 4096
+
+    def unpack(self) -> Snapshot:
+        """Return the snapshot, equal to the last bit."""
+        arrays = {}
+        for name, (dtype, shape) in self.kinds.items():
+            planes = np.frombuffer(zlib.decompress(self.bytes[name]), np.uint8).reshape(dtype.itemsize, -1)
+            arrays[name] = np.ascontiguousarray(planes.T).view(dtype).reshape(shape)
+        return dataclasses.replace(self.rest, arrays=arrays)
+
+
+def _planes(array: np.ndarray) -> bytes:
+    """First bytes of all numbers, then second bytes: exponents of neighbours are alike and pack well."""
+    flat = np.ascontiguousarray(array).reshape(-1)
+    return np.ascontiguousarray(flat.view(np.uint8).reshape(-1, array.dtype.itemsize).T).tobytes()
+
+
+def write_snapshot(path: str | Path, snapshot: Snapshot, scene: str) -> None:
+    """Write a snapshot and the JSON of its scene to an .npz file, replaced in one move."""
+    target = Path(path)
+    partial = target.with_name(target.name + ".partial")
+    about = {
+        "numbers": snapshot.numbers,
+        "names": snapshot.names,
+        "poses": [_pose_list(pose) for pose in snapshot.poses],
+        "targets": {k: _pose_list(pose) for k, pose in snapshot.targets.items()},
+        "growing": snapshot.growing,
+    }
+    with partial.open("wb") as file:
+        np.savez(file, format=2, scene=scene, about=json.dumps(about), allow_pickle=False, **snapshot.arrays)
+    partial.replace(target)
+
+
+def read_snapshot(path: str | Path, solids: Any) -> tuple[Snapshot, str]:
+    """Read what `write_snapshot` wrote; `solids` makes the list of solids from the scene's JSON."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            data = {name: file[name] for name in file.files}
+        scene = str(data["scene"])
+        about = json.loads(str(data["about"]))
+        members = solids(scene)
+        snapshot = Snapshot(
+            numbers={name: about["numbers"][name] for name in NUMBERS},
+            arrays={name: data[name] for name in (*ARRAYS, *(name for name in data if name.startswith("foam_")))},
+            solids=members,
+            names=about["names"],
+            poses=[_pose(row) for row in about["poses"]],
+            targets={int(k): _pose(row) for k, row in about["targets"].items()},
+            growing={int(k): (age, time) for k, (age, time) in about["growing"].items()},
+        )
+    except (OSError, KeyError, ValueError, EOFError) as error:
+        raise WavetankError(f"{path}: this is not a state that `Simulation.save` wrote: {error}.") from None
+    return snapshot, scene
+
+
+def _pose_list(pose: Pose) -> list[list[float]]:
+    return [pose[0].tolist(), pose[1].tolist()]
+
+
+def _pose(row: list[list[float]]) -> Pose:
+    return np.array(row[0], float), np.array(row[1], float)

@@ -1,0 +1,25 @@
+"""What a person can choose between when looking at a world."""
+
+from typing import Any
+
+from wavetank.view.quantities import QUANTITIES
+from wavetank.view.views import VIEWS
+
+USUAL = "water"
+
+
+def views() -> list[str]:
+    """Names of the renderer's views, the usual one first."""
+    return list(VIEWS)
+
+
+def colorings() -> list[str]:
+    """Names of what particles can be coloured by."""
+    return list(QUANTITIES)
+
+
+def options(view: str, color_by: str) -> dict[str, Any]:
+    """Return the renderer's arguments for a choice of both; water has no colour but that of its fluid."""
+    kind = VIEWS[view or USUAL]
+    takes_color = kind.coloured or color_by.startswith("#")
+    return {"view": kind.name, **({"color_by": color_by} if takes_color else {})}

@@ -1,0 +1,114 @@
+"""What is not water, finished: floor and solids in their light, and the background; the water refracts this picture.
+
+code       symbol   meaning                                                          unit
+tau                 water along the sun's ray before it reaches a point              m
+through             share of the sun that is left, per colour                        1
+"""
+
+from wavetank.compiler import qd
+from wavetank.view.buffers import Buffers
+from wavetank.view.lens import (
+    Lens,
+    ray_direction,
+    ray_origin,
+    to_pixel,
+    to_view,
+    vec2,
+    vec3,
+    vector,
+    view_ray,
+)
+from wavetank.view.look import Look
+from wavetank.view.passes.shade import background, smoothstep, surface_radiance
+from wavetank.view.passes.sunlight import LIGHT_STEP
+from wavetank.view.passes.thickness import thickness_at
+from wavetank.view.shot import Shot
+from wavetank.view.water_buffers import UNIT, water_of
+
+
+def draw(shot: Shot, buffers: Buffers) -> None:
+    """Fill the water's `behind` with radiance, from the albedo in `color`."""
+    water, extent = water_of(buffers, shot), shot.extent
+    paint(
+        shot.lens, shot.water_sun, shot.look, shot.absorption, vector(extent.middle[0], 0.0, extent.middle[2]),
+        extent.radius, extent.spacing / UNIT, LIGHT_STEP, shot.frame.dim, buffers.depth, buffers.surface,
+        buffers.normal, water.light, water.sun_thickness, water.sun_first,
+        water.caustic, buffers.color, water.behind,
+    )  # fmt: skip
+
+
+@qd.func
+def light_at(light: qd.template(), depth: qd.template(), row, column, step, z):
+    """Light at a pixel from the four nearest samples, as far as they lie at the same depth."""
+    rows, columns = light.shape[0], light.shape[1]
+    r, c = row // step, column // step
+    u, v = (column - c * step) * (1.0 / step), (row - r * step) * (1.0 / step)
+    total, weight, per = vec2(0.0, 0.0), 0.0, 50.0 / z
+    for k in qd.static(range(4)):
+        rr, cc = qd.min(r + k // 2, rows - 1), qd.min(c + k % 2, columns - 1)
+        share = (v if qd.static(k // 2 == 1) else 1.0 - v) * (u if qd.static(k % 2 == 1) else 1.0 - u)
+        gap = qd.abs(qd.bit_cast(depth[rr * step, cc * step], qd.f32) - z) * per
+        w = (share + 1e-3) * qd.max(1.0 - gap, 1e-3)
+        total += w * light[rr, cc]
+        weight += w
+    return total / weight
+
+
+@qd.func
+def sun_through_water(
+    sun: Lens, look: Look, absorption, at, unit, tau_map: qd.template(), first: qd.template(), caustic: qd.template()
+):  # fmt: skip
+    """Share of the sun, per colour, that reaches the point `at` through the water."""
+    c = to_view(sun, at)
+    place = to_pixel(sun, c)
+    through = vec3(1.0, 1.0, 1.0)
+    texels = tau_map.shape[0]
+    if qd.min(place.x, place.y) > 2.0 and qd.max(place.x, place.y) < texels - 2.0:
+        light = 1.0 + look.caustic * qd.min(thickness_at(caustic, place, 1.0 / 4096.0), 3.0)
+        tau = thickness_at(tau_map, place, unit)
+        if tau > 0.0:
+            nearest = qd.bit_cast(first[qd.cast(place.y, qd.i32), qd.cast(place.x, qd.i32)], qd.f32)
+            if nearest < 1e30:  # what lies above the water is in the full sun
+                within = qd.max(c.z - nearest, 0.0)
+                light = 1.0 + (light - 1.0) * qd.min(within / tau, 1.0)
+                tau = qd.min(tau, within)
+        if tau > 0.0 or light != 1.0:
+            veil = look.veil * (1.0 - qd.exp(-tau * (absorption.x + absorption.y)))
+            through = light * (1.0 - veil) * qd.exp(-0.6 * tau * absorption)
+    return through
+
+
+@qd.kernel(fastcache=True)
+def paint(
+    lens: Lens, sun: Lens, look: Look, absorption: vec3, middle: vec3, size: qd.f32, unit: qd.f32,
+    step: qd.i32, dim: qd.template(), depth: qd.types.ndarray(), surface: qd.types.ndarray(),
+    normal: qd.types.ndarray(), light: qd.types.ndarray(), tau_map: qd.types.ndarray(), first: qd.types.ndarray(),
+    caustic: qd.types.ndarray(), color: qd.types.ndarray(), behind: qd.types.ndarray(),
+):  # fmt: skip
+    """Shade every pixel that is not empty, and fill the others with the background."""
+    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
+        ray = view_ray(lens, row, column)
+        direction = ray_direction(lens, ray)
+        what = surface[row, column]
+        result, far = vec3(0.0, 0.0, 0.0), 1.0
+        if what != 0x7FFFFFFF:  # NOTHING
+            z = qd.bit_cast(depth[row, column], qd.f32)
+            at = ray_origin(lens, ray) + z * direction
+            far = smoothstep(((at - middle).norm() * (1.0 / size) - 1.5) * 0.2)
+            share = light_at(light, depth, row, column, step, z)
+            through = vec3(1.0, 1.0, 1.0)
+            if qd.static(dim == 3):
+                through = sun_through_water(sun, look, absorption, at, unit, tau_map, first, caustic)
+            albedo = color[row, column]
+            # The sky comes from everywhere; water above takes some of it.
+            dim_sky = 0.45 + 0.55 * qd.min(through, 1.0)
+            if what == -1:  # SOLID
+                n, seen = normal[row, column], -direction.normalized()
+                gloss, wrap = 0.3 * look.gloss, 0.4 * look.wrap
+                result = through * surface_radiance(look, albedo, n, seen, vec2(share.x, 0.0), wrap, gloss)
+                result += dim_sky * surface_radiance(look, albedo, n, seen, vec2(0.0, share.y), wrap, gloss)
+            else:
+                result = albedo * (look.sun * look.to_sun.y * share.x * through + look.sky * share.y * dim_sky)
+        if far > 0.0:
+            result += far * (background(look, direction.normalized()) - result)
+        behind[row, column] = result

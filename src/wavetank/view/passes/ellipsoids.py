@@ -1,0 +1,153 @@
+"""Particles as ellipsoids that follow the shape of the water around them: flat on a surface, long in a thread.
+
+J. Yu, G. Turk, "Reconstructing surfaces of particle-based fluids using anisotropic kernels", ACM Transactions on
+Graphics 32 (2013), doi:10.1145/2421636.2421641: Eq. 6 (smoothed centres), Eq. 9 (weighted covariance).
+
+    code      symbol   meaning                                                        unit
+    reach     r_i      radius of the neighbourhood, 2.2 d                             m
+    w         w_ij     weight of a neighbour, 1 - (|r| / r_i)^2                        1
+    mean               weighted mean of the neighbours, from the particle             m
+    C         C_i      weighted covariance around that mean over that of full water   1
+    B         G^-1     symmetric matrix that maps the unit ball onto the ellipsoid    m
+    shape     B^2      what the splat needs, packed as xx, yy, zz and xy, xz, yz      m^2
+
+Where we differ: no eigenvalues are taken. B = a + b C^2 has the axes of C, a lower bound on its radii (which is what
+the paper clamps for) and flattens like the paper's C, without a decomposition per particle. Centres at a surface move
+only by what they stick out of it or lie too deep, judged by how far off the mean is, so that water keeps its volume.
+Few neighbours fade to a ball, so that a drop is round. Walls are no surface: what touches one reaches through it.
+Particles deep inside are not drawn: cells whose neighbours are all well filled are left out.
+"""
+
+from typing import Any
+
+from wavetank.compiler import qd
+from wavetank.view.buffers import Buffers
+from wavetank.view.lens import vec3, vector
+from wavetank.view.passes import cells as sorting
+from wavetank.view.passes.cells import Cells
+from wavetank.view.shot import Shot
+from wavetank.view.water_buffers import Ellipsoids, water_of
+
+REACH = 2.2  # d
+BALL = 0.58  # d: radius of a lone particle, a little more than that of its volume
+LEAST = 0.36  # d: radius across a sheet
+WIDEST = {2: 1.9, 3: 1.15}  # d: radius in full water; a plane can afford smoother outlines
+DEPTH_2D = 0.75  # d: half thickness of a 2-D world's water
+
+
+def draw(shot: Shot, buffers: Buffers) -> None:
+    """Find the ellipsoids of a frame; they hold for every eye."""
+    water, d = water_of(buffers, shot), shot.extent.spacing
+    sorting.sort(shot.frame, water.cells)
+    # A 2-D world shows all of its water.
+    mark_deep(water.cells, 4 if shot.frame.dim == 3 and water.cells.own else 0)
+    fit(
+        water.cells, water.ellipsoids, shot.frame.dim, *_walls(shot), d, REACH * d, LEAST * d,
+        (WIDEST[shot.frame.dim] - LEAST) * d, BALL * d, DEPTH_2D * d, shot.frame.count,
+    )  # fmt: skip
+
+
+def _walls(shot: Shot) -> tuple[Any, Any]:
+    """Corners of the tank; far away where there is none."""
+    if shot.frame.scene.tank is None:
+        return vector(-1e6, -1e6, -1e6), vector(1e6, 1e6, 1e6)
+    return vector(*shot.extent.lower), vector(*shot.extent.upper)
+
+
+@qd.kernel(fastcache=True)
+def mark_deep(cells: Cells, full: qd.i32):
+    """Set `fill` to 1 for cells around which every cell holds at least `full` particles; 0 leaves all at 0."""
+    for k in range(cells.cells):
+        cells.fill[k] = 0
+        if full > 0 and cells.start[k + 1] > cells.start[k]:
+            least = full
+            for n in range(27):
+                j = (k + n % 3 - 1 + cells.nx * (n // 3 % 3 - 1 + cells.ny * (n // 9 - 1))) % cells.cells
+                least = qd.min(least, cells.start[j + 1] - cells.start[j])
+            cells.fill[k] = qd.cast(least >= full, qd.i32)
+
+
+@qd.kernel(fastcache=True)
+def fit(
+    cells: Cells, ellipsoids: Ellipsoids, dim: qd.template(), lower: vec3, upper: vec3, spacing: qd.f32,
+    reach: qd.f32, least: qd.f32, growth: qd.f32, ball: qd.f32, depth_2d: qd.f32, count: qd.i32,
+):  # fmt: skip
+    """Fit an ellipsoid to the neighbourhood of every particle that is not deep inside."""
+    for a in range(count):
+        p = cells.x[a]
+        cell = cells.cell[cells.order[a]]
+        ellipsoids.outward[a] = vec3(0.0, 0.0, 0.0)
+        if cells.fill[cell] == 1:
+            ellipsoids.center[a] = p
+            ellipsoids.size[a] = -1.0
+        else:
+            weight = 0.0
+            mean, square, mixed = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+            scale = 1.0 / (reach * reach)
+            for row in range(qd.static(9 if dim == 3 else 3)):
+                layer = cells.nx * (row % 3 - 1)
+                if qd.static(dim == 3):
+                    layer += cells.nx * cells.ny * (row // 3 - 1)
+                low = (cell + layer - 1) % cells.cells
+                over = qd.max(low + 3 - cells.cells, 0)
+                for part in range(1 + qd.min(over, 1)):
+                    begin = cells.start[low]
+                    end = cells.start[low + 3 - over]
+                    if part == 1:
+                        begin = 0
+                        end = cells.start[over]
+                    for b in range(begin, end):
+                        r = cells.x[b] - p
+                        w = qd.max(1.0 - r.dot(r) * scale, 0.0)
+                        s = w * r
+                        weight += w
+                        mean += s
+                        square += s * r
+                        mixed += vec3(s.x * r.y, s.x * r.z, s.y * r.z)
+            weight = qd.max(weight, 1e-6)
+            mean /= weight
+            # In units of the variance along an axis of full water, 1/7 (3-D) or 1/6 (2-D) of the square of the reach.
+            unit = qd.static(7.0 if dim == 3 else 6.0) * scale
+            diagonal = qd.max((square / weight - mean * mean) * unit, 0.0)
+            side = (mixed / weight - vec3(mean.x * mean.y, mean.x * mean.z, mean.y * mean.z)) * unit
+            n, o = squared(diagonal, side)
+            few = qd.static(2.0 if dim == 3 else 1.5)
+            trust = qd.min(qd.max((weight - few) / qd.static(3.5 if dim == 3 else 1.5), 0.0), 1.0)
+            diagonal = trust * (least + growth * n) + (1.0 - trust) * ball
+            side = trust * growth * o
+            # Water goes on behind a wall as far as its looks are concerned: what touches one reaches through it.
+            touch = vec3(0.0, 0.0, 0.0)
+            for k in qd.static(range(dim)):
+                gap = qd.min(p[k] - lower[k], upper[k] - p[k]) / spacing
+                touch[k] = qd.min(qd.max((1.5 - gap) / 0.8, 0.0), 1.0)
+                diagonal[k] += touch[k] * qd.max(1.05 * spacing - diagonal[k], 0.0)
+                mean[k] *= 1.0 - touch[k]
+            free = 1.0 - touch
+            side *= vec3(free.x * free.y, free.x * free.z, free.y * free.z)
+            if qd.static(dim == 2):
+                diagonal.z = trust * depth_2d + (1.0 - trust) * ball
+            out = mean.norm()
+            flat = qd.static(0.31 if dim == 3 else 0.34) * reach  # out of a particle in a flat surface
+            at_surface = qd.min(qd.max((out / flat - 0.5) / 0.35, 0.0), 1.0)
+            ellipsoids.center[a] = p + 0.9 * trust * at_surface * (1.0 - flat / qd.max(out, 0.3 * flat)) * mean
+            ellipsoids.outward[a] = -trust * mean / reach
+            ellipsoids.axes[a], ellipsoids.mixed[a] = squared(diagonal, side)
+            ellipsoids.size[a] = qd.max(diagonal.x, diagonal.y, diagonal.z) + side.norm()
+
+
+@qd.func
+def squared(diagonal, side):
+    """Square of a symmetric matrix: its diagonal, and its xy, xz, yz."""
+    d, s = diagonal, side
+    return (
+        vec3(
+            d.x * d.x + s.x * s.x + s.y * s.y,
+            d.y * d.y + s.x * s.x + s.z * s.z,
+            d.z * d.z + s.y * s.y + s.z * s.z,
+        ),
+        vec3(
+            s.x * (d.x + d.y) + s.y * s.z,
+            s.y * (d.x + d.z) + s.x * s.z,
+            s.z * (d.y + d.z) + s.x * s.y,
+        ),
+    )  # fmt: skip

@@ -1,0 +1,167 @@
+"""Water along every line of sight: the sum of the particles' volumes, spread over smooth discs.
+
+    code      symbol   meaning                                                       unit
+    disc               radius of a particle's disc, `DISC`                          m
+    peak               thickness in its middle: 3 d^3 / (pi disc^2)                  steps of d / 4096
+    coarse             pixels of the picture per texel, in each direction            1
+
+The disc (1 - q^2)^2 is wide enough that a lattice of particles adds up to an even thickness. Sums are whole numbers,
+so they repeat bit for bit. The picture's map is at half its resolution, or coarser where a particle is large: a disc
+never touches more than some twenty texels.
+"""
+
+import math
+
+from wavetank.compiler import qd
+from wavetank.view.buffers import Buffers
+from wavetank.view.lens import Lens, pixels_per_metre, to_pixel, to_view, vec3, vec4
+from wavetank.view.passes.spheres import dyed
+from wavetank.view.shot import Shot
+from wavetank.view.water_buffers import UNIT, water_of
+
+DISC = {2: 6.0, 3: 1.5}  # d; wide in a plane, where it shades from the rim to the depth
+TEXELS = 2.0  # of a map per spacing, at most
+
+
+def draw(shot: Shot, buffers: Buffers) -> None:
+    """Fill the thickness as the eye sees it."""
+    water, d = water_of(buffers, shot), shot.extent.spacing
+    clear(water.thickness)
+    add(
+        water.cells.x, shot.frame.count, shot.lens, float(coarseness(shot)), DISC[shot.frame.dim] * d,
+        peak(shot.frame.dim), water.thickness,
+    )  # fmt: skip
+    clear_dye(water.dye)
+    stain(
+        water.cells.x, water.cells.order, shot.frame.dye, shot.frame.material, water.stains, shot.frame.count,
+        shot.lens, float(coarseness(shot)), DISC[shot.frame.dim] * d, peak(shot.frame.dim), water.dye,
+    )  # fmt: skip
+
+
+def coarseness(shot: Shot) -> int:
+    """Pixels per texel of the thickness map, at least 2."""
+    lens, extent = shot.lens, shot.extent
+    scale = float(lens.focal)
+    if float(lens.perspective) > 0.5:
+        distance = float((extent.middle - lens.eye) @ lens.forward)
+        scale /= max(distance, 0.5 * extent.radius)
+    return max(2, min(64, round(scale * extent.spacing * DISC[extent.dim] / (DISC[3] * TEXELS))))
+
+
+def peak(dim: int) -> float:
+    """Thickness in the middle of a disc [steps]; water in a plane counts as a sheet one spacing thick."""
+    return 3.0 / (math.pi * DISC[dim] ** 2) * UNIT
+
+
+@qd.kernel(fastcache=True)
+def clear(thickness: qd.types.ndarray()):
+    """No water anywhere."""
+    for row, column in qd.ndrange(thickness.shape[0], thickness.shape[1]):
+        thickness[row, column] = 0
+
+
+@qd.kernel(fastcache=True)
+def add(
+    x: qd.types.ndarray(), count: qd.i32, lens: Lens, coarse: qd.f32, disc: qd.f32, peak: qd.f32,
+    thickness: qd.types.ndarray(),
+):  # fmt: skip
+    """Add every particle's disc; the texel (r, c) holds the pixels from coarse r, coarse c on."""
+    rows, columns = thickness.shape[0], thickness.shape[1]
+    for i in range(count):
+        c = to_view(lens, x[i])
+        if c.z > lens.near + 0.3 * disc:
+            place = to_pixel(lens, c) / coarse
+            # A disc next to the eye would fill the map; it counts as much farther away.
+            wide = qd.min(pixels_per_metre(lens, c.z) * disc / coarse, 24.0)
+            tall = peak
+            if wide < 0.75:  # smaller than a texel: keep the volume
+                tall = peak * wide * wide / 0.5625
+                wide = 0.75
+            inverse = 1.0 / (wide * wide)
+            top = qd.max(qd.cast(qd.ceil(qd.max(place.y - wide - 0.5, 0.0)), qd.i32), 0)
+            bottom = qd.min(qd.cast(qd.floor(qd.min(place.y + wide - 0.5, rows - 1.0)), qd.i32), rows - 1)
+            left = qd.max(qd.cast(qd.ceil(qd.max(place.x - wide - 0.5, 0.0)), qd.i32), 0)
+            right = qd.min(qd.cast(qd.floor(qd.min(place.x + wide - 0.5, columns - 1.0)), qd.i32), columns - 1)
+            for row in range(top, bottom + 1):
+                dy = row + 0.5 - place.y
+                for column in range(left, right + 1):
+                    dx = column + 0.5 - place.x
+                    near = 1.0 - (dx * dx + dy * dy) * inverse
+                    if near > 0.0:
+                        qd.atomic_add(thickness[row, column], qd.cast(tall * near * near + 0.5, qd.i32))
+
+
+@qd.kernel(fastcache=True)
+def clear_dye(dye: qd.types.ndarray()):
+    """No dye anywhere."""
+    for row, column in qd.ndrange(dye.shape[0], dye.shape[1]):
+        for k in qd.static(range(4)):
+            dye[row, column, k] = 0
+
+
+@qd.kernel(fastcache=True)
+def stain(
+    x: qd.types.ndarray(), order: qd.types.ndarray(), dyes: qd.types.ndarray(), materials: qd.types.ndarray(),
+    stains: qd.types.ndarray(), count: qd.i32, lens: Lens, coarse: qd.f32, disc: qd.f32, peak: qd.f32,
+    dye: qd.types.ndarray(),
+):  # fmt: skip
+    """Add the discs of coloured particles, as strong as their dye, alone and times its colour.
+
+    A fluid with a colour of its own is dyed with it where nothing else dyes it.
+    """
+    for a in range(count):
+        own = dyes[order[a]]
+        if own == 0:
+            own = stains[materials[order[a]]]
+        c = to_view(lens, x[a])
+        if own != 0 and c.z > lens.near + 0.3 * disc:
+            place = to_pixel(lens, c) / coarse
+            wide = qd.min(qd.max(pixels_per_metre(lens, c.z) * disc / coarse, 0.75), 24.0)
+            strength = peak * ((own >> 24) & 127) / 127.0
+            color = dyed(vec3(0.0, 0.0, 0.0), own | (127 << 24))
+            top = qd.max(qd.cast(qd.ceil(qd.max(place.y - wide - 0.5, 0.0)), qd.i32), 0)
+            bottom = qd.min(
+                qd.cast(qd.floor(qd.min(place.y + wide - 0.5, dye.shape[0] - 1.0)), qd.i32), dye.shape[0] - 1
+            )
+            left = qd.max(qd.cast(qd.ceil(qd.max(place.x - wide - 0.5, 0.0)), qd.i32), 0)
+            right = qd.min(
+                qd.cast(qd.floor(qd.min(place.x + wide - 0.5, dye.shape[1] - 1.0)), qd.i32), dye.shape[1] - 1
+            )
+            for row in range(top, bottom + 1):
+                for column in range(left, right + 1):
+                    away = (row + 0.5 - place.y) ** 2 + (column + 0.5 - place.x) ** 2
+                    near = qd.max(1.0 - away / (wide * wide), 0.0)
+                    share = strength * near * near
+                    qd.atomic_add(dye[row, column, 0], qd.cast(share + 0.5, qd.i32))
+                    for k in qd.static(range(3)):
+                        qd.atomic_add(dye[row, column, k + 1], qd.cast(share * color[k] + 0.5, qd.i32))
+
+
+@qd.func
+def dye_at(dye: qd.template(), place):
+    """(dyed part of the thickness [steps], mean linear colour) at a place in texels, between the four nearest."""
+    x = qd.min(qd.max(place.x - 0.5, 0.0), dye.shape[1] - 1.001)
+    y = qd.min(qd.max(place.y - 0.5, 0.0), dye.shape[0] - 1.001)
+    c, r = qd.cast(x, qd.i32), qd.cast(y, qd.i32)
+    u, v = x - c, y - r
+    c1, r1 = qd.min(c + 1, dye.shape[1] - 1), qd.min(r + 1, dye.shape[0] - 1)
+    total = vec4(0.0, 0.0, 0.0, 0.0)
+    for k in qd.static(range(4)):
+        top = dye[r, c, k] * (1.0 - u) + dye[r, c1, k] * u
+        total[k] = top + ((dye[r1, c, k] * (1.0 - u) + dye[r1, c1, k] * u) - top) * v
+    part = qd.max(total[0], 1e-6)
+    return vec4(total[0], total[1] / part, total[2] / part, total[3] / part)
+
+
+@qd.func
+def thickness_at(thickness: qd.template(), place, scale):
+    """Thickness at a place (column, row) in texels, between the four nearest; `scale` is in m per step."""
+    rows, columns = thickness.shape[0], thickness.shape[1]
+    x = qd.min(qd.max(place.x - 0.5, 0.0), columns - 1.001)
+    y = qd.min(qd.max(place.y - 0.5, 0.0), rows - 1.001)
+    c, r = qd.cast(x, qd.i32), qd.cast(y, qd.i32)
+    u, v = x - c, y - r
+    c1, r1 = qd.min(c + 1, columns - 1), qd.min(r + 1, rows - 1)
+    top = thickness[r, c] * (1.0 - u) + thickness[r, c1] * u
+    low = thickness[r1, c] * (1.0 - u) + thickness[r1, c1] * u
+    return (top * (1.0 - v) + low * v) * scale

@@ -1,0 +1,200 @@
+"""The water itself: what it reflects, what shines through it, what it swallows and what it gives back.
+
+B. Walter et al., "Microfacet models for refraction" (2007) for the directions; Schlick 1994 for Fresnel; Beer-Lambert
+for the absorption. Refraction follows the ray into the water for as far as the water is thick (the exit point of
+W. van der Laan, S. Green, M. Sainz, "Screen space fluid rendering with curvature flow", 2009, taken one step on) and
+takes the finished backdrop where that point is seen.
+
+    code      symbol   meaning                                                         unit
+    n                  normal of the surface, towards the eye                          1
+    cosi               cosine between it and the line of sight                         1
+    mirror    F        share of light that is reflected                                1
+    bent               direction of the ray within the water                           1
+    travel    s        its way to the exit point                                       m
+    swallow   sigma_a  absorption per colour, dye included                             1/m
+"""
+
+import numpy as np
+
+from wavetank.compiler import qd
+from wavetank.view.buffers import Buffers
+from wavetank.view.lens import (
+    Lens,
+    from_view,
+    point_at,
+    ray_direction,
+    ray_origin,
+    to_pixel,
+    to_view,
+    vec2,
+    vec3,
+    vector,
+    view_ray,
+)
+from wavetank.view.look import Look
+from wavetank.view.passes import cut
+from wavetank.view.passes.shade import background, smoothstep
+from wavetank.view.passes.surface import normal_at
+from wavetank.view.passes.thickness import DISC, coarseness, dye_at, thickness_at
+from wavetank.view.shot import Shot
+from wavetank.view.water_buffers import UNIT, water_of
+
+
+def under_water(shot: Shot, buffers: Buffers) -> int:
+    """1 if the eye is inside the water, else 0."""
+    eye, extent = np.asarray(shot.lens.eye, float), shot.extent
+    if shot.frame.dim == 2 or shot.lens.perspective < 0.5 or shot.frame.count == 0:
+        return 0
+    if np.any(eye < extent.lower - extent.spacing) or np.any(eye > extent.upper + extent.spacing):
+        return 0
+    water = water_of(buffers, shot)
+    found = qd.ndarray(qd.f32, shape=(1,))
+    cut.weigh(water.cells, shot.lens.eye, shot.frame.dim, found)
+    return int(float(found.to_numpy()[0]) > 0.5 * cut.full_weight(water.cells.edge / extent.spacing, 3))
+
+
+def draw(shot: Shot, buffers: Buffers) -> None:
+    """Lay the water over the backdrop."""
+    water = water_of(buffers, shot)
+    lay(
+        shot.lens, shot.look, vector(*shot.extent.lower), vector(*shot.extent.upper), DISC[2] * shot.extent.spacing,
+        shot.absorption, shot.scattering, shot.look.glow * shot.tint, float(coarseness(shot)),
+        shot.extent.spacing / UNIT, shot.extent.spacing, under_water(shot, buffers), shot.frame.dim, water.depth,
+        water.thickness, water.dye, shot.usual, buffers.depth, water.behind, buffers.color,
+    )  # fmt: skip
+
+
+@qd.func
+def wall_share(at, lower, upper, disc):
+    """Share of a disc around `at` that the walls of a plane leave; behind them nothing adds to a thickness."""
+    share = 1.0
+    for k in qd.static(range(2)):
+        for side in qd.static(range(2)):
+            gap = (at[k] - lower[k]) / disc
+            if qd.static(side == 1):
+                gap = (upper[k] - at[k]) / disc
+            s = qd.min(qd.max(gap, 0.0), 1.0)
+            share *= 0.5 + s * (15.0 - s * s * (10.0 - 3.0 * s * s)) / 16.0
+    return share
+
+
+@qd.func
+def sheet_at(lens: Lens, thickness: qd.template(), place, coarse, unit, lower, upper, disc):
+    """Thickness of the sheet that a 2-D world is, at a place in the picture [m]."""
+    c = point_at(lens, place.y - 0.5, place.x - 0.5, 1.0)
+    share = wall_share(lens.eye + from_view(lens, c), lower, upper, disc)
+    return thickness_at(thickness, place / coarse, unit) / share
+
+
+@qd.func
+def environment(look: Look, direction):
+    """Radiance that the water mirrors: the studio, its ground and its lamps."""
+    result = background(look, direction)
+    if direction.y < 0.05:
+        share = smoothstep((0.05 - direction.y) / 0.25)
+        result += share * (look.floor * look.ground * 1.4 - result)
+    else:
+        # A wide soft lamp overhead, towards the sun: broad streaks of light on every wave.
+        u = direction.x / (direction.y + 0.15)
+        v = direction.z / (direction.y + 0.15)
+        a = smoothstep((0.75 - qd.abs(u + 0.55)) / 0.18) * smoothstep((1.6 - qd.abs(v + 0.3)) / 0.25)
+        b = smoothstep((0.22 - qd.abs(u - 0.9)) / 0.12) * smoothstep((1.8 - qd.abs(v)) / 0.3)
+        result += look.lamp * (a + 0.6 * b)
+    return result
+
+
+@qd.func
+def picture_at(behind: qd.template(), place):
+    """Radiance at a place (column, row), between the four nearest pixels."""
+    rows, columns = behind.shape[0], behind.shape[1]
+    x = qd.min(qd.max(place.x - 0.5, 0.0), columns - 1.0)
+    y = qd.min(qd.max(place.y - 0.5, 0.0), rows - 1.0)
+    c, r = qd.min(qd.max(qd.cast(x, qd.i32), 0), columns - 1), qd.min(qd.max(qd.cast(y, qd.i32), 0), rows - 1)
+    c1, r1 = qd.min(c + 1, columns - 1), qd.min(r + 1, rows - 1)
+    u, v = x - c, y - r
+    top = behind[r, c] + u * (behind[r, c1] - behind[r, c])
+    low = behind[r1, c] + u * (behind[r1, c1] - behind[r1, c])
+    return top + v * (low - top)
+
+
+@qd.kernel(fastcache=True)
+def lay(
+    lens: Lens, look: Look, lower: vec3, upper: vec3, disc: qd.f32, absorption: vec3, scattering: qd.f32,
+    back_light: vec3, coarse: qd.f32, unit: qd.f32, spacing: qd.f32, under: qd.i32, dim: qd.template(),
+    water_depth: qd.types.ndarray(), thickness: qd.types.ndarray(), dye: qd.types.ndarray(), usual: qd.f32,
+    depth: qd.types.ndarray(),
+    behind: qd.types.ndarray(), color: qd.types.ndarray(),
+):  # fmt: skip
+    """Shade every pixel that shows water, and copy the backdrop to the others."""
+    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
+        key = water_depth[row, column]
+        result = behind[row, column]
+        if under == 1:
+            # From inside there is no surface in front of anything: water dims and tints what is behind it.
+            ray = view_ray(lens, row, column)
+            tau = thickness_at(thickness, vec2(column + 0.5, row + 0.5) / coarse, unit)
+            travel = qd.min(tau, qd.bit_cast(depth[row, column], qd.f32) * ray_direction(lens, ray).norm())
+            result = result * qd.exp(-travel * absorption) + (1.0 - qd.exp(-travel * scattering)) * back_light
+        elif key < 0x7F000000 and key < depth[row, column]:  # FARTHEST
+            z = qd.bit_cast(key, qd.f32)
+            ray = view_ray(lens, row, column)
+            direction = ray_direction(lens, ray)
+            pace = direction.norm()
+            ahead = direction / pace
+            at = ray_origin(lens, ray) + z * direction
+            place = vec2(column + 0.5, row + 0.5)
+            tau = thickness_at(thickness, place / coarse, unit)
+            limit = 3.0 * spacing
+            n = normal_at(lens, row, column, z, limit, water_depth)
+            if qd.static(dim == 2):
+                # A plane has no shape in depth: it gets that of a drop between two panes, from its thickness.
+                tau = sheet_at(lens, thickness, place, coarse, unit, lower, upper, disc)
+                dx, dy = vec2(coarse, 0.0), vec2(0.0, coarse)
+                right = sheet_at(lens, thickness, place + dx, coarse, unit, lower, upper, disc) - sheet_at(
+                    lens, thickness, place - dx, coarse, unit, lower, upper, disc
+                )
+                below = sheet_at(lens, thickness, place + dy, coarse, unit, lower, upper, disc) - sheet_at(
+                    lens, thickness, place - dy, coarse, unit, lower, upper, disc
+                )
+                rise = disc / (2.0 * coarse * lens.pixel * spacing)
+                n = from_view(lens, vec3(-rise * right, rise * below, -1.0).normalized())
+            cosi = qd.max(-n.dot(ahead), 0.05)
+            mirror = 0.02 + 0.98 * (1.0 - cosi) ** 5
+            reflected = (ahead + 2.0 * cosi * n).normalized()
+            bent = 0.7519 * ahead + (0.7519 * cosi - qd.sqrt(1.0 - 0.5653 * (1.0 - cosi * cosi))) * n
+            # The least that a drop is thick; in a plane the rim keeps half of the colour.
+            tau = qd.max(tau, qd.static(0.15 if dim == 3 else 0.55) * spacing)
+            back = qd.bit_cast(depth[row, column], qd.f32)
+            travel = qd.min(tau, (back - z) * pace)
+            if qd.static(dim == 3):
+                if bent.y < -1e-3 and at.y > 0.0:
+                    travel = qd.min(travel, -at.y / bent.y)
+            c = to_view(lens, at + travel * bent)
+            shown = result
+            if c.z > lens.near:
+                there = to_pixel(lens, c)
+                r = qd.min(qd.max(qd.cast(there.y, qd.i32), 0), depth.shape[0] - 1)
+                e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), depth.shape[1] - 1)
+                if depth[r, e] > key:  # not what stands in front of the water
+                    shown = picture_at(behind, there)
+            swallow, tint = absorption, back_light
+            stained = dye_at(dye, place / coarse)
+            if stained[0] > 0.0:
+                # Dyed water swallows what its colour lacks; strong dye shows in a layer thinner than the usual.
+                color_of_dye = qd.min(qd.max(vec3(stained[1], stained[2], stained[3]), 0.02), 0.98)
+                share = qd.min(stained[0] * unit / tau, 1.0)
+                swallow = absorption + share * (-qd.log(color_of_dye) * (2.5 / usual) - absorption)
+                tint = back_light + share * (look.glow * color_of_dye - back_light)
+            left = qd.exp(-travel * swallow)
+            glow = (1.0 - qd.exp(-travel * scattering)) * tint
+            h = (look.to_sun - ahead).normalized(1e-9)
+            spark = qd.min(qd.max(n.dot(h), 0.0), 1.0) ** 600 * look.sparkle * look.sun
+            own = shown * left + glow
+            if qd.static(dim == 2):  # the rim of the sheet catches the light
+                # Light comes from above left, and less of it reaches the bottom.
+                high = (at.y - lower.y) / (upper.y - lower.y)
+                own *= (0.75 + 0.3 * qd.max(n.dot(look.to_sun), 0.0)) * (0.78 + 0.4 * qd.min(high, 1.0))
+                own += 0.35 * look.lamp * smoothstep((0.85 - tau / spacing) / 0.3)
+                mirror = 0.0  # on paper there is nothing to mirror
+            result = own + mirror * (environment(look, reflected) - own) + spark
+        color[row, column] = result

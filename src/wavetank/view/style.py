@@ -1,0 +1,113 @@
+"""What a picture should show and how: the options of a picture, checked."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from wavetank.errors import WavetankError
+from wavetank.frame import Frame
+from wavetank.view.colormaps import ENTRIES, bands, rgb_of, table, to_linear
+from wavetank.view.extent import Extent
+from wavetank.view.quantities import QUANTITIES, key_of, usual
+from wavetank.view.views import VIEWS, View
+
+#: Of a drawn particle [d] in 2-D and 3-D worlds: what has no depth should close its gaps.
+RADIUS = {2: 0.62, 3: 0.55}
+MOST_SAMPLES = 4096
+#: name -> samples a pixel has in each direction, and pictures that are averaged
+QUALITIES: dict[str, tuple[int, int]] = {"draft": (1, 1), "standard": (2, 1), "film": (1, 64)}
+
+
+@dataclasses.dataclass(frozen=True)
+class Style:
+    """Options of a picture; None leaves a choice to the view. Raises `WavetankError` for what is not allowed."""
+
+    view: str | None = None  # one of VIEWS; None is water, or particles where their colours or size are given
+    color_by: str | None = None  # one of QUANTITIES, or a colour #rrggbb, which dyes the water as well
+    colormap: str | None = None  # one of COLORMAPS
+    limits: tuple[float, float] | None = None  # values of the first and the last colour
+    radius: float | None = None  # of a drawn particle, in spacings
+    cut: str | None = None  # where a slice lies: an axis, as "z", or an axis and a place in m, as "z=0.35"
+    legend: bool = True
+    samples: int = 1  # pictures, each from a slightly other eye and sun, that are averaged
+
+    def __post_init__(self) -> None:
+        """Check what needs no frame to be checked."""
+        if self.view is not None and self.view not in VIEWS:
+            raise WavetankError(f"render: view = {self.view!r} is not known; use one of {', '.join(VIEWS)}.")
+        if self.color_by is not None and self.color_by not in QUANTITIES:
+            if not str(self.color_by).startswith("#"):
+                raise WavetankError(
+                    f"render: color_by = {self.color_by!r} is not known; use one of {', '.join(QUANTITIES)}, "
+                    "or a colour such as '#3f99da'."
+                )
+            rgb_of(self.color_by)
+        if not self.kind.coloured and self.color_by in QUANTITIES:
+            raise WavetankError(
+                f"render: color_by = {self.color_by!r} does not go with the view {self.view!r}, which has the colour "
+                "of its fluid; use a colour such as '#3f99da', or the view particles or slice."
+            )
+        radius = self.radius
+        if radius is not None and not (isinstance(radius, int | float) and 0.0 < radius <= 10.0):
+            raise WavetankError(f"render: radius = {radius!r} must be a number of spacings above 0, at most 10.")
+        samples = self.samples
+        if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
+            raise WavetankError(f"render: samples = {samples!r} must be a whole number from 1 to {MOST_SAMPLES}.")
+
+    @property
+    def kind(self) -> View:
+        """The view that is meant."""
+        if self.view is None:
+            said = (self.color_by, self.colormap, self.limits, self.radius)
+            return VIEWS[
+                "slice" if self.cut is not None else "particles" if any(s is not None for s in said) else "water"
+            ]
+        return VIEWS[self.view]
+
+    def particle_radius(self, extent: Extent) -> float:
+        """Radius of a drawn particle [m]."""
+        return (RADIUS[extent.dim] if self.radius is None else float(self.radius)) * extent.spacing
+
+    def coloring(self, frame: Frame) -> tuple[int, tuple[float, float], str, np.ndarray]:
+        """Key of the quantity, its limits, and the colours with a name: linear RGB [ENTRIES, 3]."""
+        color_by = self.color_by or usual(frame.scene)
+        if color_by not in QUANTITIES:
+            return 0, (0.0, 1.0), color_by, np.tile(to_linear(np.array(rgb_of(color_by))), (ENTRIES, 1))
+        quantity = QUANTITIES[color_by]
+        name = self.colormap or quantity.colormap
+        colors = table(name)
+        if quantity.palette and not self.colormap:
+            palette = quantity.palette(frame.scene)
+            name, colors = "".join(palette), bands(palette)
+        try:
+            low, high = (float(limit) for limit in self.limits or quantity.limits(frame.scene))
+        except (TypeError, ValueError):
+            low = high = math.nan
+        if not (math.isfinite(low) and math.isfinite(high) and high - low > 1e-30):
+            raise WavetankError(f"render: limits = {self.limits} must be two finite numbers, the lower one first.")
+        return key_of(color_by), (low, high), name, colors
+
+    def plane(self, extent: Extent) -> tuple[Any, float]:
+        """Unit normal [3] of a slice, and its distance from the origin along it [m]."""
+        axis, equals, place = ("z" if self.cut is None else self.cut).partition("=")
+        axes = "xyz" if extent.dim == 3 else "z"
+        try:
+            number = "xyz".index(axes[axes.index(axis.strip() or "?")])
+            offset = float(place) if equals else float(extent.middle[number])
+        except ValueError:
+            raise WavetankError(
+                f"render: cut = {self.cut!r} is not allowed; write an axis of {', '.join(axes)} and a place [m], as "
+                "in z=0.35."
+            ) from None
+        if not (math.isfinite(offset)):
+            raise WavetankError(f"render: cut = {self.cut!r} is not allowed; the place must be a finite number [m].")
+        return np.eye(3)[number], offset
+
+
+def quality_named(name: str) -> str:
+    """Return the name of a quality, or raise `WavetankError`."""
+    if name not in QUALITIES:
+        raise WavetankError(f"--quality = {name!r} is not known; use one of {', '.join(QUALITIES)}.")
+    return name

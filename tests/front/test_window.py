@@ -1,0 +1,273 @@
+"""A real window on a virtual display: what a person does there reaches the simulation, and pictures come back."""
+
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from xvfb import Display, missing
+
+import wavetank as wt
+from wavetank.front import play
+from wavetank.recording import Recording
+from wavetank.session import Session
+
+BASIN = wt.Scene(
+    title="Basin", spacing=0.05, tank=wt.Tank(size=(1.2, 0.6, 0.4)),
+    fluids=[wt.Block(lower=(0, 0, 0), upper=(0.6, 0.4, 0.4))],
+    solids=[wt.Box(name="pillar", center=(0.9, 0.1, 0.2), size=(0.12, 0.2, 0.12))],
+)  # fmt: skip
+NEEDED = "apt-get install xvfb xdotool libgl1 libgl1-mesa-dri libglx-mesa0 libegl1"
+
+
+@pytest.fixture(scope="module")
+def display():
+    if missing():
+        if os.environ.get("CI") == "true":
+            pytest.fail(f"{' and '.join(missing())} not here; .ci/run installs them with apt-get")
+        pytest.skip(f"{' and '.join(missing())} not here: {NEEDED}")
+    server = Display()
+    yield server
+    server.close()
+
+
+class Person:
+    """Someone in front of the window."""
+
+    def __init__(self, display, window) -> None:
+        import glfw
+        from imgui_bundle import glfw_utils
+
+        self.display, self.window, self.session = display, window, window.engine.session
+        self.desk = window.desk
+        handle = glfw_utils.glfw_window_hello_imgui()
+        self.left, self.top = glfw.get_window_pos(handle)
+        glfw.focus_window(handle)
+
+    def look(self, seconds: float = 0.15) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.window.draw()
+            time.sleep(0.005)
+
+    def until(self, true, seconds: float = 300.0) -> None:
+        end = time.monotonic() + seconds
+        while not true() and time.monotonic() < end:
+            self.look(0.03)
+        assert true()
+
+    def move(self, x: float, y: float) -> None:
+        self.display.do("mousemove", round(self.left + x), round(self.top + y))
+        self.look()
+
+    def press(self, button: int = 1) -> None:
+        self.display.do("mousedown", button)
+        self.look()
+
+    def lift(self, button: int = 1) -> None:
+        self.display.do("mouseup", button)
+        self.look()
+
+    def click(self, place: str, share: float = 0.5) -> None:
+        left, top, right, bottom = self.desk.places[place]
+        self.move(left + share * (right - left), 0.5 * (top + bottom))
+        self.press()
+        self.lift()
+
+    def key(self, name: str) -> None:
+        self.display.do("key", name)
+        self.look()
+
+    def water(self, u: float, v: float) -> tuple[float, float]:
+        x, y, width, height = self.window.stage.box
+        return x + u * width, y + v * height
+
+
+@pytest.fixture(scope="module")
+def person(display):
+    before = os.environ.get("DISPLAY")
+    os.environ["DISPLAY"] = display.name
+    assert play.why_no_window() is None
+    from wavetank.front.window.window import Window
+
+    window = Window(Session(BASIN), (1240, 820))
+    window.open()
+    someone = Person(display, window)
+    someone.until(lambda: window.engine.shown.number > 2)
+    yield someone
+    window.close()
+    os.environ.pop("DISPLAY") if before is None else os.environ.update(DISPLAY=before)
+
+
+def test_the_water_is_seen(person):
+    """The texture is on the screen, where it belongs, and it changes."""
+    person.key("h")
+    x, y, width, height = (round(side) for side in person.window.stage.box)
+    person.window.draw()
+    screen = person.window.screenshot()
+    painted = person.window.engine.shown.image
+    inside = screen[y + height // 2 : y + height - 8, x + 8 : x + width - 8]  # below the card of the tool
+    assert np.abs(inside.mean((0, 1)) - painted[len(painted) // 2 :].mean((0, 1))).max() < 4.0
+    assert inside.std() > 15.0
+    first = person.window.engine.shown.number
+    person.until(lambda: person.window.engine.shown.number > first)
+
+
+def test_a_key_pauses_and_another_computes_one_frame(person):
+    person.key("space")
+    person.until(lambda: person.session.paused)
+    ticks = person.session.ticks
+    person.key("period")
+    person.until(lambda: person.session.ticks == ticks + 1)
+    person.key("space")
+    person.until(lambda: not person.session.paused)
+    person.key("3")
+    assert person.desk.tool == "attract"
+    person.key("question")
+    assert person.desk.help
+    person.key("Escape")
+    assert not person.desk.help
+
+
+def test_a_slider_acts_at_once_and_another_waits_for_a_reset(person):
+    person.click("viscosity", 0.8)
+    person.until(lambda: person.session.sim.viscosity > 0.6)
+    spacing = person.session.sim.scene.spacing
+    person.click("spacing", 0.9)
+    assert "spacing" in person.desk.pending and person.session.sim.scene.spacing == spacing
+    person.look()
+    person.click("again")
+    person.until(lambda: person.session.sim.scene.spacing > 1.3 * spacing)
+    assert person.session.sim.viscosity > 0.6, "what was set stays"
+    assert not person.desk.pending
+
+
+def test_a_tool_pushes_the_water_and_ends(person):
+    person.click("tool.push")
+    assert person.desk.tool == "push"
+    person.move(*person.water(0.35, 0.6))
+    person.press()
+    person.until(lambda: [tool.name for tool, _ in person.session.hands.values()] == ["push"])
+    person.move(*person.water(0.5, 0.6))
+    point = person.session.hands[0][1].point
+    person.move(*person.water(0.6, 0.6))
+    person.until(lambda: np.linalg.norm(person.session.hands[0][1].point - point) > 0.02)
+    person.lift()
+    person.until(lambda: not person.session.hands)
+    done = [type(command).__name__ for _, command in person.session.log]
+    assert done.count("ToolBegin") == done.count("ToolEnd") == 1 and "ToolMove" in done
+
+
+def test_buttons_wheel_and_keys_move_the_camera(person):
+    person.key("h")
+    person.until(lambda: person.session._camera is None)
+    before = person.session.camera
+    person.move(*person.water(0.5, 0.6))
+    person.press(3)
+    person.move(*person.water(0.6, 0.65))
+    person.until(lambda: person.session.camera.eye != before.eye)
+    turned = person.session.camera
+    assert turned.distance == pytest.approx(before.distance) and turned.target == before.target
+    person.display.do("keydown", "w")
+    person.until(lambda: person.session.camera.target != turned.target)
+    person.display.do("keyup", "w")
+    person.lift(3)
+    way = np.subtract(person.session.camera.target, turned.target)
+    ahead = np.subtract(turned.target, turned.eye)
+    assert way @ ahead > 0.9 * np.linalg.norm(way) * np.linalg.norm(ahead)
+    assert not person.session.hands, "the right button is no tool"
+    person.look()
+    distance = person.session.camera.distance
+    person.display.do("click", 4)
+    person.until(lambda: person.session.camera.distance < 0.95 * distance)
+
+
+def test_pages_curves_scenes_and_files(person, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    person.until(lambda: len(person.desk.curves.get("density_error_mean", ())) > 1)
+    for page in ("Look", "Curves", "Keep"):
+        person.click(f"page.{page}")
+    person.click("keep.session.toml")
+    person.until(lambda: (tmp_path / "session.toml").exists())
+    saved = Recording.load(tmp_path / "session.toml")
+    assert 0 < saved.frames <= person.session.ticks and len(saved.commands) <= len(person.session.log)
+    person.click("page.Scenes")
+    person.look()
+    person.click("scene.double-dam-2d")
+    person.until(lambda: person.session.sim.scene.dim == 2)
+
+
+def test_a_file_that_is_dropped_is_opened_and_a_wrong_one_says_why(person, tmp_path):
+    BASIN.changed(title="Dropped").save(tmp_path / "mine.toml")
+    person.window._dropped(None, [str(tmp_path / "mine.toml")])
+    person.until(lambda: person.session.sim.scene.title == "Dropped")
+    (tmp_path / "wrong.toml").write_text("spacing = 'wide'\n")
+    person.window._dropped(None, [str(tmp_path / "wrong.toml")])
+    person.until(lambda: any("spacing" in note for note, _ in person.desk.notes))
+    assert person.session.sim.scene.title == "Dropped"
+
+
+def play_out(arguments, environment, until: str, seconds: float = 300.0) -> str:
+    """Start `wavetank play`, wait for a word of its, end it as a person does; return all that it said."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "wavetank", "play", "drop-2d", "--particles", "200", *arguments],
+        env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+    said = ""
+    end = time.monotonic() + seconds
+    while process.poll() is None and until not in said and time.monotonic() < end:
+        said += process.stdout.readline()
+    if process.poll() is None:
+        process.terminate()
+    said += process.communicate(timeout=300)[0]
+    return said
+
+
+def without_display() -> dict[str, str]:
+    quiet = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    return {**quiet, "BROWSER": "true"}
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere there is always a display")
+def test_without_a_display_play_serves_the_page_and_says_why():
+    said = play_out([], without_display(), "plays at")
+    assert "no window: there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); here is the page" in said
+    assert "token=" in said and "Traceback" not in said
+    said = play_out(["--window"], without_display(), "no such word")
+    assert said.count("\n") == 1 and said.startswith("wavetank: --window: there is no display")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere there is always a display")
+def test_reasons_are_told_apart(monkeypatch):
+    """A missing package, a missing library, a display that is not there."""
+    monkeypatch.setenv("DISPLAY", ":9")
+    monkeypatch.setitem(sys.modules, "moderngl", None)
+    assert play.why_no_window() == "the package moderngl is missing (pip install 'wavetank[window]')"
+    said = play_out(["--window"], {**os.environ, "DISPLAY": ":4999"}, "no such word")
+    assert "--window: the display cannot be opened (X11: Failed to open display :4999)." in said
+
+
+def test_play_opens_a_window_and_records(display, tmp_path):
+    """The command itself, from the window to the file of the session, on a display without another window."""
+    display = Display()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "wavetank", "play", "drop-2d", "--particles", "200", "--record", tmp_path / "s.toml"],
+        env=display.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+    try:
+        found = subprocess.run(
+            ["xdotool", "search", "--sync", "--onlyvisible", "--name", "^wavetank$"],
+            env=display.environment, capture_output=True, text=True, timeout=300,
+        ).stdout.split()  # fmt: skip
+        display.do("windowfocus", "--sync", found[0])
+        for _ in range(6):  # the first picture is slow where kernels are compiled
+            display.do("key", "space")
+            time.sleep(2.0)
+    finally:
+        process.terminate()
+        said = process.communicate(timeout=300)[0]
+        display.close()
+    assert process.returncode == 0 and "session written to" in said, said
+    assert "pause" in [command["do"] for command in Recording.load(tmp_path / "s.toml").commands]

@@ -1,0 +1,75 @@
+"""Work in whole numbers against kept ones: a change that costs more, on any machine, fails here.
+
+A change that costs less fails too: put the new number in its place. The tests of the lists are those of fixed places,
+so that they do not depend on how the last digit of a sum came out.
+"""
+
+import numpy as np
+import pytest
+
+from wavetank.fluids import Points
+from wavetank.lab import counts
+from wavetank.lab.bench import sized
+from wavetank.scene import Scene, Tank
+from wavetank.simulation import Simulation
+
+SPACING = 1 / 16
+#: ordered pairs, distance tests of the list build, bytes of all that the water needs
+CLOUD = {"pairs": 70148, "tests": 396636, "bytes": 1271784}
+#: of the first frames of a dam break with four iterations, after one that fills tables
+SUBSTEPS = [9, 9, 9, 8, 8, 8, 8]
+#: kernel launches: so many in a time step, and so many besides in a frame, foam included
+LAUNCHES_PER_STEP, LAUNCHES_PER_FRAME = 24, 9
+
+
+@pytest.fixture(scope="module")
+def cloud() -> Simulation:
+    """16 x 12 x 16 shaken particles in a tank.
+
+    Places are whole multiples of d / 64, and a quarter: no pair is as far as h and no cell's edge is hit, so that
+    nothing here is a matter of rounding.
+    """
+    lattice = np.stack(np.meshgrid(*(64 * np.arange(n) + 32 for n in (16, 12, 16)), indexing="ij"), -1).reshape(-1, 3)
+    shaken = lattice + np.random.Generator(np.random.PCG64(7)).integers(-12, 13, lattice.shape)
+    places = ((shaken + 0.25) * SPACING / 64).astype(np.float32)
+    tank = Tank(size=(2.0, 1.0, 1.0))
+    return Simulation(Scene(spacing=SPACING, tank=tank, fluids=[Points(positions=places)]))
+
+
+def test_the_lists_cost_what_they_did(cloud):
+    tests = counts.distance_tests(cloud)
+    found = {"pairs": counts.pairs(cloud), "tests": tests, "bytes": counts.water_bytes(cloud)}
+    assert found == CLOUD
+
+
+def test_distance_tests_are_those_of_the_cells_around(cloud):
+    """Counted again on the host: all particles in the 27 cells around, itself included."""
+    cells = np.floor(cloud.positions.astype(float) / (1.9 * SPACING)).astype(int)
+    _, which, number = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    held = {tuple(cell): n for cell, n in zip(cells, number[which.ravel()], strict=True)}
+    steps = [np.array(s) - 1 for s in np.ndindex(3, 3, 3)]
+    total = sum(held.get(tuple(cell + s), 0) for cell in cells for s in steps)
+    assert counts.distance_tests(cloud) == total
+
+
+def test_a_frame_is_as_many_launches_and_substeps_as_it_was():
+    sim = Simulation(sized(Scene.load("dam-break-2d"), 1500))
+    sim.step()
+    launches, substeps = [], []
+    for _ in SUBSTEPS:
+        launches.append(sum(counts.frame_launches(sim).values()))
+        substeps.append(sim.time_steps)
+    assert substeps == SUBSTEPS
+    assert launches == [LAUNCHES_PER_FRAME + LAUNCHES_PER_STEP * steps for steps in substeps]
+
+
+def test_two_runs_count_the_same():
+    totals = []
+    for _ in range(2):
+        sim = Simulation(sized(Scene.load("dam-break-2d"), 1500))
+        listed = 0
+        for _ in range(5):
+            sim.step()
+            listed += counts.pairs(sim)
+        totals.append((listed, counts.distance_tests(sim)))
+    assert totals[0] == totals[1]

@@ -1,0 +1,142 @@
+"""Implicit viscosity: exact rates, momentum, bounds and no-slip (Weiler et al. 2018; see the file's head)."""
+
+import math
+
+import numpy as np
+import pytest
+
+import wavetank as wt
+from wavetank.physics.implicit_viscosity import (
+    damper_scale,
+    drag_table,
+    is_thick,
+    iterations,
+    solve_viscosity,
+)  # fmt: skip
+from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.physics.step import coefficients, prepare_fluids
+from wavetank.simulation import Simulation
+
+D, DT = 0.05, 1 / 300
+
+
+def solved(x: np.ndarray, v: np.ndarray, viscosity: float, most: int = 400, **settings):
+    """Positions and velocities, in device order, before and after one solve; the number of iterations."""
+    dim = x.shape[1]
+    scene = wt.Scene(
+        spacing=D, gravity=(0.0,) * dim, dynamic_viscosity=viscosity,
+        fluids=[wt.Points(positions=x, velocities=v)], **settings,
+    )  # fmt: skip
+    sim = Simulation(scene)
+    sim.frame()
+    world = sim.world
+    before = world.particles.v.to_numpy().astype(np.float64)
+    c = coefficients(scene, DT)
+    kinds = prepare_fluids(world, world.particles, scene, DT)
+    number = solve_viscosity(
+        world.particles, world.scratch, world.fluids, world.grid, world.solids, c, kinds, sim.count, scene.support,
+        scene.no_slip, most,
+    )  # fmt: skip
+    after = world.particles.v.to_numpy().astype(np.float64)
+    return world.particles.x.to_numpy().astype(np.float64), before, after, number
+
+
+def lattice(dim: int, side: int) -> np.ndarray:
+    return (np.stack(np.meshgrid(*[np.arange(side)] * dim, indexing="ij"), -1).reshape(-1, dim) + 0.5) * D
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("viscosity", [1.0, 10.0, 100.0])
+def test_shear_wave_decays_as_an_implicit_step_of_nu_k_squared(dim, viscosity):
+    """Momentum diffusion: v_x = sin(k y) becomes v / (1 + dt nu k^2), with the lattice's error of order (k d)^2."""
+    side = 32 if dim == 2 else 14
+    x = lattice(dim, side)
+    k = 2 * math.pi / (side * D)
+    v = np.zeros_like(x)
+    v[:, 0] = np.sin(k * x[:, 1])
+    place, before, after, _ = solved(x, v, viscosity)
+    middle = np.all(np.abs(place - 0.5 * side * D) < 0.25 * side * D, axis=1)
+    share = np.sum((after * before)[middle]) / np.sum((before**2)[middle])
+    assert 1.0 / share - 1.0 == pytest.approx(DT * viscosity / 1000.0 * k**2, rel=0.06)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("most", [1, 3, 400])
+def test_momentum_is_exact_and_energy_falls_wherever_the_iterations_end(dim, most):
+    rng = np.random.default_rng(2)
+    x = lattice(dim, 20 if dim == 2 else 8) + rng.normal(0, 0.15 * D, (20**2 if dim == 2 else 8**3, dim))
+    v = rng.normal(0, 1, x.shape)
+    place, before, after, number = solved(x, v, 1e5, most)
+    assert number <= most
+    assert np.abs((after - before).sum(axis=0)).max() < 1e-5 * np.abs(before).sum()
+    turn = [np.cross(place, w).sum(axis=0) if dim == 3 else np.sum(place[:, 0] * w[:, 1] - place[:, 1] * w[:, 0])
+            for w in (before, after)]  # fmt: skip
+    assert np.abs(np.subtract(*turn)).max() < 1e-5 * np.abs(before).sum()
+    assert np.sum(after**2) <= np.sum(before**2)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_rotation_is_left_alone(dim):
+    """A rigid rotation has no strain: nothing changes, at the free faces neither."""
+    x = lattice(dim, 10)
+    away = x - x.mean(axis=0)
+    v = np.zeros_like(x)
+    v[:, 0], v[:, 1] = -3.0 * away[:, 1], 3.0 * away[:, 0]
+    _, before, after, _ = solved(x, v, 1e3)
+    np.testing.assert_allclose(after, before, atol=1e-4)
+
+
+def test_a_thousand_times_thicker_is_stable_and_takes_no_more_than_asked():
+    rng = np.random.default_rng(3)
+    x = lattice(2, 16)
+    _, before, after, number = solved(x, rng.normal(0, 1, x.shape), 1e6, 60)
+    assert number == 60
+    assert np.isfinite(after).all()
+    assert np.sum(after**2) < 0.5 * np.sum(before**2)
+
+
+def test_walls_continue_a_linear_profile():
+    """Couette: with v = gamma y over a wall at rest the half lattice and the fluid balance, so that nothing changes."""
+    side, slope = 12, 4.0
+    x = lattice(2, side)
+    v = np.zeros_like(x)
+    v[:, 0] = slope * x[:, 1]
+    tank = wt.Tank(size=(4.0, 4.0))
+    place, before, after, _ = solved(x + [1.5, 0.0], v, 10.0, tank=tank)
+    inside = (np.abs(place[:, 0] - 1.8) < 0.1) & (place[:, 1] < 5 * D)
+    np.testing.assert_allclose(after[inside], before[inside], atol=1e-3 * slope * D)
+    _, _, slipping, _ = solved(x + [1.5, 0.0], v, 10.0, tank=tank, no_slip=0.0)
+    bottom = inside & (place[:, 1] < D)
+    assert np.all(slipping[bottom, 0] > before[bottom, 0] + 1e-3 * slope * D)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_drag_of_a_wall_is_half_the_lattice(dim):
+    """At half a spacing the wall's layers give what the lattice's own layers beyond y = 0 would."""
+    ratio = 1.9
+    r = rest_points(dim, ratio)
+    length = np.linalg.norm(r, axis=1)
+    below = r[:, 1] < -0.5
+    f = (1 - length / ratio) * r[:, 0] ** 2 / length**2
+    expected = np.sum((f * -r[:, 1])[below]) / 0.5
+    place = 0.5 / ratio * TABLE_SIZE
+    table = drag_table(dim, ratio)
+    k = int(place)
+    value = table[k] + (table[k + 1] - table[k]) * (place - k)
+    assert value == pytest.approx(expected, rel=0.01)
+    assert table[-1] == 0.0
+    assert damper_scale(dim, ratio, 0.1) == pytest.approx(damper_scale(dim, ratio, 1.0) * 100)
+
+
+def test_thin_fluids_pay_nothing():
+    scene = wt.Scene.load("still-tank").changed(dynamic_viscosity=0.0)
+    sim = Simulation(scene)
+    sim.step()
+    assert sim.world.fluids.arrays == {}
+    c = coefficients(scene, DT)
+    kinds = prepare_fluids(sim.world, sim.world.particles, scene, DT)
+    assert not is_thick(kinds, c, 3, scene.support)
+    assert iterations(1.0, 60) == 0
+    assert (
+        1 <= iterations(1.1, 60) < iterations(100.0, 60) < iterations(1e4, 1000) == math.ceil(0.5 * 100 * math.log(200))
+    )

@@ -1,0 +1,56 @@
+"""How long a time step may be."""
+
+import math
+
+import numpy as np
+import pytest
+
+import wavetank as wt
+from wavetank.physics.time_step import largest_speed, pool_depth, substeps
+from wavetank.simulation import Simulation
+
+
+def pool(depth: float, d: float, dim: int = 2, **more) -> wt.Scene:
+    size = (20 * d, 1.5 * depth, 10 * d)[:dim]
+    upper = (20 * d, depth, 10 * d)[:dim]
+    return wt.Scene(spacing=d, tank=wt.Tank(size=size), fluids=[wt.Block(lower=(0.0,) * dim, upper=upper)], **more)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("gravity", [(0.0, -9.81, 0.0), (-4.0, -3.0, 0.0)])
+def test_depth_is_twice_the_mean_height_against_gravity(dim, gravity):
+    world = Simulation(pool(0.5, 0.025, dim, gravity=gravity[:dim]))
+    up = -np.array(gravity[:dim]) / math.hypot(*gravity)
+    size = np.array(world.scene.tank.size)
+    heights = world.positions @ up
+    lowest = np.minimum(size * up, 0.0).sum()
+    depth = pool_depth(world.world.particles, world.count, gravity[:dim], np.zeros(dim), size)
+    assert depth == pytest.approx(2.0 * (heights.mean() - lowest), rel=2e-3)
+
+
+def test_every_bound_holds():
+    """v dt <= courant d, sqrt(g H) dt <= wave_courant d, dt <= frame_time / substeps."""
+    scene = pool(0.5, 0.01)
+    for speed, depth in [(0.0, 0.0), (0.0, 2.0), (3.0, 0.1), (5.0, 5.0)]:
+        n = substeps(scene, scene.frame_time, speed, depth)
+        dt = scene.frame_time / n
+        assert speed * dt <= scene.courant * scene.spacing
+        assert math.sqrt(9.81 * depth) * dt <= scene.wave_courant * scene.spacing * 1.0001
+        assert n >= scene.substeps
+    assert substeps(scene, scene.frame_time, 1e6, 0.0) == scene.largest_substeps
+
+
+def test_nothing_has_neither_speed_nor_depth():
+    world = Simulation(wt.Scene(spacing=0.1, gravity=(0, 0), fluids=[]))
+    assert largest_speed(world.world.particles, 0) == 0.0
+    assert pool_depth(world.world.particles, 0, (0.0, 0.0), np.zeros(2), np.ones(2)) == 0.0
+
+
+def test_deep_water_of_fine_particles_does_not_boil():
+    """80 layers in one metre: with five time steps a frame they fall into themselves and bounce (docs/method.md)."""
+    world = Simulation(pool(1.0, 0.0125))
+    for _ in world.frames(0.8, 20):
+        pass
+    x, v = world.positions, world.velocities
+    assert 2.0 * x[:, 1].mean() == pytest.approx(1.0, abs=0.02)
+    assert np.sqrt((v**2).sum(1).mean()) < 0.1

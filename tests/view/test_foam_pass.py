@@ -1,0 +1,168 @@
+import numpy as np
+import pytest
+
+from wavetank import Camera, Scene, Tank
+from wavetank.state import new_diffuse, upload
+from wavetank.view.renderer import Renderer
+from wavetank.view.style import Style
+from wavetank.view.views import VIEWS
+
+WIDTH, HEIGHT = 96, 64
+FRONT = Camera(eye=(0.5, 0.5, 3.0), target=(0.5, 0.5, 0.5), height=1.2)
+
+
+def with_foam(frame, positions, kind=2, age=0.2):
+    """The frame with foam at `positions`."""
+    x = np.asarray(positions, np.float32).reshape(-1, frame.dim)
+    diffuse = new_diffuse(frame.dim, len(x) + 3)
+    upload(diffuse.x, x)
+    for array, value in ((diffuse.kind, kind), (diffuse.age, age), (diffuse.life, 1.0)):
+        upload(array, np.full(len(x) + 3, value))
+    upload(diffuse.id, np.arange(len(x)))
+    frame.diffuse, frame.foam_count = diffuse, len(x)
+    return frame
+
+
+def picture(frame, camera=FRONT, size=(WIDTH, HEIGHT), **options):
+    return Renderer(*size).render(frame, camera, view="particles", legend=False, **options).astype(int)
+
+
+def cloud(n=400, center=(0.5, 0.5, 0.5), spread=0.05, seed=0):
+    return np.array(center) + np.random.default_rng(seed).normal(0, spread, (n, len(center)))
+
+
+@pytest.fixture
+def wall_of_water(tank_scene, make_frame):
+    """A dark sheet of particles across the tank at z = 0.5."""
+    x, y = np.meshgrid(np.arange(0.025, 1, 0.05), np.arange(0.025, 1, 0.05))
+    return lambda: make_frame(tank_scene, np.stack([x.ravel(), y.ravel(), np.full(x.size, 0.5)], 1))
+
+
+def test_foam_in_front_is_white(wall_of_water):
+    bare = picture(wall_of_water(), color_by="#103060", radius=0.8)
+    white = picture(with_foam(wall_of_water(), cloud(center=(0.5, 0.5, 0.75))), color_by="#103060", radius=0.8)
+    middle = (slice(28, 36), slice(44, 52))
+    assert bare[middle].max() < 180
+    assert white[middle].mean() > 200
+    assert (white[:5] == bare[:5]).all()
+
+
+def test_foam_far_behind_is_hidden_and_a_little_behind_shows_through(wall_of_water):
+    bare = picture(wall_of_water(), color_by="#103060", radius=0.8)
+    far = picture(
+        with_foam(wall_of_water(), cloud(center=(0.5, 0.5, 0.2), spread=0.02)), color_by="#103060", radius=0.8
+    )
+    near = [
+        picture(with_foam(wall_of_water(), [(0.5, 0.5, 0.5 + z)] * 3), color_by="#103060", radius=0.8).sum()
+        for z in (0.1, -0.03, -0.08)
+    ]
+    assert (far == bare).all()
+    assert near[0] > near[1] > near[2] > bare.sum()
+
+
+def test_foam_fades_with_age(wall_of_water):
+    light = [
+        picture(with_foam(wall_of_water(), cloud(center=(0.5, 0.5, 0.75)), age=age), color_by="#103060").sum()
+        for age in (0.1, 0.6, 0.9, 1.0)
+    ]
+    assert light[0] > light[1] > light[2] > light[3] == picture(wall_of_water(), color_by="#103060").sum()
+
+
+def test_the_kinds_differ_in_size(wall_of_water):
+    spray, foam, bubble = (
+        picture(with_foam(wall_of_water(), cloud(60, (0.5, 0.5, 0.75), 0.15), kind=kind), color_by="#103060").sum()
+        for kind in (1, 2, 3)
+    )
+    assert foam > bubble > 0
+    assert foam > spray > picture(wall_of_water(), color_by="#103060").sum()
+
+
+def test_foam_in_a_shadow_is_darker(tank_scene, make_frame):
+    """A roof of water between the sun and the foam."""
+    x, z = np.meshgrid(np.arange(0.025, 1, 0.03), np.arange(0.025, 1, 0.03))
+    roof = np.stack([x.ravel(), np.full(x.size, 0.9), z.ravel()], 1)
+    foam = cloud(2000, (0.6, 0.4, 0.5), 0.03)
+    lit = picture(with_foam(make_frame(tank_scene, [(0.0, 0.0, 0.0)]), foam))
+    shaded = picture(with_foam(make_frame(tank_scene, roof), foam))
+    middle = (slice(36, 38), slice(52, 54))
+    assert lit[middle].mean() > shaded[middle].mean() + 10
+
+
+def test_total_light_does_not_depend_on_the_size_of_the_picture(wall_of_water):
+    """Also where particles are smaller than a pixel, foam covers the same share of the picture."""
+    shares = []
+    for size in ((48, 32), (192, 128), (768, 512)):
+        look = {"size": size, "color_by": "#103060", "radius": 0.8}
+        bare = picture(wall_of_water(), **look) / 255
+        foamy = picture(with_foam(wall_of_water(), cloud(150, (0.5, 0.5, 0.75), 0.15)), **look) / 255
+        shares.append((foamy**2.2 - bare**2.2).mean())
+    assert shares[0] == pytest.approx(shares[2], rel=0.2)
+    assert shares[1] == pytest.approx(shares[2], rel=0.2)
+
+
+@pytest.mark.parametrize("supersample", [1, 2])
+def test_pictures_repeat_and_do_not_depend_on_the_order(wall_of_water, supersample):
+    x = cloud(3000, (0.5, 0.5, 0.6), 0.2)
+    pictures = []
+    for order in (slice(None), slice(None), slice(None, None, -1)):
+        frame = with_foam(wall_of_water(), x[order])
+        upload(frame.diffuse.id, np.arange(len(x))[order])
+        pictures.append(Renderer(WIDTH, HEIGHT, supersample).render(frame, FRONT, view="particles"))
+    assert (pictures[0] == pictures[1]).all()
+    assert (pictures[0] == pictures[2]).all()
+
+
+@pytest.mark.parametrize("eye", [(0.5, 0.5, 0.5), (0.5, 0.5, -5.0), (0.5, 0.5, 0.5001)])
+def test_foam_at_and_behind_the_eye_does_no_harm(wall_of_water, eye):
+    camera = Camera(eye=eye, target=(eye[0], eye[1], eye[2] - 1.0))
+    for size in ((1, 1), (WIDTH, HEIGHT)):
+        frame = with_foam(wall_of_water(), [*cloud(50), (0.5, 0.5, 0.5), (1e9, 0.0, 0.0), (0.5, 0.5, 1e30)])
+        assert picture(frame, camera, size).shape == (size[1], size[0], 3)
+
+
+def test_a_plane_shows_foam_on_water_and_spray_on_paper(make_frame):
+    scene = Scene(spacing=0.05, tank=Tank(size=(1.0, 1.0)))
+    x, y = np.meshgrid(np.arange(0.025, 1, 0.05), np.arange(0.025, 0.5, 0.05))
+    water = np.stack([x.ravel(), y.ravel()], 1)
+    options = {"color_by": "#103060", "radius": 0.8, "camera": Camera.framing(scene, WIDTH / HEIGHT)}
+    bare = picture(make_frame(scene, water), **options)
+    below = picture(with_foam(make_frame(scene, water), cloud(50, (0.5, 0.2), 0.02)), **options)
+    above = picture(with_foam(make_frame(scene, water), cloud(50, (0.5, 0.8), 0.02), kind=1), **options)
+    assert (below - bare).max() > 80
+    assert (below - bare).min() >= -2
+    assert (above - bare).min() < -25  # darker than the paper
+
+
+def test_without_foam_the_pass_changes_nothing(wall_of_water):
+    from wavetank.view.passes import foam, tonemap
+
+    renderer = Renderer(WIDTH, HEIGHT)
+    image = renderer.render(wall_of_water(), FRONT, view="particles")
+    shot = renderer.shot(wall_of_water(), FRONT, Style(view="particles"))
+    passes = VIEWS["particles"].passes
+    for draw in (*passes, tonemap.draw):
+        if draw is not foam.draw:
+            draw(shot, renderer.buffers)
+    assert foam.draw in passes
+    assert (renderer.render(with_foam(wall_of_water(), np.zeros((0, 3))), FRONT, view="particles") == image).all()
+
+
+def test_the_reports_foam_is_white(make_frame, tank_scene):
+    """Coloured by foam, a particle below the threshold is blue and one above it white."""
+    speed = tank_scene.foaming_speed
+    frame = make_frame(tank_scene, [(0.25, 0.5, 0.5), (0.75, 0.5, 0.5)], [(0.999 * speed, 0, 0), (1.001 * speed, 0, 0)])
+    image = picture(frame, color_by="foam", radius=2.0)
+    slow, fast = image[HEIGHT // 2, WIDTH // 2 - 13], image[HEIGHT // 2, WIDTH // 2 + 13]
+    assert slow[2] > slow[0] + 60
+    assert np.ptp(fast) < 30
+    assert frame.foaming.tolist() == [False, True]
+
+
+@pytest.mark.parametrize(("z", "visible"), [(1.05, True), (0.5, False)])
+def test_foam_lies_over_the_waters_surface_too(tank_scene, make_frame, z, visible):
+    """In the view water: bright in front of its surface, unseen far behind it."""
+    x = 0.05 * np.stack(np.meshgrid(*(np.arange(0.5, 20),) * 3, indexing="ij"), -1).reshape(-1, 3)
+    bare = Renderer(WIDTH, HEIGHT).render(make_frame(tank_scene, x), FRONT).astype(int)
+    foam = with_foam(make_frame(tank_scene, x), cloud(center=(0.5, 0.5, z), spread=0.02))
+    change = np.abs(Renderer(WIDTH, HEIGHT).render(foam, FRONT).astype(int) - bare).max()
+    assert change > 20 if visible else change == 0

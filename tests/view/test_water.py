@@ -1,0 +1,209 @@
+"""What the water passes promise: flat where it is flat, darker where it is deep, the same from frame to frame."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from test_ellipsoids import lattice
+
+from wavetank import Box, Scene, Simulation, Tank
+from wavetank.compiler import qd
+from wavetank.view.camera import Camera
+from wavetank.view.passes import ellipsoids, flatten, thickness
+from wavetank.view.renderer import Renderer, affordable
+
+D = 0.05
+CAMERA = Camera(eye=(0.7, 1.3, 2.6), target=(0.5, 0.3, 0.5))
+
+
+def pool(make_frame, depth=0.5, noise=0.0, **scene):
+    x = lattice((0, 0, 0), (1.0, depth, 1.0))
+    x = x + np.random.default_rng(1).normal(0.0, noise * D, x.shape) if noise else x
+    return make_frame(Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 1.0)), **scene), np.clip(x, 0.25 * D, 1 - 0.25 * D))
+
+
+def smoothed(field, camera=CAMERA):
+    """`field` of depths [m] after the filter, as `camera` sees it."""
+    rows, columns = field.shape
+    depth, spare = (qd.ndarray(qd.i32, shape=field.shape) for _ in range(2))
+    depth.from_numpy(np.ascontiguousarray(field, np.float32).view(np.int32) & ~1)
+    flatten.even(depth, spare, camera.lens(columns, rows), flatten.SIGMA * D, D)
+    return depth.to_numpy().view(np.float32)
+
+
+def slanted(camera=CAMERA, rows=90, columns=120):
+    """Depths of a plane that is seen at a grazing angle."""
+    lens = camera.lens(columns, rows)
+    v = (0.5 * rows - np.arange(rows) - 0.5) * lens.pixel
+    u = (np.arange(columns) + 0.5 - 0.5 * columns) * lens.pixel
+    return 2.0 / (1.0 - 1.5 * v[:, None] - 0.4 * u)
+
+
+def test_a_plane_passes_the_filter_at_any_slant():
+    plane = slanted()
+    assert np.abs(smoothed(plane) - plane).max() < 2e-6 * plane.max()
+
+
+def test_bumps_are_taken_out():
+    plane = slanted()
+    bumps = 0.1 * D * np.sin(0.9 * np.arange(90))[:, None] * np.sin(0.9 * np.arange(120))
+    left = (smoothed(plane + bumps) - plane)[20:-20, 20:-20]
+    assert np.abs(left).max() < 0.08 * np.abs(bumps).max()
+
+
+def test_an_edge_pulls_nothing_towards_itself():
+    field = np.full((60, 80), 2.0)
+    field[:, 40:] = 3.0
+    field[:10] = 1.7e38
+    out = smoothed(field)
+    assert np.abs(out[10:, :40] - 2.0).max() < 1e-6
+    assert np.abs(out[10:, 40:] - 3.0).max() < 1e-6
+    assert (out[:10] > 1e30).all()
+
+
+@pytest.mark.parametrize("deep", [0.2, 0.5, 0.9])
+def test_thickness_is_that_of_the_water(make_frame, deep):
+    renderer = Renderer(120, 90)
+    frame = pool(make_frame, deep)
+    shot = renderer.shot(frame, Camera(eye=(0.5, 4.0, 0.5), target=(0.5, 0.0, 0.5)))
+    for draw in (ellipsoids.draw, thickness.draw):
+        draw(shot, renderer.buffers)
+    seen = renderer.buffers.water.thickness.to_numpy() * D / 4096.0
+    coarse = thickness.coarseness(shot)
+    middle = seen[45 // coarse - 2 : 45 // coarse + 3, 60 // coarse - 2 : 60 // coarse + 3]
+    assert middle == pytest.approx(deep, rel=0.06)
+    assert np.ptp(middle) < 0.08 * deep
+
+
+def test_a_surface_at_rest_has_no_bumps(make_frame):
+    """Normals of a noisy flat surface, seen at a slant, all point up."""
+    renderer = Renderer(240, 160)
+    renderer.render(pool(make_frame, noise=0.05), CAMERA)
+    depth = renderer.buffers.water.depth.to_numpy()
+    top = CAMERA.project([(0.3, 0.5, 0.3), (0.7, 0.5, 0.7)], 240, 160)
+    rows, columns = np.sort(top[:, 1]).astype(int), np.sort(top[:, 0]).astype(int)
+    heights = world_heights(renderer, CAMERA)[rows[0] : rows[1], columns[0] : columns[1]]
+    assert heights.size > 100
+    assert (depth[rows[0] : rows[1], columns[0] : columns[1]] < 0x7F000000).all()
+    assert heights.std() < 0.04 * D
+    assert heights.mean() == pytest.approx(0.5, abs=0.35 * D)
+
+
+def world_heights(renderer, camera):
+    """Height [m] of the water at every pixel."""
+    depth = renderer.buffers.water.depth.to_numpy().view(np.float32)
+    lens = camera.lens(depth.shape[1], depth.shape[0])
+    rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]] + 0.5
+    v, u = (depth.shape[0] / 2 - rows) * lens.pixel, (columns - depth.shape[1] / 2) * lens.pixel
+    return lens.eye[1] + depth * (u * lens.right[1] + v * lens.up[1] + lens.forward[1])
+
+
+def test_deeper_water_is_darker_and_has_its_colour(make_frame):
+    camera = Camera(eye=(0.5, 4.0, 0.5), target=(0.5, 0.0, 0.5))
+    red = [Renderer(60, 60).render(pool(make_frame, deep), camera)[27:33, 27:33, 0].mean() for deep in (0.1, 0.4, 0.9)]
+    assert red[0] > red[1] + 8 > red[2] + 16
+    green = Renderer(60, 60).render(pool(make_frame), camera, view="water", color_by="#40d060")[27:33, 27:33]
+    assert green[..., 1].mean() > green[..., 2].mean() + 15
+
+
+def test_dye_colours_the_water_where_it_is(make_frame):
+    """Half of a pool is dyed red: that half is red, the other keeps its colour."""
+    frame = pool(make_frame)
+    dye = frame.dye.to_numpy()
+    dye[: frame.count] = np.where(frame.positions[:, 0] < 0.5, (127 << 24) | (230 << 16) | (30 << 8) | 40, 0)
+    above = Camera(eye=(0.5, 4.0, 0.5), target=(0.5, 0.0, 0.5))
+    clear = Renderer(64, 48).render(frame, above).astype(int)
+    frame.dye.from_numpy(dye)
+    dyed = Renderer(64, 48).render(frame, above).astype(int)
+    left, right = (slice(20, 28), slice(24, 28)), (slice(20, 28), slice(36, 40))
+    assert dyed[left][..., 0].mean() > dyed[left][..., 2].mean() + 40
+    assert np.abs(dyed[right] - clear[right]).max() <= 2
+
+
+def test_what_stands_behind_the_water_is_seen_through_it_and_moved(make_frame):
+    pillar = [Box(center=(0.5, 0.2, 0.3), size=(0.15, 0.4, 0.15))]
+    x = lattice((0, 0, 0), (1.0, 0.5, 1.0))
+    x = x[np.abs(x[:, [0, 2]] - (0.5, 0.3)).max(axis=1) > 0.1]
+    scene = Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 1.0)), solids=pillar)
+    camera = Camera(eye=(0.5, 0.3, 4.0), target=(0.5, 0.3, 0.0)).orbit(0.3, 0.0)
+    wet = Renderer(160, 120).render(make_frame(scene, x), camera).astype(int)
+    dry = Renderer(160, 120).render(make_frame(scene, []), camera).astype(int)
+    row = int(camera.project((0.5, 0.2, 0.3), 160, 120)[0, 1])
+
+    def middle(picture):
+        columns = np.nonzero(
+            picture[row, :, 0] - picture[row, :, 2] > np.median(picture[row, :, 0] - picture[row, :, 2]) + 25
+        )[0]
+        assert len(columns) > 3
+        return columns.mean()
+
+    assert abs(middle(wet) - middle(dry)) > 1.0
+
+
+def test_the_waters_shadow_is_coloured(make_frame, tank_scene):
+    camera = Camera(eye=(2.2, 1.6, 2.6), target=(1.2, 0.0, 0.5))
+    wet, dry = (
+        Renderer(160, 120).render(f, camera).astype(int) for f in (pool(make_frame), make_frame(tank_scene, []))
+    )
+    column, row, _ = camera.project((1.15, 0.0, 0.5), 160, 120)[0]
+    change = (dry - wet)[int(row) - 1 : int(row) + 2, int(column) - 1 : int(column) + 2].reshape(-1, 3).mean(axis=0)
+    assert change[0] > change[2] + 4 > 4
+
+
+def test_the_eye_under_water_sees_through_it(make_frame):
+    frame = pool(make_frame, 0.8)
+    inside = Camera(eye=(0.5, 0.4, 0.7), target=(0.5, 0.2, 0.0), field_of_view=1.0)
+    wet = Renderer(64, 48).render(frame, inside).reshape(-1, 3).astype(float)
+    dry = Renderer(64, 48).render(make_frame(frame.scene, []), inside).reshape(-1, 3).astype(float)
+    assert wet[:, 0].mean() < dry[:, 0].mean() - 20
+    assert wet[:, 2].mean() > wet[:, 0].mean() + 30
+
+
+def test_many_samples_agree_with_one_but_are_smoother(make_frame):
+    frame = pool(make_frame)
+    one = Renderer(160, 120).render(frame, CAMERA).astype(float)
+    renderer = Renderer(160, 120)
+    many = renderer.render(frame, CAMERA, samples=8).astype(float)
+    assert np.abs(one - many).mean() < 3.0
+    assert (renderer.render(frame, CAMERA, samples=8) == many).all()
+    assert (renderer.render(frame, CAMERA) == one).all()
+    assert np.abs(np.diff(many, axis=1)).mean() < np.abs(np.diff(one, axis=1)).mean()
+
+
+def test_a_still_tank_does_not_flicker():
+    """From frame to frame of resting water next to nothing changes: only outlines that cross a pixel do."""
+    sim = Simulation(Scene.load("still-tank").changed(spacing=0.05))
+    sim.advance(2.5)
+    renderer = Renderer(320, 180, 2)
+    first = renderer.render(sim.frame()).astype(int)
+    sim.step()
+    change = np.abs(renderer.render(sim.frame()).astype(int) - first).max(axis=2)
+    assert (change > 2).mean() < 0.002
+    assert change.mean() < 0.05
+
+
+def test_timings_name_every_pass(make_frame):
+    spent = {}
+    Renderer(32, 24).render(pool(make_frame), CAMERA, timings=spent)
+    assert {"ellipsoids", "surface", "flatten", "thickness", "water", "tonemap", "backdrop"} <= set(spent)
+    assert min(spent.values()) >= 0.0
+
+
+def test_large_pictures_are_affordable(make_frame):
+    assert affordable(8192, 4320, 2) == 1
+    assert affordable(3840, 2160, 2) == 2
+    image = Renderer(8192, 64).render(pool(make_frame, 0.2))
+    assert image.shape == (64, 8192, 3)
+
+
+def test_the_sun_of_a_sample_moves_within_its_size(make_frame):
+    renderer = Renderer(32, 24)
+    shot = renderer.shot(pool(make_frame))
+    moved = [renderer._moved(shot, k) for k in range(32)]
+    angles = [np.arccos(min(1.0, float(m.look.to_sun @ shot.look.to_sun))) for m in moved]
+    assert max(angles) <= np.arctan(shot.look.sun_size) + 1e-4
+    assert max(angles) > 0.5 * shot.look.sun_size
+    offsets = np.array([m.lens.middle - shot.lens.middle for m in moved])
+    assert np.abs(offsets).max() <= 0.5
+    assert np.abs(offsets.mean(axis=0)).max() < 0.06
+    assert dataclasses.replace(moved[0], lens=shot.lens, sun=shot.sun, water_sun=shot.water_sun, look=shot.look) == shot
