@@ -38,8 +38,9 @@ class Person:
 
     def __init__(self, display, window) -> None:
         import glfw
-        from imgui_bundle import glfw_utils
+        from imgui_bundle import glfw_utils, imgui
 
+        self.imgui = imgui
         self.display, self.window, self.session = display, window, window.engine.session
         self.desk = window.desk
         handle = glfw_utils.glfw_window_hello_imgui()
@@ -59,18 +60,29 @@ class Person:
         assert true()
 
     def move(self, x: float, y: float) -> None:
+        """Move the pointer, and wait until the window has seen it there: a busy machine may take a while."""
         self.display.do("mousemove", round(self.left + x), round(self.top + y))
+        self.until(lambda: max(abs(self.pointer.x - x), abs(self.pointer.y - y)) <= 1.0)
         self.look()
+
+    @property
+    def pointer(self):
+        return self.imgui.get_mouse_pos()
 
     def press(self, button: int = 1) -> None:
-        self.display.do("mousedown", button)
-        self.look()
+        self._hold(button, True)
 
     def lift(self, button: int = 1) -> None:
-        self.display.do("mouseup", button)
+        self._hold(button, False)
+
+    def _hold(self, button: int, down: bool) -> None:
+        self.display.do("mousedown" if down else "mouseup", button)
+        self.until(lambda: self.imgui.is_mouse_down({1: 0, 2: 2, 3: 1}[button]) == down)
         self.look()
 
     def click(self, place: str, share: float = 0.5) -> None:
+        self.until(lambda: place in self.desk.places)
+        self.look(0.05)  # what has just appeared may still move once
         left, top, right, bottom = self.desk.places[place]
         self.move(left + share * (right - left), 0.5 * (top + bottom))
         self.press()
