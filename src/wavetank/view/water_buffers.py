@@ -101,5 +101,5 @@ def _stains(frame: Frame) -> np.ndarray:
 
 
 def _ellipsoids(capacity: int) -> Ellipsoids:
-    vectors = {name: qd.ndarray(vec3, shape=(capacity,)) for name in ("center", "axes", "mixed", "outward")}
-    return Ellipsoids(**vectors, size=qd.ndarray(qd.f32, shape=(capacity,)))
+    vectors = {name: qd.ndarray(vec3, shape=(2 * capacity,)) for name in ("center", "axes", "mixed", "outward")}
+    return Ellipsoids(**vectors, size=qd.ndarray(qd.f32, shape=(2 * capacity,)))

@@ -32,7 +32,12 @@ REACH = 2.2  # d
 BALL = 0.58  # d: radius of a lone particle, a little more than that of its volume
 LEAST = 0.36  # d: radius across a sheet
 WIDEST = {2: 1.9, 3: 1.15}  # d: radius in full water; a plane can afford smoother outlines
+OPEN = vector(-1e6, -1e6, -1e6), vector(1e6, 1e6, 1e6)  # m: corners of no tank
+BEYOND = 1.3  # d: how far what touches a pane reaches through it
 DEPTH_2D = 0.75  # d: half thickness of a 2-D world's water
+#: Sum of the weights from which on a particle is not drawn: 0.93 of a lattice's, which the particles a spacing and
+#: more below a surface reach; a 2-D world shows all of its water.
+FULL = {2: 1e9, 3: 0.93 * 16.9}
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
@@ -42,15 +47,16 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     # A 2-D world shows all of its water.
     mark_deep(water.cells, 4 if shot.frame.dim == 3 and water.cells.own else 0)
     fit(
-        water.cells, water.ellipsoids, shot.frame.dim, *_walls(shot), d, REACH * d, LEAST * d,
-        (WIDEST[shot.frame.dim] - LEAST) * d, BALL * d, DEPTH_2D * d, shot.frame.count,
+        water.cells, water.ellipsoids, shot.frame.dim, *walls(shot), d, REACH * d, LEAST * d,
+        (WIDEST[shot.frame.dim] - LEAST) * d, BALL * d, BEYOND * d, DEPTH_2D * d, FULL[shot.frame.dim],
+        shot.frame.count,
     )  # fmt: skip
 
 
-def _walls(shot: Shot) -> tuple[Any, Any]:
+def walls(shot: Shot) -> tuple[Any, Any]:
     """Corners of the tank; far away where there is none."""
     if shot.frame.scene.tank is None:
-        return vector(-1e6, -1e6, -1e6), vector(1e6, 1e6, 1e6)
+        return OPEN
     return vector(*shot.extent.lower), vector(*shot.extent.upper)
 
 
@@ -70,13 +76,15 @@ def mark_deep(cells: Cells, full: qd.i32):
 @qd.kernel(fastcache=True)
 def fit(
     cells: Cells, ellipsoids: Ellipsoids, dim: qd.template(), lower: vec3, upper: vec3, spacing: qd.f32,
-    reach: qd.f32, least: qd.f32, growth: qd.f32, ball: qd.f32, depth_2d: qd.f32, count: qd.i32,
+    reach: qd.f32, least: qd.f32, growth: qd.f32, ball: qd.f32, beyond: qd.f32, depth_2d: qd.f32, full: qd.f32,
+    count: qd.i32,
 ):  # fmt: skip
     """Fit an ellipsoid to the neighbourhood of every particle that is not deep inside."""
     for a in range(count):
         p = cells.x[a]
         cell = cells.cell[cells.order[a]]
         ellipsoids.outward[a] = vec3(0.0, 0.0, 0.0)
+        ellipsoids.size[count + a] = -1.0
         if cells.fill[cell] == 1:
             ellipsoids.center[a] = p
             ellipsoids.size[a] = -1.0
@@ -115,13 +123,20 @@ def fit(
             trust = qd.min(qd.max((weight - few) / qd.static(3.5 if dim == 3 else 1.5), 0.0), 1.0)
             diagonal = trust * (least + growth * n) + (1.0 - trust) * ball
             side = trust * growth * o
-            # Water goes on behind a wall as far as its looks are concerned: what touches one reaches through it.
-            touch = vec3(0.0, 0.0, 0.0)
+            # As far as its looks are concerned water goes on behind a wall: what touches one is centred on it, as if
+            # joined with its mirror image, and reaches well through panes.
+            touch, shift, share = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0), 1.0
             for k in qd.static(range(dim)):
-                gap = qd.min(p[k] - lower[k], upper[k] - p[k]) / spacing
-                touch[k] = qd.min(qd.max((1.5 - gap) / 0.8, 0.0), 1.0)
-                diagonal[k] += touch[k] * qd.max(1.05 * spacing - diagonal[k], 0.0)
+                gap = p[k] - lower[k]
+                half = gap + diagonal[k]
+                if qd.static(k != 1):  # a floor, no ceiling; panes on both sides
+                    gap = qd.min(gap, upper[k] - p[k])
+                    half = gap + qd.max(diagonal[k], beyond)
+                touch[k] = qd.min(qd.max((1.5 - gap / spacing) / 0.8, 0.0), 1.0)
+                shift[k] = touch[k] * qd.select(p[k] - lower[k] > gap, gap, -gap)
+                diagonal[k] += touch[k] * (half - diagonal[k])
                 mean[k] *= 1.0 - touch[k]
+                share *= share_before_wall(gap / reach)
             free = 1.0 - touch
             side *= vec3(free.x * free.y, free.x * free.z, free.y * free.z)
             if qd.static(dim == 2):
@@ -129,10 +144,39 @@ def fit(
             out = mean.norm()
             flat = qd.static(0.31 if dim == 3 else 0.34) * reach  # out of a particle in a flat surface
             at_surface = qd.min(qd.max((out / flat - 0.5) / 0.35, 0.0), 1.0)
-            ellipsoids.center[a] = p + 0.9 * trust * at_surface * (1.0 - flat / qd.max(out, 0.3 * flat)) * mean
+            pull = 0.9 * trust * at_surface * (1.0 - flat / qd.max(out, 0.3 * flat))
+            ellipsoids.center[a] = p + shift + pull * mean
             ellipsoids.outward[a] = -trust * mean / reach
             ellipsoids.axes[a], ellipsoids.mixed[a] = squared(diagonal, side)
             ellipsoids.size[a] = qd.max(diagonal.x, diagonal.y, diagonal.z) + side.norm()
+            if weight > full * share:
+                if qd.max(touch.x, touch.y, touch.z) == 0.0:
+                    ellipsoids.size[a] = -1.0
+            elif qd.static(dim == 3):
+                mirror(ellipsoids, a, count + a, p, lower, upper, 3.2 * spacing)
+
+
+@qd.func
+def mirror(ellipsoids: Ellipsoids, a, b, p, lower, upper, reach):
+    """Put the mirror image of ellipsoid `a` behind the nearest pane, if that is within `reach`, into place `b`."""
+    x, z = qd.min(p.x - lower.x, upper.x - p.x), qd.min(p.z - lower.z, upper.z - p.z)
+    if qd.min(x, z) < reach:
+        turn, wall = vec3(-1.0, 1.0, 1.0), qd.select(p.x - lower.x > x, upper, lower)
+        if z < x:
+            turn, wall = vec3(1.0, 1.0, -1.0), qd.select(p.z - lower.z > z, upper, lower)
+        c = ellipsoids.center[a]
+        ellipsoids.center[b] = qd.select(turn < 0.0, 2.0 * wall - c, c)
+        ellipsoids.outward[b] = turn * ellipsoids.outward[a]
+        ellipsoids.axes[b] = ellipsoids.axes[a]
+        ellipsoids.mixed[b] = vec3(turn.x * turn.y, turn.x * turn.z, turn.y * turn.z) * ellipsoids.mixed[a]
+        ellipsoids.size[b] = ellipsoids.size[a]
+
+
+@qd.func
+def share_before_wall(gap):
+    """Share of the weight of full water that a wall `gap` reaches away leaves."""
+    t = qd.min(gap, 1.0)
+    return 0.5 + t * (15.0 - t * t * (10.0 - 3.0 * t * t)) / 16.0
 
 
 @qd.func

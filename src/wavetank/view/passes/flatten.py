@@ -14,15 +14,17 @@ narrow range of depth, followed by a clean-up with a small window.
 Where we differ: the taps of both sides are taken in pairs, and their mean is compared with the depth in the middle.
 A plane passes that test at any slant and comes out as the plane it was (inverse depth is what is linear in a picture
 in perspective, so that is what is averaged); a pair with a side beyond an edge is left out as a whole, so an edge
-pulls nothing towards itself and leaves no halo. What lies on a pane (its last bit is set) is flat already. Large
-windows are sampled at up to `TAPS` pairs.
+pulls nothing towards itself and leaves no halo. What lies well before a pane (its last bit is set) will not be seen
+and stays as it is. Large windows are sampled at up to `TAPS` pairs.
 """
 
 from typing import Any
 
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, pixels_per_metre
+from wavetank.view.lens import Lens, pixels_per_metre, ray_direction, ray_origin, vec3, view_ray
+from wavetank.view.passes.ellipsoids import OPEN, walls
+from wavetank.view.passes.solids import box_interval
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import water_of
 
@@ -31,14 +33,18 @@ NARROW, SLOPE = 1.0, 5.0  # d
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
-    """Smooth the water's depth in place."""
+    """Smooth the water's depth in place; in a plane nothing looks at its shape."""
+    if shot.frame.dim == 2:
+        return
     water, d = water_of(buffers, shot), shot.extent.spacing
-    even(water.depth, water.spare, shot.lens, SIGMA * d, d)
+    even(water.depth, water.spare, shot.lens, SIGMA * d, d, *walls(shot))
 
 
-def even(depth: Any, spare: Any, lens: Lens, sigma: float, d: float) -> None:
+def even(
+    depth: Any, spare: Any, lens: Lens, sigma: float, d: float, lower: Any = OPEN[0], upper: Any = OPEN[1]
+) -> None:
     """Smooth `depth` as `lens` sees it, in place; the second round closes the gaps between the first one's taps."""
-    straighten(lens, depth)
+    straighten(lens, lower, upper, d, depth)
     for clean in (0, 1):
         blur(lens, 0, 1, TAPS, clean, sigma, NARROW * d, SLOPE * d, depth, spare)
         blur(lens, 1, 0, TAPS, clean, sigma, NARROW * d, SLOPE * d, spare, depth)
@@ -46,14 +52,22 @@ def even(depth: Any, spare: Any, lens: Lens, sigma: float, d: float) -> None:
 
 
 @qd.kernel(fastcache=True)
-def straighten(lens: Lens, depth: qd.types.ndarray()):
-    """Put q in the place of depth; 0 (or far below any other) where there is no water."""
+def straighten(lens: Lens, lower: vec3, upper: vec3, margin: qd.f32, depth: qd.types.ndarray()):
+    """Put q in the place of depth; 0 (or far below any other) where there is no water.
+
+    The last bit is set where the surface lies more than `margin` [m] before the tank.
+    """
     for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
         z = qd.bit_cast(depth[row, column], qd.f32)
-        q = -qd.min(z, 1e9)
+        q, outside = -qd.min(z, 1e9), 0
         if lens.perspective > 0.5:
             q = qd.select(z < 1e30, 1.0 / z, 0.0)
-        depth[row, column] = (qd.bit_cast(q, qd.i32) & ~1) | (depth[row, column] & 1)
+        if z < 1e30:
+            ray = view_ray(lens, row, column)
+            origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
+            there = box_interval(origin, direction, lower, upper)
+            outside = qd.cast((there[0] - z) * direction.norm() > margin, qd.i32)
+        depth[row, column] = (qd.bit_cast(q, qd.i32) & ~1) | outside
 
 
 @qd.kernel(fastcache=True)

@@ -45,7 +45,7 @@ def draw_over_water(shot: Shot, buffers: Buffers) -> None:
     """Do the same where the water is not part of the picture's depth but lies in front of it."""
     if shot.frame.foam_count > 0:
         water = water_of(buffers, shot)
-        merge(buffers.depth, water.depth, water.spare)
+        merge(buffers.depth, water.spare, water.spare)
         lay(shot, buffers, water.spare)
 
 

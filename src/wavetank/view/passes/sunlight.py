@@ -8,8 +8,9 @@ its thickness along the sun's rays, and of the depth at which they meet it.
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec2, vec3
-from wavetank.view.passes import flatten, occlusion, shadow, smooth, spheres, surface, thickness
-from wavetank.view.passes.surface import normal_at
+from wavetank.view.passes import flatten, occlusion, panes, shadow, smooth, spheres, surface, thickness
+from wavetank.view.passes.ellipsoids import walls
+from wavetank.view.passes.surface import normal_of, rise_at
 from wavetank.view.passes.thickness import thickness_at
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import UNIT, WaterBuffers, water_of
@@ -39,7 +40,8 @@ def see_water(shot: Shot, buffers: Buffers, water: WaterBuffers) -> None:
         water.cells.x, shot.frame.count, sun, 1.0, thickness.DISC[3] * d, thickness.peak(3), water.sun_thickness
     )  # fmt: skip
     surface.see(shot, buffers, sun, water.sun_first)
-    flatten.even(water.sun_first, water.sun_spare, sun, CAUSTIC_SIGMA * d, d)
+    flatten.even(water.sun_first, water.sun_spare, sun, CAUSTIC_SIGMA * d, d, *walls(shot))
+    panes.clip(sun, *walls(shot), water.sun_first)
     thickness.clear(water.caustic)
     gather(sun, shot.look.to_sun, d / UNIT, d, water.sun_first, water.sun_thickness, water.caustic)
 
@@ -59,7 +61,7 @@ def gather(
         moved = vec2(0.0, 0.0)
         if first[row, column] < 0x7F000000:  # FARTHEST
             z = qd.bit_cast(first[row, column], qd.f32)
-            n = normal_at(sun, row, column, z, 3.0 * spacing, first)
+            n = normal_of(sun, row, column, z, rise_at(row, column, z, 3.0 * spacing, first))
             cosi = qd.max(n.dot(to_sun), 0.05)
             bent = -0.7519 * to_sun + (0.7519 * cosi - qd.sqrt(1.0 - 0.5653 * (1.0 - cosi * cosi))) * n
             travel = thickness_at(tau_map, vec2(column + 0.5, row + 0.5), unit)

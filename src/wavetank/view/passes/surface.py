@@ -17,8 +17,6 @@ Within an ellipsoid rays count as parallel; at a distance of a hundred radii tha
 
 from typing import Any
 
-import numpy as np
-
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import (
@@ -26,14 +24,11 @@ from wavetank.view.lens import (
     from_view,
     pixels_per_metre,
     plane_position,
-    ray_direction,
-    ray_origin,
     to_view,
+    vec2,
     vec3,
-    vector,
-    view_ray,
 )
-from wavetank.view.passes.solids import box_interval
+from wavetank.view.passes.ellipsoids import walls
 from wavetank.view.passes.spheres import clear_depth
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import Ellipsoids, water_of
@@ -51,27 +46,20 @@ def see(shot: Shot, buffers: Buffers, lens: Lens, depth: Any) -> None:
     """Fill `depth` with the water as `lens` sees it."""
     clear_depth(depth)
     largest = max(LARGEST * depth.shape[0], 2.0)
-    splat(water_of(buffers, shot).ellipsoids, shot.frame.count, lens, largest, AWAY, depth)
-    if shot.frame.scene.tank is None:
-        return
-    if shot.frame.dim == 2:
-        # The plane itself is what is kept: a box around it, as deep as the water is drawn.
-        thick = np.array([0.0, 0.0, 10.0 * shot.extent.spacing])
-        cut(lens, vector(*(shot.extent.lower - thick)), vector(*(shot.extent.upper + thick)), depth)
-    else:
-        press(lens, vector(*shot.extent.lower), vector(*shot.extent.upper), shot.extent.spacing, depth)
+    splat(water_of(buffers, shot).ellipsoids, shot.frame.count, lens, *walls(shot), largest, AWAY, depth)
 
 
 @qd.kernel(fastcache=True)
 def splat(
-    ellipsoids: Ellipsoids, count: qd.i32, lens: Lens, largest: qd.f32, away: qd.f32, depth: qd.types.ndarray()
+    ellipsoids: Ellipsoids, count: qd.i32, lens: Lens, lower: vec3, upper: vec3, largest: qd.f32, away: qd.f32,
+    depth: qd.types.ndarray(),
 ):  # fmt: skip
     """Lower `depth` to the front of every ellipsoid that may be seen."""
     rows, columns = depth.shape[0], depth.shape[1]
-    for n in range(count):
+    for n in range(2 * count):
         # Sorted by place: the end that is nearer goes first and hides the rest.
         i = n
-        if lens.forward.dot(ellipsoids.center[0] - ellipsoids.center[count - 1]) > 0.0:
+        if lens.forward.dot(ellipsoids.center[0] - ellipsoids.center[count - 1]) > 0.0 and i < count:
             i = count - 1 - n
         c = to_view(lens, ellipsoids.center[i])
         size = ellipsoids.size[i]
@@ -79,6 +67,13 @@ def splat(
         if lens.perspective < 0.5:
             look = lens.forward
         hidden = look.dot(ellipsoids.outward[i]) > away * look.norm()
+        if i >= count and size > 0.0:
+            # A mirror image before a pane would hide what it is the image of.
+            outside = vec3(0.0, 0.0, 0.0)
+            for k in qd.static((0, 2)):
+                x = ellipsoids.center[i][k]
+                outside[k] = qd.cast(x > upper[k], qd.f32) - qd.cast(x < lower[k], qd.f32)
+            hidden = look.dot(outside) <= 0.0
         if size > 0.0 and c.z > lens.near + size and not hidden:
             scale = pixels_per_metre(lens, c.z)
             fill_ellipse(lens, c, scale, qd.min(1.0, largest / (size * scale)), ellipsoids.axes[i],
@@ -123,7 +118,7 @@ def fill_ellipse(lens: Lens, c, scale, shrink, axes, mixed, rows, columns, depth
             for column in range(left, right + 1):
                 u = (column - at) * size  # from the middle of the row
                 front = c.z + gx * (center + u) + gy * v - half * qd.sqrt(qd.max(reach - pxx * u * u, 0.0))
-                key = qd.bit_cast(front, qd.i32) & ~1  # the last bit is for `press`
+                key = qd.bit_cast(front, qd.i32) & ~1  # the last bit is for `flatten`
                 if key > 0 and key < depth[row, column]:
                     qd.atomic_min(depth[row, column], key)
 
@@ -136,46 +131,6 @@ def times(axes, mixed, v):
         mixed.x * v.x + axes.y * v.y + mixed.z * v.z,
         mixed.y * v.x + mixed.z * v.y + axes.z * v.z,
     )
-
-
-@qd.kernel(fastcache=True)
-def cut(lens: Lens, lower: vec3, upper: vec3, depth: qd.types.ndarray()):
-    """Leave out what reaches through a wall of a 2-D world."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        if depth[row, column] < 0x7F000000:  # FARTHEST
-            ray = view_ray(lens, row, column)
-            panes = box_interval(ray_origin(lens, ray), ray_direction(lens, ray), lower, upper)
-            if panes[0] > panes[1]:
-                depth[row, column] = 0x7F000000
-
-
-@qd.kernel(fastcache=True)
-def press(lens: Lens, lower: vec3, upper: vec3, spacing: qd.f32, depth: qd.types.ndarray()):
-    """Move water that lies against a pane onto it, where it is flat, and leave out what reaches through."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        key = depth[row, column]
-        if key < 0x7F000000:  # FARTHEST
-            flat = 0
-            ray = view_ray(lens, row, column)
-            origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
-            z = qd.bit_cast(key, qd.f32)
-            panes = box_interval(origin, direction, lower, upper)
-            enter = panes[0]
-            if z > panes[1] or panes[0] > panes[1]:  # an ellipsoid reaches through a wall
-                depth[row, column] = 0x7F000000  # FARTHEST
-            elif enter > lens.near:
-                at = origin + enter * direction
-                side = qd.min(qd.abs(at.x - lower.x), qd.abs(at.x - upper.x))
-                front = qd.min(qd.abs(at.z - lower.z), qd.abs(at.z - upper.z))
-                if qd.min(side, front) < 1e-3 * spacing:  # not through the open top
-                    slope = qd.abs(direction.x) if side < front else qd.abs(direction.z)
-                    into = (z - enter) * slope / spacing  # way from the pane, along its normal
-                    ease = qd.min(qd.max((into - 0.25) / 0.35, 0.0), 1.0)
-                    z = enter + (z - enter) * ease * ease * (3.0 - 2.0 * ease)
-                    flat = qd.cast(z <= enter, qd.i32)
-                z = qd.max(z, enter)
-                # The last bit of a depth says that it lies on a pane: there nothing needs to be smoothed.
-                depth[row, column] = (qd.bit_cast(z, qd.i32) & ~1) | flat
 
 
 @qd.func
@@ -194,12 +149,16 @@ def rise_along(row, column, down, across, z, limit, depth: qd.template()):
 
 
 @qd.func
-def normal_at(lens: Lens, row, column, z, limit, depth: qd.template()):
-    """Unit normal, in the world and towards the eye, of the surface that `depth` holds."""
+def rise_at(row, column, z, limit, depth: qd.template()):
+    """Change of depth [m] to the next column and to the next row, from the smoother sides."""
+    return vec2(rise_along(row, column, 0, 1, z, limit, depth), rise_along(row, column, 1, 0, z, limit, depth))
+
+
+@qd.func
+def normal_of(lens: Lens, row, column, z, rise):
+    """Unit normal, in the world and towards the eye, of a surface at depth `z` that rises so from pixel to pixel."""
     uv = plane_position(lens, row, column) * lens.perspective
     wide = lens.pixel * (1.0 + lens.perspective * (z - 1.0))
-    right = rise_along(row, column, 0, 1, z, limit, depth)
-    below = rise_along(row, column, 1, 0, z, limit, depth)
     # Cross product of the ways along the surface: (wide + u right, v right, right), (u below, v below - wide, below).
-    n = vec3(right, -below, -wide - uv.x * right + uv.y * below)
+    n = vec3(rise.x, -rise.y, -wide - uv.x * rise.x + uv.y * rise.y)
     return from_view(lens, n).normalized(1e-20)

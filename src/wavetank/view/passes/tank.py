@@ -39,8 +39,8 @@ def draw_front(shot: Shot, buffers: Buffers) -> None:
     """Draw those edges once more that lie in front of the water; the others shine through it."""
     if shot.frame.scene.tank is not None:
         water = water_of(buffers, shot)
-        _mark_over(shot, buffers, water.depth)
-        blend_front(shot.look, buffers.depth, water.depth, buffers.lines, buffers.color)
+        _mark_over(shot, buffers, water.spare)
+        blend_front(shot.look, buffers.depth, water.spare, buffers.lines, buffers.color)
 
 
 def _mark_over(shot: Shot, buffers: Buffers, depth: Any) -> tuple[Any, Any]:

@@ -33,8 +33,10 @@ from wavetank.view.lens import (
 )
 from wavetank.view.look import Look
 from wavetank.view.passes import cut
+from wavetank.view.passes.ellipsoids import walls
+from wavetank.view.passes.panes import share_behind, tank_interval
 from wavetank.view.passes.shade import background, smoothstep
-from wavetank.view.passes.surface import normal_at
+from wavetank.view.passes.surface import normal_of, rise_at
 from wavetank.view.passes.thickness import DISC, coarseness, dye_at, thickness_at
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import UNIT, water_of
@@ -56,11 +58,15 @@ def under_water(shot: Shot, buffers: Buffers) -> int:
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Lay the water over the backdrop."""
     water = water_of(buffers, shot)
+    lower, upper = walls(shot)
+    if shot.frame.dim == 2:  # as deep as the water is drawn
+        thick = vector(0.0, 0.0, 10.0 * shot.extent.spacing)
+        lower, upper = lower - thick, upper + thick
     lay(
-        shot.lens, shot.look, vector(*shot.extent.lower), vector(*shot.extent.upper), DISC[2] * shot.extent.spacing,
+        shot.lens, shot.look, lower, upper, DISC[2] * shot.extent.spacing,
         shot.absorption, shot.scattering, shot.look.glow * shot.tint, float(coarseness(shot)),
         shot.extent.spacing / UNIT, shot.extent.spacing, under_water(shot, buffers), shot.frame.dim, water.depth,
-        water.thickness, water.dye, shot.usual, buffers.depth, water.behind, buffers.color,
+        water.thickness, water.dye, shot.usual, buffers.depth, water.behind, buffers.color, water.spare,
     )  # fmt: skip
 
 
@@ -122,79 +128,109 @@ def lay(
     lens: Lens, look: Look, lower: vec3, upper: vec3, disc: qd.f32, absorption: vec3, scattering: qd.f32,
     back_light: vec3, coarse: qd.f32, unit: qd.f32, spacing: qd.f32, under: qd.i32, dim: qd.template(),
     water_depth: qd.types.ndarray(), thickness: qd.types.ndarray(), dye: qd.types.ndarray(), usual: qd.f32,
-    depth: qd.types.ndarray(),
-    behind: qd.types.ndarray(), color: qd.types.ndarray(),
+    depth: qd.types.ndarray(), behind: qd.types.ndarray(), color: qd.types.ndarray(), seen: qd.types.ndarray(),
 ):  # fmt: skip
-    """Shade every pixel that shows water, and copy the backdrop to the others."""
+    """Shade every pixel that shows water, and copy the backdrop to the others; `seen` is filled with its depth."""
     for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        key = water_depth[row, column]
         result = behind[row, column]
+        z = qd.bit_cast(water_depth[row, column], qd.f32)
+        back = qd.bit_cast(depth[row, column], qd.f32)
+        ray = view_ray(lens, row, column)
+        origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
+        there, wet, rise, n_wall = 0.0, 0.0, vec2(0.0, 0.0), vec3(0.0, 0.0, 0.0)
+        front = z
         if under == 1:
             # From inside there is no surface in front of anything: water dims and tints what is behind it.
-            ray = view_ray(lens, row, column)
             tau = thickness_at(thickness, vec2(column + 0.5, row + 0.5) / coarse, unit)
-            travel = qd.min(tau, qd.bit_cast(depth[row, column], qd.f32) * ray_direction(lens, ray).norm())
+            travel = qd.min(tau, back * direction.norm())
             result = result * qd.exp(-travel * absorption) + (1.0 - qd.exp(-travel * scattering)) * back_light
-        elif key < 0x7F000000 and key < depth[row, column]:  # FARTHEST
-            z = qd.bit_cast(key, qd.f32)
-            ray = view_ray(lens, row, column)
-            direction = ray_direction(lens, ray)
-            pace = direction.norm()
-            ahead = direction / pace
-            at = ray_origin(lens, ray) + z * direction
-            place = vec2(column + 0.5, row + 0.5)
-            tau = thickness_at(thickness, place / coarse, unit)
-            limit = 3.0 * spacing
-            n = normal_at(lens, row, column, z, limit, water_depth)
-            if qd.static(dim == 2):
-                # A plane has no shape in depth: it gets that of a drop between two panes, from its thickness.
-                tau = sheet_at(lens, thickness, place, coarse, unit, lower, upper, disc)
-                dx, dy = vec2(coarse, 0.0), vec2(0.0, coarse)
-                right = sheet_at(lens, thickness, place + dx, coarse, unit, lower, upper, disc) - sheet_at(
-                    lens, thickness, place - dx, coarse, unit, lower, upper, disc
-                )
-                below = sheet_at(lens, thickness, place + dy, coarse, unit, lower, upper, disc) - sheet_at(
-                    lens, thickness, place - dy, coarse, unit, lower, upper, disc
-                )
-                rise = disc / (2.0 * coarse * lens.pixel * spacing)
-                n = from_view(lens, vec3(-rise * right, rise * below, -1.0).normalized())
-            cosi = qd.max(-n.dot(ahead), 0.05)
-            mirror = 0.02 + 0.98 * (1.0 - cosi) ** 5
-            reflected = (ahead + 2.0 * cosi * n).normalized()
-            bent = 0.7519 * ahead + (0.7519 * cosi - qd.sqrt(1.0 - 0.5653 * (1.0 - cosi * cosi))) * n
-            # The least that a drop is thick; in a plane the rim keeps half of the colour.
-            tau = qd.max(tau, qd.static(0.15 if dim == 3 else 0.55) * spacing)
-            back = qd.bit_cast(depth[row, column], qd.f32)
-            travel = qd.min(tau, (back - z) * pace)
-            if qd.static(dim == 3):
-                if bent.y < -1e-3 and at.y > 0.0:
-                    travel = qd.min(travel, -at.y / bent.y)
-            c = to_view(lens, at + travel * bent)
-            shown = result
-            if c.z > lens.near:
-                there = to_pixel(lens, c)
-                r = qd.min(qd.max(qd.cast(there.y, qd.i32), 0), depth.shape[0] - 1)
-                e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), depth.shape[1] - 1)
-                if depth[r, e] > key:  # not what stands in front of the water
-                    shown = picture_at(behind, there)
-            swallow, tint = absorption, back_light
-            stained = dye_at(dye, place / coarse)
-            if stained[0] > 0.0:
-                # Dyed water swallows what its colour lacks; strong dye shows in a layer thinner than the usual.
-                color_of_dye = qd.min(qd.max(vec3(stained[1], stained[2], stained[3]), 0.02), 0.98)
-                share = qd.min(stained[0] * unit / tau, 1.0)
-                swallow = absorption + share * (-qd.log(color_of_dye) * (2.5 / usual) - absorption)
-                tint = back_light + share * (look.glow * color_of_dye - back_light)
-            left = qd.exp(-travel * swallow)
-            glow = (1.0 - qd.exp(-travel * scattering)) * tint
-            h = (look.to_sun - ahead).normalized(1e-9)
-            spark = qd.min(qd.max(n.dot(h), 0.0), 1.0) ** 600 * look.sparkle * look.sun
-            own = shown * left + glow
-            if qd.static(dim == 2):  # the rim of the sheet catches the light
-                # Light comes from above left, and less of it reaches the bottom.
-                high = (at.y - lower.y) / (upper.y - lower.y)
-                own *= (0.75 + 0.3 * qd.max(n.dot(look.to_sun), 0.0)) * (0.78 + 0.4 * qd.min(high, 1.0))
-                own += 0.35 * look.lamp * smoothstep((0.85 - tau / spacing) / 0.3)
-                mirror = 0.0  # on paper there is nothing to mirror
-            result = own + mirror * (environment(look, reflected) - own) + spark
-        color[row, column] = result
+        elif z < 1e30:
+            ends, turns, n_wall = tank_interval(lens, origin, direction, lower, upper)
+            front = qd.max(z, ends[0])
+            if ends[0] <= ends[1] and front < back:
+                there = 1.0
+                if qd.static(dim == 3):
+                    if z > ends[0] - spacing:
+                        rise = rise_at(row, column, z, 3.0 * spacing, water_depth)
+                    if ends[0] > lens.near and n_wall.y == 0.0:  # not through the open top
+                        wet = 1.0 - share_behind(z, ends[0], rise, vec2(turns.x, turns.y))
+                        if z <= ends[0] - spacing:
+                            wet = 1.0
+                    there = 1.0 - share_behind(z, ends[1], rise, vec2(turns.z, turns.w))
+        seen[row, column] = qd.select(there >= 0.5, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
+        water = vec3(0.0, 0.0, 0.0)
+        for layer in range(2):
+            share, n, z_layer = wet, n_wall, front
+            if layer == 1:
+                share, n = 1.0 - wet, normal_of(lens, row, column, z, rise)
+            if there * share > 0.0:
+                water += share * shine(
+                    lens, look, lower, upper, disc, absorption, scattering, back_light, coarse, unit, spacing, dim,
+                    row, column, z_layer, n, direction, origin, thickness, dye, usual, depth, behind,
+                )  # fmt: skip
+        color[row, column] = result + there * (water - result)
+
+
+@qd.func
+def shine(
+    lens: Lens, look: Look, lower, upper, disc, absorption, scattering, back_light, coarse, unit, spacing,
+    dim: qd.template(), row, column, z, normal, direction, origin, thickness: qd.template(), dye: qd.template(), usual,
+    depth: qd.template(), behind: qd.template(),
+):  # fmt: skip
+    """Radiance of the water that a pixel shows at depth `z` with this normal."""
+    n = normal
+    pace = direction.norm()
+    ahead = direction / pace
+    at = origin + z * direction
+    place = vec2(column + 0.5, row + 0.5)
+    tau = thickness_at(thickness, place / coarse, unit)
+    if qd.static(dim == 2):
+        # A plane has no shape in depth: it gets that of a drop between two panes, from its thickness.
+        tau = sheet_at(lens, thickness, place, coarse, unit, lower, upper, disc)
+        dx, dy = vec2(coarse, 0.0), vec2(0.0, coarse)
+        right = sheet_at(lens, thickness, place + dx, coarse, unit, lower, upper, disc) - sheet_at(
+            lens, thickness, place - dx, coarse, unit, lower, upper, disc
+        )
+        below = sheet_at(lens, thickness, place + dy, coarse, unit, lower, upper, disc) - sheet_at(
+            lens, thickness, place - dy, coarse, unit, lower, upper, disc
+        )
+        bulge = disc / (2.0 * coarse * lens.pixel * spacing)
+        n = from_view(lens, vec3(-bulge * right, bulge * below, -1.0).normalized())
+    cosi = qd.max(-n.dot(ahead), 0.05)
+    mirror = 0.02 + 0.98 * (1.0 - cosi) ** 5
+    reflected = (ahead + 2.0 * cosi * n).normalized()
+    bent = 0.7519 * ahead + (0.7519 * cosi - qd.sqrt(1.0 - 0.5653 * (1.0 - cosi * cosi))) * n
+    # The least that a drop is thick; in a plane the rim keeps half of the colour.
+    tau = qd.max(tau, qd.static(0.15 if dim == 3 else 0.55) * spacing)
+    travel = qd.min(tau, (qd.bit_cast(depth[row, column], qd.f32) - z) * pace)
+    if qd.static(dim == 3):
+        if bent.y < -1e-3 and at.y > 0.0:
+            travel = qd.min(travel, -at.y / bent.y)
+    c = to_view(lens, at + travel * bent)
+    shown = behind[row, column]
+    if c.z > lens.near:
+        seen = to_pixel(lens, c)
+        r = qd.min(qd.max(qd.cast(seen.y, qd.i32), 0), depth.shape[0] - 1)
+        e = qd.min(qd.max(qd.cast(seen.x, qd.i32), 0), depth.shape[1] - 1)
+        if qd.bit_cast(depth[r, e], qd.f32) > z:  # not what stands in front of the water
+            shown = picture_at(behind, seen)
+    swallow, tint = absorption, back_light
+    stained = dye_at(dye, place / coarse)
+    if stained[0] > 0.0:
+        # Dyed water swallows what its colour lacks; strong dye shows in a layer thinner than the usual.
+        color_of_dye = qd.min(qd.max(vec3(stained[1], stained[2], stained[3]), 0.02), 0.98)
+        share = qd.min(stained[0] * unit / tau, 1.0)
+        swallow = absorption + share * (-qd.log(color_of_dye) * (2.5 / usual) - absorption)
+        tint = back_light + share * (look.glow * color_of_dye - back_light)
+    left = qd.exp(-travel * swallow)
+    glow = (1.0 - qd.exp(-travel * scattering)) * tint
+    h = (look.to_sun - ahead).normalized(1e-9)
+    spark = qd.min(qd.max(n.dot(h), 0.0), 1.0) ** 600 * look.sparkle * look.sun
+    own = shown * left + glow
+    if qd.static(dim == 2):  # the rim of the sheet catches the light
+        # Light comes from above left, and less of it reaches the bottom.
+        high = (at.y - lower.y) / (upper.y - lower.y)
+        own *= (0.75 + 0.3 * qd.max(n.dot(look.to_sun), 0.0)) * (0.78 + 0.4 * qd.min(high, 1.0))
+        own += 0.35 * look.lamp * smoothstep((0.85 - tau / spacing) / 0.3)
+        mirror = 0.0  # on paper there is nothing to mirror
+    return own + mirror * (environment(look, reflected) - own) + spark
