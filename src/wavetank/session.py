@@ -14,7 +14,7 @@ from wavetank.commands import Command, FrameLength
 from wavetank.errors import WavetankError
 from wavetank.fluids import Points
 from wavetank.forces import Force
-from wavetank.game import Game
+from wavetank.game import HARMLESS, Game
 from wavetank.history import History
 from wavetank.pace import Pace
 from wavetank.params import LIVE
@@ -253,10 +253,14 @@ class Session:
         return tool
 
     def changed_scene(self, parameters: dict[str, Any]) -> Scene:
-        """Return the scene as it began, with the live parameters as they are now and `parameters` as given."""
+        """Return the scene as it began, with the live parameters as they are now and `parameters` as given.
+
+        A level keeps none that its water feels: a tank that was left tilted stands upright again.
+        """
         now = {name: getattr(self.sim.scene, name) for name in LIVE}
         start = {name: getattr(self.scene, name) for name in LIVE}
-        kept = {name: value for name, value in now.items() if value != start[name]}
+        free = LIVE if self.game is None else HARMLESS
+        kept = {name: value for name, value in now.items() if value != start[name] and name in free}
         return self.scene.changed(**{**kept, **parameters}) if kept or parameters else self.scene
 
     def present_scene(self) -> Scene:
