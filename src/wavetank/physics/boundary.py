@@ -79,6 +79,8 @@ def follow(k, at, end, solids: SolidSet, gap):
                 # What is left of a way straight into the wall is rounding.
                 if (end - at).norm() < 1e-3 * length:
                     end = at
+    # What is not done by now is not known to be free: it ends where it has got to.
+    end = at
     for _ in range(2):
         value = local_distance(solids, k, end)
         if value.w < gap:
