@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from wavetank.errors import WavetankError
 from wavetank.fluids import Ball, Block, Points
+from wavetank.meshes.mesh import Mesh
 from wavetank.params import PARAMETERS, PRESETS
 from wavetank.scene import Scene, Tank, bundled_scenes
 from wavetank.solids import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
@@ -27,7 +28,7 @@ __version__ = _version("wavetank")
 
 __all__ = [
     "PARAMETERS", "PRESETS", "Ball", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference", "HalfSpace",
-    "Intersection", "Points", "Scene", "Session", "Simulation", "Sphere", "Tank", "Union", "WavetankError",
+    "Intersection", "Mesh", "Points", "Scene", "Session", "Simulation", "Sphere", "Tank", "Union", "WavetankError",
     "bundled_scenes", "render", "show",
 ]  # fmt: skip
 

@@ -279,7 +279,7 @@ def command_of(table: Any) -> Command:
         known = ", ".join(_BY_NAME)
         raise WavetankError(f"do = {str(keys.get('do'))[:40]!r} is not a command; it must be one of {known}.")
     try:
-        return kind.model_validate(keys)
+        return kind.model_validate(keys, context={"files": False})
     except ValidationError as report:
         raise WavetankError(f"{keys['do']}: {sentence(report, kind)}") from None
 

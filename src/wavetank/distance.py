@@ -9,6 +9,9 @@ Two-dimensional worlds are the plane z = 0 of the same solids: a box without a t
 
 Distance functions after Inigo Quilez, "3D SDF functions" (2013); the gradients are worked out here.
 
+A mesh is a grid of distances (`meshes/grid.py`) between whose nodes they are trilinear; its gradient is theirs, of unit
+length. Beyond the grid no distance is overestimated: the nearest point of the grid lies between.
+
     code      symbol   meaning                                  unit
     p                  point in the frame of the shape          m
     size      a        sizes of the shape, see each function    m
@@ -159,8 +162,48 @@ class SolidSet:
     old_rotation: qd.types.ndarray()  # vec4 [solids], at its start
     plane: qd.types.ndarray()  # vec4 [solids]: walls of the tank as planes (n, b) at the end, distance n x + b [1, m]
     sweep: qd.types.ndarray()  # vec2 [solids]: way of the origin [m] and of a point 1 m away in the substep
+    grid: qd.types.ndarray()  # i32 vec4 [grids]: number of its first sample, numbers of nodes along x, y, z
+    samples: qd.types.ndarray()  # f32: for each grid its cell edge, then the distances at its nodes, x fastest; m
     count: qd.i32
     tank_count: qd.i32  # the first so many are the walls of the tank, all of them half-spaces
+
+
+@qd.func
+def grid_distance(solids: SolidSet, number, p, scale):
+    """(gradient, distance) of a grid of distances around the origin, enlarged by `scale`."""
+    first, nx, ny, nz = solids.grid[number][0], solids.grid[number][1], solids.grid[number][2], solids.grid[number][3]
+    cell = solids.samples[first]
+    last = vec3(nx - 1, ny - 1, nz - 1)
+    q = p / (cell * scale) + 0.5 * last
+    inside = qd.max(qd.min(q, last), 0.0)
+    low = qd.min(qd.floor(inside), last - 1.0)
+    f = inside - low
+    at = first + 1 + qd.cast(low.x, qd.i32) + nx * (qd.cast(low.y, qd.i32) + ny * qd.cast(low.z, qd.i32))
+    up, back = nx, nx * ny
+    a, b = solids.samples[at], solids.samples[at + 1]
+    c, d = solids.samples[at + up], solids.samples[at + up + 1]
+    e, g = solids.samples[at + back], solids.samples[at + back + 1]
+    h, k = solids.samples[at + back + up], solids.samples[at + back + up + 1]
+    ac, bd = a + (c - a) * f.y, b + (d - b) * f.y
+    eh, gk = e + (h - e) * f.y, g + (k - g) * f.y
+    near, far = ac + (bd - ac) * f.x, eh + (gk - eh) * f.x
+    value = (near + (far - near) * f.z) / cell
+    slope = vec3(
+        (bd - ac) + ((gk - eh) - (bd - ac)) * f.z,
+        ((c - a) + ((d - b) - (c - a)) * f.x) * (1.0 - f.z) + ((h - e) + ((k - g) - (h - e)) * f.x) * f.z,
+        far - near,
+    ) / cell  # fmt: skip
+    beyond = q - inside
+    if beyond.dot(beyond) > 0.0:
+        for axis in qd.static(range(3)):
+            if beyond[axis] != 0.0:
+                slope[axis] = 0.0
+        slope = beyond + value * slope
+        value = qd.sqrt(beyond.dot(beyond) + value * value)
+    n = vec3(0.0, 1.0, 0.0)
+    if slope.norm() > 1e-6:
+        n = slope.normalized()
+    return vec4(n.x, n.y, n.z, value * cell * scale)
 
 
 @qd.func
@@ -168,7 +211,12 @@ def node_distance(solids: SolidSet, node, p):
     """(gradient, distance) of one shape of a program, at the point `p` in the solid's frame."""
     turn = solids.turn[node]
     at = rotate(conjugate(turn), p - solids.offset[node])
-    value = shape_distance(solids.op[node], at, solids.size[node])
+    op = solids.op[node]
+    value = vec4(0.0, 0.0, 0.0, 0.0)
+    if op >= 65536:  # GRIDS
+        value = grid_distance(solids, op - 65536, at, solids.size[node].x)
+    else:
+        value = shape_distance(op, at, solids.size[node])
     n = rotate(turn, vec3(value.x, value.y, value.z))
     return vec4(n.x, n.y, n.z, value.w)
 
@@ -196,6 +244,17 @@ def local_distance(solids: SolidSet, k, p):
             if (op == -1 and below.w < top.w) or (op != -1 and below.w > top.w):  # UNION
                 top = below
     return top
+
+
+@qd.func
+def grain(solids: SolidSet, k):
+    """Largest cell edge [m] of the grids that solid `k` is made of; 0 where its distances are exact."""
+    largest = 0.0
+    for node in range(solids.first[k], solids.first[k + 1]):
+        if solids.op[node] >= 65536:  # GRIDS
+            cell = solids.samples[solids.grid[solids.op[node] - 65536][0]]
+            largest = qd.max(largest, cell * solids.size[node].x)
+    return largest
 
 
 @qd.func

@@ -36,10 +36,13 @@ class Model(BaseModel, metaclass=_OneSentence):
     model_config = ConfigDict(extra="forbid", validate_assignment=True, arbitrary_types_allowed=True)
 
     @classmethod
-    def parse(cls, table: dict[str, Any], origin: str = "") -> Any:
-        """Validate `table` as this model; raise `WavetankError` naming `origin`, the key and what is allowed."""
+    def parse(cls, table: dict[str, Any], origin: str = "", **context: Any) -> Any:
+        """Validate `table` as this model; raise `WavetankError` naming `origin`, the key and what is allowed.
+
+        `context` tells where files are that the table names: `folder`, and `files` = False where none may be opened.
+        """
         try:
-            return cls.model_validate(table)
+            return cls.model_validate(table, context=context)
         except ValidationError as report:
             raise WavetankError((f"{origin}: " if origin else "") + sentence(report, cls)) from None
 
@@ -85,7 +88,7 @@ def _key(location: tuple[str | int, ...]) -> str:
     for part in location:
         if isinstance(part, int):
             text += f"[{part}]"
-        elif part.startswith("tuple[") or part in _SHAPE_TAGS:
+        elif part.startswith(("tuple[", "constrained-")) or part in _SHAPE_TAGS:
             continue
         else:
             text += f".{part}" if text else part

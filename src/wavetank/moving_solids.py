@@ -9,7 +9,7 @@ import numpy as np
 from wavetank import solids
 from wavetank.errors import WavetankError
 from wavetank.rotations import interpolate, turned, unit_quaternion
-from wavetank.solids import Solid
+from wavetank.solid import Solid
 from wavetank.state import upload
 
 Pose = tuple[np.ndarray, np.ndarray]  # position [m], shape [3], and rotation (w, x, y, z)
@@ -19,8 +19,8 @@ SMALLEST = 0.02  # size at which a growing solid starts, of its full size
 class MovingSolids:
     """Solids by name; the first `tank_count` are the walls of the tank."""
 
-    def __init__(self, walls: Sequence[Solid], others: Sequence[Solid], friction: float) -> None:
-        self.tank_count, self.friction = len(walls), friction
+    def __init__(self, walls: Sequence[Solid], others: Sequence[Solid], friction: float, spacing: float) -> None:
+        self.tank_count, self.friction, self.spacing = len(walls), friction, spacing
         self.members = [*walls, *others]
         self.names: list[str] = []
         for solid in self.members:
@@ -32,7 +32,7 @@ class MovingSolids:
 
     def rebuild(self) -> None:
         """Put all on the device anew, at rest where they are."""
-        self.device = solids.build(self.members, self.tank_count, self.friction)
+        self.device = solids.build(self.members, self.tank_count, self.friction, self.spacing)
         self.has_friction = self.friction > 0.0 or any(solid.friction for solid in self.members)
         self.reaches = [solid.reach() for solid in self.members]
         self.walls = [solid.program()[0] for solid in self.members[: self.tank_count]]

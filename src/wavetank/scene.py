@@ -20,7 +20,8 @@ from wavetank.goal import Goal
 from wavetank.materials import COLORS, Material, Properties
 from wavetank.model import Model, Size, sentence
 from wavetank.params import PRESETS, QUALITIES, Parameters
-from wavetank.solids import AnySolid, HalfSpace, Solid
+from wavetank.solid import Solid
+from wavetank.solids import AnySolid, HalfSpace
 
 MAX_PARTICLES = 100_000_000
 _TOLERANCE = 1e-6  # of a spacing: how far a fluid may reach beyond a wall by rounding
@@ -72,6 +73,9 @@ class Scene(Parameters):
         if "gravity" not in self.model_fields_set:
             self.__dict__["gravity"] = self.gravity[: self._world_dim()]
         dim = self._world_dim()
+        for number, solid in enumerate(self.solids):
+            if dim == 2 and solid.is_spatial:
+                raise ValueError(f"solids[{number}] is (or has) a mesh, and a mesh needs a 3-D world; this one is 2-D.")
         for name, vector in self._vectors():
             if len(vector) != dim:
                 raise ValueError(
@@ -231,16 +235,17 @@ class Scene(Parameters):
     @classmethod
     def load(cls, name: str | Path) -> "Scene":
         """Read a bundled scene by name, or a TOML file by path."""
-        return cls.from_text(*_read(name))
+        text, origin, folder = _read(name)
+        return cls.from_text(text, origin, folder=folder)
 
     @classmethod
-    def from_text(cls, text: str, origin: str = "scene") -> "Scene":
-        """Read the text of a TOML file; a mistake in it is told with `origin` in front."""
+    def from_text(cls, text: str, origin: str = "scene", **context: Any) -> "Scene":
+        """Read the text of a TOML file; a mistake in it is told with `origin` in front; `context` as in `parse`."""
         try:
             table = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             raise WavetankError(f"{origin}: this is not TOML: {error}.") from None
-        scene: Scene = cls.parse(table, origin)
+        scene: Scene = cls.parse(table, origin, **context)
         return scene
 
     def save(self, path: str | Path) -> None:
@@ -270,7 +275,19 @@ class Scene(Parameters):
         """Return the same scene with every length multiplied by `factor` (velocities and gravity stay)."""
         if not (math.isfinite(factor) and factor > 0):
             raise WavetankError(f"factor = {factor} is not allowed; it must be a positive number.")
-        lengths = {"spacing", "size", "lower", "upper", "center", "radius", "start", "end", "point", "positions"}
+        lengths = {
+            "spacing",
+            "size",
+            "lower",
+            "upper",
+            "center",
+            "radius",
+            "start",
+            "end",
+            "point",
+            "positions",
+            "thickness",
+        }
 
         def walk(value: Any, key: str = "") -> Any:
             if isinstance(value, dict):
@@ -328,10 +345,15 @@ def scene_schema() -> str:
     return json.dumps(Scene.model_json_schema(), indent=2)
 
 
-def _read(name: str | Path) -> tuple[str, str]:
+def _read(name: str | Path) -> tuple[str, str, Path]:
+    """Return the text of a scene, its name and the folder of its files."""
     for folder in ("scenes", "levels"):
         if str(name) in _names(folder):
-            return (importlib.resources.files("wavetank") / folder / f"{name}.toml").read_text("utf-8"), str(name)
+            return (
+                (importlib.resources.files("wavetank") / folder / f"{name}.toml").read_text("utf-8"),
+                str(name),
+                Path(),
+            )
     path = Path(name)
     if not path.is_file():
         raise WavetankError(
@@ -339,7 +361,7 @@ def _read(name: str | Path) -> tuple[str, str]:
             f"levels: {', '.join(_names('levels'))}."
         )
     try:
-        return path.read_text("utf-8"), str(path)
+        return path.read_text("utf-8"), str(path), path.parent
     except (OSError, UnicodeDecodeError) as error:
         raise WavetankError(f"{path}: the scene cannot be read: {error}.") from None
 

@@ -3,26 +3,12 @@
 import hashlib
 import json
 import os
-import sys
-from pathlib import Path
 from typing import Any
 
+from wavetank.folders import data_folder
 from wavetank.scene import Scene, bundled_levels
 
 FILE = "scores.json"
-
-
-def data_folder() -> Path:
-    """Return where this system keeps a user's data of this program; `WAVETANK_DATA` says otherwise."""
-    if own := os.environ.get("WAVETANK_DATA"):
-        return Path(own)
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "wavetank"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support" / "wavetank"
-    # XDG asks to ignore a path that is not absolute.
-    base = Path(os.environ.get("XDG_DATA_HOME") or "")
-    return (base if base.is_absolute() else Path.home() / ".local" / "share") / "wavetank"
 
 
 def key_of(scene: Scene) -> str:

@@ -43,7 +43,7 @@ def reset(session: "Session", command: c.Reset) -> None:
 def load(session: "Session", command: c.LoadScene) -> None:
     """Begin another scene. Only bundled names: a command may come from afar, and must not open files."""
     if command.text:
-        scene = Scene.from_text(command.text, "scene")
+        scene = Scene.from_text(command.text, "scene", files=False)
     elif command.name in (*bundled_scenes(), *bundled_levels()):
         scene = Scene.load(command.name)
     else:

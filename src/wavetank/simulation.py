@@ -23,7 +23,7 @@ from wavetank.physics.step import World, capillary_speed, capillary_substeps, st
 from wavetank.physics.time_step import largest_speed, pool_depth, substeps
 from wavetank.scene import MAX_PARTICLES, Scene
 from wavetank.snapshot import Snapshot, put_snapshot, read_snapshot, take_snapshot, write_snapshot
-from wavetank.solids import Solid
+from wavetank.solid import Solid
 from wavetank.state import KINDS, Fluids, Walls, new_particles, new_scratch, upload, vectors
 
 
@@ -39,7 +39,7 @@ class Simulation:
     def reset(self) -> None:
         """Put everything back to the start of the scene."""
         positions, velocities = self.scene.particles()
-        self.solids = MovingSolids(self._walls(), self.scene.solids, self.scene.friction)
+        self.solids = MovingSolids(self._walls(), self.scene.solids, self.scene.friction, self.scene.spacing)
         self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
         self.pushed: list[Force] = []  # these in the next one only
         self._next_id, self._fastest_start, self._fastest_solid, self._fastest_force = 0, 0.0, 0.0, 0.0

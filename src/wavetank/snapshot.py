@@ -11,7 +11,7 @@ import numpy as np
 from wavetank.errors import WavetankError
 from wavetank.moving_solids import MovingSolids, Pose
 from wavetank.physics.diffuse.pool import pool_from, pool_rows
-from wavetank.solids import Solid
+from wavetank.solid import Solid
 from wavetank.state import upload
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def put_snapshot(sim: "Simulation", snapshot: Snapshot) -> None:
     """Make an instant the present of a running world; its parameters and forces stay as they are now."""
     numbers = snapshot.numbers
     sim.scene.assign("solids", snapshot.solids)
-    sim.solids = MovingSolids(sim._walls(), snapshot.solids, sim.scene.friction)
+    sim.solids = MovingSolids(sim._walls(), snapshot.solids, sim.scene.friction, sim.scene.spacing)
     sim.solids.names, sim.solids.poses = [*snapshot.names], [*snapshot.poses]
     sim.solids.targets, sim.solids.growing = {**snapshot.targets}, {**snapshot.growing}
     sim.solids.rebuild()

@@ -28,56 +28,11 @@ from wavetank.distance import (
     vec4,
 )  # fmt: skip
 from wavetank.errors import WavetankError
-from wavetank.model import Model, Number, Positive, Quaternion, Size, Vector, register_model
-from wavetank.rotations import product, turn_from_y, turned, unit_quaternion
-
-Floats = Sequence[float] | np.ndarray
-ENDLESS = 1.0e5  # half size [m] of what has no end
-
-
-class Node:
-    """One step of a solid's program: a shape with its place, or a set operation."""
-
-    def __init__(self, op: int, size: Floats = (), offset: Floats = (), turn: Floats = ()) -> None:
-        self.op = op
-        self.size = np.zeros(4)
-        self.size[: len(size)] = size
-        self.offset = np.array(offset if len(offset) else (0.0, 0.0, 0.0), float)
-        self.turn = np.array(turn if len(turn) else (1.0, 0.0, 0.0, 0.0), float)
-
-    def placed(self, offset: np.ndarray, turn: np.ndarray) -> "Node":
-        """Return this node as seen from a frame in which its own frame has that offset and turn."""
-        return Node(self.op, self.size, offset + turned(turn, self.offset), product(turn, self.turn))
-
-
-class Solid(Model):
-    """What every solid has: a name to move it by, a pose and a surface."""
-
-    name: str = ""
-    rotation: Quaternion | Number = (1.0, 0.0, 0.0, 0.0)  # (w, x, y, z), or an angle about z [rad]
-    friction: Annotated[Number, Field(ge=0, le=1)] | None = None  # the scene's friction where None
-
-    @property
-    def origin(self) -> np.ndarray:
-        """Position of the solid's frame [m], shape [3]."""
-        raise NotImplementedError
-
-    @property
-    def quaternion(self) -> np.ndarray:
-        """Rotation of the solid's frame as a unit quaternion (w, x, y, z)."""
-        return unit_quaternion(self.rotation)
-
-    def program(self) -> list[Node]:
-        """Return the nodes of this solid in postfix order, in its own frame."""
-        raise NotImplementedError
-
-    def reach(self) -> float:
-        """Radius [m] around the origin that holds the whole solid."""
-        raise NotImplementedError
-
-    def vectors(self) -> list[tuple[str, Sequence[float]]]:
-        """Name every point or size of this solid, to check that all live in one dimension."""
-        return []
+from wavetank.meshes.mesh import Mesh
+from wavetank.meshes.on_device import put_grids
+from wavetank.model import Positive, Size, Vector, register_model
+from wavetank.rotations import turn_from_y, unit_quaternion
+from wavetank.solid import ENDLESS, Node, Solid, point_in_space
 
 
 def moved(solid: Solid, position: np.ndarray, rotation: np.ndarray) -> Solid:
@@ -102,7 +57,7 @@ class Box(Solid):
     @property
     @override
     def origin(self) -> np.ndarray:
-        return _point(self.center)
+        return point_in_space(self.center)
 
     @override
     def program(self) -> list[Node]:
@@ -128,7 +83,7 @@ class Sphere(Solid):
     @property
     @override
     def origin(self) -> np.ndarray:
-        return _point(self.center)
+        return point_in_space(self.center)
 
     @override
     def program(self) -> list[Node]:
@@ -156,10 +111,10 @@ class _Axial(Solid):
 
     @property
     def origin(self) -> np.ndarray:
-        return 0.5 * (_point(self.start) + _point(self.end))
+        return 0.5 * (point_in_space(self.start) + point_in_space(self.end))
 
     def _node(self, op: int) -> Node:
-        axis = _point(self.end) - _point(self.start)
+        axis = point_in_space(self.end) - point_in_space(self.start)
         return Node(op, [self.radius, 0.5 * float(np.linalg.norm(axis))], turn=turn_from_y(axis))
 
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
@@ -177,7 +132,7 @@ class Capsule(_Axial):
 
     @override
     def reach(self) -> float:
-        return 0.5 * float(np.linalg.norm(_point(self.end) - _point(self.start))) + self.radius
+        return 0.5 * float(np.linalg.norm(point_in_space(self.end) - point_in_space(self.start))) + self.radius
 
 
 class Cylinder(_Axial):
@@ -191,7 +146,7 @@ class Cylinder(_Axial):
 
     @override
     def reach(self) -> float:
-        return float(np.hypot(0.5 * np.linalg.norm(_point(self.end) - _point(self.start)), self.radius))
+        return float(np.hypot(0.5 * np.linalg.norm(point_in_space(self.end) - point_in_space(self.start)), self.radius))
 
 
 class HalfSpace(Solid):
@@ -210,11 +165,11 @@ class HalfSpace(Solid):
     @property
     @override
     def origin(self) -> np.ndarray:
-        return _point(self.point)
+        return point_in_space(self.point)
 
     @override
     def program(self) -> list[Node]:
-        return [Node(DISTANCES.index(half_space_distance), turn=turn_from_y(_point(self.normal)))]
+        return [Node(DISTANCES.index(half_space_distance), turn=turn_from_y(point_in_space(self.normal)))]
 
     @override
     def reach(self) -> float:
@@ -231,7 +186,11 @@ class _SetOperation(Solid):
 
     @property
     def origin(self) -> np.ndarray:
-        return _point(self.center)
+        return point_in_space(self.center)
+
+    @property
+    def is_spatial(self) -> bool:
+        return any(part.is_spatial for part in self.parts)
 
     def _combine(self, op: int) -> list[Node]:
         nodes: list[Node] = []
@@ -288,18 +247,19 @@ class Difference(_SetOperation):
 
 
 SHAPES: tuple[type[Solid], ...] = (
-    Box, Sphere, Capsule, Cylinder, HalfSpace, Union, Intersection, Difference,
+    Box, Sphere, Capsule, Cylinder, HalfSpace, Union, Intersection, Difference, Mesh,
 )  # fmt: skip
 AnySolid = Annotated[
-    Box | Sphere | Capsule | Cylinder | HalfSpace | Union | Intersection | Difference, Field(discriminator="shape")
+    Box | Sphere | Capsule | Cylinder | HalfSpace | Union | Intersection | Difference | Mesh,
+    Field(discriminator="shape"),
 ]
 for _shape in SHAPES:
     _shape.model_rebuild()
     register_model(_shape.model_fields["shape"].default, _shape)
 
 
-def build(solids: Sequence[Solid], tank_count: int, friction: float) -> SolidSet:
-    """Put `solids` on the device; the first `tank_count` are the walls of the tank."""
+def build(solids: Sequence[Solid], tank_count: int, friction: float, spacing: float) -> SolidSet:
+    """Put `solids` on the device, for particles of that spacing [m]; the first `tank_count` are the tank's walls."""
     programs = [solid.program() for solid in solids]
     for solid, program in zip(solids, programs, strict=True):
         depth = deepest = 0
@@ -312,6 +272,7 @@ def build(solids: Sequence[Solid], tank_count: int, friction: float) -> SolidSet
                 f"at most {STACK} are allowed: build it from several solids."
             )
     nodes = [node for program in programs for node in program] or [Node(0)]
+    codes, grid, samples = put_grids(nodes, spacing)
     count = max(len(solids), 1)
     first = np.concatenate([[0], np.cumsum([len(program) for program in programs], dtype=int)])
     position = np.array([s.origin for s in solids]).reshape(-1, 3)
@@ -327,7 +288,7 @@ def build(solids: Sequence[Solid], tank_count: int, friction: float) -> SolidSet
         return result
 
     return SolidSet(
-        op=array([n.op for n in nodes], qd.i32, len(nodes)),
+        op=array(codes, qd.i32, len(nodes)),
         size=array([n.size for n in nodes], vec4, len(nodes)),
         offset=array([n.offset for n in nodes], vec3, len(nodes)),
         turn=array([n.turn for n in nodes], vec4, len(nodes)),
@@ -340,6 +301,8 @@ def build(solids: Sequence[Solid], tank_count: int, friction: float) -> SolidSet
         old_rotation=array(rotation, vec4, count),
         plane=array([], vec4, count),
         sweep=array([], vec2, count),
+        grid=grid,
+        samples=samples,
         count=len(solids),
         tank_count=tank_count,
     )
@@ -355,9 +318,3 @@ def resize(device: SolidSet, solids: Sequence[Solid], scales: Sequence[float]) -
         host = np.zeros_like(array.to_numpy())
         host[: len(values)] = values
         array.from_numpy(host)
-
-
-def _point(vector: Sequence[float]) -> np.ndarray:
-    point = np.zeros(3)
-    point[: len(vector)] = vector
-    return point

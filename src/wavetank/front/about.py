@@ -96,8 +96,8 @@ def _outline(name: str, scene: Scene) -> dict[str, Any]:
         shapes[-1]["color"] = colors.get(fluid.material or "", "")
     for solid in scene.solids:
         if solid.reach() < ENDLESS:
-            half = np.array(getattr(solid, "size", (2.0 * solid.reach() / math.sqrt(3.0),) * 3)[:3]) / 2.0
-            half = np.concatenate([half, np.zeros(3 - len(half))])
+            half = np.ravel(getattr(solid, "size", (2.0 * solid.reach() / math.sqrt(3.0),) * 3)) / 2.0
+            half = np.full(3, half[0]) if len(half) == 1 else np.concatenate([half, np.zeros(3 - len(half))])
             is_round = solid.shape in ("sphere", "capsule")
             shapes.append({"what": "solid", "round": is_round, **_box(solid.origin - half, solid.origin + half)})
     return {

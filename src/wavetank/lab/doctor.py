@@ -14,6 +14,7 @@ _PACKAGES = {
     **dict.fromkeys(
         ("imgui-bundle", "moderngl", "glfw"), "the window of `wavetank play`: pip install wavetank[window]"
     ),
+    "trimesh": "solids from OBJ, STL, PLY and GLB files: pip install wavetank[mesh]",
     "matplotlib": "plots of `wavetank converge` and `validate`: pip install wavetank[plot]",
 }  # fmt: skip
 

@@ -114,6 +114,7 @@ def follow(k, at, end, solids: SolidSet, gap):
                     end = at
             steps += 1
             if steps == 64:
+                end = at  # what is not done by now is not known to be free: it ends where it has got to
                 phase = 2
         else:
             end += n * qd.max(gap - value.w, 0.0)

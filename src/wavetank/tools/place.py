@@ -6,7 +6,8 @@ import numpy as np
 from pydantic import PrivateAttr
 from typing_extensions import override
 
-from wavetank.solids import Box, Capsule, Solid, Sphere
+from wavetank.solid import Solid
+from wavetank.solids import Box, Capsule, Sphere
 from wavetank.tools.carry import carry
 from wavetank.tools.hand import Hand
 from wavetank.tools.tool import Tool, option

@@ -8,21 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from wavetank.errors import WavetankError
+from wavetank.folders import cache_folder
 
 PACKAGE = "pysplishsplash==2.19.0"
 #: A Python that has the package already, for who wants another version or a build of their own.
 VARIABLE = "WAVETANK_SPLISHSPLASH_PYTHON"
-
-
-def cache_folder() -> Path:
-    """Return the folder where this user's caches of wavetank live."""
-    if sys.platform == "win32":
-        start = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
-    elif sys.platform == "darwin":
-        start = Path.home() / "Library" / "Caches"
-    else:
-        start = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return start / "wavetank"
 
 
 def splishsplash_python(say: Callable[[str], None]) -> Path:

@@ -14,7 +14,7 @@ particles, which are balls around that plane and would cover the rim of every so
 import dataclasses
 
 from wavetank.compiler import qd
-from wavetank.distance import SolidSet, signed_distance
+from wavetank.distance import SolidSet, grain, signed_distance
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, vector, view_ray
 from wavetank.view.shot import Shot
@@ -88,6 +88,19 @@ def ball_interval(origin, direction, center, r):
 
 
 @qd.func
+def smooth_normal(solids: SolidSet, k, x, n):
+    """The normal `n` of solid `k` at `x`; of a grid, whose slope jumps from cell to cell, one without jumps."""
+    reach = grain(solids, k)
+    if reach > 0.0:
+        for axis in qd.static(range(3)):
+            step = vec3(0.0, 0.0, 0.0)
+            step[axis] = reach
+            n[axis] = signed_distance(solids, k, x + step).w - signed_distance(solids, k, x - step).w
+        n = n.normalized(1e-9)
+    return n
+
+
+@qd.func
 def meet(solids: SolidSet, k, origin, direction, first, last, bevel):
     """(normal, depth) where a ray meets solid `k` between two depths; depth -1 where it does not.
 
@@ -106,7 +119,8 @@ def meet(solids: SolidSet, k, origin, direction, first, last, bevel):
         # A ray that grazes a surface creeps; after so many steps it counts as a miss.
         while steps < 128 and t <= last:
             if value.w < 1e-4 * t + 1e-6:
-                hit = vec4(value.x, value.y, value.z, t)
+                n = smooth_normal(solids, k, origin + t * direction, vec3(value.x, value.y, value.z))
+                hit = vec4(n.x, n.y, n.z, t)
                 break
             t += value.w / pace
             value = signed_distance(solids, k, origin + t * direction)

@@ -1,0 +1,1 @@
+"""Solids from meshes: files, triangles, and the grids of distances that they become."""
