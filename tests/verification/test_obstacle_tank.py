@@ -1,4 +1,4 @@
-"""The default scene as a user sees it first, until the wave has come back from the far wall; coarser for ten seconds."""
+"""The default scene as a user sees it first, until the wave is back from the far wall; coarser for ten seconds."""
 
 import numpy as np
 import pytest
