@@ -33,6 +33,7 @@ class WaterBuffers:
     cells: Cells
     ellipsoids: Ellipsoids
     depth: Any  # i32 [rows, columns]: bits of the depth [m] of the water's surface, FARTHEST where there is none
+    rim: Any  # i32 [rows, columns]: share 0 to 127 that an outline covers, << 24, | 2^24 - 1 - depth >> 7; or 0
     spare: Any  # i32 [rows, columns]: the same while it is being smoothed
     thickness: Any  # i32 [rows / 2, columns / 2]: water along the view, in 1 / 4096 of a spacing
     dye: Any  # i32 [rows / 2, columns / 2, 4]: the dyed part of it, and that part times linear red, green, blue
@@ -71,6 +72,7 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
     rows, columns = buffers.rows, buffers.columns
     fields: dict[str, Any] = {
         "depth": qd.ndarray(qd.i32, shape=(rows, columns)),
+        "rim": qd.ndarray(qd.i32, shape=(rows, columns)),
         "spare": qd.ndarray(qd.i32, shape=(rows, columns)),
         "thickness": qd.ndarray(qd.i32, shape=(rows // 2 + 1, columns // 2 + 1)),
         "dye": qd.ndarray(qd.i32, shape=(rows // 2 + 1, columns // 2 + 1, 4)),

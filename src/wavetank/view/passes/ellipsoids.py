@@ -125,7 +125,7 @@ def fit(
             side = trust * growth * o
             # As far as its looks are concerned water goes on behind a wall: what touches one is centred on it, as if
             # joined with its mirror image, and reaches well through panes.
-            touch, shift, share = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0), 1.0
+            touch, shift, share, touched = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0), 1.0, 0
             for k in qd.static(range(dim)):
                 gap = p[k] - lower[k]
                 half = gap + diagonal[k]
@@ -137,6 +137,7 @@ def fit(
                 diagonal[k] += touch[k] * (half - diagonal[k])
                 mean[k] *= 1.0 - touch[k]
                 share *= share_before_wall(gap / reach)
+                touched += qd.cast(touch[k] > 0.0, qd.i32)
             free = 1.0 - touch
             side *= vec3(free.x * free.y, free.x * free.z, free.y * free.z)
             if qd.static(dim == 2):
@@ -150,8 +151,10 @@ def fit(
             ellipsoids.axes[a], ellipsoids.mixed[a] = squared(diagonal, side)
             ellipsoids.size[a] = qd.max(diagonal.x, diagonal.y, diagonal.z) + side.norm()
             if weight > full * share:
-                if qd.max(touch.x, touch.y, touch.z) == 0.0:
+                if touched == 0:
                     ellipsoids.size[a] = -1.0
+                elif touched == 1:  # seen through its wall alone
+                    ellipsoids.outward[a] = shift / spacing
             elif qd.static(dim == 3):
                 mirror(ellipsoids, a, count + a, p, lower, upper, 3.2 * spacing)
 

@@ -25,6 +25,7 @@ from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, pixels_per_metre, ray_direction, ray_origin, vec3, view_ray
 from wavetank.view.passes.ellipsoids import OPEN, walls
 from wavetank.view.passes.solids import box_interval
+from wavetank.view.passes.surface import GAP
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import water_of
 
@@ -34,9 +35,10 @@ NARROW, SLOPE = 1.0, 5.0  # d
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Smooth the water's depth in place; in a plane nothing looks at its shape."""
+    water, d = water_of(buffers, shot), shot.extent.spacing
+    join(GAP * d, water.depth, water.rim)
     if shot.frame.dim == 2:
         return
-    water, d = water_of(buffers, shot), shot.extent.spacing
     even(water.depth, water.spare, shot.lens, SIGMA * d, d, *walls(shot))
 
 
@@ -49,6 +51,18 @@ def even(
         blur(lens, 0, 1, TAPS, clean, sigma, NARROW * d, SLOPE * d, depth, spare)
         blur(lens, 1, 0, TAPS, clean, sigma, NARROW * d, SLOPE * d, spare, depth)
     restore(lens, depth)
+
+
+@qd.kernel(fastcache=True)
+def join(gap: qd.f32, depth: qd.types.ndarray(), rim: qd.types.ndarray()):
+    """Give pixels that only outlines cover their depth, and forget outlines that stand out from nothing."""
+    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
+        if rim[row, column] > 0:
+            key = (0xFFFFFF - (rim[row, column] & 0xFFFFFF)) << 7
+            if depth[row, column] == 0x7F000000:  # FARTHEST
+                depth[row, column] = key
+            elif qd.bit_cast(key, qd.f32) + gap > qd.bit_cast(depth[row, column], qd.f32):
+                rim[row, column] = 0
 
 
 @qd.kernel(fastcache=True)

@@ -34,28 +34,40 @@ from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import Ellipsoids, water_of
 
 LARGEST = 0.25  # of the picture's height: radius up to which an ellipsoid is drawn
+GAP = 2.0  # d: what an outline stands before by more, it stands out from
 AWAY = 0.12  # how much an ellipsoid faces away that no eye can see
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill the water's depth; flat against the panes of a tank."""
-    see(shot, buffers, shot.lens, water_of(buffers, shot).depth)
+    water = water_of(buffers, shot)
+    clear_rim(water.rim)
+    see(shot, buffers, shot.lens, water.depth, water.rim)
 
 
-def see(shot: Shot, buffers: Buffers, lens: Lens, depth: Any) -> None:
-    """Fill `depth` with the water as `lens` sees it."""
+def see(shot: Shot, buffers: Buffers, lens: Lens, depth: Any, rim: Any = None) -> None:
+    """Fill `depth` with the water as `lens` sees it, and `rim` with what its outlines cover in part."""
     clear_depth(depth)
     largest = max(LARGEST * depth.shape[0], 2.0)
-    splat(water_of(buffers, shot).ellipsoids, shot.frame.count, lens, *walls(shot), largest, AWAY, depth)
+    splat(
+        water_of(buffers, shot).ellipsoids, shot.frame.count, lens, *walls(shot), largest, AWAY,
+        GAP * shot.extent.spacing, int(rim is not None), depth, depth if rim is None else rim,
+    )  # fmt: skip
+
+
+@qd.kernel(fastcache=True)
+def clear_rim(rim: qd.types.ndarray()):
+    """No outlines anywhere."""
+    for row, column in qd.ndrange(rim.shape[0], rim.shape[1]):
+        rim[row, column] = 0
 
 
 @qd.kernel(fastcache=True)
 def splat(
     ellipsoids: Ellipsoids, count: qd.i32, lens: Lens, lower: vec3, upper: vec3, largest: qd.f32, away: qd.f32,
-    depth: qd.types.ndarray(),
+    gap: qd.f32, soft: qd.template(), depth: qd.types.ndarray(), rim: qd.types.ndarray(),
 ):  # fmt: skip
     """Lower `depth` to the front of every ellipsoid that may be seen."""
-    rows, columns = depth.shape[0], depth.shape[1]
     for n in range(2 * count):
         # Sorted by place: the end that is nearer goes first and hides the rest.
         i = n
@@ -77,50 +89,70 @@ def splat(
         if size > 0.0 and c.z > lens.near + size and not hidden:
             scale = pixels_per_metre(lens, c.z)
             fill_ellipse(lens, c, scale, qd.min(1.0, largest / (size * scale)), ellipsoids.axes[i],
-                         ellipsoids.mixed[i], rows, columns, depth)  # fmt: skip
+                         ellipsoids.mixed[i], gap, soft, depth, rim)  # fmt: skip
 
 
 @qd.func
-def fill_ellipse(lens: Lens, c, scale, shrink, axes, mixed, rows, columns, depth: qd.template()):
-    """Lower `depth` to that of one ellipsoid; `scale` is in pixels per metre."""
+def fill_ellipse(
+    lens: Lens, c, scale, shrink, axes, mixed, gap, soft: qd.template(), depth: qd.template(), rim: qd.template()
+):
+    """Lower `depth` to that of one ellipsoid; `scale` is in pixels per metre. With `soft` its outline goes to `rim`."""
     # Rotated into the view ...
     a, b, f = lens.right, lens.up, lens.forward
+    middle = lens.middle
     if lens.perspective > 0.5:  # ... and sheared: x' = x - (c.x / c.z) z
         a = a - (c.x / c.z) * f
         b = b - (c.y / c.z) * f
-    ma, mb, mf = times(axes, mixed, a), times(axes, mixed, b), times(axes, mixed, f)
-    s = shrink * shrink
-    xx, yy, zz = s * a.dot(ma), s * b.dot(mb), s * f.dot(mf)
-    xy, xz, yz = s * a.dot(mb), s * a.dot(mf), s * b.dot(mf)
-    area = qd.max(xx * yy - xy * xy, 1e-30)
-    pxx, pyy, pxy = yy / area, xx / area, -xy / area
-    gx, gy = pxx * xz + pxy * yz, pxy * xz + pyy * yz
-    half = qd.sqrt(qd.max(zz - gx * xz - gy * yz, 0.0))
-    size = 1.0 / scale
-    middle = lens.middle
-    if lens.perspective > 0.5:
         middle += lens.focal * qd.Vector([c.x / c.z, -c.y / c.z])
     else:
         middle += lens.focal * qd.Vector([c.x, -c.y])
-    tall = qd.sqrt(yy) * scale
+    a, b = (shrink * scale) * a, (shrink * scale) * b  # across the view in pixels
+    f = shrink * f
+    ma, mb, mf = times(axes, mixed, a), times(axes, mixed, b), times(axes, mixed, f)
+    xx, yy, zz = a.dot(ma), b.dot(mb), f.dot(mf)
+    xy, xz, yz = a.dot(mb), a.dot(mf), b.dot(mf)
+    area = qd.max(xx * yy - xy * xy, 1e-12)
+    pxx, pyy, pxy = yy / area, xx / area, -xy / area
+    gx, gy = pxx * xz + pxy * yz, pxy * xz + pyy * yz
+    half = qd.sqrt(qd.max(zz - gx * xz - gy * yz, 0.0))
+    # p(u, v) = pxx u^2 + 2 pxy u v + pyy v^2 is 1 on the outline; half a pixel outside it is `outer` at most, and half
+    # a pixel inside at least 1 - `inner`.
+    inner, outer, narrow = 0.0, 1.0, 1.0
+    if qd.static(soft):
+        narrow = qd.sqrt(qd.max(0.5 * (xx + yy) - qd.sqrt(0.25 * (xx - yy) ** 2 + xy * xy), 0.04))
+        rest = qd.max(1.0 - 0.5 / narrow, 0.0)
+        inner, outer = 1.0 - rest * rest, (1.0 + 0.5 / narrow) ** 2
+    rows, columns = depth.shape[0], depth.shape[1]
+    tall = qd.sqrt(yy * outer)
+    per, lean, fall = 1.0 / pxx, -pxy / pxx, pyy - pxy * pxy / pxx
     first = qd.max(qd.cast(qd.ceil(qd.max(middle.y - tall - 0.5, 0.0)), qd.i32), 0)
     last = qd.min(qd.cast(qd.floor(qd.min(middle.y + tall - 0.5, rows - 1.0)), qd.i32), rows - 1)
     for row in range(first, last + 1):
-        v = (middle.y - row - 0.5) * size
-        # p(u, v) = pxx u^2 + 2 pxy u v + pyy v^2 <= 1 between the two ends of this row.
-        center = -pxy * v / pxx
-        reach = 1.0 - v * v * (pyy - pxy * pxy / pxx)
-        if reach > 0.0:
-            wide = qd.sqrt(reach / pxx) * scale
-            at = middle.x + center * scale - 0.5
+        v = middle.y - row - 0.5
+        reach = 1.0 - v * v * fall
+        room = (reach + outer - 1.0) * per
+        if room > 0.0:
+            wide = qd.sqrt(room)
+            at = middle.x + lean * v - 0.5
+            base = c.z + (gx * lean + gy) * v
             left = qd.max(qd.cast(qd.ceil(qd.max(at - wide, 0.0)), qd.i32), 0)
             right = qd.min(qd.cast(qd.floor(qd.min(at + wide, columns - 1.0)), qd.i32), columns - 1)
             for column in range(left, right + 1):
-                u = (column - at) * size  # from the middle of the row
-                front = c.z + gx * (center + u) + gy * v - half * qd.sqrt(qd.max(reach - pxx * u * u, 0.0))
+                u = column - at  # from the middle of the row
+                inside = reach - pxx * u * u
+                front = base + gx * u - half * qd.sqrt(qd.max(inside, 0.0))
                 key = qd.bit_cast(front, qd.i32) & ~1  # the last bit is for `flatten`
                 if key > 0 and key < depth[row, column]:
-                    qd.atomic_min(depth[row, column], key)
+                    cover = 1.0
+                    if qd.static(soft):
+                        if inside < inner:
+                            # Distance to the outline [px]: p - 1 over its gradient.
+                            slope = 2.0 * vec2(pxx * u, pxy * (u + lean * v) + pyy * v)
+                            cover = qd.min(0.5 + qd.min(inside / qd.max(slope.norm(), 1e-6), narrow), 1.0)
+                    if cover >= 1.0:
+                        qd.atomic_min(depth[row, column], key)
+                    elif qd.bit_cast(depth[row, column], qd.f32) > front + gap and cover > 0.0:
+                        qd.atomic_max(rim[row, column], (qd.cast(127.0 * cover, qd.i32) << 24) | (0xFFFFFF - (key >> 7)))
 
 
 @qd.func

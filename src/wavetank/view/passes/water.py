@@ -66,7 +66,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         shot.lens, shot.look, lower, upper, DISC[2] * shot.extent.spacing,
         shot.absorption, shot.scattering, shot.look.glow * shot.tint, float(coarseness(shot)),
         shot.extent.spacing / UNIT, shot.extent.spacing, under_water(shot, buffers), shot.frame.dim, water.depth,
-        water.thickness, water.dye, shot.usual, buffers.depth, water.behind, buffers.color, water.spare,
+        water.thickness, water.dye, shot.usual, buffers.depth, water.behind, buffers.color, water.spare, water.rim,
     )  # fmt: skip
 
 
@@ -129,6 +129,7 @@ def lay(
     back_light: vec3, coarse: qd.f32, unit: qd.f32, spacing: qd.f32, under: qd.i32, dim: qd.template(),
     water_depth: qd.types.ndarray(), thickness: qd.types.ndarray(), dye: qd.types.ndarray(), usual: qd.f32,
     depth: qd.types.ndarray(), behind: qd.types.ndarray(), color: qd.types.ndarray(), seen: qd.types.ndarray(),
+    rim: qd.types.ndarray(),
 ):  # fmt: skip
     """Shade every pixel that shows water, and copy the backdrop to the others; `seen` is filled with its depth."""
     for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
@@ -138,7 +139,7 @@ def lay(
         ray = view_ray(lens, row, column)
         origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
         there, wet, rise, n_wall = 0.0, 0.0, vec2(0.0, 0.0), vec3(0.0, 0.0, 0.0)
-        front = z
+        front, edge, cut = z, z, 0.0
         if under == 1:
             # From inside there is no surface in front of anything: water dims and tints what is behind it.
             tau = thickness_at(thickness, vec2(column + 0.5, row + 0.5) / coarse, unit)
@@ -157,18 +158,48 @@ def lay(
                         if z <= ends[0] - spacing:
                             wet = 1.0
                     there = 1.0 - share_behind(z, ends[1], rise, vec2(turns.z, turns.w))
+                if rim[row, column] > 0:
+                    edge = qd.bit_cast((0xFFFFFF - (rim[row, column] & 0xFFFFFF)) << 7, qd.f32)
+                    cover = ((rim[row, column] >> 24) + 0.5) / 127.0
+                    if edge + spacing < z:
+                        cut = cover * qd.min((z - edge) / spacing - 1.0, 1.0) * qd.cast(edge > ends[0], qd.f32)
+                    elif wet < 1.0:
+                        there *= cover
         seen[row, column] = qd.select(there >= 0.5, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
-        water = vec3(0.0, 0.0, 0.0)
-        for layer in range(2):
-            share, n, z_layer = wet, n_wall, front
+        # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
+        shares = vec3(there * (1.0 - cut) * wet, there * (1.0 - cut) * (1.0 - wet), cut)
+        result *= 1.0 - shares.sum()
+        for layer in range(3):
+            share, n, at = shares.x, n_wall, front
             if layer == 1:
-                share, n = 1.0 - wet, normal_of(lens, row, column, z, rise)
-            if there * share > 0.0:
-                water += share * shine(
+                share, n = shares.y, normal_of(lens, row, column, z, rise)
+            elif layer == 2:
+                share, at = shares.z, edge
+                if share > 0.0:
+                    n = normal_beside(lens, row, column, edge, spacing, water_depth)
+            if share > 0.0:
+                result += share * shine(
                     lens, look, lower, upper, disc, absorption, scattering, back_light, coarse, unit, spacing, dim,
-                    row, column, z_layer, n, direction, origin, thickness, dye, usual, depth, behind,
+                    row, column, at, n, direction, origin, thickness, dye, usual, depth, behind,
                 )  # fmt: skip
-        color[row, column] = result + there * (water - result)
+        color[row, column] = result
+
+
+@qd.func
+def normal_beside(lens: Lens, row, column, z, limit, depth: qd.template()):
+    """Normal of the surface at about the depth `z` that a neighbouring pixel shows; towards the eye where none does."""
+    best, r, c = limit, row, column
+    for k in qd.static(range(4)):
+        i = qd.min(qd.max(row + qd.static((0, 0, 1, -1)[k]), 0), depth.shape[0] - 1)
+        j = qd.min(qd.max(column + qd.static((1, -1, 0, 0)[k]), 0), depth.shape[1] - 1)
+        off = qd.abs(qd.bit_cast(depth[i, j], qd.f32) - z)
+        if off < best:
+            best, r, c = off, i, j
+    n = -lens.forward
+    if best < limit:
+        there = qd.bit_cast(depth[r, c], qd.f32)
+        n = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * limit, depth))
+    return n
 
 
 @qd.func
