@@ -52,7 +52,9 @@ def test_a_run_has_every_figure(result):
     assert run["particle_iterations_per_second"]["high"] == pytest.approx(1e3 * work / frame["low"])
     assert run["water_per_second"]["low"] == pytest.approx(1e3 / 60 / frame["high"])
     assert set(run["stages"]) == {*STAGE_NAMES, "render"}
-    for name in ("contact", "neighbours", "constraint", "velocities", "foam", "time step", "host", "render"):
+    # No solids, no contact: the tank itself is part of other kernels.
+    assert run["stages"]["contact"]["median"] == 0.0
+    for name in ("neighbours", "constraint", "velocities", "foam", "time step", "host", "render"):
         assert run["stages"][name]["median"] > 0.0, name
     assert run["kernels"]["constraint: solve_multipliers"]["launches"] == 4 * run["substeps_per_frame"]
     assert math.isfinite(json.loads(json.dumps(result))["runs"][0]["pairs_per_second"]["median"])
