@@ -3,8 +3,8 @@
 Nodes lie a quarter of a particle spacing apart, in large grids half. The distance at a node is that to the nearest
 triangle. Its sign is a vote of six rays, to both sides along each axis: the crossings of a ray, counted with the side
 from which it meets each triangle, add up to the winding number of a closed surface, which is not zero inside, so that
-overlapping parts and inner hollows come out right. Where the six do not agree there is a hole; one that is narrower than a spacing is
-outvoted, a wider one is refused.
+overlapping parts and inner hollows come out right. Where the six do not agree there is a hole; one that is narrower
+than a spacing is outvoted, a wider one is refused.
 
 A wall thinner than `THINNEST` cells could fall between the nodes. Its faces are moved apart to that thickness, which is
 found by a ray inwards from the middle of each triangle; everything else stays where it is.

@@ -6,6 +6,7 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
+from wavetank.errors import WavetankError
 from wavetank.front.about import everything
 from wavetank.front.engine import Engine
 from wavetank.front.window.icons import LOOK
@@ -118,6 +119,12 @@ class Desk:
         if not text:
             self.say(f"{path.name} is empty; drop the TOML file of a scene.")
             return
+        if "mesh" in text:  # a command opens no files: the mesh goes into the text
+            try:
+                text = Scene.load(path).text()
+            except WavetankError as error:
+                self.say(str(error))
+                return
         self.pending.clear()
         self.engine.do(LoadScene, text=text)
         self.engine.do(Pause, on=False)
