@@ -9,11 +9,26 @@ from pathlib import Path
 import av
 import pytest
 
+from wavetank import cli
 
-def wavetank(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess:
-    return subprocess.run(
-        [sys.executable, "-m", "wavetank", *arguments], capture_output=True, text=True, cwd=cwd, timeout=300
-    )
+
+def process(*arguments: str) -> subprocess.CompletedProcess:
+    return subprocess.run([sys.executable, "-m", "wavetank", *arguments], capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture
+def wavetank(monkeypatch, capsys):
+    """The command line in this process, where the start and the end of one are not what is tested."""
+
+    def run(*arguments: str) -> subprocess.CompletedProcess:
+        monkeypatch.setattr("sys.argv", ["wavetank", *arguments])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        said = capsys.readouterr()
+        return subprocess.CompletedProcess(arguments, end.value.code or 0, said.out, said.err)
+
+    return run
 
 
 def pictures(path: Path) -> list:
@@ -22,7 +37,7 @@ def pictures(path: Path) -> list:
 
 
 def test_run_writes_what_was_asked_for(tmp_path):
-    result = wavetank(
+    result = process(
         "run", "drop-2d", "--seconds", "0.2", "--fps", "20", "--size", "160x90", "--out", str(tmp_path / "a" / "b"),
         "--video", "--gif", "--frames", "--export", "npz", "--export", "ply", "--set", "viscosity=0.2", "--json",
     )  # fmt: skip
@@ -79,8 +94,9 @@ def test_run_writes_what_was_asked_for(tmp_path):
         (("replay", "no-such-file.toml"), ["no-such-file.toml", "cannot be read"]),
     ],
 )
-def test_a_mistake_is_one_line_and_leaves_nothing(arguments, words, tmp_path):
-    result = wavetank(*arguments, cwd=tmp_path)
+def test_a_mistake_is_one_line_and_leaves_nothing(wavetank, arguments, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = wavetank(*arguments)
     assert result.returncode == 1
     lines = [line for line in result.stderr.splitlines() if line]
     assert len(lines) == 1, result.stderr
@@ -90,7 +106,7 @@ def test_a_mistake_is_one_line_and_leaves_nothing(arguments, words, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_render_draws_scenes_and_states(tmp_path):
+def test_render_draws_scenes_and_states(wavetank, tmp_path):
     from PIL import Image
 
     from wavetank import Scene, Simulation
@@ -118,7 +134,7 @@ def test_render_draws_scenes_and_states(tmp_path):
     assert not (tmp_path / "d.png").exists()
 
 
-def test_a_broken_scene_file_is_one_line(tmp_path):
+def test_a_broken_scene_file_is_one_line(wavetank, tmp_path):
     path = tmp_path / "mine.toml"
     for text, words in (
         ("spacing = 0.1\nspacing = 0.2", "this is not TOML"),
@@ -136,10 +152,16 @@ def test_a_broken_scene_file_is_one_line(tmp_path):
         assert not (tmp_path / "out").exists()
 
 
-def test_wrong_usage_exits_with_2():
+def test_wrong_usage_exits_with_2(wavetank):
     assert wavetank("run").returncode == 2
     assert wavetank("run", "drop", "--no-such-option").returncode == 2
-    assert wavetank("swim").returncode == 2
+    assert process("swim").returncode == 2
+
+
+def test_a_process_ends_with_one_line_too():
+    result = process("run", "no-such-scene")
+    assert (result.returncode, result.stderr.count("\n"), result.stdout) == (1, 1, "")
+    assert result.stderr.startswith("wavetank: ")
 
 
 def test_ctrl_c_finishes_the_files(tmp_path):
@@ -165,7 +187,7 @@ def test_ctrl_c_finishes_the_files(tmp_path):
     assert "Traceback" not in stderr
 
 
-def test_scenes_and_schema(tmp_path):
+def test_scenes_and_schema(wavetank, tmp_path):
     listed = json.loads(wavetank("scenes", "--json").stdout)
     assert {"obstacle-tank", "dam-break", "double-dam", "still-tank", "drop", "drop-2d"} <= set(listed)
     assert listed["levels"]["over-the-wall"]["goal"]
@@ -174,7 +196,7 @@ def test_scenes_and_schema(tmp_path):
     assert "obstacle-tank" in wavetank("scenes").stdout
 
 
-def test_doctor_says_what_works():
+def test_doctor_says_what_works(wavetank):
     findings = json.loads(wavetank("doctor", "--json").stdout)
     rows = {row["name"]: row["found"] for row in findings["checks"]}
     assert findings["ok"] is True
@@ -183,7 +205,7 @@ def test_doctor_says_what_works():
     assert wavetank("doctor").returncode == 0
 
 
-def test_converge_draws_the_reports_figures(tmp_path):
+def test_converge_draws_the_reports_figures(wavetank, tmp_path):
     result = wavetank("converge", "obstacle-tank-2d", "--seconds", "0.1", "--iterations", "4", "--out", str(tmp_path))
     assert result.returncode == 0, result.stderr
     assert {path.name for path in tmp_path.iterdir()} == {"converge.csv", "converge-steps.csv", "converge.png"}

@@ -23,6 +23,10 @@ def test_level_is_won_by_its_recorded_solution(name):
     assert wt.Scene.parse(recording.scene).table() == level.table(), "the solution is one of this level"
     for session in replay(recording):
         assert 0.0 <= session.game.progress <= 1.0
+        if session.game.outcome:
+            break
+    while not session.game.outcome:  # where the water came out a little differently, it takes a few frames more
+        session.tick()
     assert session.game.outcome == "won"
     assert session.game.progress == 1.0
     assert session.game.stars >= 2
@@ -31,11 +35,12 @@ def test_level_is_won_by_its_recorded_solution(name):
 
 @pytest.mark.parametrize("name", bundled_levels())
 def test_level_is_lost_by_doing_nothing(name):
-    """Water that nobody touches comes to rest; from then on only the clock runs."""
+    """Water that nobody touches comes to rest, or is at rest; from then on only the clock runs."""
     session = wt.Session(wt.Scene.load(name))
-    game = session.game
-    while not game.outcome and session.sim.time < 1.5:
+    game, fastest = session.game, np.inf
+    while not game.outcome and session.sim.time < 1.5 and (session.sim.time < 0.25 or fastest > 0.15):
         session.tick()
+        fastest = np.linalg.norm(session.sim.velocities, axis=1).max()
     assert game.progress < 0.3 or game.goal.is_endured
     while not game.outcome:
         game.watch(session.sim.frame(), 0.5)
@@ -99,6 +104,18 @@ def test_held_for_a_while_then_won_and_nothing_after_it_counts():
     assert session.game.elapsed == elapsed
     session.apply(do.Reset())
     assert (session.game.outcome, session.game.elapsed) == ("", 0.0)
+
+
+def test_another_attempt_begins_upright():
+    session = wt.Session(scene({"aims": [aim("deliver", 0.9)]}))
+    session.apply(do.SetParameter(name="foam", value=0.5))
+    session.apply(do.ToolBegin(tool="tilt", options={"stay": True}, origin=(0.5, 0.2, 5), direction=DOWN))
+    session.apply(do.ToolMove(origin=(0.9, 0.2, 5), direction=DOWN))
+    session.apply(do.ToolEnd())
+    assert session.sim.gravity[0] > 1.0
+    session.apply(do.Reset())
+    assert session.sim.gravity[0] == 0.0
+    assert session.sim.foam == 0.5
 
 
 def test_endured_goal_is_won_by_time_and_lost_by_water():

@@ -16,6 +16,7 @@ import wavetank as wt
 from test_session import Monkey, down, pool
 from wavetank import commands as c
 from wavetank.commands import COMMANDS, command_of, table_of
+from wavetank.forces import Force
 from wavetank.history import History
 from wavetank.recording import Recording, digest, replay
 from wavetank.session import Session
@@ -277,3 +278,35 @@ def test_play_records_and_replay_repeats(tmp_path):
     result = subprocess.run([*wavetank, "replay", str(tmp_path / "no.toml")], capture_output=True, text=True)
     assert result.returncode == 1
     assert result.stderr.count("\n") == 1
+
+
+class Lift(Force):
+    """A force of one's own, as in examples/05."""
+
+    def apply(self, particles, count, dt, time):
+        pass
+
+
+def test_forces_of_a_script_cannot_be_recorded_and_that_is_said():
+    """Those of the scene and of tools can; others would be missing in the replay."""
+    session = Session(pool())
+    session.apply(c.ToolBegin(tool="explosion", **RAY))
+    session.apply(c.ToolEnd())
+    session.apply(c.ToolBegin(tool="push", **RAY))
+    for _ in range(3):
+        session.tick()
+    assert Recording.of(session, pool()).frames == 3
+    for add in (lambda sim: sim.forces.append(Lift()), lambda sim: sim.push(Lift())):
+        session = Session(pool())
+        add(session.sim)
+        session.tick()
+        with pytest.raises(
+            wt.WavetankError, match=r"a script changed its forces \(Lift\); a recording has those of"
+        ) as e:
+            Recording.of(session, pool())
+        assert "\n" not in str(e.value)
+    session = Session(wt.Scene.from_text(OTHER, "scene"))
+    session.sim.forces.clear()
+    session.tick()
+    with pytest.raises(wt.WavetankError, match="Wind"):
+        Recording.of(session, session.scene)

@@ -123,7 +123,7 @@ def test_ten_thousand_random_commands():
             assert len(str(error)) < 1000
             continue
         loses = loses or may_lose(session)
-        if number % 6 == 0:
+        if number % 12 == 0:
             session.tick()
         now = ids(session)
         assert loses or np.isin(before, now).all(), table

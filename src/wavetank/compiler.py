@@ -19,7 +19,7 @@ with contextlib.redirect_stdout(io.StringIO()):
 
 from wavetank.errors import WavetankError
 
-__all__ = ["BACKENDS", "available_backends", "current_backend", "qd", "start", "synchronize", "watched"]
+__all__ = ["BACKENDS", "available_backends", "current_backend", "qd", "start", "synchronize", "threads", "watched"]
 
 #: Names a user may pass as ``arch``; ``gpu`` means the best one present.
 BACKENDS = ("cpu", "gpu", "cuda", "vulkan", "metal", "amdgpu")
@@ -74,6 +74,11 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
         raise WavetankError(f"arch = {arch!r} was asked for, but the compiler came up on {came_up!r}.")
     _current = wanted
     return wanted
+
+
+def threads() -> int:
+    """Return how many threads of the processor compute, 0 where a graphics processor does."""
+    return int(qd.lang.impl.current_cfg().cpu_max_num_threads) if _current == "cpu" else 0
 
 
 def synchronize() -> None:

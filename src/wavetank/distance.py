@@ -27,6 +27,7 @@ from wavetank.compiler import qd
 STACK = 8  # deepest nesting of set operations
 UNION, INTERSECTION, DIFFERENCE = -1, -2, -3
 
+vec2 = qd.types.vector(2, qd.f32)
 vec3 = qd.types.vector(3, qd.f32)
 vec4 = qd.types.vector(4, qd.f32)
 
@@ -159,10 +160,12 @@ class SolidSet:
     rotation: qd.types.ndarray()  # vec4 [solids], at the end of the substep
     old_position: qd.types.ndarray()  # vec3 [solids], m, at its start
     old_rotation: qd.types.ndarray()  # vec4 [solids], at its start
+    plane: qd.types.ndarray()  # vec4 [solids]: walls of the tank as planes (n, b) at the end, distance n x + b [1, m]
+    sweep: qd.types.ndarray()  # vec2 [solids]: way of the origin [m] and of a point 1 m away in the substep
     grid: qd.types.ndarray()  # i32 vec4 [grids]: number of its first sample, numbers of nodes along x, y, z
     samples: qd.types.ndarray()  # f32: for each grid its cell edge, then the distances at its nodes, x fastest; m
     count: qd.i32
-    tank_count: qd.i32  # the first so many are the walls of the tank
+    tank_count: qd.i32  # the first so many are the walls of the tank, all of them half-spaces
 
 
 @qd.func
@@ -261,9 +264,21 @@ def to_local(position, rotation, x):
 
 
 @qd.func
+def plane_distance(solids: SolidSet, k, x):
+    """(gradient, distance) of wall `k` of the tank at the world point `x`, with the pose of the substep's end."""
+    plane = solids.plane[k]
+    return vec4(plane.x, plane.y, plane.z, plane.x * x.x + plane.y * x.y + plane.z * x.z + plane.w)
+
+
+@qd.func
 def signed_distance(solids: SolidSet, k, x):
     """(gradient, distance) of solid `k` at the world point `x` (vec3), with the pose of the substep's end."""
-    q = solids.rotation[k]
-    value = local_distance(solids, k, to_local(solids.position[k], q, x))
-    n = rotate(q, vec3(value.x, value.y, value.z))
-    return vec4(n.x, n.y, n.z, value.w)
+    value = vec4(0.0, 0.0, 0.0, 0.0)
+    if k < solids.tank_count:
+        value = plane_distance(solids, k, x)
+    else:
+        q = solids.rotation[k]
+        own = local_distance(solids, k, to_local(solids.position[k], q, x))
+        n = rotate(q, vec3(own.x, own.y, own.z))
+        value = vec4(n.x, n.y, n.z, own.w)
+    return value

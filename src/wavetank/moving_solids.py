@@ -8,7 +8,7 @@ import numpy as np
 
 from wavetank import solids
 from wavetank.errors import WavetankError
-from wavetank.rotations import interpolate, unit_quaternion
+from wavetank.rotations import interpolate, turned, unit_quaternion
 from wavetank.solid import Solid
 from wavetank.state import upload
 
@@ -35,6 +35,7 @@ class MovingSolids:
         self.device = solids.build(self.members, self.tank_count, self.friction, self.spacing)
         self.has_friction = self.friction > 0.0 or any(solid.friction for solid in self.members)
         self.reaches = [solid.reach() for solid in self.members]
+        self.walls = [solid.program()[0] for solid in self.members[: self.tank_count]]
         self._resize()
         self._upload(0.0, 0.0)
 
@@ -127,12 +128,29 @@ class MovingSolids:
             return
         where = [self.targets.get(number, pose) for number, pose in enumerate(self.poses)]
         pairs = list(zip(self.poses, where, strict=True))
-        for share, positions, rotations in (
-            (begin, self.device.old_position, self.device.old_rotation),
-            (end, self.device.position, self.device.rotation),
-        ):
-            upload(positions, np.array([a[0] + share * (b[0] - a[0]) for a, b in pairs], np.float32))
-            upload(rotations, np.array([interpolate(a[1], b[1], share) for a, b in pairs], np.float32))
+        (old_at, old_turn), (at, turn) = (
+            (
+                np.array([a[0] + share * (b[0] - a[0]) for a, b in pairs]),
+                np.array([interpolate(a[1], b[1], share) for a, b in pairs]),
+            )
+            for share in (begin, end)
+        )
+        sweep = [np.linalg.norm(at - old_at, axis=1), 2.0 * np.linalg.norm(turn - old_turn, axis=1)]
+        device = self.device
+        for array, values in (
+            (device.old_position, old_at), (device.old_rotation, old_turn), (device.position, at),
+            (device.rotation, turn), (device.plane, self._planes(at, turn)), (device.sweep, np.stack(sweep, axis=1)),
+        ):  # fmt: skip
+            upload(array, values.astype(np.float32))
+
+    def _planes(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """Return (normal, offset) of the tank's walls at these poses, [tank_count, 4]: the distance is n x + b."""
+        planes = np.zeros((self.tank_count, 4))
+        for k, wall in enumerate(self.walls):
+            normal = turned(rotations[k], turned(wall.turn, np.array([0.0, 1.0, 0.0])))
+            point = positions[k] + turned(rotations[k], wall.offset)
+            planes[k] = *normal, -normal @ point
+        return planes
 
     def _free_name(self, name: str) -> str:
         """Return `name`, or the first free one of "solid 1", "solid 2" and so on."""

@@ -35,7 +35,16 @@ class Recording(Model):
 
     @classmethod
     def of(cls, session: Session, start: Scene) -> "Recording":
-        """Return all that was done in `session`, which began with the scene `start`."""
+        """Return all that was done in `session`, which began with the scene `start`.
+
+        Raises `WavetankError` where a script added forces or took some away: what is no command cannot be repeated.
+        """
+        if session.uncommanded:
+            names = ", ".join(sorted(session.uncommanded))
+            raise WavetankError(
+                f"this session cannot be recorded: a script changed its forces ({names}); a recording has those of the "
+                "scene, [[forces]], and what is done by commands."
+            )
         return cls(
             version=wavetank.__version__,
             arch=session.sim.arch,

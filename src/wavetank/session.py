@@ -13,7 +13,8 @@ import numpy as np
 from wavetank.commands import Command, FrameLength
 from wavetank.errors import WavetankError
 from wavetank.fluids import Points
-from wavetank.game import Game
+from wavetank.forces import Force
+from wavetank.game import HARMLESS, Game
 from wavetank.history import History
 from wavetank.pace import Pace
 from wavetank.params import LIVE
@@ -58,6 +59,8 @@ class Session:
         self.hands: dict[int, tuple[Tool, Hand]] = {}
         self.running: dict[str, tuple[Tool, Hand]] = {}
         self.moving: dict[str, tuple[Any, Any]] = {}
+        self.uncommanded: set[str] = set()  # forces that came or went without a command: no recording has them
+        self._commanded: list[Force] = []  # forces that tools push with in the next frame
         self._waiting: list[Command] = []
         self._latest: dict[Any, int] = {}
         self._lock, self._wake = threading.Lock(), threading.Event()
@@ -139,12 +142,14 @@ class Session:
     def tick(self) -> None:
         """Compute one frame, with what the hands do to it."""
         duration = self.frame_duration
+        self._look_for_strangers()
         for tool, hand in [*self.hands.values(), *self.running.values()]:
             hand.pass_time(duration)
             self.guard(hand, tool.hold, hand, duration)
         for name, (position, rotation) in list(self.moving.items()):
             self._carry(name, position, rotation, duration)
         self.sim.advance(duration)
+        self._commanded = []
         self.ticks += 1
         self.changes += 1
         if self.game is not None:
@@ -169,6 +174,13 @@ class Session:
         if self.smooth:
             self._fit_frame(time.perf_counter() - now)
         return True
+
+    def _look_for_strangers(self) -> None:
+        """Take note of forces that a script added or took away itself."""
+        now, declared, mine = self.sim.forces, self.sim.scene.forces, {id(force) for force in self._commanded}
+        changed = [force for force in now if force not in declared] + [force for force in declared if force not in now]
+        changed += [force for force in self.sim.pushed if id(force) not in mine]
+        self.uncommanded.update(type(force).__name__ for force in changed)
 
     def _fit_frame(self, took: float) -> None:
         """Shorten the frames of a machine that is too slow for them; a command, so that a recording knows."""
@@ -203,10 +215,12 @@ class Session:
 
     def guard(self, hand: Hand, act: Any, *arguments: Any) -> None:
         """Let a tool act; what it has to say, and what it may not do, becomes a note."""
+        before = len(self.sim.pushed)
         try:
             act(*arguments)
         except WavetankError as error:
             hand.notes.append(str(error))
+        self._commanded += self.sim.pushed[before:]
         for sentence in hand.notes:
             self.note(sentence)
         hand.notes.clear()
@@ -239,10 +253,14 @@ class Session:
         return tool
 
     def changed_scene(self, parameters: dict[str, Any]) -> Scene:
-        """Return the scene as it began, with the live parameters as they are now and `parameters` as given."""
+        """Return the scene as it began, with the live parameters as they are now and `parameters` as given.
+
+        A level keeps none that its water feels: a tank that was left tilted stands upright again.
+        """
         now = {name: getattr(self.sim.scene, name) for name in LIVE}
         start = {name: getattr(self.scene, name) for name in LIVE}
-        kept = {name: value for name, value in now.items() if value != start[name]}
+        free = LIVE if self.game is None else HARMLESS
+        kept = {name: value for name, value in now.items() if value != start[name] and name in free}
         return self.scene.changed(**{**kept, **parameters}) if kept or parameters else self.scene
 
     def present_scene(self) -> Scene:

@@ -41,7 +41,7 @@ class Simulation:
         positions, velocities = self.scene.particles()
         self.solids = MovingSolids(self._walls(), self.scene.solids, self.scene.friction, self.scene.spacing)
         self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
-        self._passing: list[Force] = []  # these in the next one only
+        self.pushed: list[Force] = []  # these in the next one only
         self._next_id, self._fastest_start, self._fastest_solid, self._fastest_force = 0, 0.0, 0.0, 0.0
         self._fill(len(positions))
         self.add(positions, velocities, materials=self.scene.kinds())
@@ -111,7 +111,7 @@ class Simulation:
 
     def push(self, force: Force) -> None:
         """Let a force act during the next frame only."""
-        self._passing.append(force)
+        self.pushed.append(force)
 
     def _advance_frame(self, duration: float) -> None:
         began = time.perf_counter()
@@ -121,12 +121,12 @@ class Simulation:
         for part in range(parts):
             self.solids.move_to(part / parts, (part + 1) / parts)
             if self.count:
-                for force in (*self.forces, *self._passing):
+                for force in (*self.forces, *self.pushed):
                     force.apply(self.world.particles, self.count, duration / parts, self.time + duration * part / parts)
                 step(self.world, self.scene, duration / parts, limit)
         self.solids.move_to(0.0, 1.0)
         update_diffuse(self.world, self.scene, duration, self.frame_number)
-        self._passing = []
+        self.pushed = []
         self.solids.arrive()
         compiler.synchronize()
         self.seconds_per_frame = time.perf_counter() - began
@@ -139,7 +139,7 @@ class Simulation:
         scene, particles, count = self.scene, self.world.particles, self.count
         box = (np.zeros(scene.dim), np.array(scene.tank.size)) if scene.tank else self._start_box
         speed = max(self._solid_speed(duration), largest_speed(particles, count))
-        speed += duration * sum(force.largest_acceleration() for force in (*self.forces, *self._passing))
+        speed += duration * sum(force.largest_acceleration() for force in (*self.forces, *self.pushed))
         capillary = min(capillary_substeps(self.world, scene, duration), scene.largest_substeps)
         return max(capillary, substeps(scene, duration, speed, pool_depth(particles, count, scene.gravity, *box)))
 
@@ -157,7 +157,7 @@ class Simulation:
             return math.inf
         self._fastest_solid = max(self._fastest_solid, self._solid_speed(duration))
         fall = sum(2.0 * abs(g) * edge for g, edge in zip(self.scene.gravity, self.scene.tank.size, strict=True))
-        pushes = sum(force.largest_speed() for force in (*self.forces, *self._passing))
+        pushes = sum(force.largest_speed() for force in (*self.forces, *self.pushed))
         self._fastest_force = max(self._fastest_force, pushes)
         given = math.sqrt(fall + self._fastest_start**2) + 2.0 * self._fastest_solid + self._fastest_force
         return self.scene.speed_limit * max(given + capillary_speed(self.world, self.scene), 1e-6)

@@ -84,7 +84,7 @@ def put_snapshot(sim: "Simulation", snapshot: Snapshot) -> None:
         snapshot.arrays, numbers["foam_born"], numbers["foam_capacity"], sim.scene.dim, sim._capacity
     )
     sim.time, sim.frame_number, sim._owed = numbers["time"], snapshot.frame_number, numbers["owed"]
-    sim._next_id, sim._passing = max(sim._next_id, int(numbers["next_id"])), []
+    sim._next_id, sim.pushed = max(sim._next_id, int(numbers["next_id"])), []
     sim._fastest_start, sim._fastest_solid = numbers["fastest_start"], numbers["fastest_solid"]
     sim._fastest_force = numbers["fastest_force"]
     sim._start_box = (np.array(numbers["start_box"][0]), np.array(numbers["start_box"][1]))

@@ -23,6 +23,7 @@ from wavetank.distance import (
     cylinder_distance,
     half_space_distance,
     sphere_distance,
+    vec2,
     vec3,
     vec4,
 )  # fmt: skip
@@ -281,8 +282,8 @@ def build(solids: Sequence[Solid], tank_count: int, friction: float, spacing: fl
     def array(values: Any, kind: Any, length: int) -> Any:
         result = qd.ndarray(kind, shape=(length,))
         host = np.zeros(result.to_numpy().shape, np.int32 if kind is qd.i32 else np.float32)
-        values = np.asarray(values)
-        host[: len(values)] = values
+        if len(values):
+            host[: len(values)] = np.asarray(values)
         result.from_numpy(host)
         return result
 
@@ -298,6 +299,8 @@ def build(solids: Sequence[Solid], tank_count: int, friction: float, spacing: fl
         rotation=array(rotation, vec4, count),
         old_position=array(position, vec3, count),
         old_rotation=array(rotation, vec4, count),
+        plane=array([], vec4, count),
+        sweep=array([], vec2, count),
         grid=grid,
         samples=samples,
         count=len(solids),

@@ -1,5 +1,8 @@
 """The arrays of a world on the device, with unit and shape; allocated once at capacity.
 
+Arrays of particles have one row more than there is room: row `capacity` is nowhere, farther from everything than any
+support, and stands in neighbour lists where there is no neighbour.
+
 Two sets of the moving arrays exist so that sorting and Jacobi updates can read one and write the other; which is
 which is swapped on the host, nothing is copied.
 """
@@ -11,13 +14,17 @@ import numpy as np
 
 from wavetank.compiler import qd
 
+NOWHERE = 1e6  # m, in every direction
+
 
 @dataclasses.dataclass
 class Particles:
     """What a particle carries, in device order (sorted by cell)."""
 
     x: qd.types.ndarray()  # vec [capacity], m: position at the start of the substep
-    p: qd.types.ndarray()  # vec [capacity], m: predicted position, Algorithm 1's x*
+    px: qd.types.ndarray()  # f32 [capacity + 32], m: predicted position, Algorithm 1's x*; see `physics/places.py`
+    py: qd.types.ndarray()  # likewise
+    pz: qd.types.ndarray()  # likewise; unused in 2-D
     v: qd.types.ndarray()  # vec [capacity], m/s
     id: qd.types.ndarray()  # i32 [capacity]: name of the particle for life; those of removed ones are not used again
     material: qd.types.ndarray()  # i32 [capacity]: number of its material
@@ -34,6 +41,7 @@ class Scratch:
     lam: qd.types.ndarray()  # f32 [capacity], m^2: multiplier, the sum over the iterations of a substep
     dlam: qd.types.ndarray()  # f32 [capacity], m^2: its change in the last iteration
     omega: qd.types.ndarray()  # vec3 [capacity], 1/s: vorticity
+    wall: qd.types.ndarray()  # vec4 [capacity]: (gradient [1/m], share of rho_0) of the solids, where any is near
     weight: qd.types.ndarray()  # f32 [capacity]: largest rest density of all fluids over its own; 1 where all are equal
 
 
@@ -47,7 +55,10 @@ class Grid:
     blocks: qd.types.ndarray()  # i32 [blocks]: partial sums of the scan
     order: qd.types.ndarray()  # i32 [capacity]: which particle comes at each sorted place
     number: qd.types.ndarray()  # i32 [capacity]: neighbours of each particle
-    list: qd.types.ndarray()  # i32 [capacity, room]: their indices
+    visits: qd.types.ndarray()  # i32 [capacity]: the same, in whole groups of `lanes`
+    list: qd.types.ndarray()  # i32 [capacity, room]: their indices, filled up with `nowhere`; room a multiple of 16
+    lanes: qd.i32  # neighbours that are computed together
+    nowhere: qd.i32  # index of a particle that is far from all others
     nx: qd.i32  # cells before the pattern moves on along y
     ny: qd.i32
     nz: qd.i32
@@ -117,7 +128,7 @@ class Fluids:
     def array(self, name: str) -> Any:
         """Return the vec4 [capacity] of that name, made when it is first asked for."""
         if name not in self.arrays:
-            self.arrays[name] = vectors(4, self.capacity)
+            self.arrays[name] = vectors(4, self.capacity + 1)
         return self.arrays[name]
 
 
@@ -127,6 +138,7 @@ class Coefficients:
 
     dt: qd.f32  # s
     h: qd.f32  # m, support radius
+    inverse_h: qd.f32  # 1/m
     density_scale: qd.f32  # see RestLattice
     gradient_scale: qd.f32  # 1/m
     eps: qd.f32  # 1/m^2, constraint force mixing
@@ -147,6 +159,11 @@ class Coefficients:
     cohesion: qd.f32 = 0.0  # m^(dim - 2), likewise
 
 
+def swap_predictions(a: Particles, b: Particles) -> None:
+    """Exchange the predicted positions of two sets; nothing is copied."""
+    a.px, b.px, a.py, b.py, a.pz, b.pz = b.px, a.px, b.py, a.py, b.pz, a.pz
+
+
 #: What a particle is, by its number in files and on the device.
 KINDS = ("water", "spray", "foam", "bubble")
 
@@ -156,9 +173,9 @@ def vectors(dim: int, capacity: int) -> Any:
     return qd.ndarray(qd.types.vector(dim, qd.f32), shape=(max(capacity, 1),))
 
 
-def scalars(capacity: int) -> Any:
-    """Allocate a device array of `capacity` float32 numbers."""
-    return qd.ndarray(qd.f32, shape=(max(capacity, 1),))
+def scalars(*shape: int) -> Any:
+    """Allocate a device array of float32 numbers."""
+    return qd.ndarray(qd.f32, shape=tuple(max(n, 1) for n in shape))
 
 
 def integers(*shape: int) -> Any:
@@ -174,16 +191,22 @@ def upload(array: Any, values: np.ndarray) -> None:
 
 
 def new_particles(dim: int, capacity: int) -> Particles:
-    """Allocate particles that all rest at the origin."""
-    x, p, v = (vectors(dim, capacity) for _ in range(3))
-    return Particles(x, p, v, *(integers(capacity) for _ in range(5)))
+    """Allocate particles that all rest at the origin, and the one that is nowhere."""
+    rows = capacity + 1
+    px, py, pz = (scalars(capacity + 32 if k < dim else 1) for k in range(3))
+    places = np.zeros(capacity + 32, np.float32)
+    places[capacity] = NOWHERE
+    for component in (px, py, pz)[:dim]:
+        component.from_numpy(places)
+    return Particles(vectors(dim, rows), px, py, pz, vectors(dim, rows), *(integers(rows) for _ in range(5)))
 
 
 def new_scratch(capacity: int) -> Scratch:
     """Allocate the scratch arrays."""
-    rho, lam, dlam, weight = (scalars(capacity) for _ in range(4))
+    rows = capacity + 1
+    rho, lam, dlam, weight = (scalars(rows) for _ in range(4))
     weight.fill(1.0)
-    return Scratch(rho, lam, dlam, omega=vectors(3, capacity), weight=weight)
+    return Scratch(rho, lam, dlam, omega=vectors(3, rows), wall=vectors(4, rows), weight=weight)
 
 
 def new_diffuse(dim: int, capacity: int) -> Diffuse:

@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+from xdnd import Drag
 from xvfb import Display, missing
 
 import wavetank as wt
@@ -19,6 +20,7 @@ BASIN = wt.Scene(
     fluids=[wt.Block(lower=(0, 0, 0), upper=(0.6, 0.4, 0.4))],
     solids=[wt.Box(name="pillar", center=(0.9, 0.1, 0.2), size=(0.12, 0.2, 0.12))],
 )  # fmt: skip
+LONGEST = 120.0  # s, on a busy machine that compiles its kernels on the way
 NEEDED = "apt-get install xvfb xdotool libgl1 libgl1-mesa-dri libglx-mesa0 libegl1"
 
 
@@ -53,7 +55,7 @@ class Person:
             self.window.draw()
             time.sleep(0.005)
 
-    def until(self, true, seconds: float = 300.0) -> None:
+    def until(self, true, seconds: float = LONGEST) -> None:
         end = time.monotonic() + seconds
         while not true() and time.monotonic() < end:
             self.look(0.03)
@@ -87,6 +89,21 @@ class Person:
         self.move(left + share * (right - left), 0.5 * (top + bottom))
         self.press()
         self.lift()
+
+    def scroll_to(self, place: str) -> None:
+        """Turn the wheel over the panel until all of a control is in sight."""
+        self.until(lambda: place in self.desk.places)
+        left, top, right, bottom = self.desk.places["panel"]
+        self.move(0.5 * (left + right), bottom - 40.0)
+
+        def is_seen() -> bool:
+            _, high, _, low = self.desk.places[place]
+            if high < top or low > bottom:
+                self.display.do("click", 4 if high < top else 5)
+                self.look(0.1)
+            return high >= top and low <= bottom
+
+        self.until(is_seen)
 
     def key(self, name: str) -> None:
         self.display.do("key", name)
@@ -206,22 +223,104 @@ def test_pages_curves_scenes_and_files(person, tmp_path, monkeypatch):
     saved = Recording.load(tmp_path / "session.toml")
     assert 0 < saved.frames <= person.session.ticks and len(saved.commands) <= len(person.session.log)
     person.click("page.Scenes")
-    person.look()
+    person.scroll_to("scene.double-dam-2d")  # below the levels
     person.click("scene.double-dam-2d")
     person.until(lambda: person.session.sim.scene.dim == 2)
 
 
+def drop(person, file) -> None:
+    """Drag a file over the window and let go, as another program would."""
+    import glfw
+    from imgui_bundle import glfw_utils
+
+    x, y = person.water(0.5, 0.5)
+    target = glfw.get_x11_window(glfw_utils.glfw_window_hello_imgui())
+    drag = Drag(person.display.name, target, [file], round(person.left + x), round(person.top + y))
+
+    def is_done() -> bool:
+        drag.pump()
+        return drag.finished
+
+    person.until(is_done)
+    drag.close()
+
+
 def test_a_file_that_is_dropped_is_opened_and_a_wrong_one_says_why(person, tmp_path):
     BASIN.changed(title="Dropped").save(tmp_path / "mine.toml")
-    person.window._dropped(None, [str(tmp_path / "mine.toml")])
+    drop(person, tmp_path / "mine.toml")
     person.until(lambda: person.session.sim.scene.title == "Dropped")
     (tmp_path / "wrong.toml").write_text("spacing = 'wide'\n")
-    person.window._dropped(None, [str(tmp_path / "wrong.toml")])
+    drop(person, tmp_path / "wrong.toml")
     person.until(lambda: any("spacing" in note for note, _ in person.desk.notes))
     assert person.session.sim.scene.title == "Dropped"
 
 
-def play_out(arguments, environment, until: str, seconds: float = 300.0) -> str:
+LEVEL = wt.Scene(
+    title="Small level", spacing=0.05, tank=wt.Tank(size=(1.2, 0.7)),
+    fluids=[wt.Block(lower=(0, 0), upper=(0.6, 0.3))], solids=[wt.Box(center=(0.65, 0.175), size=(0.1, 0.35))],
+    goal={
+        "text": "Bring the water over.", "hint": "Tilt more.", "seconds": 60,
+        "tools": {"tilt": {"most": 60.0}, "push": {}},
+        "aims": [{"kind": "deliver", "name": "here", "lower": (0.7, 0), "upper": (1.2, 0.7), "share": 0.2}],
+    },
+)  # fmt: skip
+
+
+def time_is_over(person) -> None:
+    def wait() -> None:
+        person.session.game.elapsed = person.session.game.goal.seconds
+
+    person.window.engine.ask(wait).result()
+    person.until(lambda: person.desk.game["outcome"] == "lost" and "retry" in person.desk.places)
+
+
+def test_a_level_is_won_and_lost(person, tmp_path, monkeypatch):
+    """Region and allowed tools are shown; a drag wins and the score is kept; retry and the next level are a click."""
+    monkeypatch.setenv("WAVETANK_DATA", str(tmp_path / "scores"))
+    session, desk = person.session, person.desk
+    LEVEL.save(tmp_path / "level.toml")
+    drop(person, tmp_path / "level.toml")
+    person.until(lambda: desk.game is not None and "region.0" in desk.places)
+    assert [tool["name"] for tool in desk.rail] == ["look", "push", "tilt"]
+    assert desk.tool == "tilt"
+    assert [about["name"] for about in desk.hand["options"]] == ["stay"], "the angle is fixed"
+    person.key("9")
+    assert desk.tool == "tilt", "there is no dye in this level"
+    assert (desk.game["heading"], desk.game["aims"][0]["label"]) == ("Level", "here 0 % of 20 %")
+
+    def columns() -> list[float]:
+        x, _, width, height = person.window.stage.box
+        return (x + session.camera.project([[0.7, 0.0, 0.0], [1.2, 0.0, 0.0]], width, height)[:, 0]).tolist()
+
+    person.until(lambda: desk.places["region.0"][0::2] == pytest.approx(columns(), abs=2.0))
+    person.move(*person.water(0.4, 0.5))
+    person.press()
+    person.move(*person.water(0.95, 0.5))
+    person.until(lambda: session.game.outcome == "won")
+    person.lift()
+    person.until(lambda: "retry" in desk.places)
+    assert "next" not in desk.places
+    assert desk.game["headline"] == "Won" and "A new best." in desk.game["verdict"]
+    assert [entry["stars"] for entry in desk.engine.shown.scores.values()] == [desk.game["stars"]]
+    assert (tmp_path / "scores" / "scores.json").exists()
+    attempt = session.game
+    person.click("retry")
+    person.until(lambda: session.game is not attempt and not desk.game["outcome"])
+    person.look()
+    assert "retry" not in desk.places
+    time_is_over(person)
+    assert (desk.game["headline"], desk.game["verdict"]) == ("Time is over", "Tilt more.")
+    person.click("page.Scenes")
+    person.scroll_to("scene.over-the-wall")
+    person.click("scene.over-the-wall")
+    person.until(lambda: desk.game["heading"] == "Level 1 of 8")
+    time_is_over(person)
+    person.click("next")
+    person.until(lambda: desk.game["heading"] == "Level 2 of 8")
+    assert session.scene.title == wt.Scene.load("spill").title
+
+
+def play_out(arguments, environment, until: str, seconds: float = LONGEST) -> str:
     """Start `wavetank play`, wait for a word of its, end it as a person does; return all that it said."""
     process = subprocess.Popen(
         [sys.executable, "-m", "wavetank", "play", "drop-2d", "--particles", "200", *arguments],
@@ -233,7 +332,7 @@ def play_out(arguments, environment, until: str, seconds: float = 300.0) -> str:
         said += process.stdout.readline()
     if process.poll() is None:
         process.terminate()
-    said += process.communicate(timeout=300)[0]
+    said += process.communicate(timeout=LONGEST)[0]
     return said
 
 
@@ -271,7 +370,7 @@ def test_play_opens_a_window_and_records(display, tmp_path):
     try:
         found = subprocess.run(
             ["xdotool", "search", "--sync", "--onlyvisible", "--name", "^wavetank$"],
-            env=display.environment, capture_output=True, text=True, timeout=300,
+            env=display.environment, capture_output=True, text=True, timeout=LONGEST,
         ).stdout.split()  # fmt: skip
         display.do("windowfocus", "--sync", found[0])
         for _ in range(6):  # the first picture is slow where kernels are compiled
@@ -279,7 +378,7 @@ def test_play_opens_a_window_and_records(display, tmp_path):
             time.sleep(2.0)
     finally:
         process.terminate()
-        said = process.communicate(timeout=300)[0]
+        said = process.communicate(timeout=LONGEST)[0]
         display.close()
     assert process.returncode == 0 and "session written to" in said, said
     assert "pause" in [command["do"] for command in Recording.load(tmp_path / "s.toml").commands]

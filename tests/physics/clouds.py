@@ -27,10 +27,15 @@ class Cloud:
         self.c = dataclasses.replace(coefficients(self.scene, 1 / 240), largest_correction=1e9, relaxation=1.0)
         self.method = method_number(self.scene)
         self.dim, self.count, self.h = dim, count, self.scene.support * d
-        self.x = self.world.particles.p.to_numpy().astype(np.float64)
-        self.v = self.world.particles.v.to_numpy().astype(np.float64)
+        self.x = self.predictions(self.world.particles)
+        self.v = self.world.particles.v.to_numpy()[:count].astype(np.float64)
         self.r = self.x[:, None, :] - self.x[None, :, :]
         self.distance = np.linalg.norm(self.r, axis=-1)
+
+    def predictions(self, particles) -> np.ndarray:
+        """Predicted positions [m], float64 [count, dim]."""
+        components = [particles.px, particles.py, particles.pz][: self.dim]
+        return np.stack([p.to_numpy()[: self.count] for p in components], axis=1).astype(np.float64)
 
     def mass_over_rest_density(self) -> float:
         """m / rho_0 for which the rest lattice has density rho_0."""

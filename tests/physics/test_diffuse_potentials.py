@@ -40,7 +40,7 @@ def potentials(cloud: Cloud, speed: float) -> tuple[np.ndarray, np.ndarray]:
     find_surface(births, world.particles, world.grid, world.solids, world.walls, cloud.c, a, cloud.count, cloud.method)
     out = scalars(cloud.count)
     fill_potentials(out, births, world.particles, world.grid, cloud.c, a, cloud.count, cloud.method)
-    return births.normal.to_numpy(), out.to_numpy()
+    return births.normal.to_numpy()[: cloud.count], out.to_numpy()
 
 
 def ramp(value: np.ndarray, low: float, high: float) -> np.ndarray:

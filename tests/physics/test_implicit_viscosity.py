@@ -30,15 +30,15 @@ def solved(x: np.ndarray, v: np.ndarray, viscosity: float, most: int = 400, **se
     sim = Simulation(scene)
     sim.frame()
     world = sim.world
-    before = world.particles.v.to_numpy().astype(np.float64)
+    before = world.particles.v.to_numpy()[: sim.count].astype(np.float64)
     c = coefficients(scene, DT)
     kinds = prepare_fluids(world, world.particles, scene, DT)
     number = solve_viscosity(
         world.particles, world.scratch, world.fluids, world.grid, world.solids, c, kinds, sim.count, scene.support,
         scene.no_slip, most,
     )  # fmt: skip
-    after = world.particles.v.to_numpy().astype(np.float64)
-    return world.particles.x.to_numpy().astype(np.float64), before, after, number
+    after = world.particles.v.to_numpy()[: sim.count].astype(np.float64)
+    return world.particles.x.to_numpy()[: sim.count].astype(np.float64), before, after, number
 
 
 def lattice(dim: int, side: int) -> np.ndarray:

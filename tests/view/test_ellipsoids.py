@@ -97,15 +97,57 @@ def test_a_drop_is_drawn_as_the_ball_it_is(make_frame, height):
     inner = np.isfinite(entry_depths(camera, (0.45, 0.55, 0.5), 0.95 * radius))
     assert inner.sum() > 5
     assert np.abs(depth - exact)[inner].max() < 0.02 * radius
-    assert (depth[~np.isfinite(entry_depths(camera, (0.45, 0.55, 0.5), 1.06 * radius))] > 1e30).all()
+    outer = 1.06 * radius + 0.5 * float(shot.lens.pixel) * (exact[inner].min() if height is None else 1.0)
+    outside = ~np.isfinite(entry_depths(camera, (0.45, 0.55, 0.5), outer))
+    assert (depth[outside] > 1e30).all()
 
 
-def test_water_against_a_pane_is_as_flat_as_the_pane(make_frame):
+@pytest.mark.parametrize("height", [None, 1.2])
+def test_an_outline_covers_its_share_of_a_pixel(make_frame, height):
+    """The cover of all pixels adds up to the area of the drop, wherever it lies between them."""
+    camera = Camera(eye=CAMERA.eye, target=CAMERA.target, field_of_view=0.8, height=height)
+    renderer, areas = Renderer(2 * WIDTH, 2 * HEIGHT), []
+    for shift in np.linspace(0.0, 1.0, 7):
+        frame = open_water([(0.45 + 0.03 * shift, 0.55 + 0.02 * shift, 0.5)], make_frame)
+        shot = renderer.shot(frame, camera)
+        ellipsoids.draw(shot, renderer.buffers)
+        surface.draw(shot, renderer.buffers)
+        water = renderer.buffers.water
+        there, rim = water.depth.to_numpy() < 0x7F000000, water.rim.to_numpy() >> 24
+        areas.append(np.where(rim > 0, (rim + 0.5) / 127.0, 1.0)[there].sum())
+        depth = water.depth.to_numpy().view(np.float32)[there].mean()
+    pixel = float(shot.lens.pixel) * (depth if height is None else 1.0)
+    assert np.array(areas) == pytest.approx(np.pi * (ellipsoids.BALL * D / pixel) ** 2, rel=0.03)
+
+
+@pytest.mark.parametrize(("eye", "shown"), [((0.5, 0.4, 3.0), 2.0), ((0.5, 1.6, 3.0), None)])
+def test_water_against_a_pane_is_as_flat_as_the_pane(make_frame, eye, shown):
     frame = make_frame(Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 1.0))), lattice((0, 0, 0), (1.0, 0.8, 1.0)))
-    camera = Camera(eye=(0.5, 0.4, 3.0), target=(0.5, 0.4, 0.0), height=0.5)
+    camera = Camera(eye=eye, target=(0.5, 0.4, 1.0), height=0.5)
     renderer = Renderer(64, 48)
-    shot = renderer.shot(frame, camera)
-    ellipsoids.draw(shot, renderer.buffers)
-    surface.draw(shot, renderer.buffers)
-    depth = renderer.buffers.water.depth.to_numpy().view(np.float32)
-    assert np.abs(depth - 2.0).max() < 1e-5
+    renderer.render(frame, camera)
+    depth = renderer.buffers.water.spare.to_numpy().view(np.float32)
+    lens = camera.lens(64, 48)
+    v = (24 - np.arange(48) - 0.5)[:, None] * lens.pixel
+    pane = (1.0 - lens.eye[2] - v * lens.up[2]) / lens.forward[2]
+    height = lens.eye[1] + v * lens.up[1] + pane * lens.forward[1]
+    below = np.broadcast_to(height < 0.8 - 0.5 * D, depth.shape) if shown is None else np.ones(depth.shape, bool)
+    assert below.mean() > 0.5
+    assert np.abs(depth - pane)[below].max() < 1e-5
+
+
+def test_the_surface_meets_a_pane_along_a_straight_line(make_frame):
+    """Noisy water at rest, seen against the front pane: the edge of the wet part is level to a small part of d."""
+    x = lattice((0, 0, 0), (1.0, 0.6, 1.0))
+    x = np.clip(x + np.random.default_rng(2).normal(0.0, 0.08 * D, x.shape), 0.25 * D, 1.0 - 0.25 * D)
+    camera = Camera(eye=(0.5, 1.1, 3.0), target=(0.5, 0.5, 1.0), height=0.6)
+    renderer = Renderer(320, 240)
+    renderer.render(make_frame(Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 1.0))), x), camera)
+    seen = renderer.buffers.water.spare.to_numpy().view(np.float32)
+    lens = camera.lens(320, 240)
+    v = (120 - np.arange(240) - 0.5)[:, None] * lens.pixel
+    pane = (1.0 - lens.eye[2] - v * lens.up[2]) / lens.forward[2]
+    wet = np.abs(seen - pane) < 1e-4
+    line = wet[:, 40:-40].argmax(axis=0) * lens.pixel * float(lens.up[1])
+    assert wet.any(axis=0).all()
+    assert line.std() < 0.08 * D

@@ -80,6 +80,7 @@ def kept_picture(dim, view):
     return np.asarray(Image.open(FOLDER / f"{view}-{dim}d.png").convert("RGB"))
 
 
+PARTS = ("still", "once", "passes")
 CASES = [(dim, view) for dim in (2, 3) for view in views.VIEWS]
 
 
@@ -91,15 +92,12 @@ def test_a_view_looks_as_it_did(dim, view):
 
 
 @pytest.mark.parametrize(
-    "name", sorted({f.__module__.rpartition(".")[2] for f in views.VIEWS["water"].passes + views.VIEWS["water"].once})
+    "name", sorted({f.__module__.rpartition(".")[2] for part in PARTS for f in getattr(views.VIEWS["water"], part)})
 )
 def test_no_pass_can_be_left_out(monkeypatch, name):
     """The comparison is keen enough to see every single pass of the water missing."""
     kind = views.VIEWS["water"]
-    without = {
-        part: tuple(f for f in getattr(kind, part) if f.__module__.rpartition(".")[2] != name)
-        for part in ("once", "passes")
-    }
+    without = {part: tuple(f for f in getattr(kind, part) if f.__module__.rpartition(".")[2] != name) for part in PARTS}
     monkeypatch.setitem(views.VIEWS, "water", dataclasses.replace(kind, **without))
     assert not looks_like(picture(3, "water"), kept_picture(3, "water"))
 

@@ -16,6 +16,7 @@ import numpy as np
 from wavetank.commands import Command
 from wavetank.errors import WavetankError
 from wavetank.front.about import figures, status, world
+from wavetank.front.hud import Hud
 from wavetank.front.picture import Painter
 from wavetank.session import Session
 
@@ -35,15 +36,20 @@ class Shown:
     world: dict[str, Any] = dataclasses.field(default_factory=dict)
     figures: dict[str, float] = dataclasses.field(default_factory=dict)
     measured: int = 0  # how often figures were taken
+    game: dict[str, Any] | None = None
+    scores: dict[str, dict[str, Any]] = dataclasses.field(default_factory=dict)  # by level
+    regions: list[dict[str, Any]] = dataclasses.field(default_factory=list)  # of the game, in the picture
 
 
 class Engine:
     """Turns a session and paints it until `stop`. `submit` and `do` may be called from any thread."""
 
     def __init__(self, session: Session) -> None:
-        self.session, self.painter = session, Painter(session)
+        self.session, self.painter, self.hud = session, Painter(session), Hud(session)
         session.smooth = True
-        self.shown = Shown(status=status(session, self.painter), world=world(session))
+        self.shown = Shown(
+            status=status(session, self.painter), world=world(session), game=self.hud.status(), scores=self.hud.scores
+        )
         self.notes: queue.SimpleQueue[str] = queue.SimpleQueue()
         self.failure: BaseException | None = None
         self.size = self.painter.asked  # px of the place for the picture; the front sets it
@@ -113,10 +119,13 @@ class Engine:
             return
         self._painted, self._painted_at, self._sharp = self.session.changes, now, calm
         image = self.painter.paint(sharp=calm)
-        self.shown = dataclasses.replace(self.shown, image=image, number=self.shown.number + 1)
+        regions = self.hud.regions(self.painter.wanted)
+        self.shown = dataclasses.replace(self.shown, image=image, number=self.shown.number + 1, regions=regions)
 
     def _tell(self, now: float) -> None:
         session = self.session
+        # The game first: a score that cannot be kept is one more note.
+        game = self.hud.status()
         notes, session.notes = session.notes, []
         for sentence in notes:
             self.notes.put(sentence)
@@ -130,5 +139,6 @@ class Engine:
             took = time.perf_counter() - began
             self._next_figures = now + min(FIGURES_SELDOM, max(FIGURES_EVERY, took / FIGURES_SHARE))
         self.shown = dataclasses.replace(
-            self.shown, status=status(session, self.painter), world=world(session), figures=measured, measured=count
-        )
+            self.shown, status=status(session, self.painter), world=world(session), figures=measured, measured=count,
+            game=game, scores=self.hud.scores,
+        )  # fmt: skip

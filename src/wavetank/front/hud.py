@@ -1,4 +1,4 @@
-"""What a page shows of a game: the goal and how it stands, its regions in the picture, high scores."""
+"""What page and window show of a game: the goal and how it stands, its regions in the picture, high scores."""
 
 import itertools
 import math
@@ -10,6 +10,8 @@ from wavetank.game import Game
 from wavetank.scene import bundled_levels
 from wavetank.scores import keep_score, key_of, scores
 from wavetank.session import Session
+
+Place = list[float]  # u, v: shares of a picture's width and height
 
 
 class Hud:
@@ -34,10 +36,13 @@ class Hud:
             self._keep(game)
         levels = bundled_levels()
         place = levels.index(self._level) + 1 if self._level in levels else 0
+        told = game.describe()
+        for aim in told["aims"]:
+            aim["label"] = _label(aim)
         return {
-            **game.describe(), "level": self._level, "number": place, "levels": len(levels),
-            "next": levels[place] if 0 < place < len(levels) else "", "best": self.scores.get(self._level),
-            "record": self._is_best,
+            **told, "level": self._level, "next": levels[place] if 0 < place < len(levels) else "",
+            "heading": f"Level {place} of {len(levels)}" if place else "Level",
+            "headline": _headline(game, place == len(levels)), "verdict": self._verdict(game),
         }  # fmt: skip
 
     def _keep(self, game: Game) -> None:
@@ -47,15 +52,27 @@ class Hud:
             self.session.note(f"The score cannot be kept: {error}.")
         self.scores = scores()
 
-    def regions(self, size: tuple[int, int]) -> dict[str, Any]:
-        """Return the corners of each region as shares of a picture of `size` [px], for the page to draw over it."""
-        game = self.session.game
-        return {
-            "type": "regions",
-            "regions": [] if game is None else [self._corners(aim.lower, aim.upper, size) for aim in game.goal.aims],
-        }
+    def _verdict(self, game: Game) -> str:
+        """Say in a sentence or two how it was won, or how it may be."""
+        if game.outcome != "won":
+            return game.goal.hint
+        said = [] if game.goal.is_endured else [f"In {game.elapsed:.1f} s."]
+        best = self.scores.get(self._level)
+        if self._is_best:
+            said.append("A new best.")
+        elif best is not None:
+            wet = f"{100 * best['mark']:.0f} % of what is allowed got wet"
+            mark = wet if game.goal.is_endured else f"{best['mark']:.1f} s"
+            said.append(f"Best: {best['stars']} star{'s' * (best['stars'] > 1)}, {mark}.")
+        return " ".join(said)
 
-    def _corners(self, lower: Any, upper: Any, size: tuple[int, int]) -> list[list[float]]:
+    def regions(self, size: tuple[int, int]) -> list[dict[str, list[Place]]]:
+        """Return the corners and the outline of each region, as shares of a picture of `size` [px]."""
+        game = self.session.game
+        places = [] if game is None else [self._corners(aim.lower, aim.upper, size) for aim in game.goal.aims]
+        return [{"corners": corners, "outline": _hull(corners)} for corners in places]
+
+    def _corners(self, lower: Any, upper: Any, size: tuple[int, int]) -> list[Place]:
         flat = len(lower) == 2
         ends = [(a, b) for a, b in zip(lower, upper, strict=True)] + ([(0.0,)] if flat else [])
         # x runs fastest, so that corner k lies at the upper end of axis j where bit j of k is set.
@@ -63,3 +80,33 @@ class Hud:
         places = self.session.camera.project(corners, *size)[:, :2] / size
         seen = all(math.isfinite(part) for part in places.reshape(-1))
         return [[round(float(u), 5), round(float(v), 5)] for u, v in places] if seen else []
+
+
+def _label(aim: dict[str, Any]) -> str:
+    asked = "keep dry" if aim["forbids"] else f"{100 * aim['value']:.0f} % of {100 * aim['share']:.0f} %"
+    return f"{aim['name']} {asked}".strip()
+
+
+def _headline(game: Game, is_last: bool) -> str:
+    if game.outcome == "won":
+        return "Won: the last level" if is_last else "Won"
+    if game.outcome == "lost":
+        return "Time is over" if game.elapsed >= game.goal.seconds - 0.01 else "Too wet"
+    return ""
+
+
+def _hull(points: list[Place]) -> list[Place]:
+    """Return the corners of the convex hull in order: monotone chain, Andrew 1979, doi:10.1016/0020-0190(79)90072-3."""
+    ends = []
+    for order in (sorted(points), sorted(points, reverse=True)):
+        chain: list[Place] = []
+        for p in order:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], p) <= 0:
+                chain.pop()
+            chain.append(p)
+        ends += chain[:-1]
+    return ends
+
+
+def _turn(a: Place, b: Place, c: Place) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

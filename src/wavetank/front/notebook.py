@@ -43,5 +43,6 @@ def show(what: Any, arch: str = "cpu", height: int = 640) -> Show:
     if hasattr(what, "snapshot"):
         session = Session(what.scene, what.arch)
         session.sim.resume(what.snapshot())
+        session.sim.forces = [*what.forces]
         return Show(session, height)
     return Show(Session(what if isinstance(what, Scene) else Scene.load(what), arch), height)

@@ -97,6 +97,8 @@ class WebFront:
             try:
                 future.set_result(job())
             except Exception as error:  # it belongs to who asked; the water goes on
+                if isinstance(error, WavetankError):
+                    self.session.note(str(error))
                 future.set_exception(error)
         driver = self.viewers.driver
         self.painter.detail = self.viewers.detail
@@ -134,7 +136,7 @@ class WebFront:
         for viewer in self.viewers.all:
             viewer.is_new = False
         image = self.painter.paint(sharp=calm)
-        outlines = self.hud.regions(self.painter.wanted)
+        outlines = {"type": "regions", "regions": self.hud.regions(self.painter.wanted)}
         if new or outlines != self._outlined:
             self._outlined = outlines
             self._call(lambda: self.viewers.broadcast(outlines))
@@ -203,7 +205,10 @@ class WebFront:
         self._jobs.put((make, future))
         self.session.wake()
         headers = {"content-disposition": f"attachment; filename={name}"}
-        return Response(await asyncio.wrap_future(future), media_type="application/toml", headers=headers)
+        try:
+            return Response(await asyncio.wrap_future(future), media_type="application/toml", headers=headers)
+        except WavetankError as error:
+            return Response(f"{error}\n", status_code=409, media_type="text/plain")
 
 
 def _packaged(name: str) -> Response:

@@ -28,6 +28,7 @@ class Order:
     threads: int | None
     peers: bool
     roofline: bool
+    search: bool
     start_up: bool
     compare: Path | None
     arch: str
@@ -38,11 +39,22 @@ def perform(order: Order, say: Callable[[str], None]) -> tuple[dict[str, Any], l
 
     Raises `WavetankError` for options that do not go together or are out of range.
     """
-    if order.peers + order.roofline + (order.compare is not None) > 1:
-        raise WavetankError("--peers, --roofline and --compare are three things; give one of them.")
+    if order.peers + order.roofline + order.search + (order.compare is not None) > 1:
+        raise WavetankError("--peers, --roofline, --search and --compare are four things; give one of them.")
     names, sizes = split(order.scenes, order.sizes)
     if order.peers:
         return _peers(order, names, sizes, say)
+    if order.search:
+        from wavetank.lab import search
+
+        if names:
+            raise WavetankError(
+                "--search compares neighbour searches on lattices of its own; give sizes, but no scene."
+            )
+        result = search.search(
+            sizes or search.SIZES, arch=order.arch, repeats=order.repeats, threads=order.threads, say=say
+        )
+        return result, [search.search_table(result)]
     if order.roofline:
         from wavetank.lab.roofline import roofline, roofline_table
 

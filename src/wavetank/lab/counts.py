@@ -30,7 +30,7 @@ def count_tests(tests: qd.types.ndarray(), particles: Particles, grid: Grid, c: 
     """Count the particles in the cells around each particle: one distance test each when the lists are built."""
     for i in range(count):
         sums = qd.Vector([0])
-        for_each_around(sums, add_one, particles.p[i], particles.p, particles.p, grid, c)
+        for_each_around(sums, add_one, particles.x[i], particles.x, particles.x, grid, c)
         tests[i] = sums[0]
 
 

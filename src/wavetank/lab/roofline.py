@@ -53,21 +53,19 @@ class Cost:
 
 #: By the name of the kernel. Vectors are three words of four bytes.
 COSTS: dict[str, Cost] = {
-    "predict": Cost(vectors=4, operations=12),  # x, v twice, p
+    "predict": Cost(vectors=4, words=1, operations=110),  # x, v twice, p
     "mark_near_solids": Cost(vectors=2, words=1, operations=150),
     "keep_out_of_solids": Cost(words=1),  # nearly all particles are far from every wall
     "count_cells": Cost(vectors=1, words=3, operations=6),
     "place_particles": Cost(words=7),
     "reorder": Cost(vectors=6, words=5),
-    "list_neighbors": Cost(vectors=1, words=3, pair_words=1, test_operations=9),
-    "clear_multipliers": Cost(words=2),
+    "list_neighbors": Cost(vectors=1, words=4, pair_words=1, test_operations=9),
     "solve_multipliers": Cost(vectors=1, words=6, pair_words=1, operations=25, pair_operations=26),
     "correct_positions": Cost(vectors=2, words=3, pair_words=1, operations=12, pair_operations=24),
-    "update_velocities": Cost(vectors=4, operations=24),
+    "update_velocities": Cost(vectors=5, operations=24),
     "apply_viscosity": Cost(vectors=3, words=1, pair_words=1, operations=7, pair_operations=22),
     "find_vorticity": Cost(vectors=3, words=1, pair_words=1, pair_operations=38),
     "confine_vorticity": Cost(vectors=4, words=1, pair_words=1, operations=25, pair_operations=36),
-    "accept_positions": Cost(vectors=2),
 }
 
 
@@ -104,8 +102,8 @@ def add_way(sums: qd.template(), r, i, j, data: qd.template(), c: Coefficients, 
 def walk(total: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32):
     """Go once over all neighbour lists."""
     for i in range(count):
-        way = particles.p[i] * 0.0
-        for_each_neighbor(way, add_way, i, particles.p, particles.p, grid, c, 0)
+        way = particles.x[i] * 0.0
+        for_each_neighbor(way, add_way, i, particles, particles.v, grid, c, 0)
         total[i] = way.norm_sqr()
 
 

@@ -16,7 +16,18 @@ Contact: conservative advancement along the path (Hart 1996, "Sphere tracing", 1
 """
 
 from wavetank.compiler import qd
-from wavetank.distance import SolidSet, lift, local_distance, rotate, signed_distance, to_local, vec3, vec4
+from wavetank.distance import (
+    SolidSet,
+    lift,
+    local_distance,
+    plane_distance,
+    rotate,
+    signed_distance,
+    to_local,
+    vec3,
+    vec4,
+)  # fmt: skip
+from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Particles, Walls
 
 # Bit 30 of `near` stands for every solid from number 30 on.
@@ -26,6 +37,18 @@ from wavetank.state import Coefficients, Particles, Walls
 def is_near(near, k):
     """Say whether solid `k` is marked in the bits `near`."""
     return (near >> qd.min(k, 30)) & 1
+
+
+@qd.func
+def next_near(near, k, count):
+    """First solid behind number `k` that is marked in the bits `near`, or `count`: most particles have few marks."""
+    following = k + 1
+    if following < 30:
+        rest = near >> following
+        following = following + qd.math.ffs(rest) - 1 if rest != 0 else count
+    elif (near >> 30) == 0:
+        following = count
+    return qd.min(following, count)
 
 
 @qd.func
@@ -44,14 +67,15 @@ def wall_density(x: qd.template(), near, solids: SolidSet, walls: Walls, c: Coef
     point = lift(x)
     free = 1.0
     gradient = vec3(0.0, 0.0, 0.0)
-    for k in range(solids.count):
-        if is_near(near, k) == 1:
-            value = signed_distance(solids, k, point)
-            if value.w < c.h:
-                share = wall_share(walls, value.w, c.h) * c.wall_density
-                n = vec3(value.x, value.y, value.z)
-                gradient = gradient * (1.0 - share[0]) - n * (free * share[1] / c.h)
-                free *= 1.0 - share[0]
+    k = next_near(near, -1, solids.count)
+    while k < solids.count:
+        value = signed_distance(solids, k, point)
+        if value.w < c.h:
+            share = wall_share(walls, value.w, c.h) * c.wall_density
+            n = vec3(value.x, value.y, value.z)
+            gradient = gradient * (1.0 - share[0]) - n * (free * share[1] / c.h)
+            free *= 1.0 - share[0]
+        k = next_near(near, k, solids.count)
     return vec4(gradient.x, gradient.y, gradient.z, 1.0 - free)
 
 
@@ -60,32 +84,55 @@ def follow(k, at, end, solids: SolidSet, gap):
     """Return where a particle on its way from `at` to `end` comes out, both in the frame of solid `k`.
 
     The path is followed in steps as long as the distance to the solid; where it touches, the rest of it slides on
-    along the surface. Whatever the speed, nothing passes through a wall that the distance function resolves.
+    along the surface. Whatever the speed, nothing passes through a wall that the distance function resolves. Distances
+    are asked for in one place of the code only, because what a kernel takes to compile grows with their number.
     """
     nearest = 0.1 * gap
-    for _ in range(64):
+    # 0: has the way touched the solid at all? 1: follow it, in 64 steps at most. 2 and 3: keep the gap where it ends.
+    phase, steps = 0, 0
+    while phase < 4:
+        probe = end
+        if phase == 1:
+            probe = at
+        value = local_distance(solids, k, probe)
+        n = vec3(value.x, value.y, value.z)
         way = end - at
         length = way.norm()
-        if length > 0.0:
-            value = local_distance(solids, k, at)
-            n = vec3(value.x, value.y, value.z)
+        if phase == 0:
+            # A way no longer than the distance at its end has not touched.
+            phase = 4 if value.w >= qd.max(gap, length) else 1
+        elif phase == 1:
             inward = way.dot(n)
             if value.w >= length:
                 at = end
             elif value.w > nearest or inward >= 0.0:
-                at += way * (qd.max(value.w, nearest) / length) if value.w < length else way
+                at += way * (qd.max(value.w, nearest) / length)
             else:
                 end -= n * inward
                 # What is left of a way straight into the wall is rounding.
                 if (end - at).norm() < 1e-3 * length:
                     end = at
-    # What is not done by now is not known to be free: it ends where it has got to.
-    end = at
-    for _ in range(2):
-        value = local_distance(solids, k, end)
-        if value.w < gap:
-            end += vec3(value.x, value.y, value.z) * (gap - value.w)
+            steps += 1
+            if steps == 64:
+                end = at  # what is not done by now is not known to be free: it ends where it has got to
+                phase = 2
+        else:
+            end += n * qd.max(gap - value.w, 0.0)
+            phase += 1
+        if phase == 1 and (end - at).norm() == 0.0:
+            phase = 2
     return end
+
+
+@qd.func
+def kept_in_tank(target, near, solids: SolidSet, gap):
+    """Return the point `target` moved back in front of the marked walls of the tank; nothing passes a half-space."""
+    k = next_near(near, -1, solids.count)
+    while k < solids.tank_count:
+        value = plane_distance(solids, k, target)
+        target += vec3(value.x, value.y, value.z) * qd.max(gap - value.w, 0.0)
+        k = next_near(near, k, solids.count)
+    return target
 
 
 @qd.func
@@ -95,51 +142,79 @@ def stopped(origin, target, near, solids: SolidSet, gap):
     The tank comes last: it is convex from inside, so its word holds. Where one solid moved a particle all are asked
     once more.
     """
-    turns = solids.count
-    for turn in range(2 * solids.count):
-        k = solids.count - 1 - turn % solids.count
-        if turn < turns and is_near(near, k) == 1:
+    turn, moved = 0, 1
+    while turn < 2 and moved == 1:
+        moved = 0
+        k = next_near(near, solids.tank_count - 1, solids.count)
+        while k < solids.count:
             rotation = solids.rotation[k]
             end = to_local(solids.position[k], rotation, target)
             at = to_local(solids.old_position[k], solids.old_rotation[k], origin)
-            # A way no longer than the distance at its end has not touched the solid.
-            if local_distance(solids, k, end).w < qd.max(gap, (end - at).norm()):
-                out = follow(k, at, end, solids, gap)
-                if (out - end).norm() > 0.0:
-                    target = solids.position[k] + rotate(rotation, out)
-                    turns = 2 * solids.count
+            out = follow(k, at, end, solids, gap)
+            if (out - end).norm() > 0.0:
+                target = solids.position[k] + rotate(rotation, out)
+                moved = 1
+            k = next_near(near, k, solids.count)
+        inside = kept_in_tank(target, near, solids, gap)
+        if (inside - target).norm_sqr() > 0.0:
+            target = inside
+            moved = 1
+        turn += 1
     return target
 
 
 @qd.func
-def near_solids(x, p, solids: SolidSet, h):
-    """Bits of the solids that a particle on its way from `x` to `p` may touch or feel, and a little beyond."""
+def near_walls(x, p, solids: SolidSet, h):
+    """Bits of the tank's walls that a particle on its way from `x` to `p` may touch or feel, and a little beyond."""
     near = 0
-    for k in range(solids.count):
-        turn = (solids.rotation[k] - solids.old_rotation[k]).norm()
-        margin = 1.2 * h + (p - x).norm() + (solids.position[k] - solids.old_position[k]).norm()
-        margin += 2.0 * turn * qd.min(solids.reach[k], (p - solids.position[k]).norm())
-        if (p - solids.position[k]).norm() < solids.reach[k] + margin:
+    way = 1.2 * h + (p - x).norm()
+    for k in range(solids.tank_count):
+        margin = way + solids.sweep[k][0]
+        if solids.sweep[k][1] > 0.0:
+            margin += solids.sweep[k][1] * (p - solids.position[k]).norm()
+        near |= qd.cast(plane_distance(solids, k, p).w < margin, qd.i32) << k
+    return near
+
+
+@qd.func
+def near_solids(x, p, solids: SolidSet, h):
+    """Bits of all solids that a particle on its way from `x` to `p` may touch or feel, and a little beyond."""
+    near = near_walls(x, p, solids, h)
+    way = 1.2 * h + (p - x).norm()
+    for k in range(solids.tank_count, solids.count):
+        away = (p - solids.position[k]).norm()
+        margin = way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(solids.reach[k], away)
+        if away < solids.reach[k] + margin:
             if signed_distance(solids, k, p).w < margin:
                 near |= 1 << qd.min(k, 30)
     return near
 
 
-@qd.kernel(fastcache=True)
-def keep_out_of_solids(particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
-    """Move the predicted positions out of the solids, as reached from the positions before."""
-    for i in range(count):
-        near = particles.near[i]
-        if near != 0:
-            target = stopped(lift(particles.x[i]), lift(particles.p[i]), near, solids, c.wall_gap)
-            p = particles.p[i]
-            for axis in qd.static(range(p.n)):
-                p[axis] = target[axis]
-            particles.p[i] = p
+@qd.func
+def flattened(point, x: qd.template()):
+    """The point in space `point` as one of the world of `x`, 2-D or 3-D."""
+    result = x
+    for k in qd.static(range(x.n)):
+        result[k] = point[k]
+    return result
 
 
 @qd.kernel(fastcache=True)
 def mark_near_solids(particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
     """Mark for every particle the solids that it may touch or feel on its way and a little beyond."""
     for i in range(count):
-        particles.near[i] = near_solids(lift(particles.x[i]), lift(particles.p[i]), solids, c.h)
+        particles.near[i] = near_solids(lift(particles.x[i]), lift(predicted(particles, i)), solids, c.h)
+
+
+@qd.kernel(fastcache=True)
+def keep_out_of_solids(particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
+    """Move the predicted positions out of the marked solids, as reached from the positions before.
+
+    Particles that only walls of the tank are near are left to `kept_in_tank`, of which every correction is followed.
+    """
+    for i in range(count):
+        near = particles.near[i]
+        if near >> solids.tank_count != 0:
+            x = particles.x[i]
+            target = stopped(lift(x), lift(predicted(particles, i)), near, solids, c.wall_gap)
+            predict_at(particles, i, flattened(target, x))

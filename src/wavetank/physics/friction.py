@@ -12,6 +12,7 @@ Position-based friction after Macklin et al. 2014, "Unified Particle Physics" (1
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, rotate, signed_distance, to_local, vec3
 from wavetank.physics.boundary import is_near, wall_share
+from wavetank.physics.places import predicted
 from wavetank.state import Coefficients, Particles, Scratch, Walls
 
 
@@ -23,7 +24,7 @@ def apply_friction(
     for i in range(count):
         near = particles.near[i]
         if near != 0:
-            p = lift(particles.p[i])
+            p = lift(predicted(particles, i))
             v = lift(particles.v[i])
             for k in range(solids.count):
                 if is_near(near, k) == 1 and solids.friction[k] > 0.0:

@@ -40,6 +40,7 @@ from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars, upload
 
@@ -120,7 +121,7 @@ def find_drag(
         pull = vec4(0.0, 0.0, 0.0, 0.0)
         free = vec4(0.0, 0.0, 0.0, 0.0)
         if near != 0:
-            p = lift(particles.p[i])
+            p = lift(predicted(particles, i))
             last = table.shape[0] - 1
             walls = 0
             for k in range(solids.count):
@@ -152,10 +153,9 @@ def stiffest_particle(
     """
     most = 0
     for i in range(count):
-        p = particles.p[i]
-        dim = qd.static(p.n)
+        dim = qd.static(particles.x[i].n)
         sums = qd.Vector([0.0] * (dim * dim))
-        for_each_neighbor(sums, add_stiffness, i, particles.p, packed, grid, c, 0)
+        for_each_neighbor(sums, add_stiffness, i, particles, packed, grid, c, 0)
         largest = 0.0
         for k in qd.static(range(dim)):
             row = 0.0
@@ -179,7 +179,7 @@ def relax_velocities(
         row = packed[i]
         before = following[i]
         force = v * 0.0
-        for_each_neighbor(force, add_damping, i, particles.p, packed, grid, c, 0)
+        for_each_neighbor(force, add_damping, i, particles, packed, grid, c, 0)
         wall = vec3(drag[i].x, drag[i].y, drag[i].z) - vec3(row.x, row.y, row.z) * drag[i].w
         n = vec3(normal[i].x, normal[i].y, normal[i].z)
         wall -= n * n.dot(wall)

@@ -1,6 +1,9 @@
 """The two ends of a position-based step: predict positions, and read velocities off the corrected ones."""
 
 from wavetank.compiler import qd
+from wavetank.distance import SolidSet, lift
+from wavetank.physics.boundary import flattened, kept_in_tank, near_walls
+from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Particles
 
 
@@ -18,25 +21,33 @@ def accelerate(particles: Particles, i, v, c: Coefficients):
     taken for a push when the velocities are read off the positions again.
     """
     x = particles.x[i]
-    particles.p[i] += free_motion(x, v, c) - free_motion(x, particles.v[i], c)
+    change = free_motion(x, v, c) - free_motion(x, particles.v[i], c)
+    predict_at(particles, i, predicted(particles, i) + change)
     particles.v[i] = v
 
 
 @qd.kernel(fastcache=True)
-def predict(particles: Particles, c: Coefficients, count: qd.i32, gravity: qd.types.vector(3, qd.f32)):
-    """Accelerate and move freely: Algorithm 1, lines 2-3."""
+def predict(
+    particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32, gravity: qd.types.vector(3, qd.f32)
+):
+    """Accelerate, move freely (Algorithm 1, lines 2-3), mark the walls of the tank that are near and stay inside."""
     for i in range(count):
         x = particles.x[i]
         v = particles.v[i]
         for k in qd.static(range(x.n)):
             v[k] += c.dt * gravity[k]
         particles.v[i] = v
-        particles.p[i] = free_motion(x, v, c)
+        p = free_motion(x, v, c)
+        near = near_walls(lift(x), lift(p), solids, c.h)
+        particles.near[i] = near
+        if near != 0:
+            p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), x)
+        predict_at(particles, i, p)
 
 
 @qd.kernel(fastcache=True)
 def update_velocities(particles: Particles, c: Coefficients, count: qd.i32):
-    """Set v = (p - x) / dt: Algorithm 1, line 21; shortened to the speed limit.
+    """Set v = (p - x) / dt, shortened to the speed limit, and x = p: Algorithm 1, lines 21 and 23.
 
     It is written as a change of the free velocity, so that a particle that nothing touched keeps its velocity to the
     last digit; the difference of two positions would lose what is below their rounding.
@@ -44,19 +55,14 @@ def update_velocities(particles: Particles, c: Coefficients, count: qd.i32):
     for i in range(count):
         x = particles.x[i]
         v = particles.v[i]
-        v += (particles.p[i] - free_motion(x, v, c)) / c.dt
+        p = predicted(particles, i)
+        v += (p - free_motion(x, v, c)) / c.dt
+        particles.x[i] = p
         particles.v[i] = v * qd.min(1.0, c.speed_limit / qd.max(v.norm(), 1e-12))
-
-
-@qd.kernel(fastcache=True)
-def accept_positions(particles: Particles, count: qd.i32):
-    """Set x = p: Algorithm 1, line 23."""
-    for i in range(count):
-        particles.x[i] = particles.p[i]
 
 
 @qd.kernel(fastcache=True)
 def forget_predictions(particles: Particles, count: qd.i32):
     """Set p = x, to measure the particles where they are."""
     for i in range(count):
-        particles.p[i] = particles.x[i]
+        predict_at(particles, i, particles.x[i])

@@ -15,9 +15,10 @@ import numpy as np
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, signed_distance, vec3
 from wavetank.physics.neighbors import reorder
+from wavetank.physics.places import predict_at
 from wavetank.state import Grid, Particles, integers, new_particles, upload, vectors
 
-_FIELDS = ("x", "p", "v", "id", "material", "near", "dye", "frozen")
+_FIELDS = ("x", "v", "id", "material", "near", "dye", "frozen")
 
 
 @qd.func
@@ -64,7 +65,7 @@ def hold_frozen(particles: Particles, count: qd.i32):
     """Put ice back where it was at the start of the substep."""
     for i in range(count):
         if particles.frozen[i] == 1:
-            particles.p[i] = particles.x[i]
+            predict_at(particles, i, particles.x[i])
 
 
 @qd.kernel(fastcache=True)
@@ -83,7 +84,6 @@ def append_rows(
     """Write `count` new particles from place `first` on, with ids from `first_id` on."""
     for i in range(count):
         particles.x[first + i] = x[i]
-        particles.p[first + i] = x[i]
         particles.v[first + i] = v[i]
         particles.id[first + i] = first_id + i
         particles.near[first + i] = 0
@@ -155,8 +155,8 @@ def keep_only(particles: Particles, spare: Particles, grid: Grid, keep: np.ndarr
 
 
 def at_capacity(particles: Particles, dim: int, capacity: int) -> Particles:
-    """Return a copy with room for `capacity` particles."""
+    """Return a copy with room for `capacity` particles; where they are predicted to go is left open."""
     larger = new_particles(dim, capacity)
     for name in _FIELDS:
-        upload(getattr(larger, name), getattr(particles, name).to_numpy()[:capacity])
+        upload(getattr(larger, name), getattr(particles, name).to_numpy()[: capacity + 1])
     return larger

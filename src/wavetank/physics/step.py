@@ -13,17 +13,11 @@ from wavetank.distance import SolidSet
 from wavetank.materials import Material
 from wavetank.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids, mark_near_solids
-from wavetank.physics.density_constraint import (
-    clear_multipliers,
-    correct_positions,
-    measure_density,
-    schedule,
-    solve_multipliers,
-)  # fmt: skip
+from wavetank.physics.density_constraint import correct_positions, measure_density, schedule, solve_multipliers
 from wavetank.physics.diffuse.pool import Pool
 from wavetank.physics.friction import apply_friction
 from wavetank.physics.implicit_viscosity import is_thick, solve_viscosity
-from wavetank.physics.integrate import accept_positions, forget_predictions, predict, update_velocities
+from wavetank.physics.integrate import forget_predictions, predict, update_velocities
 from wavetank.physics.mixture import Blend, blend, fill_table, pack_weights, stiffening, weigh
 from wavetank.physics.neighbors import find_neighbors, sort_particles
 from wavetank.physics.population import hold_frozen, stop_frozen
@@ -31,7 +25,7 @@ from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattic
 from wavetank.physics.tension import apply_tension, limited_tensions, substeps_for
 from wavetank.physics.viscosity import apply_mixed_viscosity, apply_viscosity
 from wavetank.physics.vorticity import confine_vorticity, find_vorticity
-from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, Walls
+from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, Walls, swap_predictions
 
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
 #: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; measured, docs/method.md.
@@ -56,6 +50,11 @@ class World:
     frozen: int = 0  # particles that are ice
     pool: Pool | None = None  # of spray, foam and bubbles; made when the first are
 
+    @property
+    def has_solids(self) -> bool:
+        """Whether there is anything solid besides the walls of the tank, which are planes and need no search."""
+        return bool(self.solids.count > self.solids.tank_count)
+
 
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
     """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
@@ -64,9 +63,10 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         world.particles, world.spare, world.scratch, world.grid, world.solids, world.walls,
     )  # fmt: skip
 
-    predict(now, c, count, np.array([*params.gravity, 0.0][:3], np.float32))  # 1-4
-    mark_near_solids(now, solids, c, count)
-    keep_out_of_solids(now, solids, c, count)
+    predict(now, solids, c, count, np.array([*params.gravity, 0.0][:3], np.float32))  # 1-4
+    if world.has_solids:
+        mark_near_solids(now, solids, c, count)
+        keep_out_of_solids(now, solids, c, count)
 
     sort_particles(now, spare, grid, c, count)  # 5-7
     now, spare = spare, now
@@ -76,18 +76,19 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         mark_near_solids(now, solids, c, count)
         keep_out_of_solids(now, solids, c, count)
 
-    clear_multipliers(scratch, count)
     tensile = int(params.tensile_strength > 0.0)
-    for relaxation, momentum in relaxations(params, kinds.density_ratio):  # 8-19
+    for number, (relaxation, momentum) in enumerate(relaxations(params, kinds.density_ratio)):  # 8-19
         c = dataclasses.replace(c, relaxation=relaxation, momentum=momentum)
-        solve_multipliers(scratch, now, grid, solids, walls, c, count, method, kinds.mixed)  # 9-11
-        correct_positions(spare, now, scratch, grid, solids, walls, c, count, method, tensile, kinds.mixed)  # 12-18
-        now.p, spare.p = spare.p, now.p
-        keep_out_of_solids(now, solids, c, count)
+        first = int(number == 0)
+        solve_multipliers(scratch, now, grid, solids, walls, c, count, first, method, kinds.mixed)  # 9-11
+        correct_positions(spare, now, scratch, grid, solids, c, count, method, tensile, kinds.mixed)  # 12-18
+        swap_predictions(now, spare)
+        if world.has_solids:
+            keep_out_of_solids(now, solids, c, count)
         if world.frozen:
             hold_frozen(now, count)
 
-    update_velocities(now, c, count)  # 21
+    update_velocities(now, c, count)  # 21, 23
     if world.has_friction:
         apply_friction(now, scratch, solids, walls, c, count)
     if params.vorticity > 0.0:
@@ -103,7 +104,6 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         now.v, spare.v = spare.v, now.v
     if world.frozen:
         stop_frozen(now, count)
-    accept_positions(now, count)  # 23
 
     world.particles, world.spare = now, spare
 
@@ -183,6 +183,7 @@ def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf) -
     return Coefficients(
         dt=dt,
         h=h,
+        inverse_h=1.0 / h,
         density_scale=rest.density_scale,
         gradient_scale=rest.gradient_scale / h,
         eps=params.force_mixing * s_0,

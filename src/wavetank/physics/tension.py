@@ -40,6 +40,7 @@ from wavetank.physics.boundary import is_near
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars, upload
 
@@ -146,7 +147,8 @@ def add_pull(sums: qd.template(), r, i, j, surface: qd.template(), c: Coefficien
     size_b = qd.max(g_b.norm(), 1e-9)
     stress = n * (size_a + size_b) - g_a * (g_a.dot(n) / size_a) - g_b * (g_b.dot(n) / size_b)
     t = qd.max(1.0 - q, 0.0)
-    force = c.skin * q * t * t * stress + c.cohesion * 3.0 * q * q * (size_a + size_b) * n
+    bond = c.cohesion * 3.0 * q * q * qd.cast(t > 0.0, qd.f32)
+    force = c.skin * q * t * t * stress + bond * (size_a + size_b) * n
     tension = qd.min(a.w, b.w)
     for k in qd.static(range(r.n)):
         sums[k] -= tension * force[k]
@@ -166,8 +168,8 @@ def find_surface(
 ):  # fmt: skip
     """Find where the surface is and which way it faces: g, without what is noise."""
     for i in range(count):
-        g = particles.p[i] * 0.0
-        for_each_neighbor(g, add_gradient, i, particles.p, tension, grid, c, 0)
+        g = particles.x[i] * 0.0
+        for_each_neighbor(g, add_gradient, i, particles, tension, grid, c, 0)
         size = scale * g.norm()
         g3 = lift(g) * (scale * qd.max(size - quiet, 0.0) / qd.max(size, 1e-12))
         surface[i] = vec4(g3.x, g3.y, g3.z, tension[i])
@@ -181,9 +183,9 @@ def attract(
 ):  # fmt: skip
     """Find the velocities after the pull of neighbours and solids; `rate` is dt over the largest mass of a particle."""
     for i in range(count):
-        p = particles.p[i]
+        p = predicted(particles, i)
         force = p * 0.0
-        for_each_neighbor(force, add_pull, i, particles.p, surface, grid, c, 0)
+        for_each_neighbor(force, add_pull, i, particles, surface, grid, c, 0)
         if particles.near[i] != 0:
             last = table.shape[0] - 1
             wetting = adhesion * surface[i].w * rows[particles.material[i]][3]
@@ -220,7 +222,7 @@ def apply_tension(
     if "adhesion table" not in fluids.arrays:
         fluids.arrays["adhesion table"] = scalars(TABLE_SIZE + 1)
         upload(fluids.arrays["adhesion table"], adhesion_table(dim, ratio))
-        fluids.arrays["tension"] = scalars(fluids.capacity)
+        fluids.arrays["tension"] = scalars(fluids.capacity + 1)
     pulled, surface = fluids.array("packed"), fluids.array("normal")
     tension, table = fluids.arrays["tension"], fluids.arrays["adhesion table"]
     flat = flat_surface(dim, ratio)

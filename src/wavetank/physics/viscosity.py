@@ -14,7 +14,7 @@ from wavetank.state import Coefficients, Grid, Particles
 @qd.func
 def add_xsph(sums: qd.template(), r, i, j, v: qd.template(), c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j (v_j - v_i) w_ij."""
-    sums += (v[j] - v[i]) * kernel(method, r.norm() / c.h)[0]
+    sums += (v[j] - v[i]) * kernel(method, r.norm() * c.inverse_h)[0]
 
 
 @qd.func
@@ -22,7 +22,7 @@ def add_mixed_xsph(sums: qd.template(), r, i, j, data: qd.template(), c: Coeffic
     """Add neighbour j to sum_j (v_j - v_i) w_ij min(1, m_j / m_i); the inverse masses w are in `data`, behind v."""
     a = data[i]
     b = data[j]
-    share = kernel(method, r.norm() / c.h)[0] * qd.min(1.0, a[r.n] / b[r.n])
+    share = kernel(method, r.norm() * c.inverse_h)[0] * qd.min(1.0, a[r.n] / b[r.n])
     for k in qd.static(range(r.n)):
         sums[k] += (b[k] - a[k]) * share
 
@@ -34,7 +34,7 @@ def apply_viscosity(
     """Smooth the velocities (Eq. 11)."""
     for i in range(count):
         dv = particles.v[i] * 0.0
-        for_each_neighbor(dv, add_xsph, i, particles.p, particles.v, grid, c, method)
+        for_each_neighbor(dv, add_xsph, i, particles, particles.v, grid, c, method)
         smoothed.v[i] = particles.v[i] + c.viscosity * c.density_scale * dv
 
 
@@ -46,5 +46,5 @@ def apply_mixed_viscosity(
     """Smooth the velocities (Eq. 11) of fluids of different density; `packed` as `mixture.pack_weights` leaves it."""
     for i in range(count):
         dv = particles.v[i] * 0.0
-        for_each_neighbor(dv, add_mixed_xsph, i, particles.p, packed, grid, c, method)
+        for_each_neighbor(dv, add_mixed_xsph, i, particles, packed, grid, c, method)
         smoothed.v[i] = particles.v[i] + c.viscosity * c.density_scale * dv

@@ -52,7 +52,7 @@ def find_vorticity(
     """Estimate the vorticity of every particle (Eq. 9)."""
     for i in range(count):
         omega = vec3(0.0, 0.0, 0.0)
-        for_each_neighbor(omega, add_vorticity, i, particles.p, particles.v, grid, c, method)
+        for_each_neighbor(omega, add_vorticity, i, particles, particles.v, grid, c, method)
         scratch.omega[i] = omega
 
 
@@ -64,7 +64,7 @@ def confine_vorticity(
     for i in range(count):
         omega = scratch.omega[i]
         sums = qd.Vector([0.0] * 7)
-        for_each_neighbor(sums, add_eta, i, particles.p, scratch.omega, grid, c, method)
+        for_each_neighbor(sums, add_eta, i, particles, scratch.omega, grid, c, method)
         eta = vec3(sums[0], sums[1], sums[2])
         n = eta / qd.max(eta.norm(), 1e-6)
         mean = vec3(sums[3], sums[4], sums[5])

@@ -27,10 +27,10 @@ class Buffers:
     surface: Any  # i32 [rows, columns]: place of the particle in device order, or NOTHING, SOLID, FLOOR
     normal: Any  # vec3 [rows, columns], unit, in the world
     color: Any  # vec3 [rows, columns], linear RGB: albedo until the shade pass, radiance from then on
-    light: Any  # vec2 [rows, columns]: share of the sun, share of the sky that reaches the surface
+    light: Any  # vec2 [rows, columns]: share of the sun, share of the sky that reaches the surface; see `with_light`
     rough_light: Any  # vec2 [rows, columns]: the same while it is being smoothed
     foam: Any  # i32 [height, width, 2]: optical depth of foam in 1/256, and the part of it that the sun reaches
-    lines: Any  # i32 [rows, columns]: coverage by the tank's edges, 0 to 255
+    lines: Any  # i32 [rows, columns]: share 0 to 255 that an edge of the tank covers, << 23, | 2^23 - 1 - depth >> 8
     sun_depth: Any  # i32 [texels, texels]: bits of the depth [m] of what the sun sees first
     solid_box: Any  # i32 [4]: first and last column, first and last row that may show a solid
     curve: Any  # i32 [entries]: sRGB byte of linear light 0 to 1, in equal steps
@@ -54,6 +54,13 @@ class Buffers:
         """Edge of the sun's depth map in pixels."""
         return int(self.sun_depth.shape[0])
 
+    def with_light(self) -> Any:
+        """Return `light`, allocated by the first view that needs it at every pixel."""
+        if self.light is None:
+            shape = (self.rows, self.columns)
+            self.light, self.rough_light = (qd.ndarray(vec2, shape=shape) for _ in range(2))
+        return self.light
+
     def host_picture(self) -> np.ndarray:
         """Return a copy of the finished picture, uint8 [height, width, 3]."""
         synchronize()
@@ -75,8 +82,8 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
         surface=qd.ndarray(qd.i32, shape=shape),
         normal=qd.ndarray(vec3, shape=shape),
         color=qd.ndarray(vec3, shape=shape),
-        light=qd.ndarray(vec2, shape=shape),
-        rough_light=qd.ndarray(vec2, shape=shape),
+        light=None,
+        rough_light=None,
         foam=qd.ndarray(qd.i32, shape=(height, width, 2)),
         lines=qd.ndarray(qd.i32, shape=shape),
         sun_depth=qd.ndarray(qd.i32, shape=(texels, texels)),

@@ -47,6 +47,7 @@ class Renderer:
         self.buffers = allocate(self.width, self.height, self.supersample)
         self._colors = qd.ndarray(vec3, shape=(ENTRIES,))
         self._colors_name = ""
+        self._kept: Any = None  # what the still part of the last picture depended on
         self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
 
     def render(
@@ -61,7 +62,8 @@ class Renderer:
         shot = self.shot(frame, camera, style)
         self._run(style.kind.once, shot, timings)
         if style.samples == 1:
-            self._run((*style.kind.passes, tonemap.draw), shot, timings)
+            self._take(style, shot, timings)
+            self._run((tonemap.draw,), shot, timings)
         else:
             self._average(style, shot, timings)
         picture = self.buffers.host_picture()
@@ -98,6 +100,14 @@ class Renderer:
             plane=style.plane(extent),
         )
 
+    def _take(self, style: Style, shot: Shot, timings: dict[str, float] | None) -> None:
+        """Fill `color`; what does not move is kept from the picture before, and comes out as it would anew."""
+        key = (style.kind.name, *_rests(shot), id(self.buffers.water)) if style.kind.still else None
+        if key is None or key != self._kept:
+            self._run(style.kind.still, shot, timings)
+            self._kept = key and (*key[:-1], id(self.buffers.water))
+        self._run(style.kind.passes, shot, timings)
+
     def _run(self, passes: tuple[Pass, ...], shot: Shot, timings: dict[str, float] | None) -> None:
         for draw in passes:
             began = time.perf_counter()
@@ -112,7 +122,7 @@ class Renderer:
         if self._total is None:
             self._total = qd.ndarray(vec3, shape=(self.buffers.rows, self.buffers.columns))
         for number in range(style.samples):
-            self._run(style.kind.passes, self._moved(shot, number), timings)
+            self._take(style, self._moved(shot, number), timings)
             tonemap.collect(self.buffers.color, self._total, 1.0 / (number + 1))
         tonemap.draw_collected(self._total, self.buffers)
 
@@ -130,6 +140,18 @@ class Renderer:
             water_sun=_sun_lens(shot.extent, to_sun, sun_texels(shot.extent)),
             look=dataclasses.replace(shot.look, to_sun=to_sun, sun_size=min(POINT_SUN, shot.look.sun_size)),
         )
+
+
+def _rests(shot: Shot) -> tuple[Any, ...]:
+    """Return all that what is not water depends on, to be compared with that of another picture."""
+    numbers = [getattr(part, field.name) for part in (shot.lens, shot.sun) for field in dataclasses.fields(part)]
+    numbers += [shot.look.to_sun, shot.look.sun_size, shot.radius, shot.extent.lower, shot.extent.upper]
+    solids = shot.frame.solids
+    if solids.count > solids.tank_count:
+        synchronize()
+        arrays = (solids.op, solids.size, solids.offset, solids.turn, solids.first, solids.reach, solids.position)
+        numbers += [array.to_numpy(copy=None) for array in (*arrays, solids.rotation)]
+    return shot.frame.dim, solids.count, *(np.asarray(number).tobytes() for number in numbers)
 
 
 def _radical_inverse(number: int, prime: int) -> float:

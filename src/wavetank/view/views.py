@@ -35,6 +35,7 @@ class View:
 
     name: str
     sentence: str
+    still: tuple[Pass, ...]  # what depends on eye, sun and solids alone; kept while these rest
     once: tuple[Pass, ...]  # what depends on the frame alone, not on the eye
     passes: tuple[Pass, ...]
     coloured: bool  # whether particles show a quantity, with its legend
@@ -44,17 +45,18 @@ VIEWS: dict[str, View] = {
     "water": View(
         "water",
         "the surface of the water, with light and shadow",
+        still=(nothing.draw, solids.draw, floor.draw, sunlight.draw, backdrop.prepare, tank.draw_lines),
         once=(ellipsoids.draw,),
         passes=(
-            nothing.draw, solids.draw, floor.draw, sunlight.draw, backdrop.draw, tank.draw_behind,
-            surface.draw, flatten.draw, thickness.draw, water.draw,
-            tank.draw_front, foam.draw_over_water,
+            sunlight.see_water, backdrop.draw, surface.draw, flatten.draw, thickness.draw, water.draw,
+            foam.draw_over_water,
         ),
         coloured=False,
     ),
     "particles": View(
         "particles",
         "particles as balls, coloured by a quantity",
+        still=(),
         once=(),
         passes=(
             spheres.draw, solids.draw, floor.draw, shadow.draw, occlusion.draw, smooth.draw, shade.draw,
@@ -65,6 +67,7 @@ VIEWS: dict[str, View] = {
     "slice": View(
         "slice",
         "a quantity on a plane that cuts the water",
+        still=(),
         once=(cut.prepare,),
         passes=(
             nothing.draw, solids.draw, floor.draw, shadow.draw_solids, occlusion.draw, smooth.draw, shade.draw,
@@ -75,6 +78,7 @@ VIEWS: dict[str, View] = {
     "foam": View(
         "foam",
         "spray, foam and bubbles alone",
+        still=(),
         once=(),
         passes=(
             nothing.draw, solids.draw, floor.draw, shadow.draw_solids, occlusion.draw, smooth.draw, shade.draw,

@@ -17,13 +17,14 @@ from wavetank.view.shot import Shot
 
 @dataclasses.dataclass
 class Ellipsoids:
-    """One ellipsoid per particle, in the order of `cells`."""
+    """One ellipsoid per particle, in the order of `cells`, and after them room for the mirror image of each."""
 
-    center: qd.types.ndarray()  # vec3 [capacity], m
-    axes: qd.types.ndarray()  # vec3 [capacity], m^2: diagonal of the squared shape matrix
-    mixed: qd.types.ndarray()  # vec3 [capacity], m^2: its xy, xz, yz
-    outward: qd.types.ndarray()  # vec3 [capacity]: away from the water, up to about 0.4 long
-    size: qd.types.ndarray()  # f32 [capacity], m: bound on the radius; negative where nothing is drawn
+    center: qd.types.ndarray()  # vec3 [2 capacity], m
+    axes: qd.types.ndarray()  # vec3 [2 capacity], m^2: diagonal of the squared shape matrix
+    mixed: qd.types.ndarray()  # vec3 [2 capacity], m^2: its xy, xz, yz
+    outward: qd.types.ndarray()  # vec3 [2 capacity]: away from the water, up to about 0.4 long
+    size: qd.types.ndarray()  # f32 [2 capacity], m: bound on the radius; negative where nothing is drawn
+    edge: qd.types.ndarray()  # i32 [2 capacity]: 1 where its outline may be seen, 0 elsewhere
 
 
 @dataclasses.dataclass
@@ -33,9 +34,11 @@ class WaterBuffers:
     cells: Cells
     ellipsoids: Ellipsoids
     depth: Any  # i32 [rows, columns]: bits of the depth [m] of the water's surface, FARTHEST where there is none
-    spare: Any  # i32 [rows, columns]: the same while it is being smoothed
+    rim: Any  # i32 [rows, columns]: share 0 to 127 that an outline covers, << 24, | 2^24 - 1 - depth >> 7; or 0
+    spare: Any  # i32 [rows, columns]: the same while it is being smoothed, then as seen through the panes
     thickness: Any  # i32 [rows / 2, columns / 2]: water along the view, in 1 / 4096 of a spacing
     dye: Any  # i32 [rows / 2, columns / 2, 4]: the dyed part of it, and that part times linear red, green, blue
+    stained: Any  # i32 [1]: 1 where any of it is dyed, else `dye` holds nothing of use
     stains: Any  # i32 [materials]: colour of each fluid as a dye, 0 where the scene has one fluid only
     light: Any  # vec2 [rows / 2, columns / 2]: share of the sun, share of the sky that reaches what is not water
     rough_light: Any  # vec2, likewise: the same while it is being smoothed
@@ -43,6 +46,8 @@ class WaterBuffers:
     sun_first: Any  # i32 [texels, texels]: bits of the depth [m] at which the sun's rays meet the water
     sun_spare: Any  # i32 [texels, texels]: the same while it is being smoothed
     caustic: Any  # i32 [texels, texels]: light that refraction brings or takes, in 1 / 4096 of the sun's
+    in_sun: Any  # vec3 [rows, columns]: radiance of what is not water that comes from the sun
+    in_sky: Any  # vec3 [rows, columns]: and that comes from elsewhere, both without any water
     behind: Any  # vec3 [rows, columns]: radiance of what is not water
     key: tuple[Any, ...]  # what the sizes were made for
 
@@ -71,15 +76,19 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
     rows, columns = buffers.rows, buffers.columns
     fields: dict[str, Any] = {
         "depth": qd.ndarray(qd.i32, shape=(rows, columns)),
+        "rim": qd.ndarray(qd.i32, shape=(rows, columns)),
         "spare": qd.ndarray(qd.i32, shape=(rows, columns)),
         "thickness": qd.ndarray(qd.i32, shape=(rows // 2 + 1, columns // 2 + 1)),
         "dye": qd.ndarray(qd.i32, shape=(rows // 2 + 1, columns // 2 + 1, 4)),
         "light": qd.ndarray(vec2, shape=((rows + 1) // 2, (columns + 1) // 2)),
         "rough_light": qd.ndarray(vec2, shape=((rows + 1) // 2, (columns + 1) // 2)),
+        "in_sun": qd.ndarray(vec3, shape=(rows, columns)),
+        "in_sky": qd.ndarray(vec3, shape=(rows, columns)),
         "behind": qd.ndarray(vec3, shape=(rows, columns)),
     }
     if water is not None:  # only the particles or the scene changed
         fields = {name: getattr(water, name) for name in fields}
+    fields["stained"] = qd.ndarray(qd.i32, shape=(1,))
     fields["stains"] = qd.ndarray(qd.i32, shape=stains.shape)
     fields["stains"].from_numpy(stains)
     texels = sun_texels(extent)
@@ -101,5 +110,6 @@ def _stains(frame: Frame) -> np.ndarray:
 
 
 def _ellipsoids(capacity: int) -> Ellipsoids:
-    vectors = {name: qd.ndarray(vec3, shape=(capacity,)) for name in ("center", "axes", "mixed", "outward")}
-    return Ellipsoids(**vectors, size=qd.ndarray(qd.f32, shape=(capacity,)))
+    vectors = {name: qd.ndarray(vec3, shape=(2 * capacity,)) for name in ("center", "axes", "mixed", "outward")}
+    size, edge = (qd.ndarray(kind, shape=(2 * capacity,)) for kind in (qd.f32, qd.i32))
+    return Ellipsoids(**vectors, size=size, edge=edge)

@@ -38,18 +38,42 @@ class Desk:
     filter: str = ""
     notes: list[tuple[str, float]] = dataclasses.field(default_factory=list)  # with the time at which they go
     curves: dict[str, deque[float]] = dataclasses.field(default_factory=dict)
-    places: dict[str, tuple[float, float, float, float]] = dataclasses.field(default_factory=dict)  # of controls [px]
+    places: dict[str, tuple[float, float, float, float]] = dataclasses.field(default_factory=dict)  # of what is drawn
+    banner_height: float = 160.0  # px
     _touched: dict[str, tuple[float, Any]] = dataclasses.field(default_factory=dict)
     _measured: int = 0
+    _rules: dict[str, Any] | None = None  # the level's, that the tool in hand was last checked against
 
     def __post_init__(self) -> None:
         """Read the declarations."""
         self.declared = everything(self.engine.session)
 
     @property
+    def game(self) -> dict[str, Any] | None:
+        """How the game stands, where there is one."""
+        return self.engine.shown.game
+
+    @property
+    def rules(self) -> dict[str, Any] | None:
+        """The tools that a level allows, with the options that it fixes; None where all are free."""
+        return self.game["tools"] if self.game else None
+
+    @property
+    def rail(self) -> list[dict[str, Any]]:
+        """The tools there are to choose from."""
+        rules = self.rules
+        return [tool for tool in self.tools if rules is None or tool["name"] == "look" or tool["name"] in rules]
+
+    @property
     def hand(self) -> dict[str, Any]:
-        """The tool in hand."""
-        return next(tool for tool in self.tools if tool["name"] == self.tool)
+        """The tool in hand, without the options that are not free."""
+        tool = next(tool for tool in self.tools if tool["name"] == self.tool)
+        return {**tool, "options": [about for about in tool["options"] if about["name"] not in self.fixed]}
+
+    @property
+    def fixed(self) -> dict[str, Any]:
+        """The options of the tool in hand that the level fixes."""
+        return (self.rules or {}).get(self.tool, {})
 
     @property
     def options(self) -> dict[str, Any]:
@@ -93,6 +117,9 @@ class Desk:
         while not self.engine.notes.empty():
             self.say(self.engine.notes.get())
         self.notes = [note for note in self.notes if note[1] > time.perf_counter()]
+        if self.rules != self._rules:
+            self._rules = self.rules
+            self.tool = next(iter(self._rules), "look") if self._rules is not None else self.tool
         shown = self.engine.shown
         if shown.measured != self._measured:
             self._measured = shown.measured
@@ -106,8 +133,6 @@ class Desk:
 
     def open(self, path: Path) -> None:
         """Begin the scene of a file; what is wrong with it becomes a note."""
-        from wavetank.commands import LoadScene, Pause
-
         try:
             if path.stat().st_size > LONGEST_SCENE:
                 self.say(f"{path.name} is too large for a scene file.")
@@ -125,6 +150,12 @@ class Desk:
             except WavetankError as error:
                 self.say(str(error))
                 return
+        self.begin(text=text)
+
+    def begin(self, **which: str) -> None:
+        """Begin a bundled scene or level by `name`, or one whose file says `text`."""
+        from wavetank.commands import LoadScene, Pause
+
         self.pending.clear()
-        self.engine.do(LoadScene, text=text)
+        self.engine.do(LoadScene, **which)
         self.engine.do(Pause, on=False)

@@ -64,7 +64,7 @@ def typed(desk: Desk) -> None:
         return  # letters fly
     for code in io.input_queue_characters:
         sign = chr(code).lower()
-        tool = next((tool["name"] for tool in desk.tools if tool["key"] and tool["key"] == sign), None)
+        tool = next((tool["name"] for tool in desk.rail if tool["key"] and tool["key"] == sign), None)
         if sign in signs:
             signs[sign]()
         elif tool is not None:
@@ -90,7 +90,7 @@ def draw_help(desk: Desk) -> None:
     if not desk.help:
         return
     em, io = imgui.get_font_size(), imgui.get_io()
-    tools = [(tool["key"].upper(), tool["label"]) for tool in desk.tools if tool["key"]]
+    tools = [(tool["key"].upper(), tool["label"]) for tool in desk.rail if tool["key"]]
     imgui.set_next_window_pos(ImVec2(0.5 * io.display_size.x, 0.5 * io.display_size.y), 0, ImVec2(0.5, 0.5))
     imgui.set_next_window_focus()
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(1.6 * em, 1.4 * em))

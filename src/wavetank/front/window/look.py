@@ -1,6 +1,8 @@
 """How the window looks: colours, spacing, fonts, and the few things it draws by hand."""
 
-from collections.abc import Sequence
+import contextlib
+import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from imgui_bundle import ImVec2, ImVec4, hello_imgui, imgui, implot
@@ -11,6 +13,9 @@ FONT = 15.0  # px at usual density
 GROUND, PANEL, RAISED, HOVER, LINE = "#0c1115", "#131a20", "#1b242c", "#25313b", "#24303a"
 TEXT, SOFT, ACCENT, ACCENT_GROUND = "#e3ebf0", "#8fa3b0", "#59c8ff", "#123447"
 WARM, WARM_GROUND = "#ffb866", "#3a2a14"
+GOOD, GOLD = "#3fcf7f", "#ffd257"
+
+_fonts: dict[str, Any] = {}  # belong to the one context that imgui has
 
 
 def rgba(color: str, alpha: float = 1.0) -> ImVec4:
@@ -27,6 +32,15 @@ def ink(color: str, alpha: float = 1.0) -> int:
 def load_fonts() -> None:
     """Load Roboto, which comes with imgui-bundle; its glyphs are made when they are needed, for any pixel density."""
     hello_imgui.load_font("fonts/Roboto/Roboto-Regular.ttf", FONT)
+    _fonts["bold"] = hello_imgui.load_font("fonts/Roboto/Roboto-Bold.ttf", FONT)
+
+
+@contextlib.contextmanager
+def heading(size: float) -> Iterator[None]:
+    """Write in bold letters of `size` [px]."""
+    imgui.push_font(_fonts["bold"], size / imgui.get_style().font_scale_dpi)
+    yield
+    imgui.pop_font()
 
 
 def set_style() -> None:
@@ -65,6 +79,29 @@ def draw_icon(draw: Any, path: str, at: ImVec2, size: float, color: int, weight:
     for line in lines(path):
         places = [ImVec2(at.x + size / 24 * x, at.y + size / 24 * y) for x, y in line]
         draw.add_polyline(places, color, max(1.0, weight * size / 24), 0)
+
+
+def draw_star(draw: Any, middle: ImVec2, radius: float, color: int) -> None:
+    """Draw a filled star of five rays; the letters have none."""
+    tips = []
+    for k in range(10):
+        far, turn = radius if k % 2 == 0 else 0.42 * radius, 0.2 * math.pi * k
+        tips.append(ImVec2(middle.x + far * math.sin(turn), middle.y - far * math.cos(turn)))
+    draw.add_concave_poly_filled(tips, color)
+
+
+@contextlib.contextmanager
+def floating(name: str, at: ImVec2, wide: float, *, padding: float = 12.0, opaque: bool = False) -> Iterator[None]:
+    """Draw a card over the picture whose upper left corner is `at`, as high as what is in it."""
+    imgui.set_cursor_screen_pos(at)
+    imgui.push_style_color(imgui.Col_.child_bg, ink("#10171d", 0.96 if opaque else 0.87))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(padding, max(10.0, 0.8 * padding)))
+    flags = imgui.ChildFlags_.always_use_window_padding | imgui.ChildFlags_.auto_resize_y | imgui.ChildFlags_.borders
+    imgui.begin_child(name, ImVec2(wide, 0), int(flags))
+    imgui.pop_style_var()
+    yield
+    imgui.end_child()
+    imgui.pop_style_color()
 
 
 def chip(text: str, *, warm: bool = False) -> None:

@@ -40,6 +40,8 @@ def panel(desk: Desk) -> None:
         low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
         desk.places[f"page.{name}"] = (low.x, low.y, high.x, high.y)
         if shown:
+            at, size = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
+            desk.places["panel"] = (at.x, at.y, at.x + size.x, at.y + size.y)
             if imgui.begin_child(name):
                 draw(desk)
             imgui.end_child()

@@ -4,9 +4,9 @@ from typing import Any
 
 from imgui_bundle import ImVec2, imgui
 
-from wavetank.commands import LoadScene, Pause
 from wavetank.front.window.desk import Desk
-from wavetank.front.window.look import ACCENT, GROUND, HOVER, LINE, SOFT, TEXT, hint, ink
+from wavetank.front.window.hud import stars
+from wavetank.front.window.look import ACCENT, GROUND, HOVER, LINE, SOFT, TEXT, hint, ink, title
 
 WATER, SOLID = ("#2a92d4", "#6cc7f6", "#1d70a8"), ("#c99a73", "#e6c19f", "#a27852")  # front, top, side
 EDGES = ((0, 1), (1, 5), (5, 4), (4, 0), (2, 3), (3, 7), (7, 6), (6, 2), (0, 2), (1, 3), (5, 7), (4, 6))
@@ -21,24 +21,23 @@ def browser(desk: Desk) -> None:
     imgui.pop_text_wrap_pos()
     gap = imgui.get_style().item_spacing.x
     wide = (imgui.get_content_region_avail().x - gap * (COLUMNS - 1)) / COLUMNS
-    for n, scene in enumerate(desk.declared["scenes"]):
-        if n % COLUMNS:
-            imgui.same_line()
-        at = imgui.get_cursor_screen_pos()
-        size = ImVec2(wide, 0.72 * wide + 2.9 * em)
-        clicked = imgui.invisible_button(f"scene {scene['name']}", size)
-        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-        desk.places[f"scene.{scene['name']}"] = (low.x, low.y, high.x, high.y)
-        hint(f"{scene['title']}: {scene['dim']}-D, {scene['count']:,} particles")
-        current = (scene["title"], scene["dim"]) == (desk.world["title"], desk.world["dim"])
-        _card(scene, at, size, 0.72 * wide, current)
-        if clicked:
-            desk.pending.clear()
-            desk.engine.do(LoadScene, name=scene["name"])
-            desk.engine.do(Pause, on=False)
+    size = ImVec2(wide, 0.72 * wide + 2.9 * em)
+    for text, is_level in (("Levels", True), ("Scenes", False)):
+        title(text)
+        for n, scene in enumerate(scene for scene in desk.declared["scenes"] if bool(scene["goal"]) == is_level):
+            if n % COLUMNS:
+                imgui.same_line()
+            _card(desk, scene, size, 0.72 * wide)
 
 
-def _card(scene: dict[str, Any], at: ImVec2, size: ImVec2, tall: float, current: bool) -> None:
+def _card(desk: Desk, scene: dict[str, Any], size: ImVec2, tall: float) -> None:
+    at = imgui.get_cursor_screen_pos()
+    if imgui.invisible_button(f"scene {scene['name']}", size):
+        desk.begin(name=scene["name"])
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    desk.places[f"scene.{scene['name']}"] = (low.x, low.y, high.x, high.y)
+    hint(scene["goal"] or f"{scene['title']}: {scene['dim']}-D, {scene['count']:,} particles")
+    current = (scene["title"], scene["dim"]) == (desk.world["title"], desk.world["dim"])
     draw, em, hovered = imgui.get_window_draw_list(), imgui.get_font_size(), imgui.is_item_hovered()
     end = ImVec2(at.x + size.x, at.y + size.y)
     draw.add_rect_filled(at, end, ink(HOVER if hovered else GROUND, 0.9), 8.0)
@@ -46,7 +45,11 @@ def _card(scene: dict[str, Any], at: ImVec2, size: ImVec2, tall: float, current:
     _outline(draw, scene, at.x, at.y, size.x, tall)
     draw.push_clip_rect(at, end, True)
     draw.add_text(ImVec2(at.x + 8, at.y + tall), ink(TEXT), scene["title"])
-    draw.add_text(ImVec2(at.x + 8, at.y + tall + 1.25 * em), ink(SOFT), f"{scene['dim']}-D · {scene['count']:,}")
+    if scene["goal"]:
+        best = desk.engine.shown.scores.get(scene["name"], {}).get("stars", 0)
+        stars(best, ImVec2(at.x + 8, at.y + tall + 1.35 * em), 0.95 * em)
+    else:
+        draw.add_text(ImVec2(at.x + 8, at.y + tall + 1.25 * em), ink(SOFT), f"{scene['dim']}-D · {scene['count']:,}")
     draw.pop_clip_rect()
 
 
@@ -70,7 +73,7 @@ def _outline(draw: Any, scene: dict[str, Any], left: float, top: float, width: f
 
     order = sorted(scene["shapes"], key=lambda shape: shape["lower"][2] + 0.1 * shape["lower"][0])
     for shape in order:
-        front, up, side = WATER if shape["what"] == "water" else SOLID
+        front, up, side = (shape["color"],) * 3 if shape.get("color") else WATER if shape["what"] == "water" else SOLID
         if shape["round"]:
             middle = [0.5 * (a + b) for a, b in zip(shape["lower"], shape["upper"], strict=True)]
             draw.add_circle_filled(to(middle), 0.5 * scale * (shape["upper"][1] - shape["lower"][1]), ink(front), 40)

@@ -9,7 +9,8 @@ from imgui_bundle import ImVec2, imgui
 from wavetank.commands import Orbit, Pan, ToolBegin, ToolEnd, ToolMove, Zoom
 from wavetank.front.window.controls import control, words
 from wavetank.front.window.desk import Desk
-from wavetank.front.window.look import ACCENT, GROUND, LINE, SOFT, TEXT, button, ink
+from wavetank.front.window.hud import draw_game
+from wavetank.front.window.look import ACCENT, GROUND, LINE, SOFT, TEXT, button, floating, heading, ink
 
 TURN = 3.2  # rad for a drag over the height of the picture
 FLIGHT = 0.8  # heights in view a second
@@ -52,6 +53,7 @@ class Stage:
             self._wheel()
         self._ring(hovered)
         self._card(at)
+        draw_game(self.desk, self.box)
         self._running(ImVec2(at.x + 12, end.y - 2.6 * imgui.get_font_size()))
         self._notes(at, size)
         imgui.end()
@@ -131,7 +133,7 @@ class Stage:
 
     def _ring(self, hovered: bool) -> None:
         """Show how far the tool reaches."""
-        hand, options = self.desk.hand, self.desk.options
+        hand, options = self.desk.hand, self.desk.options | self.desk.fixed
         if not hand["cursor"] or not (hovered or self.mode == "tool") or self.mode in ("orbit", "pan"):
             return
         declared = {about["name"]: about["default"] for about in hand["options"]} | options
@@ -144,13 +146,9 @@ class Stage:
     def _card(self, at: ImVec2) -> None:
         """The tool in hand and its options."""
         em, hand = imgui.get_font_size(), self.desk.hand
-        imgui.set_cursor_screen_pos(ImVec2(at.x + 12, at.y + 12))
-        imgui.push_style_color(imgui.Col_.child_bg, ink("#10171d", 0.87))
-        flags = (
-            imgui.ChildFlags_.always_use_window_padding | imgui.ChildFlags_.auto_resize_y | imgui.ChildFlags_.borders
-        )
-        if imgui.begin_child("card", ImVec2(17.5 * em, 0), int(flags)):
-            imgui.text(hand["label"])
+        with floating("card", ImVec2(at.x + 12, at.y + 12), 17.5 * em):
+            with heading(em):
+                imgui.text(hand["label"])
             imgui.push_text_wrap_pos(0.0)
             imgui.text_disabled(hand["sentence"])
             imgui.pop_text_wrap_pos()
@@ -159,8 +157,6 @@ class Stage:
                 chosen = control(self.desk, about, value, group=f"{hand['name']}.")
                 if chosen is not None:
                     self.desk.options[about["name"]] = chosen
-        imgui.end_child()
-        imgui.pop_style_color()
 
     def _running(self, at: ImVec2) -> None:
         """Buttons that stop what goes on by itself."""

@@ -120,6 +120,7 @@ class Window:
 
     def _gui(self) -> None:
         self.desk.pass_time()
+        self.desk.places.clear()
         self._upload()
         em, room = imgui.get_font_size(), imgui.get_io().display_size
         rail, side, top, bottom = 9.0 * em, 22.5 * em if self.desk.panel else 0.0, 2.6 * em, 3.7 * em
@@ -158,7 +159,7 @@ class Window:
         draw, gap = imgui.get_window_draw_list(), 4.0
         wide = 0.5 * (imgui.get_content_region_avail().x - gap)
         running = self.desk.status["running"]
-        for n, tool in enumerate(self.desk.tools):
+        for n, tool in enumerate(self.desk.rail):
             if n % 2:
                 imgui.same_line(0, gap)
             at = imgui.get_cursor_screen_pos()

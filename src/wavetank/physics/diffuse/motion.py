@@ -22,8 +22,8 @@ Where we differ, and why:
 """
 
 from wavetank.compiler import qd
-from wavetank.distance import SolidSet, lift, signed_distance
-from wavetank.physics.boundary import is_near, near_solids, stopped
+from wavetank.distance import SolidSet, lift, signed_distance, vec2
+from wavetank.physics.boundary import flattened, stopped
 from wavetank.physics.neighbors import for_each_around
 from wavetank.state import Air, Births, Coefficients, Diffuse, Grid, Particles
 
@@ -39,30 +39,30 @@ def add_water(sums: qd.template(), r, j, v: qd.template(), c: Coefficients):
 
 
 @qd.func
-def free_share(point, near, solids: SolidSet, h):
-    """Share of the support around `point` that is not inside of a solid: Poly6 over a half-space for each of them.
+def surroundings(point, solids: SolidSet, h):
+    """(distance to the nearest solid [m], share of the support around `point` that is not inside of one).
 
-    The polynomial is the integral in space; in the plane it is off by 0.02 at most.
+    The share is that of Poly6 over a half-space for each solid. The polynomial is the integral in space; in the plane
+    it is off by 0.02 at most.
     """
-    free = 1.0
+    nearest, free = 1e9, 1.0
     for k in range(solids.count):
-        if is_near(near, k) == 1:
-            t = qd.min(qd.max(signed_distance(solids, k, point).w / h, -1.0), 1.0)
-            s = t * t
-            free *= 0.5 + 1.2304688 * t * (1.0 - s * (1.3333333 - s * (1.2 - s * (0.57142857 - s / 9.0))))
-    return free
+        distance = signed_distance(solids, k, point).w
+        nearest = qd.min(nearest, distance)
+        t = qd.min(qd.max(distance / h, -1.0), 1.0)
+        s = t * t
+        free *= 0.5 + 1.2304688 * t * (1.0 - s * (1.3333333 - s * (1.2 - s * (0.57142857 - s / 9.0))))
+    return vec2(nearest, free)
 
 
 @qd.func
-def water_at(point: qd.template(), near, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients, a: Air):
-    """(share of water, its mean velocity [m/s]) around `point`."""
+def water_at(point: qd.template(), free, water: Particles, grid: Grid, c: Coefficients, a: Air):
+    """(share of water, its mean velocity [m/s]) around `point`, of whose support the share `free` is outside solids."""
     sums = qd.Vector([0.0] * (point.n + 1))
     for_each_around(sums, add_water, point, water.x, water.v, grid, c)
     for k in qd.static(range(point.n)):
         sums[1 + k] /= qd.max(sums[0], 1e-12)
-    sums[0] *= a.share
-    if near != 0:
-        sums[0] /= qd.max(free_share(lift(point), near, solids, c.h), 0.1)
+    sums[0] *= a.share / qd.max(free, 0.1)
     return sums
 
 
@@ -88,8 +88,8 @@ def move(
         v = diffuse.v[i]
         # The water has moved already: what is around is asked where the particle gets to.
         ahead = x + a.dt * v
-        near = near_solids(lift(x), lift(ahead), solids, c.h)
-        here = water_at(ahead, near, water, grid, solids, c, a)
+        room = surroundings(lift(ahead), solids, c.h)
+        here = water_at(ahead, room[1], water, grid, c, a)
         kind = kind_in(here[0])
         medium, pull = x * 0.0, x * 0.0
         for k in qd.static(range(x.n)):
@@ -105,16 +105,10 @@ def move(
             slip = v - medium
             later = medium + slip * a.bubble_keep - 2.0 * pull * a.bubble_path
             target = x + a.dt * medium + slip * a.bubble_path - 2.0 * pull * a.bubble_bend
-        # No further from where its solids were asked for than their margin.
-        off = target - ahead
-        target = ahead + off * qd.min(1.0, c.h / qd.max(off.norm(), 1e-12))
-        if near != 0:
-            out = stopped(lift(x), lift(target), near, solids, c.wall_gap)
-            moved = out - lift(target)
-            if moved.norm_sqr() > 0.0:
-                for k in qd.static(range(x.n)):
-                    target[k] = out[k]
-                later = (target - x) / a.dt
+        out = stopped(lift(x), lift(target), -1, solids, c.wall_gap)  # -1: all solids, marked or not
+        if (out - lift(target)).norm_sqr() > 0.0:
+            target = flattened(out, x)
+            later = (target - x) / a.dt
         diffuse.x[i] = target
         diffuse.v[i] = later
         diffuse.kind[i] = kind

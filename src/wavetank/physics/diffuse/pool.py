@@ -10,8 +10,7 @@ import numpy as np
 
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift
-from wavetank.physics.boundary import near_solids, stopped
-from wavetank.physics.diffuse.motion import kind_in, water_at
+from wavetank.physics.diffuse.motion import kind_in, surroundings, water_at
 from wavetank.physics.diffuse.noise import stream, uniform
 from wavetank.state import Air, Births, Coefficients, Diffuse, Grid, Particles, integers, new_diffuse, upload, vectors
 
@@ -38,7 +37,7 @@ class Pool:
 def new_pool(dim: int, capacity: int, water: int) -> Pool:
     """Allocate an empty pool beside room for `water` particles."""
     births = Births(
-        normal=vectors(dim, water), first=integers(water + 1), kept=integers(capacity + 1),
+        normal=vectors(dim, water + 1), first=integers(water + 1), kept=integers(capacity + 1),
         blocks=integers(-(-max(capacity, water) // SCAN_BLOCK)),
     )  # fmt: skip
     return Pool(new_diffuse(dim, capacity), new_diffuse(dim, capacity), births, capacity)
@@ -123,14 +122,12 @@ def bear(
                     aside[axis] = 2.0 * uniform(state, k + axis) - 1.0
                 aside -= ahead * aside.dot(ahead)
                 x = water.x[i] - (a.dt * uniform(state, k + 3)) * v + a.spread * aside
-                near = near_solids(lift(water.x[i]), lift(x), solids, c.h)
-                if near != 0:
-                    out = stopped(lift(water.x[i]), lift(x), near, solids, c.wall_gap)
-                    for axis in qd.static(range(x.n)):
-                        x[axis] = out[axis]
+                around = surroundings(lift(x), solids, c.h)
+                if around[0] < c.wall_gap:  # inside of a solid: born where the water is
+                    x = water.x[i]
                 diffuse.x[slot] = x
                 diffuse.v[slot] = v + (0.25 * v.norm()) * aside
-                diffuse.kind[slot] = kind_in(water_at(x, near, water, grid, solids, c, a)[0])
+                diffuse.kind[slot] = kind_in(water_at(x, around[1], water, grid, c, a)[0])
                 diffuse.age[slot] = 0.0
                 diffuse.life[slot] = a.lifetime * (0.5 + uniform(state, k + 4))
                 diffuse.id[slot] = born + place

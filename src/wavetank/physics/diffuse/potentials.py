@@ -26,6 +26,7 @@ from wavetank.physics.boundary import wall_density
 from wavetank.physics.density_constraint import add_density
 from wavetank.physics.diffuse.noise import stream, uniform
 from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.physics.places import predicted
 from wavetank.state import Air, Births, Coefficients, Grid, Particles, Walls
 
 
@@ -56,9 +57,9 @@ def outward_normal(
     i, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, method: qd.template()
 ):
     """Unit normal of the water's surface at particle `i`, zero inside the water: the density falls along it."""
-    p = particles.p[i]
+    p = predicted(particles, i)
     sums = qd.Vector([0.0] * (p.n + 2))
-    for_each_neighbor(sums, add_density, i, particles.p, particles.p, grid, c, method)
+    for_each_neighbor(sums, add_density, i, particles, particles.v, grid, c, method)
     n = p * 0.0
     for k in qd.static(range(p.n)):
         n[k] = -sums[1 + k]
@@ -78,7 +79,7 @@ def find_surface(
 ):  # fmt: skip
     """Set the normals of the surface, except where the water is too slow to matter for a crest."""
     for i in range(count):
-        n = particles.p[i] * 0.0
+        n = particles.x[i] * 0.0
         if particles.v[i].norm_sqr() > 0.01 * a.speed * a.speed:
             n = outward_normal(i, particles, grid, solids, walls, c, method)
         births.normal[i] = n
@@ -93,11 +94,11 @@ def potential(i, births: Births, particles: Particles, grid: Grid, c: Coefficien
     energy = limited(v.norm_sqr() / (a.speed * a.speed), 0.05, 0.5)
     if energy > 0.0:
         trapped = qd.Vector([0.0])
-        for_each_neighbor(trapped, add_approach, i, particles.p, particles.v, grid, c, method)
+        for_each_neighbor(trapped, add_approach, i, particles, particles.v, grid, c, method)
         result = limited(trapped[0] * a.mean / a.speed, 0.12, 0.5)
         if n.dot(v) > 0.6 * v.norm():  # Eq. 7: only where the surface moves outwards
             crest = qd.Vector([0.0])
-            for_each_neighbor(crest, add_bend, i, particles.p, births.normal, grid, c, method)
+            for_each_neighbor(crest, add_bend, i, particles, births.normal, grid, c, method)
             result += 2.0 * limited(crest[0] * a.mean, 0.2, 0.6)
     return energy * result
 

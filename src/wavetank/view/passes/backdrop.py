@@ -21,19 +21,31 @@ from wavetank.view.lens import (
 from wavetank.view.look import Look
 from wavetank.view.passes.shade import background, smoothstep, surface_radiance
 from wavetank.view.passes.sunlight import LIGHT_STEP
+from wavetank.view.passes.tank import with_tank
 from wavetank.view.passes.thickness import thickness_at
 from wavetank.view.shot import Shot
+from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import UNIT, water_of
 
 
-def draw(shot: Shot, buffers: Buffers) -> None:
-    """Fill the water's `behind` with radiance, from the albedo in `color`."""
+def prepare(shot: Shot, buffers: Buffers) -> None:
+    """Fill the water's `in_sun` and `in_sky`, the radiance that either gives where there is no water."""
     water, extent = water_of(buffers, shot), shot.extent
+    divide(
+        strips_of(buffers.depth), shot.lens, shot.look, vector(extent.middle[0], 0.0, extent.middle[2]), extent.radius,
+        LIGHT_STEP, buffers.depth, buffers.surface, buffers.normal, water.light, buffers.color, water.in_sun,
+        water.in_sky,
+    )  # fmt: skip
+
+
+def draw(shot: Shot, buffers: Buffers) -> None:
+    """Fill the water's `behind` with radiance: what was prepared, in the light that the water leaves."""
+    water, extent = water_of(buffers, shot), shot.extent
+    lower, upper = vector(*extent.lower), vector(*extent.upper)
     paint(
-        shot.lens, shot.water_sun, shot.look, shot.absorption, vector(extent.middle[0], 0.0, extent.middle[2]),
-        extent.radius, extent.spacing / UNIT, LIGHT_STEP, shot.frame.dim, buffers.depth, buffers.surface,
-        buffers.normal, water.light, water.sun_thickness, water.sun_first,
-        water.caustic, buffers.color, water.behind,
+        strips_of(buffers.depth), shot.lens, shot.water_sun, shot.look, shot.absorption, lower, upper,
+        extent.spacing / UNIT, shot.frame.dim, buffers.depth, water.in_sun, water.in_sky, water.sun_thickness,
+        water.sun_first, water.caustic, buffers.lines, int(shot.frame.scene.tank is not None), water.behind,
     )  # fmt: skip
 
 
@@ -79,36 +91,61 @@ def sun_through_water(
 
 
 @qd.kernel(fastcache=True)
-def paint(
-    lens: Lens, sun: Lens, look: Look, absorption: vec3, middle: vec3, size: qd.f32, unit: qd.f32,
-    step: qd.i32, dim: qd.template(), depth: qd.types.ndarray(), surface: qd.types.ndarray(),
-    normal: qd.types.ndarray(), light: qd.types.ndarray(), tau_map: qd.types.ndarray(), first: qd.types.ndarray(),
-    caustic: qd.types.ndarray(), color: qd.types.ndarray(), behind: qd.types.ndarray(),
+def divide(
+    strips: Strips, lens: Lens, look: Look, middle: vec3, size: qd.f32, step: qd.i32, depth: qd.types.ndarray(),
+    surface: qd.types.ndarray(), normal: qd.types.ndarray(), light: qd.types.ndarray(), color: qd.types.ndarray(),
+    in_sun: qd.types.ndarray(), in_sky: qd.types.ndarray(),
 ):  # fmt: skip
-    """Shade every pixel that is not empty, and fill the others with the background."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        ray = view_ray(lens, row, column)
-        direction = ray_direction(lens, ray)
-        what = surface[row, column]
-        result, far = vec3(0.0, 0.0, 0.0), 1.0
-        if what != 0x7FFFFFFF:  # NOTHING
+    """Shade every pixel that is not empty, and fill the others with the background, which counts as the sky's."""
+    for task in range(strips.count):
+        row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
+        for column in range(first, last):
+            ray = view_ray(lens, row, column)
+            direction = ray_direction(lens, ray)
+            what = surface[row, column]
+            sun, sky, far = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0), 1.0
+            if what != 0x7FFFFFFF:  # NOTHING
+                z = qd.bit_cast(depth[row, column], qd.f32)
+                at = ray_origin(lens, ray) + z * direction
+                far = smoothstep(((at - middle).norm() * (1.0 / size) - 1.5) * 0.2)
+                share = light_at(light, depth, row, column, step, z)
+                albedo = color[row, column]
+                if what == -1:  # SOLID
+                    n, seen = normal[row, column], -direction.normalized()
+                    gloss, wrap = 0.3 * look.gloss, 0.4 * look.wrap
+                    sun = surface_radiance(look, albedo, n, seen, vec2(share.x, 0.0), wrap, gloss)
+                    sky = surface_radiance(look, albedo, n, seen, vec2(0.0, share.y), wrap, gloss)
+                else:
+                    sun, sky = albedo * look.sun * (look.to_sun.y * share.x), albedo * look.sky * share.y
+            in_sun[row, column] = (1.0 - far) * sun
+            if far > 0.0:
+                sky += far * (background(look, direction.normalized()) - sky)
+            in_sky[row, column] = sky
+
+
+@qd.kernel(fastcache=True)
+def paint(
+    strips: Strips, lens: Lens, sun: Lens, look: Look, absorption: vec3, lower: vec3, upper: vec3, unit: qd.f32,
+    dim: qd.template(), depth: qd.types.ndarray(), in_sun: qd.types.ndarray(), in_sky: qd.types.ndarray(),
+    tau_map: qd.types.ndarray(), first_depth: qd.types.ndarray(), caustic: qd.types.ndarray(),
+    lines: qd.types.ndarray(), has_tank: qd.i32, behind: qd.types.ndarray(),
+):  # fmt: skip
+    """Put sun and sky together as far as the water leaves them, and lay the tank over it."""
+    for task in range(strips.count):
+        row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
+        for column in range(first, last):
+            ray = view_ray(lens, row, column)
+            origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
             z = qd.bit_cast(depth[row, column], qd.f32)
-            at = ray_origin(lens, ray) + z * direction
-            far = smoothstep(((at - middle).norm() * (1.0 / size) - 1.5) * 0.2)
-            share = light_at(light, depth, row, column, step, z)
-            through = vec3(1.0, 1.0, 1.0)
+            result = in_sun[row, column] + in_sky[row, column]
             if qd.static(dim == 3):
-                through = sun_through_water(sun, look, absorption, at, unit, tau_map, first, caustic)
-            albedo = color[row, column]
-            # The sky comes from everywhere; water above takes some of it.
-            dim_sky = 0.45 + 0.55 * qd.min(through, 1.0)
-            if what == -1:  # SOLID
-                n, seen = normal[row, column], -direction.normalized()
-                gloss, wrap = 0.3 * look.gloss, 0.4 * look.wrap
-                result = through * surface_radiance(look, albedo, n, seen, vec2(share.x, 0.0), wrap, gloss)
-                result += dim_sky * surface_radiance(look, albedo, n, seen, vec2(0.0, share.y), wrap, gloss)
-            else:
-                result = albedo * (look.sun * look.to_sun.y * share.x * through + look.sky * share.y * dim_sky)
-        if far > 0.0:
-            result += far * (background(look, direction.normalized()) - result)
-        behind[row, column] = result
+                if z < 1e30:
+                    at = origin + z * direction
+                    through = sun_through_water(sun, look, absorption, at, unit, tau_map, first_depth, caustic)
+                    if through.x != 1.0 or through.z != 1.0:
+                        # The sky comes from everywhere; water above takes some of it.
+                        dim_sky = 0.45 + 0.55 * qd.min(through, 1.0)
+                        result = through * in_sun[row, column] + dim_sky * in_sky[row, column]
+            if has_tank == 1:
+                result = with_tank(lens, look, lower, upper, origin, direction, z, lines[row, column], result)
+            behind[row, column] = result

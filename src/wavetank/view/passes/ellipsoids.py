@@ -32,54 +32,55 @@ REACH = 2.2  # d
 BALL = 0.58  # d: radius of a lone particle, a little more than that of its volume
 LEAST = 0.36  # d: radius across a sheet
 WIDEST = {2: 1.9, 3: 1.15}  # d: radius in full water; a plane can afford smoother outlines
+OPEN = vector(-1e6, -1e6, -1e6), vector(1e6, 1e6, 1e6)  # m: corners of no tank
+BEYOND = 1.3  # d: how far what touches a pane reaches through it
+MIRRORED = 3.2  # d: how near a pane the surface has a mirror image behind it
 DEPTH_2D = 0.75  # d: half thickness of a 2-D world's water
+#: Sum of the weights from which on a particle is not drawn: 0.93 of a lattice's, which the particles a spacing and
+#: more below a surface reach; a 2-D world shows all of its water.
+FULL = {2: 1e9, 3: 0.93 * 16.9}
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Find the ellipsoids of a frame; they hold for every eye."""
     water, d = water_of(buffers, shot), shot.extent.spacing
     sorting.sort(shot.frame, water.cells)
-    # A 2-D world shows all of its water.
-    mark_deep(water.cells, 4 if shot.frame.dim == 3 and water.cells.own else 0)
     fit(
-        water.cells, water.ellipsoids, shot.frame.dim, *_walls(shot), d, REACH * d, LEAST * d,
-        (WIDEST[shot.frame.dim] - LEAST) * d, BALL * d, DEPTH_2D * d, shot.frame.count,
+        water.cells, water.ellipsoids, shot.frame.dim, *walls(shot), d, REACH * d, LEAST * d,
+        (WIDEST[shot.frame.dim] - LEAST) * d, BALL * d, BEYOND * d, MIRRORED * d, DEPTH_2D * d, FULL[shot.frame.dim],
+        shot.frame.count,
     )  # fmt: skip
 
 
-def _walls(shot: Shot) -> tuple[Any, Any]:
+def walls(shot: Shot) -> tuple[Any, Any]:
     """Corners of the tank; far away where there is none."""
     if shot.frame.scene.tank is None:
-        return vector(-1e6, -1e6, -1e6), vector(1e6, 1e6, 1e6)
+        return OPEN
     return vector(*shot.extent.lower), vector(*shot.extent.upper)
-
-
-@qd.kernel(fastcache=True)
-def mark_deep(cells: Cells, full: qd.i32):
-    """Set `fill` to 1 for cells around which every cell holds at least `full` particles; 0 leaves all at 0."""
-    for k in range(cells.cells):
-        cells.fill[k] = 0
-        if full > 0 and cells.start[k + 1] > cells.start[k]:
-            least = full
-            for n in range(27):
-                j = (k + n % 3 - 1 + cells.nx * (n // 3 % 3 - 1 + cells.ny * (n // 9 - 1))) % cells.cells
-                least = qd.min(least, cells.start[j + 1] - cells.start[j])
-            cells.fill[k] = qd.cast(least >= full, qd.i32)
 
 
 @qd.kernel(fastcache=True)
 def fit(
     cells: Cells, ellipsoids: Ellipsoids, dim: qd.template(), lower: vec3, upper: vec3, spacing: qd.f32,
-    reach: qd.f32, least: qd.f32, growth: qd.f32, ball: qd.f32, depth_2d: qd.f32, count: qd.i32,
+    reach: qd.f32, least: qd.f32, growth: qd.f32, ball: qd.f32, beyond: qd.f32, far: qd.f32, depth_2d: qd.f32,
+    full: qd.f32, count: qd.i32,
 ):  # fmt: skip
-    """Fit an ellipsoid to the neighbourhood of every particle that is not deep inside."""
+    """Fit an ellipsoid to the neighbourhood of every particle that may be seen."""
+    for k in range(cells.cells):
+        cells.fill[k] = 0
+        if qd.static(dim == 3):  # a 2-D world shows all of its water
+            if cells.own == 1 and cells.start[k + 1] > cells.start[k]:
+                cells.fill[k] = deep(cells, k, lower, upper)
     for a in range(count):
         p = cells.x[a]
         cell = cells.cell[cells.order[a]]
         ellipsoids.outward[a] = vec3(0.0, 0.0, 0.0)
+        ellipsoids.size[count + a] = -1.0
         if cells.fill[cell] == 1:
-            ellipsoids.center[a] = p
-            ellipsoids.size[a] = -1.0
+            # Full water all around: a ball, seen through a wall if at all.
+            touch, to_wall = near_walls(p, lower, upper, spacing, dim)
+            ball_there = (least + growth) * vec3(1.0, 1.0, 1.0)
+            put_inside(ellipsoids, a, p, touch, to_wall, joined(ball_there, touch, to_wall, beyond), spacing)
         else:
             weight = 0.0
             mean, square, mixed = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
@@ -115,24 +116,115 @@ def fit(
             trust = qd.min(qd.max((weight - few) / qd.static(3.5 if dim == 3 else 1.5), 0.0), 1.0)
             diagonal = trust * (least + growth * n) + (1.0 - trust) * ball
             side = trust * growth * o
-            # Water goes on behind a wall as far as its looks are concerned: what touches one reaches through it.
-            touch = vec3(0.0, 0.0, 0.0)
+            touch, to_wall = near_walls(p, lower, upper, spacing, dim)
+            free, share = 1.0 - touch, 1.0
             for k in qd.static(range(dim)):
-                gap = qd.min(p[k] - lower[k], upper[k] - p[k]) / spacing
-                touch[k] = qd.min(qd.max((1.5 - gap) / 0.8, 0.0), 1.0)
-                diagonal[k] += touch[k] * qd.max(1.05 * spacing - diagonal[k], 0.0)
-                mean[k] *= 1.0 - touch[k]
-            free = 1.0 - touch
+                share *= share_before_wall(qd.abs(to_wall[k]) / reach)
+            diagonal = joined(diagonal, touch, to_wall, beyond)
             side *= vec3(free.x * free.y, free.x * free.z, free.y * free.z)
+            mean *= free
             if qd.static(dim == 2):
                 diagonal.z = trust * depth_2d + (1.0 - trust) * ball
-            out = mean.norm()
-            flat = qd.static(0.31 if dim == 3 else 0.34) * reach  # out of a particle in a flat surface
-            at_surface = qd.min(qd.max((out / flat - 0.5) / 0.35, 0.0), 1.0)
-            ellipsoids.center[a] = p + 0.9 * trust * at_surface * (1.0 - flat / qd.max(out, 0.3 * flat)) * mean
-            ellipsoids.outward[a] = -trust * mean / reach
-            ellipsoids.axes[a], ellipsoids.mixed[a] = squared(diagonal, side)
-            ellipsoids.size[a] = qd.max(diagonal.x, diagonal.y, diagonal.z) + side.norm()
+            if weight > full * share:
+                put_inside(ellipsoids, a, p, touch, to_wall, diagonal, spacing)
+            else:
+                out = mean.norm()
+                flat = qd.static(0.31 if dim == 3 else 0.34) * reach  # out of a particle in a flat surface
+                at_surface = qd.min(qd.max((out / flat - 0.5) / 0.35, 0.0), 1.0)
+                pull = 0.9 * trust * at_surface * (1.0 - flat / qd.max(out, 0.3 * flat))
+                ellipsoids.center[a] = p + touch * to_wall + pull * mean
+                ellipsoids.outward[a] = -trust * mean / reach
+                ellipsoids.axes[a], ellipsoids.mixed[a] = squared(diagonal, side)
+                ellipsoids.size[a] = qd.max(diagonal.x, diagonal.y, diagonal.z) + side.norm()
+                if qd.static(dim == 3):
+                    mirror(ellipsoids, a, count + a, p, lower, upper, far)
+
+
+@qd.func
+def deep(cells: Cells, k, lower, upper):
+    """1 where cell `k` of a tank and all around it hold four particles and more; what lies behind a wall counts."""
+    last = qd.cast(qd.ceil((upper - lower) / cells.edge), qd.i32) - 1
+    rest = (upper - lower) / cells.edge - last  # share of the last cell that lies in the tank
+    here = qd.Vector([k % cells.nx, k // cells.nx % cells.ny, k // (cells.nx * cells.ny)])
+    result = 1
+    for n in range(27):
+        j, least, inside = 0, 4.0, 1
+        for axis in qd.static(range(3)):
+            c = here[axis] + n // qd.static(3**axis) % 3 - 1
+            if qd.static(axis == 0):
+                j += c
+            elif qd.static(axis == 1):
+                j += c * cells.nx
+            else:
+                j += c * cells.nx * cells.ny
+            if c < 0:
+                inside = 0
+            if qd.static(axis != 1):  # there is no ceiling
+                if c > last[axis] or (c == last[axis] and rest[axis] < 0.3):
+                    inside = 0
+                elif c == last[axis]:
+                    least *= rest[axis]
+        if inside == 1:
+            if cells.start[j + 1] - cells.start[j] < least:
+                result = 0
+    return result
+
+
+@qd.func
+def near_walls(p, lower, upper, spacing, dim: qd.template()):
+    """How much a particle touches the walls of each axis, 0 to 1, and the way [m] to the nearer; no ceiling."""
+    touch, way = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+    for k in qd.static(range(dim)):
+        way[k] = lower[k] - p[k]
+        if qd.static(k != 1):
+            if upper[k] - p[k] < p[k] - lower[k]:
+                way[k] = upper[k] - p[k]
+        touch[k] = qd.min(qd.max((1.5 - qd.abs(way[k]) / spacing) / 0.8, 0.0), 1.0)
+    return touch, way
+
+
+@qd.func
+def joined(diagonal, touch, way, beyond):
+    """Half lengths of an ellipsoid that is centred on the wall it touches, as if joined with its mirror image.
+
+    As far as its looks are concerned water goes on behind a wall: through panes it reaches well beyond.
+    """
+    half = qd.abs(way) + vec3(qd.max(diagonal.x, beyond), diagonal.y, qd.max(diagonal.z, beyond))
+    return diagonal + touch * (half - diagonal)
+
+
+@qd.func
+def put_inside(ellipsoids: Ellipsoids, a, p, touch, way, diagonal, spacing):
+    """Draw a particle in full water only where it touches a wall; a pane need not be covered more than once."""
+    half, shift = (0.8 + 0.2 * touch) * diagonal, touch * way
+    ellipsoids.center[a] = p + shift
+    ellipsoids.axes[a], ellipsoids.mixed[a] = half * half, vec3(0.0, 0.0, 0.0)
+    ellipsoids.size[a] = qd.select(touch.max() > 0.0, half.max(), -1.0)
+    if touch.max() == touch.sum():  # by one wall alone: hidden from behind
+        ellipsoids.outward[a] = shift / spacing
+
+
+@qd.func
+def mirror(ellipsoids: Ellipsoids, a, b, p, lower, upper, reach):
+    """Put the mirror image of ellipsoid `a` behind the nearest pane, if that is within `reach`, into place `b`."""
+    x, z = qd.min(p.x - lower.x, upper.x - p.x), qd.min(p.z - lower.z, upper.z - p.z)
+    if qd.min(x, z) < reach:
+        turn, wall = vec3(-1.0, 1.0, 1.0), qd.select(p.x - lower.x > x, upper, lower)
+        if z < x:
+            turn, wall = vec3(1.0, 1.0, -1.0), qd.select(p.z - lower.z > z, upper, lower)
+        c = ellipsoids.center[a]
+        ellipsoids.center[b] = qd.select(turn < 0.0, 2.0 * wall - c, c)
+        ellipsoids.outward[b] = turn * ellipsoids.outward[a]
+        ellipsoids.axes[b] = ellipsoids.axes[a]
+        ellipsoids.mixed[b] = vec3(turn.x * turn.y, turn.x * turn.z, turn.y * turn.z) * ellipsoids.mixed[a]
+        ellipsoids.size[b] = ellipsoids.size[a]
+
+
+@qd.func
+def share_before_wall(gap):
+    """Share of the weight of full water that a wall `gap` reaches away leaves."""
+    t = qd.min(gap, 1.0)
+    return 0.5 + t * (15.0 - t * t * (10.0 - 3.0 * t * t)) / 16.0
 
 
 @qd.func

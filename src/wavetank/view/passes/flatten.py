@@ -14,16 +14,19 @@ narrow range of depth, followed by a clean-up with a small window.
 Where we differ: the taps of both sides are taken in pairs, and their mean is compared with the depth in the middle.
 A plane passes that test at any slant and comes out as the plane it was (inverse depth is what is linear in a picture
 in perspective, so that is what is averaged); a pair with a side beyond an edge is left out as a whole, so an edge
-pulls nothing towards itself and leaves no halo. What lies on a pane (its last bit is set) is flat already. Large
-windows are sampled at up to `TAPS` pairs.
+pulls nothing towards itself and leaves no halo. What lies well before a pane (its last bit is set) will not be seen
+and stays as it is. Large windows are sampled at up to `TAPS` pairs.
 """
 
 from typing import Any
 
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, pixels_per_metre
+from wavetank.view.lens import Lens, ray_direction, ray_origin, vec3, view_ray
+from wavetank.view.passes.ellipsoids import OPEN, walls
+from wavetank.view.passes.solids import box_interval
 from wavetank.view.shot import Shot
+from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import water_of
 
 SIGMA, TAPS = 1.4, 6  # d; pairs of taps at most
@@ -31,86 +34,101 @@ NARROW, SLOPE = 1.0, 5.0  # d
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
-    """Smooth the water's depth in place."""
-    water, d = water_of(buffers, shot), shot.extent.spacing
-    even(water.depth, water.spare, shot.lens, SIGMA * d, d)
+    """Smooth the water's depth in place; in a plane nothing looks at its shape."""
+    if shot.frame.dim == 3:
+        water, d = water_of(buffers, shot), shot.extent.spacing
+        even(water.depth, water.spare, shot.lens, SIGMA * d, d, *walls(shot))
 
 
-def even(depth: Any, spare: Any, lens: Lens, sigma: float, d: float) -> None:
+def even(
+    depth: Any, spare: Any, lens: Lens, sigma: float, d: float, lower: Any = OPEN[0], upper: Any = OPEN[1]
+) -> None:
     """Smooth `depth` as `lens` sees it, in place; the second round closes the gaps between the first one's taps."""
-    straighten(lens, depth)
+    strips = strips_of(depth)
+    straighten(strips, lens, lower, upper, d, depth)
     for clean in (0, 1):
-        blur(lens, 0, 1, TAPS, clean, sigma, NARROW * d, SLOPE * d, depth, spare)
-        blur(lens, 1, 0, TAPS, clean, sigma, NARROW * d, SLOPE * d, spare, depth)
-    restore(lens, depth)
+        blur(strips, lens, 0, 1, TAPS, clean, 0, sigma, 1.0 / (NARROW * d), 1.0 / (SLOPE * d), depth, spare)
+        blur(strips, lens, 1, 0, TAPS, clean, clean, sigma, 1.0 / (NARROW * d), 1.0 / (SLOPE * d), spare, depth)
 
 
 @qd.kernel(fastcache=True)
-def straighten(lens: Lens, depth: qd.types.ndarray()):
-    """Put q in the place of depth; 0 (or far below any other) where there is no water."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        z = qd.bit_cast(depth[row, column], qd.f32)
-        q = -qd.min(z, 1e9)
-        if lens.perspective > 0.5:
-            q = qd.select(z < 1e30, 1.0 / z, 0.0)
-        depth[row, column] = (qd.bit_cast(q, qd.i32) & ~1) | (depth[row, column] & 1)
+def straighten(strips: Strips, lens: Lens, lower: vec3, upper: vec3, margin: qd.f32, depth: qd.types.ndarray()):
+    """Put q in the place of depth; 0 (or far below any other) where there is no water.
+
+    The last bit is set where the surface lies more than `margin` [m] before the tank.
+    """
+    for task in range(strips.count):
+        row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
+        for column in range(first, last):
+            z = qd.bit_cast(depth[row, column], qd.f32)
+            q, outside = -qd.min(z, 1e9), 0
+            if lens.perspective > 0.5:
+                q = qd.select(z < 1e30, 1.0 / z, 0.0)
+            if z < 1e30:
+                ray = view_ray(lens, row, column)
+                origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
+                there = box_interval(origin, direction, lower, upper)
+                outside = qd.cast((there[0] - z) * direction.norm() > margin, qd.i32)
+            depth[row, column] = (qd.bit_cast(q, qd.i32) & ~1) | outside
 
 
-@qd.kernel(fastcache=True)
-def restore(lens: Lens, depth: qd.types.ndarray()):
-    """Put depth in the place of q."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        q = qd.bit_cast(depth[row, column], qd.f32)
-        key = 0x7F000000  # FARTHEST
-        if lens.perspective > 0.5:
-            if q > 0.0:
-                key = qd.bit_cast(1.0 / q, qd.i32)
-        elif q > -1e8:
-            key = qd.bit_cast(-q, qd.i32)
-        depth[row, column] = key
+@qd.func
+def depth_of(q, perspective):
+    """Bits of the depth that q stands for."""
+    key = 0x7F000000  # FARTHEST
+    if perspective > 0.5:
+        if q > 0.0:
+            key = qd.bit_cast(1.0 / q, qd.i32)
+    elif q > -1e8:
+        key = qd.bit_cast(-q, qd.i32)
+    return key
 
 
 @qd.kernel(fastcache=True)
 def blur(
-    lens: Lens, down: qd.i32, across: qd.i32, taps: qd.i32, clean: qd.i32, sigma: qd.f32, narrow: qd.f32,
-    slope: qd.f32, depth: qd.types.ndarray(), result: qd.types.ndarray(),
+    strips: Strips, lens: Lens, down: qd.i32, across: qd.i32, taps: qd.i32, clean: qd.i32, final: qd.i32,
+    sigma: qd.f32, per_narrow: qd.f32, per_slope: qd.f32, depth: qd.types.ndarray(), result: qd.types.ndarray(),
 ):  # fmt: skip
-    """Blur q along rows or columns."""
+    """Blur q along rows or columns; the `final` round puts depth in its place."""
     rows, columns = depth.shape[0], depth.shape[1]
-    for row, column in qd.ndrange(rows, columns):
-        key = depth[row, column]
-        q = qd.bit_cast(key, qd.f32)
-        if (key & 1) == 0 and q != 0.0 and q > -1e8:
-            z, grain = -q, 1.0
-            if lens.perspective > 0.5:
-                z = 1.0 / q
-                grain = z * z
-            spread = sigma * pixels_per_metre(lens, z)
-            # Two standard deviations in whole steps; no step where a pixel is larger than the window.
-            step = qd.max(qd.cast(2.0 * spread / taps + 0.5, qd.i32), 1)
-            if clean == 1:
-                spread = qd.max(0.5 * step, 0.25 * spread)
-                step = 1
-            room = qd.min(row, rows - 1 - row) * down + qd.min(column, columns - 1 - column) * across
-            last = qd.min(qd.cast(2.0 * spread, qd.i32), room) // step
-            last = qd.min(last, taps)
-            # exp(-k^2 / (2 spread^2)) from one k to the next: w, then w ratio, then w ratio (ratio decay), ...
-            ratio = qd.exp(-0.5 * step * step / qd.max(spread * spread, 1e-6))
-            decay = ratio * ratio
-            gauss = 1.0
-            bend_scale, apart_scale = grain / narrow, grain / slope
-            total, weight = q, 1.0
-            for k in range(1, last + 1):
-                gauss *= ratio
-                ratio *= decay
-                off = k * step
-                left = qd.bit_cast(depth[row - off * down, column - off * across], qd.f32)
-                right = qd.bit_cast(depth[row + off * down, column + off * across], qd.f32)
-                pair = 0.5 * (left + right)
-                bend, apart = (pair - q) * bend_scale, (left - right) * apart_scale
-                # Both fade to nothing at the end of their range: what moves across it must not flicker.
-                w = gauss * qd.max(1.0 - bend * bend, 0.0) * qd.max(1.0 - apart * apart, 0.0)
-                total += w * pair
-                weight += w
-            key = qd.bit_cast(total / weight, qd.i32) & ~1
-        result[row, column] = key
+    for task in range(strips.count):
+        row, first, end = strip(strips, task, rows, columns)
+        for column in range(first, end):
+            key = depth[row, column]
+            q = qd.bit_cast(key, qd.f32)
+            if (key & 1) == 0 and q != 0.0 and q > -1e8:
+                grain, spread = 1.0, sigma * lens.focal
+                if lens.perspective > 0.5:
+                    grain = 1.0 / (q * q)
+                    spread *= q
+                # Two standard deviations in whole steps; no step where a pixel is larger than the window.
+                step = qd.max(qd.cast(2.0 * spread / taps + 0.5, qd.i32), 1)
+                if clean == 1:
+                    spread = qd.max(0.5 * step, 0.25 * spread)
+                    step = 1
+                room = qd.min(row, rows - 1 - row) * down + qd.min(column, columns - 1 - column) * across
+                last = qd.min(qd.cast(2.0 * spread, qd.i32), room) // step
+                last = qd.min(last, taps)
+                # exp(-k^2 / (2 spread^2)) from one k to the next: w, then w ratio, then w ratio (ratio decay), ...
+                ratio = qd.exp(-0.5 * step * step / qd.max(spread * spread, 1e-6))
+                decay = ratio * ratio
+                gauss = 1.0
+                bend_scale, apart_scale = grain * per_narrow, grain * per_slope
+                total, weight = q, 1.0
+                for k in range(1, last + 1):
+                    gauss *= ratio
+                    ratio *= decay
+                    off = k * step
+                    left = qd.bit_cast(depth[row - off * down, column - off * across], qd.f32)
+                    right = qd.bit_cast(depth[row + off * down, column + off * across], qd.f32)
+                    pair = 0.5 * (left + right)
+                    bend, apart = (pair - q) * bend_scale, (left - right) * apart_scale
+                    # Both fade to nothing at the end of their range: what moves across it must not flicker.
+                    w = gauss * qd.max(1.0 - bend * bend, 0.0) * qd.max(1.0 - apart * apart, 0.0)
+                    total += w * pair
+                    weight += w
+                q = total / weight
+                key = qd.bit_cast(q, qd.i32) & ~1
+            if final == 1:
+                key = depth_of(q, lens.perspective)
+            result[row, column] = key

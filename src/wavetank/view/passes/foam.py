@@ -25,6 +25,7 @@ from wavetank.state import Diffuse
 from wavetank.view.buffers import Buffers
 from wavetank.view.colormaps import rgb_of, to_linear
 from wavetank.view.lens import Lens, pixels_per_metre, to_pixel, to_view, vec3, vector
+from wavetank.view.passes.tank import line_cover, slack
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import water_of
 
@@ -45,7 +46,7 @@ def draw_over_water(shot: Shot, buffers: Buffers) -> None:
     """Do the same where the water is not part of the picture's depth but lies in front of it."""
     if shot.frame.foam_count > 0:
         water = water_of(buffers, shot)
-        merge(buffers.depth, water.depth, water.spare)
+        merge(buffers.depth, water.spare, water.spare)
         lay(shot, buffers, water.spare, 0.25 * shot.extent.spacing)
 
 
@@ -71,7 +72,7 @@ def lay(shot: Shot, buffers: Buffers, depth: Any, slack: float) -> None:
     white = (shot.look.sun + shot.look.sky).astype(np.float32)
     blend(
         white, PALE if flat else white, SHADE * shot.look.sun * (not flat), buffers.supersample, buffers.foam,
-        shot.look.line_strength if frame.scene.tank else 0.0, buffers.lines, depth, buffers.color,
+        shot.look.line_strength if frame.scene.tank else 0.0, slack(shot), buffers.lines, depth, buffers.color,
     )  # fmt: skip
 
 
@@ -153,7 +154,7 @@ def splat(
 @qd.kernel(fastcache=True)
 def blend(
     white: vec3, in_air: vec3, shade: vec3, samples: qd.i32, foam: qd.types.ndarray(), line_strength: qd.f32,
-    lines: qd.types.ndarray(), depth: qd.types.ndarray(), color: qd.types.ndarray(),
+    slack: qd.f32, lines: qd.types.ndarray(), depth: qd.types.ndarray(), color: qd.types.ndarray(),
 ):  # fmt: skip
     """Lay the sums over the picture: `white` or, over nothing, `in_air`, less `shade` where the sun is hidden."""
     for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
@@ -165,5 +166,6 @@ def blend(
             light -= shade * (1.0 - foam[row // samples, column // samples, 1] / qd.cast(tau, qd.f32))
             cover = 1.0 - qd.exp(-tau / 256.0)
             if line_strength > 0.0:  # the tank's edges stay in front
-                cover *= 1.0 - line_strength * lines[row, column] / 255.0
+                here = qd.bit_cast(depth[row, column], qd.f32)
+                cover *= 1.0 - line_strength * line_cover(lines[row, column], here, slack)
             color[row, column] += cover * (light - color[row, column])

@@ -20,26 +20,27 @@ from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec
 from wavetank.view.passes import solids, spheres
 from wavetank.view.passes.probes import pattern_turn, spiral, turned
 from wavetank.view.shot import Shot
+from wavetank.view.strips import Strips, strip, strips_of
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill the first component of `light` with the shadows of particles and solids; a 2-D world has none."""
     if shot.frame.dim == 2:
-        fill(buffers.light)
+        fill(buffers.with_light())
         return
     spheres.clear_depth(buffers.sun_depth)
     frame = shot.frame
     spheres.splat(frame.x, frame.count, shot.radius, shot.sun, float(buffers.texels), buffers.sun_depth)
-    of_solids(shot, buffers, buffers.light, 1)
+    of_solids(shot, buffers, buffers.with_light(), 1)
 
 
 def draw_solids(shot: Shot, buffers: Buffers) -> None:
     """Fill the first component of `light` with the shadows of solids alone."""
     if shot.frame.dim == 2:
-        fill(buffers.light)
+        fill(buffers.with_light())
     else:
         spheres.clear_depth(buffers.sun_depth)
-        of_solids(shot, buffers, buffers.light, 1)
+        of_solids(shot, buffers, buffers.with_light(), 1)
 
 
 def of_solids(shot: Shot, buffers: Buffers, light: Any, step: int) -> None:
@@ -47,10 +48,13 @@ def of_solids(shot: Shot, buffers: Buffers, light: Any, step: int) -> None:
     solid_set, texels = shot.frame.solids, buffers.texels
     if solid_set.count > solid_set.tank_count:
         solids.bound(solid_set, shot.sun, texels, texels, buffers.solid_box)
-        solids.trace_depth(solid_set, solids.window(shot), shot.sun, buffers.solid_box, buffers.sun_depth)
+        solids.trace_depth(
+            strips_of(buffers.sun_depth), solid_set, solids.window(shot), shot.sun, buffers.solid_box,
+            buffers.sun_depth,
+        )  # fmt: skip
     receive(
-        shot.lens, shot.sun, shot.look.to_sun, shot.look.sun_size, 0.3 * shot.radius, buffers.probes, step,
-        buffers.sun_depth, buffers.depth, buffers.surface, buffers.normal, light,
+        strips_of(light), shot.lens, shot.sun, shot.look.to_sun, shot.look.sun_size, 0.3 * shot.radius,
+        buffers.probes, step, buffers.sun_depth, buffers.depth, buffers.surface, buffers.normal, light,
     )  # fmt: skip
 
 
@@ -73,30 +77,34 @@ def gap_at(sun_depth: qd.template(), place, depth):
 
 @qd.kernel(fastcache=True)
 def receive(
-    lens: Lens, sun: Lens, to_sun: vec3, sun_size: qd.f32, lift: qd.f32, probes: qd.template(),
+    strips: Strips, lens: Lens, sun: Lens, to_sun: vec3, sun_size: qd.f32, lift: qd.f32, probes: qd.template(),
     step: qd.i32, sun_depth: qd.types.ndarray(), depth: qd.types.ndarray(), surface: qd.types.ndarray(),
     normal: qd.types.ndarray(), light: qd.types.ndarray(),
 ):  # fmt: skip
     """Compare visible points with the sun's depth map: those of every `step`-th row and column."""
     texels = sun_depth.shape[0]
-    for own_row, own_column in qd.ndrange(light.shape[0], light.shape[1]):
-        row, column = own_row * step, own_column * step
-        share = 0.0  # what faces away from the sun is dark without a look
-        if surface[row, column] != 0x7FFFFFFF and normal[row, column].dot(to_sun) > -0.4:  # NOTHING
-            share = 1.0
-            t = qd.bit_cast(depth[row, column], qd.f32)
-            at = lens.eye + from_view(lens, point_at(lens, row, column, t))
-            # The more a surface turns from the sun, the deeper it is within one texel of the map.
-            away = (1.75 - 1.25 * normal[row, column].dot(to_sun)) / sun.focal
-            if surface[row, column] >= 0:
-                away += lift
-            c = to_view(sun, at + away * normal[row, column])
-            place = to_pixel(sun, c)
-            # The cone in which something as high as a few tenths of the map could stand in the way.
-            wide = 0.25 * sun_size * texels
-            if qd.min(place.x, place.y) > -wide and qd.max(place.x, place.y) < texels + wide:
-                share = sun_share(sun, sun_size, wide, probes, c.z, place, pattern_turn(own_row, own_column), sun_depth)
-        light[own_row, own_column] = vec2(share, 1.0)
+    for task in range(strips.count):
+        own_row, first, last = strip(strips, task, light.shape[0], light.shape[1])
+        for own_column in range(first, last):
+            row, column = own_row * step, own_column * step
+            share = 0.0  # what faces away from the sun is dark without a look
+            if surface[row, column] != 0x7FFFFFFF and normal[row, column].dot(to_sun) > -0.4:  # NOTHING
+                share = 1.0
+                t = qd.bit_cast(depth[row, column], qd.f32)
+                at = lens.eye + from_view(lens, point_at(lens, row, column, t))
+                # The more a surface turns from the sun, the deeper it is within one texel of the map.
+                away = (1.75 - 1.25 * normal[row, column].dot(to_sun)) / sun.focal
+                if surface[row, column] >= 0:
+                    away += lift
+                c = to_view(sun, at + away * normal[row, column])
+                place = to_pixel(sun, c)
+                # The cone in which something as high as a few tenths of the map could stand in the way.
+                wide = 0.25 * sun_size * texels
+                if qd.min(place.x, place.y) > -wide and qd.max(place.x, place.y) < texels + wide:
+                    share = sun_share(
+                        sun, sun_size, wide, probes, c.z, place, pattern_turn(own_row, own_column), sun_depth
+                    )
+            light[own_row, own_column] = vec2(share, 1.0)
 
 
 @qd.func

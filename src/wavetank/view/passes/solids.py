@@ -18,6 +18,7 @@ from wavetank.distance import SolidSet, grain, signed_distance
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, vector, view_ray
 from wavetank.view.shot import Shot
+from wavetank.view.strips import Strips, strip, strips_of
 
 UNBOUNDED = 1e4  # m
 
@@ -39,8 +40,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if solids.count > solids.tank_count:
         bound(solids, shot.lens, buffers.rows, buffers.columns, buffers.solid_box)
         trace(
-            solids, window(shot), shot.lens, shot.look.solid, buffers.solid_box, buffers.depth, buffers.surface,
-            buffers.normal, buffers.color,
+            strips_of(buffers.depth), solids, window(shot), shot.lens, shot.look.solid, buffers.solid_box,
+            buffers.depth, buffers.surface, buffers.normal, buffers.color,
         )  # fmt: skip
 
 
@@ -177,27 +178,31 @@ def bound(solids: SolidSet, lens: Lens, rows: qd.i32, columns: qd.i32, box: qd.t
 
 @qd.kernel(fastcache=True)
 def trace(
-    solids: SolidSet, window: Window, lens: Lens, albedo: vec3, box: qd.types.ndarray(), depth: qd.types.ndarray(),
-    surface: qd.types.ndarray(), normal: qd.types.ndarray(), color: qd.types.ndarray(),
+    strips: Strips, solids: SolidSet, window: Window, lens: Lens, albedo: vec3, box: qd.types.ndarray(),
+    depth: qd.types.ndarray(), surface: qd.types.ndarray(), normal: qd.types.ndarray(), color: qd.types.ndarray(),
 ):  # fmt: skip
     """Draw the nearest solid at every pixel where it is nearer than what is there."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        if in_box(box, row, column):
-            hit = nearest_solid(solids, window, lens, row, column, qd.bit_cast(depth[row, column], qd.f32))
-            if hit.w > 0.0:
-                depth[row, column] = qd.bit_cast(hit.w, qd.i32)
-                surface[row, column] = -1  # SOLID
-                normal[row, column] = vec3(hit.x, hit.y, hit.z)
-                color[row, column] = albedo
+    for task in range(strips.count):
+        row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
+        for column in range(first, last):
+            if in_box(box, row, column):
+                hit = nearest_solid(solids, window, lens, row, column, qd.bit_cast(depth[row, column], qd.f32))
+                if hit.w > 0.0:
+                    depth[row, column] = qd.bit_cast(hit.w, qd.i32)
+                    surface[row, column] = -1  # SOLID
+                    normal[row, column] = vec3(hit.x, hit.y, hit.z)
+                    color[row, column] = albedo
 
 
 @qd.kernel(fastcache=True)
 def trace_depth(
-    solids: SolidSet, window: Window, lens: Lens, box: qd.types.ndarray(), depth: qd.types.ndarray()
+    strips: Strips, solids: SolidSet, window: Window, lens: Lens, box: qd.types.ndarray(), depth: qd.types.ndarray()
 ):  # fmt: skip
     """Lower `depth` to that of the nearest solid."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        if in_box(box, row, column):
-            hit = nearest_solid(solids, window, lens, row, column, qd.bit_cast(depth[row, column], qd.f32))
-            if hit.w > 0.0:
-                depth[row, column] = qd.bit_cast(hit.w, qd.i32)
+    for task in range(strips.count):
+        row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
+        for column in range(first, last):
+            if in_box(box, row, column):
+                hit = nearest_solid(solids, window, lens, row, column, qd.bit_cast(depth[row, column], qd.f32))
+                if hit.w > 0.0:
+                    depth[row, column] = qd.bit_cast(hit.w, qd.i32)

@@ -8,18 +8,19 @@ its thickness along the sun's rays, and of the depth at which they meet it.
 from wavetank.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec2, vec3
-from wavetank.view.passes import flatten, occlusion, shadow, smooth, spheres, surface, thickness
-from wavetank.view.passes.surface import normal_at
+from wavetank.view.passes import flatten, occlusion, panes, shadow, smooth, spheres, surface, thickness
+from wavetank.view.passes.ellipsoids import walls
+from wavetank.view.passes.surface import normal_of, rise_at
 from wavetank.view.passes.thickness import thickness_at
 from wavetank.view.shot import Shot
-from wavetank.view.water_buffers import UNIT, WaterBuffers, water_of
+from wavetank.view.water_buffers import UNIT, water_of
 
 LIGHT_STEP = 2
 CAUSTIC_SIGMA = 1.8  # d: finer ripples are the particles', not the water's
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
-    """Fill the light on floor and solids, and the sun's maps of the water; a 2-D world has no shadows."""
+    """Fill the light on floor and solids where there is no water; a 2-D world has no shadows."""
     water = water_of(buffers, shot)
     if shot.frame.dim == 2:
         shadow.fill(water.light)
@@ -28,19 +29,19 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     shadow.of_solids(shot, buffers, water.light, LIGHT_STEP)
     occlusion.look(shot, buffers, water.light, LIGHT_STEP)
     smooth.even(shot, buffers, water.light, water.rough_light, LIGHT_STEP)
-    see_water(shot, buffers, water)
 
 
-def see_water(shot: Shot, buffers: Buffers, water: WaterBuffers) -> None:
+def see_water(shot: Shot, buffers: Buffers) -> None:
     """Fill the sun's maps of the water: its thickness, its surface, and where its light goes."""
-    d, sun = shot.extent.spacing, shot.water_sun
-    thickness.clear(water.sun_thickness)
+    if shot.frame.dim == 2:
+        return
+    water, d, sun = water_of(buffers, shot), shot.extent.spacing, shot.water_sun
     thickness.add(
         water.cells.x, shot.frame.count, sun, 1.0, thickness.DISC[3] * d, thickness.peak(3), water.sun_thickness
     )  # fmt: skip
     surface.see(shot, buffers, sun, water.sun_first)
-    flatten.even(water.sun_first, water.sun_spare, sun, CAUSTIC_SIGMA * d, d)
-    thickness.clear(water.caustic)
+    flatten.even(water.sun_first, water.sun_spare, sun, CAUSTIC_SIGMA * d, d, *walls(shot))
+    panes.clip(sun, *walls(shot), water.sun_first)
     gather(sun, shot.look.to_sun, d / UNIT, d, water.sun_first, water.sun_thickness, water.caustic)
 
 
@@ -56,10 +57,12 @@ def gather(
     """
     texels = first.shape[0]
     for row, column in qd.ndrange(texels, texels):
+        caustic[row, column] = 0
+    for row, column in qd.ndrange(texels, texels):
         moved = vec2(0.0, 0.0)
         if first[row, column] < 0x7F000000:  # FARTHEST
             z = qd.bit_cast(first[row, column], qd.f32)
-            n = normal_at(sun, row, column, z, 3.0 * spacing, first)
+            n = normal_of(sun, row, column, z, rise_at(row, column, z, 3.0 * spacing, first))
             cosi = qd.max(n.dot(to_sun), 0.05)
             bent = -0.7519 * to_sun + (0.7519 * cosi - qd.sqrt(1.0 - 0.5653 * (1.0 - cosi * cosi))) * n
             travel = thickness_at(tau_map, vec2(column + 0.5, row + 0.5), unit)

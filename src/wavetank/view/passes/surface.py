@@ -17,115 +17,184 @@ Within an ellipsoid rays count as parallel; at a distance of a hundred radii tha
 
 from typing import Any
 
-import numpy as np
-
-from wavetank.compiler import qd
+from wavetank.compiler import qd, threads
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import (
     Lens,
     from_view,
     pixels_per_metre,
     plane_position,
-    ray_direction,
-    ray_origin,
     to_view,
+    vec2,
     vec3,
-    vector,
-    view_ray,
 )
-from wavetank.view.passes.solids import box_interval
-from wavetank.view.passes.spheres import clear_depth
+from wavetank.view.passes.ellipsoids import walls
 from wavetank.view.shot import Shot
+from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import Ellipsoids, water_of
 
 LARGEST = 0.25  # of the picture's height: radius up to which an ellipsoid is drawn
+GAP = 2.0  # d: what an outline stands before by more, it stands out from
 AWAY = 0.12  # how much an ellipsoid faces away that no eye can see
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
-    """Fill the water's depth; flat against the panes of a tank."""
-    see(shot, buffers, shot.lens, water_of(buffers, shot).depth)
+    """Fill the water's depth and its outlines, as if the water went on behind the panes."""
+    water = water_of(buffers, shot)
+    see(shot, buffers, shot.lens, water.depth, water.rim)
 
 
-def see(shot: Shot, buffers: Buffers, lens: Lens, depth: Any) -> None:
-    """Fill `depth` with the water as `lens` sees it."""
-    clear_depth(depth)
-    largest = max(LARGEST * depth.shape[0], 2.0)
-    splat(water_of(buffers, shot).ellipsoids, shot.frame.count, lens, largest, AWAY, depth)
-    if shot.frame.scene.tank is None:
-        return
-    if shot.frame.dim == 2:
-        # The plane itself is what is kept: a box around it, as deep as the water is drawn.
-        thick = np.array([0.0, 0.0, 10.0 * shot.extent.spacing])
-        cut(lens, vector(*(shot.extent.lower - thick)), vector(*(shot.extent.upper + thick)), depth)
-    else:
-        press(lens, vector(*shot.extent.lower), vector(*shot.extent.upper), shot.extent.spacing, depth)
+def see(shot: Shot, buffers: Buffers, lens: Lens, depth: Any, rim: Any = None) -> None:
+    """Fill `depth` with the water as `lens` sees it, and `rim` with what its outlines cover in part."""
+    count, turns = shot.frame.count, max(threads(), 1)
+    splat(
+        strips_of(depth), water_of(buffers, shot).ellipsoids, count, turns, -(-count // turns), lens, *walls(shot),
+        max(LARGEST * depth.shape[0], 2.0), AWAY, GAP * shot.extent.spacing, int(rim is not None), depth,
+        depth if rim is None else rim,
+    )  # fmt: skip
 
 
 @qd.kernel(fastcache=True)
 def splat(
-    ellipsoids: Ellipsoids, count: qd.i32, lens: Lens, largest: qd.f32, away: qd.f32, depth: qd.types.ndarray()
+    strips: Strips, ellipsoids: Ellipsoids, count: qd.i32, turns: qd.i32, run: qd.i32, lens: Lens, lower: vec3,
+    upper: vec3, largest: qd.f32, away: qd.f32, gap: qd.f32, soft: qd.template(), depth: qd.types.ndarray(),
+    rim: qd.types.ndarray(),
 ):  # fmt: skip
-    """Lower `depth` to the front of every ellipsoid that may be seen."""
-    rows, columns = depth.shape[0], depth.shape[1]
-    for n in range(count):
-        # Sorted by place: the end that is nearer goes first and hides the rest.
-        i = n
-        if lens.forward.dot(ellipsoids.center[0] - ellipsoids.center[count - 1]) > 0.0:
-            i = count - 1 - n
-        c = to_view(lens, ellipsoids.center[i])
-        size = ellipsoids.size[i]
-        look = c.x * lens.right + c.y * lens.up + c.z * lens.forward
-        if lens.perspective < 0.5:
-            look = lens.forward
-        hidden = look.dot(ellipsoids.outward[i]) > away * look.norm()
-        if size > 0.0 and c.z > lens.near + size and not hidden:
-            scale = pixels_per_metre(lens, c.z)
-            fill_ellipse(lens, c, scale, qd.min(1.0, largest / (size * scale)), ellipsoids.axes[i],
-                         ellipsoids.mixed[i], rows, columns, depth)  # fmt: skip
+    """Lower `depth` to the front of every ellipsoid that may be seen, and of its mirror image.
+
+    Threads take turns, so that each begins at the near end: ellipsoids are sorted by place, and what is near hides
+    the rest.
+    """
+    for task in range(strips.count):
+        row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
+        for column in range(first, last):
+            depth[row, column] = 0x7F000000  # FARTHEST
+            if qd.static(soft):
+                rim[row, column] = 0
+    for n in range(turns * run):
+        i = n % run * turns + n // run
+        if i < count:
+            if lens.forward.dot(ellipsoids.center[0] - ellipsoids.center[count - 1]) > 0.0:
+                i = count - 1 - i
+            for image in range(2):
+                j = i + image * count
+                ellipsoids.edge[j] = 0
+                if ellipsoids.size[j] > 0.0:
+                    if may_be_seen(ellipsoids, j, image, lens, lower, upper, away):
+                        ellipsoids.edge[j] = fill_ellipse(
+                            ellipsoids, j, lens, largest, gap, qd.static(1 if soft else 0), depth, rim
+                        )
+    # What stands out from nothing in the finished depth has no outline, whatever the order of the threads.
+    for n in range(2 * count):
+        if qd.static(soft):
+            if ellipsoids.edge[n] == 1:
+                fill_ellipse(ellipsoids, n, lens, largest, gap, 2, depth, rim)
+    # Pixels that only outlines cover get their depth.
+    for task in range(strips.count):
+        row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
+        if qd.static(soft):
+            for column in range(first, last):
+                if rim[row, column] > 0 and depth[row, column] == 0x7F000000:  # FARTHEST
+                    depth[row, column] = (0xFFFFFF - (rim[row, column] & 0xFFFFFF)) << 7
 
 
 @qd.func
-def fill_ellipse(lens: Lens, c, scale, shrink, axes, mixed, rows, columns, depth: qd.template()):
-    """Lower `depth` to that of one ellipsoid; `scale` is in pixels per metre."""
+def may_be_seen(ellipsoids: Ellipsoids, i, image, lens: Lens, lower, upper, away):
+    """Whether an ellipsoid lies before the eye and does not face away from it."""
+    c = to_view(lens, ellipsoids.center[i])
+    look = lens.forward
+    if lens.perspective > 0.5:
+        look = c.x * lens.right + c.y * lens.up + c.z * lens.forward
+    hidden = look.dot(ellipsoids.outward[i]) > away * look.norm()
+    if image == 1:  # before a pane it would hide what it is the image of
+        outside = vec3(0.0, 0.0, 0.0)
+        for k in qd.static((0, 2)):
+            x = ellipsoids.center[i][k]
+            outside[k] = qd.cast(x > upper[k], qd.f32) - qd.cast(x < lower[k], qd.f32)
+        hidden = look.dot(outside) <= 0.0
+    return c.z > lens.near + ellipsoids.size[i] and not hidden
+
+
+@qd.func
+def fill_ellipse(
+    ellipsoids: Ellipsoids, i, lens: Lens, largest, gap, part: qd.template(), depth: qd.template(),
+    rim: qd.template(),
+):  # fmt: skip
+    """Lower `depth` to that of one ellipsoid, or raise `rim` to the share of a pixel that its outline covers.
+
+    Part 0 takes the pixels whose centres lie inside. Part 1 takes those that are covered as a whole, as if the outline
+    were straight, and returns whether it may have left others to part 2.
+    """
+    c, size = to_view(lens, ellipsoids.center[i]), ellipsoids.size[i]
+    scale = pixels_per_metre(lens, c.z)
+    shrink = qd.min(1.0, largest / (size * scale))
+    axes, mixed, left_over = ellipsoids.axes[i], ellipsoids.mixed[i], 0
     # Rotated into the view ...
     a, b, f = lens.right, lens.up, lens.forward
+    middle = lens.middle
     if lens.perspective > 0.5:  # ... and sheared: x' = x - (c.x / c.z) z
         a = a - (c.x / c.z) * f
         b = b - (c.y / c.z) * f
-    ma, mb, mf = times(axes, mixed, a), times(axes, mixed, b), times(axes, mixed, f)
-    s = shrink * shrink
-    xx, yy, zz = s * a.dot(ma), s * b.dot(mb), s * f.dot(mf)
-    xy, xz, yz = s * a.dot(mb), s * a.dot(mf), s * b.dot(mf)
-    area = qd.max(xx * yy - xy * xy, 1e-30)
-    pxx, pyy, pxy = yy / area, xx / area, -xy / area
-    gx, gy = pxx * xz + pxy * yz, pxy * xz + pyy * yz
-    half = qd.sqrt(qd.max(zz - gx * xz - gy * yz, 0.0))
-    size = 1.0 / scale
-    middle = lens.middle
-    if lens.perspective > 0.5:
         middle += lens.focal * qd.Vector([c.x / c.z, -c.y / c.z])
     else:
         middle += lens.focal * qd.Vector([c.x, -c.y])
-    tall = qd.sqrt(yy) * scale
+    a, b = (shrink * scale) * a, (shrink * scale) * b  # across the view in pixels
+    f = shrink * f
+    ma, mb, mf = times(axes, mixed, a), times(axes, mixed, b), times(axes, mixed, f)
+    xx, yy, zz = a.dot(ma), b.dot(mb), f.dot(mf)
+    xy, xz, yz = a.dot(mb), a.dot(mf), b.dot(mf)
+    area = qd.max(xx * yy - xy * xy, 1e-12)
+    pxx, pyy, pxy = yy / area, xx / area, -xy / area
+    gx, gy = pxx * xz + pxy * yz, pxy * xz + pyy * yz
+    half = qd.sqrt(qd.max(zz - gx * xz - gy * yz, 0.0))
+    # p(u, v) = pxx u^2 + 2 pxy u v + pyy v^2 is 1 on the outline; half a pixel outside it is `outer` at most, and half
+    # a pixel inside at least 1 - `inner`.
+    inner, outer, narrow = 0.0, 1.0, 1.0
+    if qd.static(part != 0):
+        narrow = qd.sqrt(qd.max(0.5 * (xx + yy) - qd.sqrt(0.25 * (xx - yy) ** 2 + xy * xy), 0.04))
+        rest = qd.max(1.0 - 0.5 / narrow, 0.0)
+        inner, outer = 1.0 - rest * rest, (1.0 + 0.5 / narrow) ** 2
+    nearest = qd.bit_cast(qd.max(c.z - qd.sqrt(zz), 1e-6), qd.i32)
+    rows, columns = depth.shape[0], depth.shape[1]
+    tall = qd.sqrt(yy * outer)
+    per, lean, fall = 1.0 / pxx, -pxy / pxx, pyy - pxy * pxy / pxx
     first = qd.max(qd.cast(qd.ceil(qd.max(middle.y - tall - 0.5, 0.0)), qd.i32), 0)
     last = qd.min(qd.cast(qd.floor(qd.min(middle.y + tall - 0.5, rows - 1.0)), qd.i32), rows - 1)
     for row in range(first, last + 1):
-        v = (middle.y - row - 0.5) * size
-        # p(u, v) = pxx u^2 + 2 pxy u v + pyy v^2 <= 1 between the two ends of this row.
-        center = -pxy * v / pxx
-        reach = 1.0 - v * v * (pyy - pxy * pxy / pxx)
-        if reach > 0.0:
-            wide = qd.sqrt(reach / pxx) * scale
-            at = middle.x + center * scale - 0.5
+        v = middle.y - row - 0.5
+        reach = 1.0 - v * v * fall
+        room = (reach + outer - 1.0) * per
+        if room > 0.0:
+            wide = qd.sqrt(room)
+            at = middle.x + lean * v - 0.5
+            base = c.z + (gx * lean + gy) * v
             left = qd.max(qd.cast(qd.ceil(qd.max(at - wide, 0.0)), qd.i32), 0)
             right = qd.min(qd.cast(qd.floor(qd.min(at + wide, columns - 1.0)), qd.i32), columns - 1)
             for column in range(left, right + 1):
-                u = (column - at) * size  # from the middle of the row
-                front = c.z + gx * (center + u) + gy * v - half * qd.sqrt(qd.max(reach - pxx * u * u, 0.0))
-                key = qd.bit_cast(front, qd.i32) & ~1  # the last bit is for `press`
-                if key > 0 and key < depth[row, column]:
-                    qd.atomic_min(depth[row, column], key)
+                u = column - at  # from the middle of the row
+                inside = reach - pxx * u * u
+                tried = depth[row, column] > nearest
+                if qd.static(part == 2):
+                    tried = inside < inner
+                if tried:
+                    front = base + gx * u - half * qd.sqrt(qd.max(inside, 0.0))
+                    key = qd.bit_cast(front, qd.i32) & ~1  # the last bit is for `flatten`
+                    if key > 0 and key < depth[row, column]:
+                        cover = 1.0
+                        if qd.static(part != 0):
+                            if inside < inner:
+                                # Distance to the outline [px]: p - 1 over its gradient.
+                                slope = 2.0 * vec2(pxx * u, pxy * (u + lean * v) + pyy * v)
+                                cover = qd.min(0.5 + qd.min(inside / qd.max(slope.norm(), 1e-6), narrow), 1.0)
+                        if cover >= 1.0:
+                            if qd.static(part != 2):
+                                qd.atomic_min(depth[row, column], key)
+                        elif cover > 0.0 and qd.bit_cast(depth[row, column], qd.f32) > front + gap:
+                            left_over = 1
+                            if qd.static(part == 2):
+                                share = qd.cast(127.0 * cover, qd.i32)
+                                qd.atomic_max(rim[row, column], (share << 24) | (0xFFFFFF - (key >> 7)))
+    return left_over
 
 
 @qd.func
@@ -136,46 +205,6 @@ def times(axes, mixed, v):
         mixed.x * v.x + axes.y * v.y + mixed.z * v.z,
         mixed.y * v.x + mixed.z * v.y + axes.z * v.z,
     )
-
-
-@qd.kernel(fastcache=True)
-def cut(lens: Lens, lower: vec3, upper: vec3, depth: qd.types.ndarray()):
-    """Leave out what reaches through a wall of a 2-D world."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        if depth[row, column] < 0x7F000000:  # FARTHEST
-            ray = view_ray(lens, row, column)
-            panes = box_interval(ray_origin(lens, ray), ray_direction(lens, ray), lower, upper)
-            if panes[0] > panes[1]:
-                depth[row, column] = 0x7F000000
-
-
-@qd.kernel(fastcache=True)
-def press(lens: Lens, lower: vec3, upper: vec3, spacing: qd.f32, depth: qd.types.ndarray()):
-    """Move water that lies against a pane onto it, where it is flat, and leave out what reaches through."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        key = depth[row, column]
-        if key < 0x7F000000:  # FARTHEST
-            flat = 0
-            ray = view_ray(lens, row, column)
-            origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
-            z = qd.bit_cast(key, qd.f32)
-            panes = box_interval(origin, direction, lower, upper)
-            enter = panes[0]
-            if z > panes[1] or panes[0] > panes[1]:  # an ellipsoid reaches through a wall
-                depth[row, column] = 0x7F000000  # FARTHEST
-            elif enter > lens.near:
-                at = origin + enter * direction
-                side = qd.min(qd.abs(at.x - lower.x), qd.abs(at.x - upper.x))
-                front = qd.min(qd.abs(at.z - lower.z), qd.abs(at.z - upper.z))
-                if qd.min(side, front) < 1e-3 * spacing:  # not through the open top
-                    slope = qd.abs(direction.x) if side < front else qd.abs(direction.z)
-                    into = (z - enter) * slope / spacing  # way from the pane, along its normal
-                    ease = qd.min(qd.max((into - 0.25) / 0.35, 0.0), 1.0)
-                    z = enter + (z - enter) * ease * ease * (3.0 - 2.0 * ease)
-                    flat = qd.cast(z <= enter, qd.i32)
-                z = qd.max(z, enter)
-                # The last bit of a depth says that it lies on a pane: there nothing needs to be smoothed.
-                depth[row, column] = (qd.bit_cast(z, qd.i32) & ~1) | flat
 
 
 @qd.func
@@ -194,12 +223,16 @@ def rise_along(row, column, down, across, z, limit, depth: qd.template()):
 
 
 @qd.func
-def normal_at(lens: Lens, row, column, z, limit, depth: qd.template()):
-    """Unit normal, in the world and towards the eye, of the surface that `depth` holds."""
+def rise_at(row, column, z, limit, depth: qd.template()):
+    """Change of depth [m] to the next column and to the next row, from the smoother sides."""
+    return vec2(rise_along(row, column, 0, 1, z, limit, depth), rise_along(row, column, 1, 0, z, limit, depth))
+
+
+@qd.func
+def normal_of(lens: Lens, row, column, z, rise):
+    """Unit normal, in the world and towards the eye, of a surface at depth `z` that rises so from pixel to pixel."""
     uv = plane_position(lens, row, column) * lens.perspective
     wide = lens.pixel * (1.0 + lens.perspective * (z - 1.0))
-    right = rise_along(row, column, 0, 1, z, limit, depth)
-    below = rise_along(row, column, 1, 0, z, limit, depth)
     # Cross product of the ways along the surface: (wide + u right, v right, right), (u below, v below - wide, below).
-    n = vec3(right, -below, -wide - uv.x * right + uv.y * below)
+    n = vec3(rise.x, -rise.y, -wide - uv.x * rise.x + uv.y * rise.y)
     return from_view(lens, n).normalized(1e-20)

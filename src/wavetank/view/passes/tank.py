@@ -1,7 +1,8 @@
 """The tank: thin lines along its edges, hidden by what is in front of them, and a breath of glass.
 
 Every edge is walked pixel by pixel along the axis of the picture in which it is longer; each step marks the few pixels
-across the line with how much of them it covers. Marks are integers and the largest wins, so their order is irrelevant.
+across the line with how much of them it covers, and at what depth. Marks are integers and the largest wins, so their
+order is irrelevant.
 
     code      symbol   meaning                                                unit
     a, b               ends of an edge in the picture                         px
@@ -17,7 +18,6 @@ from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_vie
 from wavetank.view.look import Look
 from wavetank.view.passes.solids import box_interval
 from wavetank.view.shot import Shot
-from wavetank.view.water_buffers import water_of
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
@@ -27,20 +27,15 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         blend(shot.lens, shot.look, lower, upper, buffers.depth, buffers.lines, buffers.color)
 
 
-def draw_behind(shot: Shot, buffers: Buffers) -> None:
-    """Draw the tank into the backdrop that the water refracts."""
+def draw_lines(shot: Shot, buffers: Buffers) -> None:
+    """Mark the edges for those who draw them: the backdrop, and the water those in front of it."""
     if shot.frame.scene.tank is not None:
-        lower, upper = _mark_over(shot, buffers, buffers.depth)
-        behind = water_of(buffers, shot).behind
-        blend(shot.lens, shot.look, lower, upper, buffers.depth, buffers.lines, behind)
+        _mark_over(shot, buffers, buffers.depth)
 
 
-def draw_front(shot: Shot, buffers: Buffers) -> None:
-    """Draw those edges once more that lie in front of the water; the others shine through it."""
-    if shot.frame.scene.tank is not None:
-        water = water_of(buffers, shot)
-        _mark_over(shot, buffers, water.depth)
-        blend_front(shot.look, buffers.depth, water.depth, buffers.lines, buffers.color)
+def slack(shot: Shot) -> float:
+    """Depth [m] by which a line wins."""
+    return 2.0 * shot.radius
 
 
 def _mark_over(shot: Shot, buffers: Buffers, depth: Any) -> tuple[Any, Any]:
@@ -50,8 +45,8 @@ def _mark_over(shot: Shot, buffers: Buffers, depth: Any) -> tuple[Any, Any]:
     edges = 12 if shot.frame.dim == 3 else 4
     erase(buffers.lines)
     mark(
-        shot.lens, lower, upper, edges, max(buffers.rows, buffers.columns) + 2, width, 2.0 * shot.radius,
-        depth, buffers.lines,
+        shot.lens, lower, upper, edges, max(buffers.rows, buffers.columns) + 2, width, slack(shot), depth,
+        buffers.lines,
     )  # fmt: skip
     return lower, upper
 
@@ -132,7 +127,35 @@ def mark_step(lens: Lens, a, b, step, width, slack, depth: qd.template(), lines:
                 if along == 1:
                     row, column = pixel, other
                 if z - slack < qd.bit_cast(depth[row, column], qd.f32):
-                    qd.atomic_max(lines[row, column], qd.cast(255.0 * cover + 0.5, qd.i32))
+                    place = 0x7FFFFF - (qd.bit_cast(z, qd.i32) >> 8)
+                    qd.atomic_max(lines[row, column], (qd.cast(255.0 * cover + 0.5, qd.i32) << 23) | place)
+
+
+@qd.func
+def line_cover(line, depth, slack):
+    """Share of a pixel that a line covers, unless something at `depth` hides it."""
+    cover = 0.0
+    if line > 0:
+        z = qd.bit_cast((0x7FFFFF - (line & 0x7FFFFF)) << 8, qd.f32)
+        if z - slack < depth:
+            cover = (line >> 23) / 255.0
+    return cover
+
+
+@qd.func
+def with_tank(lens: Lens, look: Look, lower, upper, origin, direction, depth, line, radiance):
+    """Radiance with panes and lines laid over it."""
+    result = radiance
+    if look.glass > 0.0:
+        panes = box_interval(origin, direction, lower, upper)
+        if panes[0] <= panes[1]:
+            for k in qd.static(range(2)):
+                if panes[k] > lens.near and panes[k] < depth:
+                    result += look.glass * (look.pane - result)
+        elif look.glass == 1.0:  # a plane: particles are wider than their distance to the wall
+            result = look.horizon
+    cover = look.line_strength * line_cover(line, depth, 1e30)
+    return result + cover * (look.line - result)
 
 
 @qd.kernel(fastcache=True)
@@ -142,28 +165,8 @@ def blend(
 ):  # fmt: skip
     """Lay panes and lines over the picture."""
     for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        result = color[row, column]
-        if look.glass > 0.0:
-            ray = view_ray(lens, row, column)
-            panes = box_interval(ray_origin(lens, ray), ray_direction(lens, ray), lower, upper)
-            here = qd.bit_cast(depth[row, column], qd.f32)
-            if panes[0] <= panes[1]:
-                for k in qd.static(range(2)):
-                    if panes[k] > lens.near and panes[k] < here:
-                        result += look.glass * (look.pane - result)
-            elif look.glass == 1.0:  # a plane: particles are wider than their distance to the wall
-                result = look.horizon
-        cover = look.line_strength * lines[row, column] / 255.0
-        color[row, column] = result + cover * (look.line - result)
-
-
-@qd.kernel(fastcache=True)
-def blend_front(
-    look: Look, depth: qd.types.ndarray(), water_depth: qd.types.ndarray(), lines: qd.types.ndarray(),
-    color: qd.types.ndarray(),
-):  # fmt: skip
-    """Lay lines over the water."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        if lines[row, column] > 0 and water_depth[row, column] < depth[row, column]:
-            cover = look.line_strength * lines[row, column] / 255.0
-            color[row, column] += cover * (look.line - color[row, column])
+        ray = view_ray(lens, row, column)
+        color[row, column] = with_tank(
+            lens, look, lower, upper, ray_origin(lens, ray), ray_direction(lens, ray),
+            qd.bit_cast(depth[row, column], qd.f32), lines[row, column], color[row, column],
+        )  # fmt: skip

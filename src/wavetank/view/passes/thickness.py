@@ -25,16 +25,12 @@ TEXELS = 2.0  # of a map per spacing, at most
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill the thickness as the eye sees it."""
-    water, d = water_of(buffers, shot), shot.extent.spacing
-    clear(water.thickness)
-    add(
-        water.cells.x, shot.frame.count, shot.lens, float(coarseness(shot)), DISC[shot.frame.dim] * d,
-        peak(shot.frame.dim), water.thickness,
-    )  # fmt: skip
-    clear_dye(water.dye)
+    water, disc = water_of(buffers, shot), DISC[shot.frame.dim] * shot.extent.spacing
+    count, coarse, tall = shot.frame.count, float(coarseness(shot)), peak(shot.frame.dim)
+    add(water.cells.x, count, shot.lens, coarse, disc, tall, water.thickness)
     stain(
-        water.cells.x, water.cells.order, shot.frame.dye, shot.frame.material, water.stains, shot.frame.count,
-        shot.lens, float(coarseness(shot)), DISC[shot.frame.dim] * d, peak(shot.frame.dim), water.dye,
+        water.cells.x, water.cells.order, shot.frame.dye, shot.frame.material, water.stains, count, shot.lens, coarse,
+        disc, tall, water.dye, water.stained,
     )  # fmt: skip
 
 
@@ -54,19 +50,14 @@ def peak(dim: int) -> float:
 
 
 @qd.kernel(fastcache=True)
-def clear(thickness: qd.types.ndarray()):
-    """No water anywhere."""
-    for row, column in qd.ndrange(thickness.shape[0], thickness.shape[1]):
-        thickness[row, column] = 0
-
-
-@qd.kernel(fastcache=True)
 def add(
     x: qd.types.ndarray(), count: qd.i32, lens: Lens, coarse: qd.f32, disc: qd.f32, peak: qd.f32,
     thickness: qd.types.ndarray(),
 ):  # fmt: skip
-    """Add every particle's disc; the texel (r, c) holds the pixels from coarse r, coarse c on."""
+    """Add up every particle's disc; the texel (r, c) holds the pixels from coarse r, coarse c on."""
     rows, columns = thickness.shape[0], thickness.shape[1]
+    for row, column in qd.ndrange(rows, columns):
+        thickness[row, column] = 0
     for i in range(count):
         c = to_view(lens, x[i])
         if c.z > lens.near + 0.3 * disc:
@@ -92,27 +83,31 @@ def add(
 
 
 @qd.kernel(fastcache=True)
-def clear_dye(dye: qd.types.ndarray()):
-    """No dye anywhere."""
-    for row, column in qd.ndrange(dye.shape[0], dye.shape[1]):
-        for k in qd.static(range(4)):
-            dye[row, column, k] = 0
-
-
-@qd.kernel(fastcache=True)
 def stain(
     x: qd.types.ndarray(), order: qd.types.ndarray(), dyes: qd.types.ndarray(), materials: qd.types.ndarray(),
     stains: qd.types.ndarray(), count: qd.i32, lens: Lens, coarse: qd.f32, disc: qd.f32, peak: qd.f32,
-    dye: qd.types.ndarray(),
+    dye: qd.types.ndarray(), stained: qd.types.ndarray(),
 ):  # fmt: skip
-    """Add the discs of coloured particles, as strong as their dye, alone and times its colour.
+    """Add up the discs of coloured particles, as strong as their dye, alone and times its colour.
 
-    A fluid with a colour of its own is dyed with it where nothing else dyes it.
+    A fluid with a colour of its own is dyed with it where nothing else dyes it. `stained` tells whether any is; where
+    none is, `dye` holds nothing of use.
     """
+    for _ in range(1):
+        stained[0] = 0
     for a in range(count):
-        own = dyes[order[a]]
-        if own == 0:
-            own = stains[materials[order[a]]]
+        if dyes[a] != 0 or stains[materials[a]] != 0:
+            stained[0] = 1
+    for row, column in qd.ndrange(dye.shape[0], dye.shape[1]):
+        if stained[0] == 1:
+            for k in qd.static(range(4)):
+                dye[row, column, k] = 0
+    for a in range(count):
+        own = 0
+        if stained[0] == 1:
+            own = dyes[order[a]]
+            if own == 0:
+                own = stains[materials[order[a]]]
         c = to_view(lens, x[a])
         if own != 0 and c.z > lens.near + 0.3 * disc:
             place = to_pixel(lens, c) / coarse

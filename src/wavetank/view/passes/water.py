@@ -14,6 +14,8 @@ takes the finished backdrop where that point is seen.
     swallow   sigma_a  absorption per colour, dye included                             1/m
 """
 
+import dataclasses
+
 import numpy as np
 
 from wavetank.compiler import qd
@@ -33,10 +35,14 @@ from wavetank.view.lens import (
 )
 from wavetank.view.look import Look
 from wavetank.view.passes import cut
+from wavetank.view.passes.ellipsoids import walls
+from wavetank.view.passes.panes import share_behind, tank_interval
 from wavetank.view.passes.shade import background, smoothstep
-from wavetank.view.passes.surface import normal_at
+from wavetank.view.passes.surface import normal_of, rise_at
+from wavetank.view.passes.tank import line_cover, slack
 from wavetank.view.passes.thickness import DISC, coarseness, dye_at, thickness_at
 from wavetank.view.shot import Shot
+from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import UNIT, water_of
 
 
@@ -56,12 +62,34 @@ def under_water(shot: Shot, buffers: Buffers) -> int:
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Lay the water over the backdrop."""
     water = water_of(buffers, shot)
-    lay(
-        shot.lens, shot.look, vector(*shot.extent.lower), vector(*shot.extent.upper), DISC[2] * shot.extent.spacing,
-        shot.absorption, shot.scattering, shot.look.glow * shot.tint, float(coarseness(shot)),
-        shot.extent.spacing / UNIT, shot.extent.spacing, under_water(shot, buffers), shot.frame.dim, water.depth,
-        water.thickness, water.dye, shot.usual, buffers.depth, water.behind, buffers.color,
+    lower, upper = walls(shot)
+    if shot.frame.dim == 2:  # as deep as the water is drawn
+        thick = vector(0.0, 0.0, 10.0 * shot.extent.spacing)
+        lower, upper = lower - thick, upper + thick
+    optics = Optics(
+        absorption=shot.absorption, scattering=shot.scattering, glow=shot.look.glow * shot.tint, usual=shot.usual,
+        coarse=float(coarseness(shot)), unit=shot.extent.spacing / UNIT, spacing=shot.extent.spacing,
+        disc=DISC[2] * shot.extent.spacing,
     )  # fmt: skip
+    lay(
+        strips_of(buffers.depth), shot.lens, shot.look, optics, lower, upper, slack(shot), under_water(shot, buffers),
+        shot.frame.dim, water.depth, water.rim, water.thickness, water.dye, water.stained, buffers.depth, water.behind,
+        buffers.lines, buffers.color, water.spare,
+    )  # fmt: skip
+
+
+@dataclasses.dataclass
+class Optics:
+    """What the fluid does to light, and the scale of the maps of its thickness, on the device."""
+
+    absorption: vec3  # 1/m
+    scattering: qd.f32  # 1/m
+    glow: vec3  # radiance of light that comes back out of deep water
+    usual: qd.f32  # m: water that gives its colour to what is behind it
+    coarse: qd.f32  # pixels per texel of the thickness
+    unit: qd.f32  # m per step of it
+    spacing: qd.f32  # m
+    disc: qd.f32  # m: radius of a particle's disc in a plane
 
 
 @qd.func
@@ -79,11 +107,23 @@ def wall_share(at, lower, upper, disc):
 
 
 @qd.func
-def sheet_at(lens: Lens, thickness: qd.template(), place, coarse, unit, lower, upper, disc):
+def sheet_at(lens: Lens, optics: Optics, thickness: qd.template(), place, lower, upper):
     """Thickness of the sheet that a 2-D world is, at a place in the picture [m]."""
     c = point_at(lens, place.y - 0.5, place.x - 0.5, 1.0)
-    share = wall_share(lens.eye + from_view(lens, c), lower, upper, disc)
-    return thickness_at(thickness, place / coarse, unit) / share
+    share = wall_share(lens.eye + from_view(lens, c), lower, upper, optics.disc)
+    return thickness_at(thickness, place / optics.coarse, optics.unit) / share
+
+
+@qd.func
+def sheet_normal(lens: Lens, optics: Optics, thickness: qd.template(), place, lower, upper):
+    """Normal of the sheet: a plane has no shape in depth and gets that of a drop between two panes."""
+    dx, dy = vec2(optics.coarse, 0.0), vec2(0.0, optics.coarse)
+    right = sheet_at(lens, optics, thickness, place + dx, lower, upper)
+    right -= sheet_at(lens, optics, thickness, place - dx, lower, upper)
+    below = sheet_at(lens, optics, thickness, place + dy, lower, upper)
+    below -= sheet_at(lens, optics, thickness, place - dy, lower, upper)
+    bulge = optics.disc / (2.0 * optics.coarse * lens.pixel * optics.spacing)
+    return from_view(lens, vec3(-bulge * right, bulge * below, -1.0).normalized())
 
 
 @qd.func
@@ -119,82 +159,151 @@ def picture_at(behind: qd.template(), place):
 
 @qd.kernel(fastcache=True)
 def lay(
-    lens: Lens, look: Look, lower: vec3, upper: vec3, disc: qd.f32, absorption: vec3, scattering: qd.f32,
-    back_light: vec3, coarse: qd.f32, unit: qd.f32, spacing: qd.f32, under: qd.i32, dim: qd.template(),
-    water_depth: qd.types.ndarray(), thickness: qd.types.ndarray(), dye: qd.types.ndarray(), usual: qd.f32,
-    depth: qd.types.ndarray(),
-    behind: qd.types.ndarray(), color: qd.types.ndarray(),
+    strips: Strips, lens: Lens, look: Look, optics: Optics, lower: vec3, upper: vec3, slack: qd.f32, under: qd.i32,
+    dim: qd.template(), water_depth: qd.types.ndarray(), rim: qd.types.ndarray(), thickness: qd.types.ndarray(),
+    dye: qd.types.ndarray(), stained: qd.types.ndarray(), depth: qd.types.ndarray(), behind: qd.types.ndarray(),
+    lines: qd.types.ndarray(), color: qd.types.ndarray(), seen: qd.types.ndarray(),
 ):  # fmt: skip
-    """Shade every pixel that shows water, and copy the backdrop to the others."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        key = water_depth[row, column]
-        result = behind[row, column]
-        if under == 1:
-            # From inside there is no surface in front of anything: water dims and tints what is behind it.
-            ray = view_ray(lens, row, column)
-            tau = thickness_at(thickness, vec2(column + 0.5, row + 0.5) / coarse, unit)
-            travel = qd.min(tau, qd.bit_cast(depth[row, column], qd.f32) * ray_direction(lens, ray).norm())
-            result = result * qd.exp(-travel * absorption) + (1.0 - qd.exp(-travel * scattering)) * back_light
-        elif key < 0x7F000000 and key < depth[row, column]:  # FARTHEST
-            z = qd.bit_cast(key, qd.f32)
-            ray = view_ray(lens, row, column)
-            direction = ray_direction(lens, ray)
-            pace = direction.norm()
-            ahead = direction / pace
-            at = ray_origin(lens, ray) + z * direction
-            place = vec2(column + 0.5, row + 0.5)
-            tau = thickness_at(thickness, place / coarse, unit)
-            limit = 3.0 * spacing
-            n = normal_at(lens, row, column, z, limit, water_depth)
-            if qd.static(dim == 2):
-                # A plane has no shape in depth: it gets that of a drop between two panes, from its thickness.
-                tau = sheet_at(lens, thickness, place, coarse, unit, lower, upper, disc)
-                dx, dy = vec2(coarse, 0.0), vec2(0.0, coarse)
-                right = sheet_at(lens, thickness, place + dx, coarse, unit, lower, upper, disc) - sheet_at(
-                    lens, thickness, place - dx, coarse, unit, lower, upper, disc
-                )
-                below = sheet_at(lens, thickness, place + dy, coarse, unit, lower, upper, disc) - sheet_at(
-                    lens, thickness, place - dy, coarse, unit, lower, upper, disc
-                )
-                rise = disc / (2.0 * coarse * lens.pixel * spacing)
-                n = from_view(lens, vec3(-rise * right, rise * below, -1.0).normalized())
-            cosi = qd.max(-n.dot(ahead), 0.05)
-            mirror = 0.02 + 0.98 * (1.0 - cosi) ** 5
-            reflected = (ahead + 2.0 * cosi * n).normalized()
-            bent = 0.7519 * ahead + (0.7519 * cosi - qd.sqrt(1.0 - 0.5653 * (1.0 - cosi * cosi))) * n
-            # The least that a drop is thick; in a plane the rim keeps half of the colour.
-            tau = qd.max(tau, qd.static(0.15 if dim == 3 else 0.55) * spacing)
-            back = qd.bit_cast(depth[row, column], qd.f32)
-            travel = qd.min(tau, (back - z) * pace)
-            if qd.static(dim == 3):
-                if bent.y < -1e-3 and at.y > 0.0:
-                    travel = qd.min(travel, -at.y / bent.y)
-            c = to_view(lens, at + travel * bent)
-            shown = result
-            if c.z > lens.near:
-                there = to_pixel(lens, c)
-                r = qd.min(qd.max(qd.cast(there.y, qd.i32), 0), depth.shape[0] - 1)
-                e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), depth.shape[1] - 1)
-                if depth[r, e] > key:  # not what stands in front of the water
-                    shown = picture_at(behind, there)
-            swallow, tint = absorption, back_light
-            stained = dye_at(dye, place / coarse)
-            if stained[0] > 0.0:
-                # Dyed water swallows what its colour lacks; strong dye shows in a layer thinner than the usual.
-                color_of_dye = qd.min(qd.max(vec3(stained[1], stained[2], stained[3]), 0.02), 0.98)
-                share = qd.min(stained[0] * unit / tau, 1.0)
-                swallow = absorption + share * (-qd.log(color_of_dye) * (2.5 / usual) - absorption)
-                tint = back_light + share * (look.glow * color_of_dye - back_light)
-            left = qd.exp(-travel * swallow)
-            glow = (1.0 - qd.exp(-travel * scattering)) * tint
-            h = (look.to_sun - ahead).normalized(1e-9)
-            spark = qd.min(qd.max(n.dot(h), 0.0), 1.0) ** 600 * look.sparkle * look.sun
-            own = shown * left + glow
-            if qd.static(dim == 2):  # the rim of the sheet catches the light
-                # Light comes from above left, and less of it reaches the bottom.
-                high = (at.y - lower.y) / (upper.y - lower.y)
-                own *= (0.75 + 0.3 * qd.max(n.dot(look.to_sun), 0.0)) * (0.78 + 0.4 * qd.min(high, 1.0))
-                own += 0.35 * look.lamp * smoothstep((0.85 - tau / spacing) / 0.3)
-                mirror = 0.0  # on paper there is nothing to mirror
-            result = own + mirror * (environment(look, reflected) - own) + spark
-        color[row, column] = result
+    """Shade every pixel that shows water, and copy the backdrop to the others; `seen` is filled with its depth."""
+    for task in range(strips.count):
+        row, begin, end = strip(strips, task, depth.shape[0], depth.shape[1])
+        for column in range(begin, end):
+            result = behind[row, column]
+            z = qd.bit_cast(water_depth[row, column], qd.f32)
+            front = 1.7e38
+            if under == 1:
+                result = dimmed(lens, optics, row, column, qd.bit_cast(depth[row, column], qd.f32), thickness, result)
+            elif z < 1e30:
+                ray = view_ray(lens, row, column)
+                origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
+                ends, turns, wall = tank_interval(lens, origin, direction, lower, upper)
+                front = qd.max(z, ends[0])
+                if ends[0] <= ends[1] and front < qd.bit_cast(depth[row, column], qd.f32):
+                    # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
+                    wet, there, cover, edge, rise = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0)
+                    if qd.static(dim == 3):
+                        at_pane = ends[0] > lens.near and wall.y == 0.0  # not through the open top
+                        if at_pane and z < ends[0] - optics.spacing:
+                            wet = 1.0
+                        else:
+                            rise = rise_at(row, column, z, 3.0 * optics.spacing, water_depth)
+                            if at_pane and z < ends[0] + optics.spacing:
+                                wet = 1.0 - share_behind(z, ends[0], rise, vec2(turns.x, turns.y))
+                            if z > ends[1] - optics.spacing:
+                                there = 1.0 - share_behind(z, ends[1], rise, vec2(turns.z, turns.w))
+                    if rim[row, column] > 0:
+                        edge = qd.bit_cast((0xFFFFFF - (rim[row, column] & 0xFFFFFF)) << 7, qd.f32)
+                        cover = ((rim[row, column] >> 24) + 0.5) / 127.0
+                        if edge + optics.spacing > z:
+                            there *= qd.select(wet < 1.0, cover, 1.0)
+                            cover = 0.0
+                        else:
+                            stands = qd.min((z - edge) / optics.spacing - 1.0, 1.0)
+                            cover *= qd.select(edge > ends[0], stands, 0.0)
+                    first, second = there * (1.0 - cover) * wet, there * (1.0 - cover) * (1.0 - wet)
+                    result *= 1.0 - (first + second + cover)
+                    for layer in range(3):
+                        share, n, at = first, wall, front
+                        if layer == 1:
+                            share = second
+                            if qd.static(dim == 3):
+                                n = normal_of(lens, row, column, z, rise)
+                        elif layer == 2:
+                            share, at = cover, edge
+                            if qd.static(dim == 3):
+                                if share > 0.0:
+                                    n = normal_beside(lens, row, column, edge, optics.spacing, water_depth)
+                        if share > 0.0:
+                            result += share * shine(
+                                lens, look, optics, lower, upper, dim, row, column, at, n, origin, direction,
+                                thickness, dye, stained[0], depth, behind,
+                            )  # fmt: skip
+                    result += (
+                        look.line_strength * there * line_cover(lines[row, column], front, slack) * (look.line - result)
+                    )
+                    if there < 0.5:
+                        front = 1.7e38
+                else:
+                    front = 1.7e38
+            color[row, column] = result
+            seen[row, column] = qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
+
+
+@qd.func
+def dimmed(lens: Lens, optics: Optics, row, column, back, thickness: qd.template(), radiance):
+    """Radiance as seen from within the water: there is no surface, water dims and tints what is behind it."""
+    tau = thickness_at(thickness, vec2(column + 0.5, row + 0.5) / optics.coarse, optics.unit)
+    travel = qd.min(tau, back * ray_direction(lens, view_ray(lens, row, column)).norm())
+    left = qd.exp(-travel * optics.absorption)
+    return radiance * left + (1.0 - qd.exp(-travel * optics.scattering)) * optics.glow
+
+
+@qd.func
+def normal_beside(lens: Lens, row, column, z, limit, depth: qd.template()):
+    """Normal of the surface at about the depth `z` that a neighbouring pixel shows; towards the eye where none does."""
+    best, r, c = limit, row, column
+    for k in qd.static(range(4)):
+        i = qd.min(qd.max(row + qd.static((0, 0, 1, -1)[k]), 0), depth.shape[0] - 1)
+        j = qd.min(qd.max(column + qd.static((1, -1, 0, 0)[k]), 0), depth.shape[1] - 1)
+        off = qd.abs(qd.bit_cast(depth[i, j], qd.f32) - z)
+        if off < best:
+            best, r, c = off, i, j
+    n = -lens.forward
+    if best < limit:
+        there = qd.bit_cast(depth[r, c], qd.f32)
+        n = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * limit, depth))
+    return n
+
+
+@qd.func
+def shine(
+    lens: Lens, look: Look, optics: Optics, lower, upper, dim: qd.template(), row, column, z, normal, origin,
+    direction, thickness: qd.template(), dye: qd.template(), stained, depth: qd.template(), behind: qd.template(),
+):  # fmt: skip
+    """Radiance of the water that a pixel shows at depth `z` with this normal."""
+    n, pace = normal, direction.norm()
+    ahead, at = direction / pace, origin + z * direction
+    place = vec2(column + 0.5, row + 0.5)
+    tau = 0.0
+    if qd.static(dim == 2):
+        tau = sheet_at(lens, optics, thickness, place, lower, upper)
+        n = sheet_normal(lens, optics, thickness, place, lower, upper)
+    else:
+        tau = thickness_at(thickness, place / optics.coarse, optics.unit)
+    cosi = qd.max(-n.dot(ahead), 0.05)
+    bent = 0.7519 * ahead + (0.7519 * cosi - qd.sqrt(1.0 - 0.5653 * (1.0 - cosi * cosi))) * n
+    # The least that a drop is thick; in a plane the rim keeps half of the colour.
+    tau = qd.max(tau, qd.static(0.15 if dim == 3 else 0.55) * optics.spacing)
+    travel = qd.min(tau, (qd.bit_cast(depth[row, column], qd.f32) - z) * pace)
+    if qd.static(dim == 3):
+        if bent.y < -1e-3 and at.y > 0.0:
+            travel = qd.min(travel, -at.y / bent.y)
+    c = to_view(lens, at + travel * bent)
+    shown = behind[row, column]
+    if c.z > lens.near:
+        there = to_pixel(lens, c)
+        r = qd.min(qd.max(qd.cast(there.y, qd.i32), 0), depth.shape[0] - 1)
+        e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), depth.shape[1] - 1)
+        if qd.bit_cast(depth[r, e], qd.f32) > z:  # not what stands in front of the water
+            shown = picture_at(behind, there)
+    swallow, tint = optics.absorption, optics.glow
+    if stained == 1:
+        dyed = dye_at(dye, place / optics.coarse)
+        if dyed[0] > 0.0:
+            # Dyed water swallows what its colour lacks; strong dye shows in a layer thinner than the usual.
+            color_of_dye = qd.min(qd.max(vec3(dyed[1], dyed[2], dyed[3]), 0.02), 0.98)
+            share = qd.min(dyed[0] * optics.unit / tau, 1.0)
+            swallow += share * (-qd.log(color_of_dye) * (2.5 / optics.usual) - swallow)
+            tint += share * (look.glow * color_of_dye - tint)
+    result = shown * qd.exp(-travel * swallow) + (1.0 - qd.exp(-travel * optics.scattering)) * tint
+    if qd.static(dim == 2):  # the rim of the sheet catches the light, and on paper there is nothing to mirror
+        # Light comes from above left, and less of it reaches the bottom.
+        high = (at.y - lower.y) / (upper.y - lower.y)
+        result *= (0.75 + 0.3 * qd.max(n.dot(look.to_sun), 0.0)) * (0.78 + 0.4 * qd.min(high, 1.0))
+        result += 0.35 * look.lamp * smoothstep((0.85 - tau / optics.spacing) / 0.3)
+    else:
+        mirror = 0.02 + 0.98 * (1.0 - cosi) ** 5
+        result += mirror * (environment(look, ahead + 2.0 * cosi * n) - result)
+        half = (look.to_sun - ahead).normalized(1e-9)
+        result += qd.min(qd.max(n.dot(half), 0.0), 1.0) ** 600 * look.sparkle * look.sun
+    return result

@@ -1,0 +1,53 @@
+"""How a kernel walks over a picture: strips of a row, one after the other in one thread.
+
+A thread that has a strip to itself does once what all pixels of it share. Processors get a contiguous part of a
+kernel's tasks each, one half of the picture where there are two; so rows are dealt out in turns, because the lower
+half, where the water is, takes longer. Graphics processors want many threads: there a strip is one pixel.
+"""
+
+import dataclasses
+import functools
+import math
+from typing import Any
+
+from wavetank.compiler import qd, threads
+
+LEAST_TASKS = 512  # that the compiler gives to a processor's thread, whatever they cost
+
+
+@dataclasses.dataclass
+class Strips:
+    """Strips of one picture, on the device."""
+
+    count: qd.i32  # tasks; some of the last may lie below the picture
+    parts: qd.i32  # strips in a row
+    width: qd.i32  # px
+    turns: qd.i32  # threads that take turns
+    run: qd.i32  # rows of each
+
+
+def strips_of(array: Any) -> Strips:
+    """Return the strips of a device array [rows, columns, ...]."""
+    return _strips(int(array.shape[0]), int(array.shape[1]), threads())
+
+
+@functools.lru_cache(maxsize=64)
+def _strips(rows: int, columns: int, turns: int) -> Strips:
+    if turns == 0:
+        return Strips(count=rows * columns, parts=columns, width=1, turns=1, run=rows)
+    parts = min(columns, math.ceil(LEAST_TASKS * turns / rows)) if turns > 1 else 1
+    width = math.ceil(columns / parts)
+    parts, run = math.ceil(columns / width), math.ceil(rows / turns)
+    return Strips(count=run * turns * parts, parts=parts, width=width, turns=turns, run=run)
+
+
+@qd.func
+def strip(strips: Strips, task, rows, columns):
+    """(row, first column, column after the last) of a task; no columns where there is no such row."""
+    number = task // strips.parts
+    row = number % strips.run * strips.turns + number // strips.run
+    first = (task - number * strips.parts) * strips.width
+    last = qd.min(first + strips.width, columns)
+    if row >= rows:
+        last = first
+    return row, first, last

@@ -1,0 +1,45 @@
+"""Water, foam and pictures are the same to the last bit on any number of threads, and looking changes nothing."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import hashlib, json, sys
+import wavetank as wt
+from wavetank import compiler
+
+threads = int(sys.argv[1])
+compiler.start("cpu", threads=threads)
+sim = wt.Simulation(wt.Scene.load("dam-break").changed(spacing=0.04, foam=6.0))
+for k in range(45):
+    sim.step()
+    if k % 7 == threads:
+        sim.stats()
+frame = sim.frame()
+digest = lambda *arrays: hashlib.sha256(b"".join(a.tobytes() for a in arrays)).hexdigest()
+foam = (
+    frame.foam_positions, frame.foam_velocities, frame.foam_kinds, frame.foam_ages, frame.foam_lives, frame.foam_ids
+)
+views = {f"{view} view": digest(wt.render(sim, 96, 64, view=view)) for view in ("water", "particles", "slice")}
+size = [len(frame.ids), len(frame.foam_ids)]
+print(json.dumps({"water": digest(frame.positions, frame.velocities), "foam": digest(*foam), "size": size, **views}))
+"""
+
+
+@pytest.fixture(scope="module")
+def runs() -> list[dict]:
+    told = [
+        subprocess.run([sys.executable, "-c", PROGRAM, n], capture_output=True, text=True, check=True).stdout
+        for n in ("1", "2", "3")
+    ]
+    return [json.loads(text.splitlines()[-1]) for text in told]
+
+
+@pytest.mark.parametrize("what", ["size", "water", "foam", "water view", "particles view", "slice view"])
+def test_the_number_of_threads_and_looking_do_not_matter(runs, what):
+    assert runs[0]["size"][0] > 2000
+    assert runs[0]["size"][1] > 1000
+    assert len({str(run[what]) for run in runs}) == 1
