@@ -16,7 +16,7 @@ from wavetank.view.style import QUALITIES, Style, quality_named
 
 USUAL_TIME = 0.5  # s: when a scene is shown unless told
 #: the same for bundled scenes whose best moment is another one
-SHOWN_AT = {"still-tank": 1.0, "still-tank-2d": 1.0, "drop": 0.42, "drop-2d": 0.35, "obstacle-tank": 0.62}
+SHOWN_AT = {"still-tank": 1.0, "still-tank-2d": 1.0, "drop": 0.42, "drop-2d": 0.35, "obstacle-tank": 0.62, "knot": 0.35}
 
 
 def take(

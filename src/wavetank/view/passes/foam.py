@@ -39,7 +39,7 @@ PALE = vector(*to_linear(np.array(rgb_of("#6fa8d2"))))
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Lay spray, foam and bubbles over the radiance in `color`, by the depth that the picture shows."""
-    lay(shot, buffers, buffers.depth)
+    lay(shot, buffers, buffers.depth, IN_FRONT)
 
 
 def draw_over_water(shot: Shot, buffers: Buffers) -> None:
@@ -47,7 +47,7 @@ def draw_over_water(shot: Shot, buffers: Buffers) -> None:
     if shot.frame.foam_count > 0:
         water = water_of(buffers, shot)
         merge(buffers.depth, water.spare, water.spare)
-        lay(shot, buffers, water.spare)
+        lay(shot, buffers, water.spare, 0.25 * shot.extent.spacing)
 
 
 @qd.kernel(fastcache=True)
@@ -57,8 +57,8 @@ def merge(depth: qd.types.ndarray(), water_depth: qd.types.ndarray(), nearest: q
         nearest[row, column] = qd.min(depth[row, column], water_depth[row, column])
 
 
-def lay(shot: Shot, buffers: Buffers, depth: Any) -> None:
-    """Lay spray, foam and bubbles over whatever lies at `depth`."""
+def lay(shot: Shot, buffers: Buffers, depth: Any, sunk: float) -> None:
+    """Lay spray, foam and bubbles over whatever lies at `depth`; solids hide what is `sunk` [m] behind them."""
     frame, d, flat = shot.frame, shot.extent.spacing, shot.frame.dim == 2
     if frame.diffuse is None or frame.foam_count == 0:
         return
@@ -66,7 +66,8 @@ def lay(shot: Shot, buffers: Buffers, depth: Any) -> None:
     through = IN_FRONT if flat else SHOW_THROUGH * d
     splat(
         frame.diffuse, frame.foam_count, SIZE[frame.dim] * d, through, shot.lens, shot.sun, buffers.supersample,
-        max(LARGEST * buffers.rows / buffers.supersample, 1.0), depth, buffers.sun_depth, buffers.foam,
+        max(LARGEST * buffers.rows / buffers.supersample, 1.0), depth, buffers.depth, sunk, buffers.sun_depth,
+        buffers.foam,
     )  # fmt: skip
     white = (shot.look.sun + shot.look.sky).astype(np.float32)
     blend(
@@ -112,7 +113,8 @@ def sunlit(sun: Lens, sun_depth: qd.template(), x, slack):
 @qd.kernel(fastcache=True)
 def splat(
     diffuse: Diffuse, count: qd.i32, d: qd.f32, through: qd.f32, lens: Lens, sun: Lens, samples: qd.i32,
-    largest: qd.f32, depth: qd.types.ndarray(), sun_depth: qd.types.ndarray(), foam: qd.types.ndarray(),
+    largest: qd.f32, depth: qd.types.ndarray(), solid_depth: qd.types.ndarray(), sunk: qd.f32,
+    sun_depth: qd.types.ndarray(), foam: qd.types.ndarray(),
 ):  # fmt: skip
     """Add the optical depth of every particle of about the size `d` [m] to the pixels it covers."""
     for i in range(count):
@@ -136,7 +138,10 @@ def splat(
                     rest = 1.0 - away / (wide * wide)
                     at = qd.bit_cast(depth[row * samples + samples // 2, column * samples + samples // 2], qd.f32)
                     behind = c.z - at - radius * d
-                    if rest > 0.0 and behind < 4.0 * through:
+                    wall = qd.bit_cast(
+                        solid_depth[row * samples + samples // 2, column * samples + samples // 2], qd.f32
+                    )
+                    if rest > 0.0 and behind < 4.0 * through and c.z - radius * d < wall + sunk:
                         if light < 0.0:
                             light = sunlit(sun, sun_depth, x, 2.0 * d)
                         tau = qd.cast(strength * rest * qd.exp(-qd.max(behind, 0.0) / through) + 0.5, qd.i32)
