@@ -85,6 +85,7 @@ class Births:
     first: qd.types.ndarray()  # i32 [water capacity + 1]: births of each water particle, then the first of its places
     kept: qd.types.ndarray()  # i32 [capacity + 1]: 1 for who lives on, then its next place
     blocks: qd.types.ndarray()  # i32 [blocks]: partial sums of the scan
+    reluctance: qd.types.ndarray()  # f32 [materials]: energy at which a fluid foams, in that of one without viscosity
 
 
 @dataclasses.dataclass

@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 
 import wavetank as wt
+from wavetank.materials import Material
+from wavetank.physics.diffuse.update import reluctance
 from wavetank.simulation import Simulation
 from wavetank.state import KINDS
 
@@ -178,3 +180,28 @@ def test_the_reports_rule(dim):
     np.testing.assert_allclose(frame.weber_numbers, 1000 * v[:, 0] ** 2 * 0.02 / 0.0728, rtol=1e-5)
     assert frame.foaming.tolist() == [False, False, True, True]
     assert Simulation(scene).stats()["foaming"] == 2
+
+
+def test_what_is_too_viscous_to_break_up_does_not_foam():
+    """Critical Weber number of drops 12 (1 + 1.077 Oh^1.6), Brodkey 1967; Oh^4 of the capillary length is the Morton
+    number g mu^4 / (rho sigma^3): 2.5e-11 of water, 120 of glycerol (Clift, Grace and Weber 1978).
+    """
+    fluids = {
+        0: Material(viscosity=0.001, surface_tension=0.0728),
+        1: Material(viscosity=1.41, density=1261.0, surface_tension=0.0634),
+        2: Material(viscosity=20.0, density=1420.0),
+    }
+    water, glycerol, honey = reluctance(fluids, dam())
+    assert water == pytest.approx(1.0, abs=1e-3)
+    assert glycerol == pytest.approx(1.0 + 1.077 * 120.0**0.4, rel=0.03)
+    assert 200.0 < honey < 5000.0
+    # Of five pascal seconds a dam this large still falls and hits the wall like water, and no bubble can form in it.
+    speeds, births = [], []
+    for viscosity in (0.001, 5.0):
+        sim = Simulation(dam(dynamic_viscosity=viscosity))
+        sim.advance(0.9)
+        speeds.append(np.linalg.norm(sim.velocities, axis=1).mean())
+        births.append(sim.world.pool.born)
+    assert speeds[1] > 0.5 * speeds[0]
+    assert births[0] > 100
+    assert births[1] == 0

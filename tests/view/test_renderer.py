@@ -5,8 +5,10 @@ import pytest
 
 from wavetank import Box, HalfSpace, Scene, Tank
 from wavetank.errors import WavetankError
+from wavetank.simulation import Simulation
 from wavetank.view import renderer as module
 from wavetank.view.camera import Camera
+from wavetank.view.passes import ellipsoids
 from wavetank.view.renderer import Renderer, render
 from wavetank.view.style import Style
 from wavetank.view.views import VIEWS
@@ -45,6 +47,24 @@ def test_the_order_of_particles_does_not_matter(make_frame, splash, view):
     shuffled = make_frame(splash.scene, splash.positions[order], splash.velocities[order], splash.densities[order])
     renderer = Renderer(*SIZE)
     assert (renderer.render(shuffled, view=view) == renderer.render(splash, view=view)).all()
+
+
+def test_water_that_rests_is_looked_at_from_all_sides_for_less(monkeypatch):
+    """From the third picture of a moment on, its shape and the sun in it are kept; what moves or changes is seen."""
+    sim = Simulation(Scene.load("drop").changed(spacing=0.05))
+    renderer, eyes = Renderer(*SIZE), [Camera(eye=(3.0 * np.sin(a), 1.5, 3.0 * np.cos(a)), target=(0.4, 0.3, 0.4))
+                                       for a in (0.1, 0.4, 0.7, 1.0)]  # fmt: skip
+    fitted = []
+    monkeypatch.setattr(ellipsoids, "fit", lambda *a, fit=ellipsoids.fit: (fitted.append(1), fit(*a)))
+    for eye in eyes:
+        np.testing.assert_array_equal(renderer.render(sim.frame(), eye), Renderer(*SIZE).render(sim.frame(), eye))
+    assert len(fitted) == len(eyes) + 2 + (renderer.buffers.water is None)
+    sim.step()
+    for change in (lambda: None, lambda: None, lambda: None, sim.step, lambda: sim.remove(range(40)),
+                   lambda: sim.paint_inside(np.zeros(3), np.ones(3), 0.2, 127 << 24 | 0xE0446A)):  # fmt: skip
+        change()
+        image = renderer.render(sim.frame(), eyes[0])
+        np.testing.assert_array_equal(image, Renderer(*SIZE).render(sim.frame(), eyes[0]))
 
 
 EYES = {

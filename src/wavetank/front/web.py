@@ -70,6 +70,7 @@ class WebFront:
         self._told: dict[str, Any] = {}
         self._outlined: dict[str, Any] = {}
         self._figures: dict[str, float] = {}
+        self._measured = (-1, 0)  # frames and particles when that was
         self._next_status = self._next_figures = 0.0
         self._shown, self._shown_at, self._sharp = -1, 0.0, False
         self._packing: concurrent.futures.Future[None] | None = None
@@ -149,8 +150,8 @@ class WebFront:
 
     def _tell(self, now: float) -> None:
         session = self.session
-        if now >= self._next_figures:
-            self._next_figures = now + FIGURES_EVERY
+        if now >= self._next_figures and self._measured != (session.ticks, session.sim.count):
+            self._next_figures, self._measured = now + FIGURES_EVERY, (session.ticks, session.sim.count)
             self._figures = figures(session)
         # The game first: a score that cannot be kept is one more note.
         game = self.hud.status()

@@ -48,6 +48,8 @@ class Renderer:
         self._colors = qd.ndarray(vec3, shape=(ENTRIES,))
         self._colors_name = ""
         self._kept: Any = None  # what the still part of the last picture depended on
+        self._water: Any = None  # moment and places of the water in the last picture
+        self._sun: Any = None  # the way to the sun for which its light in that water was found
         self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
 
     def render(
@@ -60,7 +62,9 @@ class Renderer:
         """
         style = Style(**options)
         shot = self.shot(frame, camera, style)
-        self._run(style.kind.once, shot, timings)
+        if not self._rested(style, shot):
+            self._run(style.kind.once, shot, timings)
+            self._sun = None
         if style.samples == 1:
             self._take(style, shot, timings)
             self._run((tonemap.draw,), shot, timings)
@@ -106,7 +110,28 @@ class Renderer:
         if key is None or key != self._kept:
             self._run(style.kind.still, shot, timings)
             self._kept = key and (*key[:-1], id(self.buffers.water))
+        sun = np.asarray(shot.look.to_sun).tobytes()
+        if sun != self._sun:
+            self._run(style.kind.sunny, shot, timings)
+            self._sun = sun
         self._run(style.kind.passes, shot, timings)
+
+    def _rested(self, style: Style, shot: Shot) -> bool:
+        """Say whether the water is where it was in the last picture, as when an eye goes round it.
+
+        Only in the second picture of a moment its places are kept, so that moving water costs nothing here.
+        """
+        frame, before = shot.frame, self._water
+        moment = (style.kind.name, frame.number, frame.time, frame.count, id(self.buffers.water))
+        if not style.kind.still or before is None or before[0] != moment:
+            self._water = moment, None
+            return False
+        synchronize()
+        arrays = [array.to_numpy(copy=None)[: frame.count] for array in (frame.x, frame.id)]
+        if before[1] is not None and all(map(np.array_equal, before[1], arrays)):
+            return True
+        self._water = moment, [array.copy() for array in arrays]
+        return False
 
     def _run(self, passes: tuple[Pass, ...], shot: Shot, timings: dict[str, float] | None) -> None:
         for draw in passes:

@@ -37,6 +37,7 @@ class View:
     sentence: str
     still: tuple[Pass, ...]  # what depends on eye, sun and solids alone; kept while these rest
     once: tuple[Pass, ...]  # what depends on the frame alone, not on the eye
+    sunny: tuple[Pass, ...]  # what depends on frame and sun; with a still part these two are kept while the water rests
     passes: tuple[Pass, ...]
     coloured: bool  # whether particles show a quantity, with its legend
 
@@ -47,8 +48,9 @@ VIEWS: dict[str, View] = {
         "the surface of the water, with light and shadow",
         still=(nothing.draw, solids.draw, floor.draw, sunlight.draw, backdrop.prepare, tank.draw_lines),
         once=(ellipsoids.draw,),
+        sunny=(sunlight.see_water,),
         passes=(
-            sunlight.see_water, backdrop.draw, surface.draw, flatten.draw, thickness.draw, water.draw,
+            backdrop.draw, surface.draw, flatten.draw, thickness.draw, water.draw,
             foam.draw_over_water,
         ),
         coloured=False,
@@ -58,6 +60,7 @@ VIEWS: dict[str, View] = {
         "particles as balls, coloured by a quantity",
         still=(),
         once=(),
+        sunny=(),
         passes=(
             spheres.draw, solids.draw, floor.draw, shadow.draw, occlusion.draw, smooth.draw, shade.draw,
             tank.draw, foam.draw,
@@ -69,6 +72,7 @@ VIEWS: dict[str, View] = {
         "a quantity on a plane that cuts the water",
         still=(),
         once=(cut.prepare,),
+        sunny=(),
         passes=(
             nothing.draw, solids.draw, floor.draw, shadow.draw_solids, occlusion.draw, smooth.draw, shade.draw,
             cut.draw, tank.draw,
@@ -80,6 +84,7 @@ VIEWS: dict[str, View] = {
         "spray, foam and bubbles alone",
         still=(),
         once=(),
+        sunny=(),
         passes=(
             nothing.draw, solids.draw, floor.draw, shadow.draw_solids, occlusion.draw, smooth.draw, shade.draw,
             tank.draw, foam.draw,

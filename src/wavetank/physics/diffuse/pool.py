@@ -12,7 +12,19 @@ from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift
 from wavetank.physics.diffuse.motion import kind_in, surroundings, water_at
 from wavetank.physics.diffuse.noise import stream, uniform
-from wavetank.state import Air, Births, Coefficients, Diffuse, Grid, Particles, integers, new_diffuse, upload, vectors
+from wavetank.state import (
+    Air,
+    Births,
+    Coefficients,
+    Diffuse,
+    Grid,
+    Particles,
+    integers,
+    new_diffuse,
+    scalars,
+    upload,
+    vectors,
+)
 
 SCAN_BLOCK = 1024
 #: What a saved state holds of spray, foam and bubbles, and the array of it.
@@ -33,12 +45,18 @@ class Pool:
     count: int = 0
     born: int = 0  # since the start; the number of the next one
 
+    def set_reluctance(self, values: np.ndarray) -> None:
+        """Set at how much energy each material foams, float32 [materials]; see `update.reluctance`."""
+        if self.births.reluctance.shape[0] != len(values):
+            self.births = dataclasses.replace(self.births, reluctance=scalars(len(values)))
+        upload(self.births.reluctance, values)
+
 
 def new_pool(dim: int, capacity: int, water: int) -> Pool:
     """Allocate an empty pool beside room for `water` particles."""
     births = Births(
         normal=vectors(dim, water + 1), first=integers(water + 1), kept=integers(capacity + 1),
-        blocks=integers(-(-max(capacity, water) // SCAN_BLOCK)),
+        blocks=integers(-(-max(capacity, water) // SCAN_BLOCK)), reluctance=scalars(1),
     )  # fmt: skip
     return Pool(new_diffuse(dim, capacity), new_diffuse(dim, capacity), births, capacity)
 

@@ -9,7 +9,7 @@ Ihmsen, Akinci, Akinci and Teschner 2012, "Unified spray, foam and bubbles for p
     speed      U           sqrt(g L), L the edge of a cube of all the water                     m/s
     trapped    v_i^diff    approach of the neighbours, weighted mean over the support           U
     crest      kappa_i     bend of a convex surface, likewise                                   1
-    energy                 v_i^2 / U^2                                                          1
+    energy                 v_i^2 / (U^2 times the reluctance of the fluid, see `update.py`)     1
     limited    Phi         ramp from 0 to 1 between two thresholds (Eq. 1)                      1
 
 Where we differ, and why:
@@ -17,6 +17,7 @@ Where we differ, and why:
   speed U of water that falls by its own size; births are counted per U / L. So the same splash makes the same foam in a
   cup and in a harbour, and at twice the resolution it makes as many births per particle of the surface.
 - The wall's own gradient is part of the normal, so that water on a wall shows no surface towards it.
+- Fluids that are too viscous to break up do not foam.
 - One amount serves both sources; the paper has a factor for each. Crests count twice, and still bear few.
 """
 
@@ -91,7 +92,8 @@ def potential(i, births: Births, particles: Particles, grid: Grid, c: Coefficien
     v = particles.v[i]
     n = births.normal[i]
     result = 0.0
-    energy = limited(v.norm_sqr() / (a.speed * a.speed), 0.05, 0.5)
+    scale = a.speed * a.speed * births.reluctance[particles.material[i]]
+    energy = limited(v.norm_sqr() / scale, 0.05, 0.5)
     if energy > 0.0:
         trapped = qd.Vector([0.0])
         for_each_neighbor(trapped, add_approach, i, particles, particles.v, grid, c, method)
