@@ -14,8 +14,11 @@ demo: .venv/demo-ready
 	@echo "  $(BIN)/wavetank run double-dam-2d --video --set spacing=0.01"
 	@echo "  $(BIN)/python examples/01_ten_lines.py"
 
+# One worker a processor and one thread a worker; kernels that most tests share are compiled first.
+test: export QD_CPU_MAX_NUM_THREADS = 1
 test: lint
-	$(BIN)/python -m pytest
+	$(BIN)/python tests/compile_kernels.py
+	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist worksteal
 
 lint: .venv/test-ready
 	$(BIN)/ruff format --check src tests examples

@@ -28,6 +28,7 @@ BOWL = [(0, 0), (0.06, 0), (0.11, 0.03), (0.15, 0.1), (0.142, 0.1), (0.102, 0.03
 scene = wt.Scene(
     title="A jug pours into a bowl",
     spacing=0.014,
+    foam=0,
     tank=wt.Tank(size=(0.7, 0.6, 0.4)),
     fluids=[wt.Block(lower=(0.205, 0.335, 0.155), upper=(0.295, 0.475, 0.245))],
     solids=[
@@ -41,8 +42,8 @@ for k in range(150):
     angle = -1.9 * min(1.0, max(0.0, (k - 20) / 100))
     sim.move("jug", rotation=angle)
     sim.step()
-    if k in (20, 70, 90, 149):
-        images.append(wt.render(sim, width=640, height=560))
+    if k in (20, 92, 104, 149):
+        images.append(wt.render(sim, width=640, height=560, view="water", color_by="#a01838"))
 Image.fromarray(np.hstack(images)).save("pouring.png")
 radius = np.hypot(sim.positions[:, 0] - 0.44, sim.positions[:, 2] - 0.2)
 caught = np.mean((radius < 0.15) & (sim.positions[:, 1] < 0.12))

@@ -169,12 +169,12 @@ def test_a_back_end_that_is_not_there_is_an_error():
 
 def test_odd_time_steps_do_not_shake_the_water():
     """Still water sampled at any rate stays still: a tiny step must not turn density error into velocity."""
-    for fps in (59.999, 60.001, 97.0, 1000.0, 20000.0):
+    for fps in (59.999, 60.001, 97.0, 5000.0):
         sim = Simulation(wt.Scene.load("still-tank-2d").changed(spacing=0.05, viscosity=0.3))
         sim.advance(1.0)
-        for _ in sim.frames(0.25, fps):
+        for _ in sim.frames(0.1, fps):
             pass
-        assert sim.time == pytest.approx(1.25, abs=0.01)
+        assert sim.time == pytest.approx(1.1, abs=0.01)
         assert sim.stats()["speed_rms"] < 0.03, fps
 
 

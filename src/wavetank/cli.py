@@ -274,8 +274,16 @@ def bench(
 
 
 @app.command()
-def doctor(as_json: Json = False) -> None:
+def doctor(
+    compare: Annotated[
+        str | None, typer.Option(metavar="ARCH", help="Compute and draw the same on the CPU and on this back end.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
     """Say what is installed, which back ends work, and how to get what is missing."""
+    if compare is not None:
+        _compare_backends(compare, as_json)
+        return
     from wavetank.lab.doctor import examine
 
     findings = examine()
@@ -285,6 +293,23 @@ def doctor(as_json: Json = False) -> None:
     table = Table("what", "found", "note")
     for row in findings["checks"]:
         table.add_row(row["name"], row["found"], row["note"])
+    Console().print(table)
+
+
+def _compare_backends(arch: str, as_json: bool) -> None:
+    from wavetank.front import backends
+
+    with console.status(f"the same water on cpu and {arch}"):
+        result = backends.compare(arch)
+    if as_json:
+        print(json.dumps(result))
+        return
+    table = Table(f"{result['scene']}, {result['particles']:,} particles, {result['seconds']:g} s", "cpu", arch)
+    for name, values in {**result["figures"], "mean height [m]": result["height"]}.items():
+        table.add_row(name, *(f"{value:.4g}" for value in values))
+    for view, seen in result["views"].items():
+        text = f"{100 * seen['close']:.3f} % within {backends.CLOSE}/255, largest {seen['largest']}"
+        table.add_row(f"picture: {view}", "", text)
     Console().print(table)
 
 

@@ -49,7 +49,8 @@ class Renderer:
         self._colors_name = ""
         self._kept: Any = None  # what the still part of the last picture depended on
         self._water: Any = None  # moment and places of the water in the last picture
-        self._sun: Any = None  # the way to the sun for which its light in that water was found
+        self._shaped = 0  # for which buffers its shape was found
+        self._sun: Any = None  # for which still part and way to the sun the light in that water was found
         self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
 
     def render(
@@ -64,7 +65,7 @@ class Renderer:
         shot = self.shot(frame, camera, style)
         if not self._rested(style, shot):
             self._run(style.kind.once, shot, timings)
-            self._sun = None
+            self._shaped, self._sun = id(self.buffers.water), None
         if style.samples == 1:
             self._take(style, shot, timings)
             self._run((tonemap.draw,), shot, timings)
@@ -110,7 +111,7 @@ class Renderer:
         if key is None or key != self._kept:
             self._run(style.kind.still, shot, timings)
             self._kept = key and (*key[:-1], id(self.buffers.water))
-        sun = np.asarray(shot.look.to_sun).tobytes()
+        sun = (self._kept, np.asarray(shot.look.to_sun).tobytes())
         if sun != self._sun:
             self._run(style.kind.sunny, shot, timings)
             self._sun = sun
@@ -122,13 +123,14 @@ class Renderer:
         Only in the second picture of a moment its places are kept, so that moving water costs nothing here.
         """
         frame, before = shot.frame, self._water
-        moment = (style.kind.name, frame.number, frame.time, frame.count, id(self.buffers.water))
+        moment = (style.kind.name, frame.number, frame.time, frame.count)
         if not style.kind.still or before is None or before[0] != moment:
             self._water = moment, None
             return False
         synchronize()
         arrays = [array.to_numpy(copy=None)[: frame.count] for array in (frame.x, frame.id)]
-        if before[1] is not None and all(map(np.array_equal, before[1], arrays)):
+        same = before[1] is not None and all(map(np.array_equal, before[1], arrays))
+        if same and self._shaped == id(self.buffers.water):
             return True
         self._water = moment, [array.copy() for array in arrays]
         return False

@@ -58,8 +58,8 @@ def fastest(scene: Scene, frames: int, arch: str) -> float:
 
 
 def run(quick: bool, arch: str) -> Outcome:
-    """Run 100 worlds for 30 frames, and again without the limit of speed (quick: 10)."""
-    seeds = list(range(10 if quick else 100))
+    """Run 100 worlds for 30 frames, and again without the limit of speed (quick: 5)."""
+    seeds = list(range(5 if quick else 100))
     limited = [fastest(world(seed), 30, arch) for seed in seeds]
     free = [fastest(world(seed, speed_limit=1e6), 30, arch) for seed in seeds]
     blown = sum(speed > ROUNDING for speed in limited)

@@ -44,12 +44,16 @@ class Pool:
     capacity: int
     count: int = 0
     born: int = 0  # since the start; the number of the next one
+    reluctance: np.ndarray | None = None  # what the device has of it
 
     def set_reluctance(self, values: np.ndarray) -> None:
         """Set at how much energy each material foams, float32 [materials]; see `update.reluctance`."""
+        if self.reluctance is not None and np.array_equal(values, self.reluctance):
+            return
         if self.births.reluctance.shape[0] != len(values):
             self.births = dataclasses.replace(self.births, reluctance=scalars(len(values)))
         upload(self.births.reluctance, values)
+        self.reluctance = values
 
 
 def new_pool(dim: int, capacity: int, water: int) -> Pool:
@@ -58,6 +62,7 @@ def new_pool(dim: int, capacity: int, water: int) -> Pool:
         normal=vectors(dim, water + 1), first=integers(water + 1), kept=integers(capacity + 1),
         blocks=integers(-(-max(capacity, water) // SCAN_BLOCK)), reluctance=scalars(1),
     )  # fmt: skip
+    births.reluctance.fill(1.0)
     return Pool(new_diffuse(dim, capacity), new_diffuse(dim, capacity), births, capacity)
 
 

@@ -93,8 +93,8 @@ def stain(
     A fluid with a colour of its own is dyed with it where nothing else dyes it. `stained` tells whether any is; where
     none is, `dye` holds nothing of use.
     """
-    for _ in range(1):
-        stained[0] = 0
+    for k in range(stained.shape[0]):
+        stained[k] = 0
     for a in range(count):
         if dyes[a] != 0 or stains[materials[a]] != 0:
             stained[0] = 1
