@@ -28,6 +28,7 @@ from wavetank.front.gate import Gate
 from wavetank.front.hud import Hud
 from wavetank.front.picture import Painter, jpeg
 from wavetank.front.viewers import Viewers
+from wavetank.pace import share_interpreter
 from wavetank.recording import Recording
 from wavetank.session import Session
 
@@ -80,6 +81,7 @@ class WebFront:
 
     def start(self) -> None:
         """Open the doors."""
+        share_interpreter()
         self._thread.start()
 
     def run(self) -> None:
