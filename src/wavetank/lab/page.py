@@ -33,18 +33,16 @@ WATCH = """(async () => {
   const canvas = document.querySelector('#picture');
   window.watch = { seen, status: {}, pixels: [], delays: [] };
   on('status', (status) => Object.assign(watch.status, status));
-  let pressed = null, pictures = seen.pictures;
+  let pressed = null;
   canvas.addEventListener('pointerdown', (event) => { pressed = event.timeStamp; }, true);
-  const look = () => {
-    if (seen.pictures !== pictures) {
-      pictures = seen.pictures;
-      watch.pixels.push(canvas.width * canvas.height);
-      if (pressed !== null) watch.delays.push(performance.now() - pressed);
-      pressed = null;
-    }
-    requestAnimationFrame(look);
+  const draw = CanvasRenderingContext2D.prototype.drawImage;
+  CanvasRenderingContext2D.prototype.drawImage = function (...given) {
+    draw.apply(this, given);
+    if (this.canvas !== canvas) return;
+    watch.pixels.push(canvas.width * canvas.height);
+    if (pressed !== null) watch.delays.push(performance.now() - pressed);
+    pressed = null;
   };
-  look();
 })()"""
 
 
