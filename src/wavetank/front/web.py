@@ -69,6 +69,7 @@ class WebFront:
         self._jobs: queue.SimpleQueue[tuple[Callable[[], Any], concurrent.futures.Future[Any]]] = queue.SimpleQueue()
         self._stopped = threading.Event()
         self._told: dict[str, Any] = {}
+        self._heard: Any = None  # the last status, and who was there
         self._outlined: dict[str, Any] = {}
         self._figures: dict[str, float] = {}
         self._measured = (-1, 0)  # frames and particles when that was
@@ -169,7 +170,10 @@ class WebFront:
             told_now["world"] = about
         # JSON has no word for what is no number, such as the time of a frame before there was one.
         told = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in told_now.items()}
-        self._call(lambda: self.viewers.broadcast(told))
+        heard = (told, [*self.viewers.all])
+        if heard != self._heard:  # what stands still says nothing
+            self._heard = heard
+            self._call(lambda: self.viewers.broadcast(told))
 
     # --- the server's thread ---
 

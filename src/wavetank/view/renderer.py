@@ -102,6 +102,7 @@ class Renderer:
             tint=tint,
             usual=usual_depth(extent),
             plane=style.plane(extent),
+            outlines=style.outlines,
         )
 
     def _take(self, style: Style, shot: Shot, timings: dict[str, float] | None) -> None:
