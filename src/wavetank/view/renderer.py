@@ -50,6 +50,8 @@ class Renderer:
         self._kept: Any = None  # what the still part of the last picture depended on
         self._water: Any = None  # moment and places of the water in the last picture
         self._sun: Any = None  # the way to the sun for which its light in that water was found
+        self._lit: Any = None  # the water whose light was found
+        self._waits = False  # whether the last picture did without a new one
         self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
 
     def render(
@@ -64,7 +66,10 @@ class Renderer:
         shot = self.shot(frame, camera, style)
         if not self._rested(style, shot):
             self._run(style.kind.once, shot, timings)
-            self._sun = None
+            if not self._sun_waits(style, shot):
+                self._sun = None
+        elif self._waits:
+            self._waits, self._sun = False, None
         if style.samples == 1:
             self._take(style, shot, timings)
             self._run((tonemap.draw,), shot, timings)
@@ -102,7 +107,7 @@ class Renderer:
             tint=tint,
             usual=usual_depth(extent),
             plane=style.plane(extent),
-            outlines=style.outlines,
+            hasty=style.hasty,
         )
 
     def _take(self, style: Style, shot: Shot, timings: dict[str, float] | None) -> None:
@@ -133,6 +138,13 @@ class Renderer:
             return True
         self._water = moment, [array.copy() for array in arrays]
         return False
+
+    def _sun_waits(self, style: Style, shot: Shot) -> bool:
+        """Say whether moving water may lie in the light of the picture before: every second time where haste is asked."""
+        water = (style.kind.name, shot.frame.dim, id(self.buffers.water))
+        self._waits = style.hasty and self._lit == water and not self._waits
+        self._lit = water
+        return self._waits
 
     def _run(self, passes: tuple[Pass, ...], shot: Shot, timings: dict[str, float] | None) -> None:
         for draw in passes:
