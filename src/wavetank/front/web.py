@@ -34,7 +34,7 @@ from wavetank.session import Session
 
 PORT = 8420  # the first one tried where none is asked for
 LONGEST_MESSAGE = 2_500_000  # bytes: a dropped scene file
-STATUS_EVERY, FIGURES_EVERY = 0.1, 1.0  # s
+STATUS_EVERY, FIGURES_EVERY = 0.1, 2.0  # s
 CALM = 0.25  # s without a change after which a sharp picture is worth it
 
 

@@ -29,7 +29,9 @@ class Browser:
 
         program = executable()
         if program is None:
-            raise WavetankError("there is no Chromium here; install one (on Debian and Ubuntu: apt-get install chromium).")
+            raise WavetankError(
+                "there is no Chromium here; install one (on Debian and Ubuntu: apt-get install chromium)."
+            )
         self.process = subprocess.Popen(
             [program, "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
              "--remote-debugging-port=0", f"--user-data-dir={folder}", f"--window-size={width},{height}",
@@ -106,7 +108,7 @@ class Browser:
         self.mouse("mousePressed", *start)
         for k in range(1, steps + 1):
             share = k / steps
-            self.mouse("mouseMoved", *(a + share * (b - a) for a, b in zip(start, end, strict=True)))
+            self.mouse("mouseMoved", start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1]))
             time.sleep(pause)
         self.mouse("mouseReleased", *end)
 

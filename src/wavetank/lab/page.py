@@ -49,7 +49,7 @@ WATCH = """(async () => {
 def measure(
     scene: str = SCENE, size: int = SIZE, *, seconds: float = SECONDS, arch: str = "cpu", say: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Return pictures a second while an eye goes round resting water and while water moves, and ms from click to picture."""
+    """Return pictures a second of resting and of moving water, and milliseconds from click to picture."""
     with _served(scene, size, arch) as url, _browsing() as browser:
         browser.open(url)
         browser.wait_for("document.querySelector('#veil.gone') !== null")
@@ -73,8 +73,8 @@ def measure(
         moving = _counted(browser, lambda: time.sleep(seconds))
         moving["water_per_second"] = (browser.run("watch.status.time") - began) / moving["seconds"]
         return {
-            "scene": scene, "particles": browser.run("watch.status.count"), "stage": list(_sides(browser)), "arch": arch,
-            "paused": paused, "moving": moving, "click_ms": _quartiles(delays), "clicks": len(delays),
+            "scene": scene, "particles": browser.run("watch.status.count"), "stage": list(_sides(browser)),
+            "arch": arch, "paused": paused, "moving": moving, "click_ms": _quartiles(delays), "clicks": len(delays),
             "machine": machine(arch),
         }  # fmt: skip
 
@@ -86,7 +86,9 @@ def _served(scene: str, size: int, arch: str) -> Iterator[str]:
         sys.executable, "-m", "wavetank", "play", scene, "--particles", str(size), "--web", "--no-browser", "--port",
         "0", "--arch", arch,
     ]  # fmt: skip
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}) as server:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+    ) as server:
         try:
             assert server.stdout is not None
             line = next((line for line in server.stdout if "http://" in line), "")
@@ -110,7 +112,9 @@ def _browsing() -> Iterator[Browser]:
 
 
 def _sides(browser: Browser) -> tuple[int, int]:
-    width, height = browser.run("[document.querySelector('#stage').clientWidth, document.querySelector('#stage').clientHeight]")
+    width, height = browser.run(
+        "[document.querySelector('#stage').clientWidth, document.querySelector('#stage').clientHeight]"
+    )
     return width, height
 
 
@@ -130,7 +134,9 @@ def _counted(browser: Browser, act: Callable[[], None]) -> dict[str, Any]:
     before, began = browser.run("[watch.seen.pictures, watch.seen.bytes]"), time.perf_counter()
     act()
     seconds = time.perf_counter() - began
-    pictures, size = (b - a for a, b in zip(before, browser.run("[watch.seen.pictures, watch.seen.bytes]"), strict=True))
+    pictures, size = (
+        b - a for a, b in zip(before, browser.run("[watch.seen.pictures, watch.seen.bytes]"), strict=True)
+    )
     share = np.sqrt(np.median(browser.run("watch.pixels") or [0]) / (STAGE[0] * STAGE[1]))
     return {
         "seconds": seconds, "pictures_per_second": pictures / seconds, "sharpness": float(share),
@@ -166,7 +172,11 @@ def page_table(result: dict[str, Any]) -> Table:
     for title, one in (("paused, the eye goes round", result["paused"]), ("the water moves", result["moving"])):
         water = f"{one['water_per_second']:.3f} s" if "water_per_second" in one else ""
         table.add_row(
-            title, f"{one['pictures_per_second']:.1f}", f"{one['sharpness']:.2f}", f"{one['kilobytes_per_second']:.0f}", water
+            title,
+            f"{one['pictures_per_second']:.1f}",
+            f"{one['sharpness']:.2f}",
+            f"{one['kilobytes_per_second']:.0f}",
+            water,
         )
     table.add_row("paused, click to picture", f"{click['median']:.0f} ms [{click['low']:.0f}, {click['high']:.0f}]")
     return table

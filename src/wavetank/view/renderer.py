@@ -48,6 +48,7 @@ class Renderer:
         self._colors = qd.ndarray(vec3, shape=(ENTRIES,))
         self._colors_name = ""
         self._kept: Any = None  # what the still part of the last picture depended on
+        self._shadows: Any = None  # what its shadows of solids depended on
         self._water: Any = None  # moment and places of the water in the last picture
         self._sun: Any = None  # the way to the sun for which its light in that water was found
         self._lit: Any = None  # the water whose light was found
@@ -112,10 +113,15 @@ class Renderer:
 
     def _take(self, style: Style, shot: Shot, timings: dict[str, float] | None) -> None:
         """Fill `color`; what does not move is kept from the picture before, and comes out as it would anew."""
-        key = (style.kind.name, *_rests(shot), id(self.buffers.water)) if style.kind.still else None
+        key, shadows = None, None
+        if style.kind.still:
+            shadows = style.kind.name, *_stands(shot)
+            key = *shadows, *_looks(shot), id(self.buffers.water)
         if key is None or key != self._kept:
+            self.buffers.shadows_rest = shadows is not None and shadows == self._shadows
             self._run(style.kind.still, shot, timings)
             self._kept = key and (*key[:-1], id(self.buffers.water))
+        self._shadows = shadows
         sun = np.asarray(shot.look.to_sun).tobytes()
         if sun != self._sun:
             self._run(style.kind.sunny, shot, timings)
@@ -140,7 +146,7 @@ class Renderer:
         return False
 
     def _sun_waits(self, style: Style, shot: Shot) -> bool:
-        """Say whether moving water may lie in the light of the picture before: every second time where haste is asked."""
+        """Say whether moving water may lie in the light of the picture before: every second time, in haste."""
         water = (style.kind.name, shot.frame.dim, id(self.buffers.water))
         self._waits = style.hasty and self._lit == water and not self._waits
         self._lit = water
@@ -180,16 +186,27 @@ class Renderer:
         )
 
 
-def _rests(shot: Shot) -> tuple[Any, ...]:
-    """Return all that what is not water depends on, to be compared with that of another picture."""
-    numbers = [getattr(part, field.name) for part in (shot.lens, shot.sun) for field in dataclasses.fields(part)]
-    numbers += [shot.look.to_sun, shot.look.sun_size, shot.radius, shot.extent.lower, shot.extent.upper]
+def _bytes(numbers: list[Any]) -> tuple[bytes, ...]:
+    return tuple(np.asarray(number).tobytes() for number in numbers)
+
+
+def _looks(shot: Shot) -> tuple[Any, ...]:
+    """Return all of eye and style that what is not water depends on, to be compared with another picture's."""
+    return _bytes(
+        [*(getattr(shot.lens, f.name) for f in dataclasses.fields(shot.lens)), shot.look.sun_size, shot.radius]
+    )
+
+
+def _stands(shot: Shot) -> tuple[Any, ...]:
+    """Return all that the shadows of solids in the sun's view depend on, likewise."""
+    numbers = [getattr(shot.sun, field.name) for field in dataclasses.fields(shot.sun)]
+    numbers += [shot.look.to_sun, shot.extent.lower, shot.extent.upper]
     solids = shot.frame.solids
     if solids.count > solids.tank_count:
         synchronize()
         arrays = (solids.op, solids.size, solids.offset, solids.turn, solids.first, solids.reach, solids.position)
         numbers += [array.to_numpy(copy=None) for array in (*arrays, solids.rotation)]
-    return shot.frame.dim, solids.count, *(np.asarray(number).tobytes() for number in numbers)
+    return shot.frame.dim, solids.count, *_bytes(numbers)
 
 
 def _radical_inverse(number: int, prime: int) -> float:
