@@ -251,6 +251,7 @@ def bench(
         bool, typer.Option("--roofline", help="Compare each kernel with what this machine can do.")
     ] = False,
     search: Annotated[bool, typer.Option("--search", help="Compare the neighbour search with a k-d tree.")] = False,
+    page: Annotated[bool, typer.Option("--page", help="Measure the page in a headless Chromium.")] = False,
     start_up: Annotated[bool, typer.Option(help="Measure the start of a fresh process too.")] = True,
     out: Annotated[Path | None, typer.Option(help="Write the result to this JSON file.")] = None,
     compare: Annotated[Path | None, typer.Option(metavar="OLD.json", help="Print ratios to an earlier result.")] = None,
@@ -262,7 +263,7 @@ def bench(
 
     order = bench_run.Order(
         scenes=scenes, sizes=sizes, seconds=seconds, repeats=repeats, threads=threads, peers=peers, roofline=roofline,
-        search=search, start_up=start_up, compare=compare, arch=arch,
+        search=search, page=page, start_up=start_up, compare=compare, arch=arch,
     )  # fmt: skip
     result, tables = bench_run.perform(order, console.print)
     if out is not None:

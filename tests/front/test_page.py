@@ -6,10 +6,10 @@ import time
 
 import numpy as np
 import pytest
-from chromium import Browser, executable
 
 import wavetank as wt
 from wavetank import commands as do
+from wavetank.lab.chromium import Browser, executable
 
 BASIN = wt.Scene(
     title="Basin", spacing=0.05, tank=wt.Tank(size=(1.2, 0.6, 0.4)),

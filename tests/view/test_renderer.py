@@ -8,7 +8,7 @@ from wavetank.errors import WavetankError
 from wavetank.simulation import Simulation
 from wavetank.view import renderer as module
 from wavetank.view.camera import Camera
-from wavetank.view.passes import ellipsoids
+from wavetank.view.passes import ellipsoids, shadow, sunlight
 from wavetank.view.renderer import Renderer, render
 from wavetank.view.style import Style
 from wavetank.view.views import VIEWS
@@ -65,6 +65,46 @@ def test_water_that_rests_is_looked_at_from_all_sides_for_less(monkeypatch):
         change()
         image = renderer.render(sim.frame(), eyes[0])
         np.testing.assert_array_equal(image, Renderer(*SIZE).render(sim.frame(), eyes[0]))
+
+
+def test_shadows_of_solids_wait_for_the_solids_not_for_the_eye(monkeypatch):
+    scene = Scene.load("drop").changed(spacing=0.06, solids=[Box(name="box", center=(0.2, 0.1, 0.2), size=(0.1,) * 3)])
+    sim, renderer, casts = Simulation(scene), Renderer(*SIZE), []
+    monkeypatch.setattr(shadow, "cast", lambda *a, cast=shadow.cast: (casts.append(1), cast(*a)))
+
+    def look(angle: float, view: str = "water") -> int:
+        eye = Camera(eye=(3.0 * np.sin(angle), 1.5, 3.0 * np.cos(angle)), target=(0.4, 0.3, 0.4))
+        before = len(casts)
+        image, cast = renderer.render(sim.frame(), eye, view=view), len(casts) - before
+        np.testing.assert_array_equal(image, Renderer(*SIZE).render(sim.frame(), eye, view=view))
+        return cast
+
+    look(0.1)
+    assert [look(angle) for angle in (0.4, 0.7, 1.0)] == [0, 0, 0]
+    sim.move("box", (0.3, 0.1, 0.2))
+    sim.step()
+    assert look(1.0) == 1
+    assert look(1.0, "particles") == 1  # which puts particles into the same map
+    assert look(1.0) == 1
+
+
+def test_in_haste_the_sun_looks_at_moving_water_every_second_time(monkeypatch):
+    sim, renderer, looks = Simulation(Scene.load("drop").changed(spacing=0.06)), Renderer(*SIZE), []
+    monkeypatch.setattr(sunlight, "gather", lambda *a, gather=sunlight.gather: (looks.append(1), gather(*a)))
+
+    def count(**options) -> int:
+        before = len(looks)
+        sim.step()
+        renderer.render(sim.frame(), **options)
+        return len(looks) - before
+
+    assert [count() for _ in range(2)] == [1, 1]
+    assert sum(count(hasty=True) for _ in range(6)) == 3
+    while count(hasty=True):
+        pass
+    for _ in range(2):  # where the water came to rest, its light is that of this moment
+        image = renderer.render(sim.frame(), hasty=True)
+    np.testing.assert_array_equal(image, Renderer(*SIZE).render(sim.frame(), hasty=True))
 
 
 EYES = {

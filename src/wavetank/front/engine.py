@@ -18,6 +18,7 @@ from wavetank.errors import WavetankError
 from wavetank.front.about import figures, status, world
 from wavetank.front.hud import Hud
 from wavetank.front.picture import Painter
+from wavetank.pace import share_interpreter
 from wavetank.session import Session
 
 STATUS_EVERY = 0.1  # s
@@ -63,6 +64,7 @@ class Engine:
 
     def start(self) -> None:
         """Let the water move."""
+        share_interpreter()
         self._thread.start()
 
     def stop(self) -> None:

@@ -11,11 +11,11 @@ from wavetank.session import Session
 from wavetank.view.choices import options
 from wavetank.view.renderer import Renderer
 
-AFFORD = 0.03  # s that a picture may take while the water moves
+AFFORD = 0.035  # s that a picture may take while the water moves
 LARGEST = 1600 * 900  # pixels
 SMALLEST = 32  # px
 STEP = 8  # px: sizes are multiples of this
-SMALLEST_SHARE = 0.5  # of width and height
+SMALLEST_SHARE = 0.4  # of width and height
 QUALITY = 84  # of JPEG
 
 
@@ -57,7 +57,7 @@ class Painter:
         began = time.perf_counter()
         image = self._renderer(width, height).render(
             self.session.sim.frame(measured=self._needs_densities), self.session.camera, legend=False,
-            **options(self.session.view, self.session.color_by),
+            hasty=share < 0.99, **options(self.session.view, self.session.color_by),
         )  # fmt: skip
         self.seconds = time.perf_counter() - began
         self.session.picture_seconds += 0.2 * (self.seconds - self.session.picture_seconds)

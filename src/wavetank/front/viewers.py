@@ -33,11 +33,12 @@ class Bucket:
 
 
 class Viewer:
-    """One socket: at most one picture is on its way to it."""
+    """One socket: at most one picture is on its way to it, and the next one may wait here."""
 
     def __init__(self, socket: Any) -> None:
         self.socket, self.bucket = socket, Bucket()
-        self.ready = True  # for a picture
+        self.is_busy = False  # with a picture that is on its way
+        self.next_picture: bytes | None = None
         self.is_new = True  # and has not seen one yet
         self.size = (960, 540)
         self.outbox: asyncio.Queue[dict[str, Any] | bytes] = asyncio.Queue(maxsize=64)
@@ -54,6 +55,20 @@ class Viewer:
             self.outbox.put_nowait(message)
         elif message is self.status:
             self.status = None
+
+    def show(self, picture: bytes) -> None:
+        """Send a picture as soon as the one before was shown; a later one takes its place until then."""
+        if self.is_busy:
+            self.next_picture = picture
+        else:
+            self.is_busy = True
+            self.post(picture)
+
+    def shown(self) -> None:
+        """Send the picture that waits: the page has shown the one before."""
+        picture, self.next_picture, self.is_busy = self.next_picture, None, False
+        if picture is not None:
+            self.show(picture)
 
     async def send_all(self) -> None:
         """Send what is posted, for ever."""
@@ -80,8 +95,8 @@ class Viewers:
 
     @property
     def anyone_ready(self) -> bool:
-        """Whether someone waits for a picture."""
-        return any(viewer.ready for viewer in self.all)
+        """Whether someone has use for a picture: one is made while the one before is on its way."""
+        return any(viewer.next_picture is None for viewer in self.all)
 
     async def serve(self, socket: Any) -> None:
         """Talk with one page until it leaves."""
@@ -119,7 +134,7 @@ class Viewers:
         """Act on one message; raises `WavetankError` for what is not allowed."""
         do = table.get("do")
         if do == "ack":
-            viewer.ready = True
+            viewer.shown()
             self.wake()
         elif do == "size":
             viewer.size = (_whole(table, "width", LONGEST_SIDE), _whole(table, "height", LONGEST_SIDE))
@@ -162,11 +177,9 @@ class Viewers:
             viewer.post(message)
 
     def show(self, picture: bytes) -> None:
-        """Post a picture to everyone who has shown the one before."""
+        """Send a picture to everyone, to each at its pace."""
         for viewer in self.all:
-            if viewer.ready:
-                viewer.ready = False
-                viewer.post(picture)
+            viewer.show(picture)
 
     def _leave(self, viewer: Viewer) -> None:
         self.all.remove(viewer)

@@ -28,12 +28,13 @@ from wavetank.front.gate import Gate
 from wavetank.front.hud import Hud
 from wavetank.front.picture import Painter, jpeg
 from wavetank.front.viewers import Viewers
+from wavetank.pace import share_interpreter
 from wavetank.recording import Recording
 from wavetank.session import Session
 
 PORT = 8420  # the first one tried where none is asked for
 LONGEST_MESSAGE = 2_500_000  # bytes: a dropped scene file
-STATUS_EVERY, FIGURES_EVERY = 0.1, 1.0  # s
+STATUS_EVERY, FIGURES_EVERY = 0.1, 2.0  # s
 CALM = 0.25  # s without a change after which a sharp picture is worth it
 
 
@@ -68,6 +69,7 @@ class WebFront:
         self._jobs: queue.SimpleQueue[tuple[Callable[[], Any], concurrent.futures.Future[Any]]] = queue.SimpleQueue()
         self._stopped = threading.Event()
         self._told: dict[str, Any] = {}
+        self._heard: Any = None  # the last status, and who was there
         self._outlined: dict[str, Any] = {}
         self._figures: dict[str, float] = {}
         self._measured = (-1, 0)  # frames and particles when that was
@@ -80,6 +82,7 @@ class WebFront:
 
     def start(self) -> None:
         """Open the doors."""
+        share_interpreter()
         self._thread.start()
 
     def run(self) -> None:
@@ -167,7 +170,10 @@ class WebFront:
             told_now["world"] = about
         # JSON has no word for what is no number, such as the time of a frame before there was one.
         told = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in told_now.items()}
-        self._call(lambda: self.viewers.broadcast(told))
+        heard = (told, [*self.viewers.all])
+        if heard != self._heard:  # what stands still says nothing
+            self._heard = heard
+            self._call(lambda: self.viewers.broadcast(told))
 
     # --- the server's thread ---
 

@@ -29,6 +29,7 @@ class Order:
     peers: bool
     roofline: bool
     search: bool
+    page: bool
     start_up: bool
     compare: Path | None
     arch: str
@@ -39,11 +40,13 @@ def perform(order: Order, say: Callable[[str], None]) -> tuple[dict[str, Any], l
 
     Raises `WavetankError` for options that do not go together or are out of range.
     """
-    if order.peers + order.roofline + order.search + (order.compare is not None) > 1:
-        raise WavetankError("--peers, --roofline, --search and --compare are four things; give one of them.")
+    if order.peers + order.roofline + order.search + order.page + (order.compare is not None) > 1:
+        raise WavetankError("--peers, --roofline, --search, --page and --compare are five things; give one of them.")
     names, sizes = split(order.scenes, order.sizes)
     if order.peers:
         return _peers(order, names, sizes, say)
+    if order.page:
+        return _page(order, names, sizes, say)
     if order.search:
         from wavetank.lab import search
 
@@ -87,6 +90,20 @@ def split(words: list[str], sizes: str) -> tuple[list[str], list[int]]:
             raise WavetankError(f"--sizes = {sizes!r} is not allowed; write whole numbers, as in --sizes 10000,100000.")
     more = [word for word in words if word.isdigit()]
     return [word for word in words if not word.isdigit()], [int(number) for number in [*numbers, *more]]
+
+
+def _page(
+    order: Order, names: list[str], sizes: list[int], say: Callable[[str], None]
+) -> tuple[dict[str, Any], list[Table]]:
+    from wavetank.lab import page
+
+    if len(names) > 1 or len(sizes) > 1 or order.threads is not None:
+        raise WavetankError("--page measures one scene at one size on all threads; give no more than that.")
+    result = page.measure(
+        names[0] if names else page.SCENE, sizes[0] if sizes else page.SIZE,
+        seconds=page.SECONDS if order.seconds is None else order.seconds, arch=order.arch, say=say,
+    )  # fmt: skip
+    return result, [page.page_table(result)]
 
 
 def _peers(

@@ -37,6 +37,7 @@ class Buffers:
     picture: Any  # i32 [words]: the finished picture, three sRGB bytes a pixel, row by row
     water: Any  # WaterBuffers once a picture of water was taken
     supersample: int  # computed pixels per pixel of the picture, in each direction
+    shadows_rest: bool  # whether the solids are in `sun_depth` as they stand, and nothing else is
     probes: int  # of light per computed pixel: fewer where more pixels are averaged
 
     @property
@@ -92,5 +93,6 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
         picture=qd.ndarray(qd.i32, shape=(3 * -(-height * width // 4),)),
         water=None,
         supersample=supersample,
+        shadows_rest=False,
         probes=8 if supersample == 1 else 4,
     )

@@ -48,9 +48,12 @@ class Renderer:
         self._colors = qd.ndarray(vec3, shape=(ENTRIES,))
         self._colors_name = ""
         self._kept: Any = None  # what the still part of the last picture depended on
+        self._shadows: Any = None  # what its shadows of solids depended on
         self._water: Any = None  # moment and places of the water in the last picture
-        self._shaped = 0  # for which buffers its shape was found
-        self._sun: Any = None  # for which still part and way to the sun the light in that water was found
+        self._shaped: Any = None  # for which buffers its shape was found
+        self._sun: Any = None  # for which solids and way to the sun the light in that water was found
+        self._lit: Any = None  # the water whose light was found
+        self._waits = False  # whether the last picture did without a new one
         self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
 
     def render(
@@ -65,7 +68,11 @@ class Renderer:
         shot = self.shot(frame, camera, style)
         if not self._rested(style, shot):
             self._run(style.kind.once, shot, timings)
-            self._shaped, self._sun = id(self.buffers.water), None
+            self._shaped = self.buffers.water
+            if not self._sun_waits(style, shot):
+                self._sun = None
+        elif self._waits:
+            self._waits, self._sun = False, None
         if style.samples == 1:
             self._take(style, shot, timings)
             self._run((tonemap.draw,), shot, timings)
@@ -103,15 +110,21 @@ class Renderer:
             tint=tint,
             usual=usual_depth(extent),
             plane=style.plane(extent),
+            hasty=style.hasty,
         )
 
     def _take(self, style: Style, shot: Shot, timings: dict[str, float] | None) -> None:
         """Fill `color`; what does not move is kept from the picture before, and comes out as it would anew."""
-        key = (style.kind.name, *_rests(shot), id(self.buffers.water)) if style.kind.still else None
+        key, shadows = None, None
+        if style.kind.still:
+            shadows = style.kind.name, *_stands(shot)
+            key = *shadows, *_looks(shot), id(self.buffers.water)
         if key is None or key != self._kept:
+            self.buffers.shadows_rest = shadows is not None and shadows == self._shadows
             self._run(style.kind.still, shot, timings)
             self._kept = key and (*key[:-1], id(self.buffers.water))
-        sun = (self._kept, np.asarray(shot.look.to_sun).tobytes())
+        self._shadows = shadows
+        sun = shadows, np.asarray(shot.look.to_sun).tobytes()
         if sun != self._sun:
             self._run(style.kind.sunny, shot, timings)
             self._sun = sun
@@ -130,10 +143,17 @@ class Renderer:
         synchronize()
         arrays = [array.to_numpy(copy=None)[: frame.count] for array in (frame.x, frame.id)]
         same = before[1] is not None and all(map(np.array_equal, before[1], arrays))
-        if same and self._shaped == id(self.buffers.water):
+        if same and self._shaped is self.buffers.water:
             return True
         self._water = moment, [array.copy() for array in arrays]
         return False
+
+    def _sun_waits(self, style: Style, shot: Shot) -> bool:
+        """Say whether moving water may lie in the light of the picture before: every second time, in haste."""
+        water = (style.kind.name, shot.frame.dim, id(self.buffers.water))
+        self._waits = style.hasty and self._lit == water and not self._waits
+        self._lit = water
+        return self._waits
 
     def _run(self, passes: tuple[Pass, ...], shot: Shot, timings: dict[str, float] | None) -> None:
         for draw in passes:
@@ -169,16 +189,27 @@ class Renderer:
         )
 
 
-def _rests(shot: Shot) -> tuple[Any, ...]:
-    """Return all that what is not water depends on, to be compared with that of another picture."""
-    numbers = [getattr(part, field.name) for part in (shot.lens, shot.sun) for field in dataclasses.fields(part)]
-    numbers += [shot.look.to_sun, shot.look.sun_size, shot.radius, shot.extent.lower, shot.extent.upper]
+def _bytes(numbers: list[Any]) -> tuple[bytes, ...]:
+    return tuple(np.asarray(number).tobytes() for number in numbers)
+
+
+def _looks(shot: Shot) -> tuple[Any, ...]:
+    """Return all of eye and style that what is not water depends on, to be compared with another picture's."""
+    return _bytes(
+        [*(getattr(shot.lens, f.name) for f in dataclasses.fields(shot.lens)), shot.look.sun_size, shot.radius]
+    )
+
+
+def _stands(shot: Shot) -> tuple[Any, ...]:
+    """Return all that the shadows of solids in the sun's view depend on, likewise."""
+    numbers = [getattr(shot.sun, field.name) for field in dataclasses.fields(shot.sun)]
+    numbers += [shot.look.to_sun, shot.extent.lower, shot.extent.upper]
     solids = shot.frame.solids
     if solids.count > solids.tank_count:
         synchronize()
         arrays = (solids.op, solids.size, solids.offset, solids.turn, solids.first, solids.reach, solids.position)
         numbers += [array.to_numpy(copy=None) for array in (*arrays, solids.rotation)]
-    return shot.frame.dim, solids.count, *(np.asarray(number).tobytes() for number in numbers)
+    return shot.frame.dim, solids.count, *_bytes(numbers)
 
 
 def _radical_inverse(number: int, prime: int) -> float:

@@ -27,4 +27,5 @@ class Shot:
     scattering: float  # 1/m: what makes deep water shine
     tint: Any  # numpy f32 [3]: colour of the light that comes back out of deep water
     usual: float  # m: water that gives its colour to what is behind it
+    hasty: bool  # whether outlines stay rough
     plane: tuple[Any, float]  # of a cut: unit normal [3], and the distance [m] of the plane from the origin along it

@@ -1,13 +1,17 @@
 // A level: what is asked, how it stands, its regions over the picture, and what became of it.
 
-import { find, make, svg } from "./make.js";
+import { find, make, say, svg } from "./make.js";
 import { on, send } from "./link.js";
 
 const hud = find("hud"), banner = find("banner"), drawing = find("regions"), names = find("region-names");
 const EDGES = [[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [5, 7], [7, 6], [6, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
 let regions = [], game = null, shown = "";
 
+let outlined = "";
 function drawRegions() {
+  const now = JSON.stringify([regions, game?.aims ?? null]);
+  if (now === outlined) return;
+  outlined = now;
   drawing.replaceChildren(); names.replaceChildren();
   regions.forEach(({ corners: points, outline }, k) => {
     const aim = game?.aims[k];
@@ -38,12 +42,12 @@ function showHud() {
   hud.hidden = !game;
   if (!game) return;
   const left = Math.max(0, game.seconds - game.elapsed);
-  parts.level.textContent = game.heading;
-  parts.text.textContent = game.text.replaceAll(" %", "\u00a0%");
-  parts.clock.textContent = seconds(left);
+  say(parts.level, game.heading);
+  say(parts.text, game.text.replaceAll(" %", "\u00a0%"));
+  say(parts.clock, seconds(left));
   parts.clock.classList.toggle("short", left < 5 && !game.outcome && !game.endured);
   parts.stars.replaceChildren(stars(game.stars));
-  parts.strokes.textContent = game.strokes === null ? "" : `${game.strokes} left`;
+  say(parts.strokes, game.strokes === null ? "" : `${game.strokes} left`);
   const bar = parts.bar.firstChild;
   bar.style.width = `${100 * game.progress}%`;
   parts.bar.classList.toggle("met", game.progress >= 1);

@@ -1,6 +1,6 @@
 // How it looks, and what is measured.
 
-import { find, make, note, pretty, words } from "./make.js";
+import { find, make, note, pretty, say, words } from "./make.js";
 import { link, on, send } from "./link.js";
 import { seen, snapshot } from "./stage.js";
 
@@ -48,8 +48,8 @@ function plot(key, value, text) {
   list.push(value);
   if (list.length > 135) list.shift(); // 13 s
   const { value: label, canvas } = rows[key];
-  label.textContent = text;
-  if (!canvas.isConnected || !canvas.offsetParent) return;
+  if (find("look").hidden || !canvas.isConnected) return;
+  say(label, text);
   const g = canvas.getContext("2d"), top = Math.max(...list, 1e-9);
   g.clearRect(0, 0, canvas.width, canvas.height);
   g.beginPath();
@@ -58,6 +58,11 @@ function plot(key, value, text) {
   g.lineTo(canvas.width - 1, canvas.height); g.lineTo(canvas.width - 2 * list.length + 1, canvas.height);
   g.fillStyle = "#59c8ff1c"; g.fill();
 }
+
+const stats = { count: make("b"), rate: make("b"), error: make("b") };
+const wide = (...parts) => make("span", { className: "wide" }, ...parts);
+find("stats").append(wide(stats.count, " particles · "), stats.rate, " fps", wide(" · compression ", stats.error));
+find("late").title = "This machine is slower than real time; the water slows down rather than cheat.";
 
 let pictures = [performance.now(), 0], rate = 0;
 on("hello", (hello) => { about = hello; build(); });
@@ -69,14 +74,11 @@ on("status", (status) => {
   plot("picture", status.picture_ms, `${pretty(status.picture_ms)} ms`);
   const now = performance.now();
   if (now - pictures[0] > 900) { rate = 1000 * (seen.pictures - pictures[1]) / (now - pictures[0]); pictures = [now, seen.pictures]; }
-  const wide = (text) => make("span", { className: "wide" }, text);
-  find("stats").replaceChildren(
-    wide(make("b", { textContent: status.count.toLocaleString("en") })), wide(" particles · "),
-    make("b", { textContent: rate.toFixed(0) }), " fps",
-    wide(" · compression "), wide(make("b", { textContent: `${(100 * (status.density_error_mean ?? 0)).toFixed(2)} %` })));
+  say(stats.count, status.count.toLocaleString("en"));
+  say(stats.rate, rate.toFixed(0));
+  say(stats.error, `${(100 * (status.density_error_mean ?? 0)).toFixed(2)} %`);
   find("late").hidden = !status.late;
-  find("late").textContent = `${status.pace.toFixed(2)} × real time`;
-  find("late").title = "This machine is slower than real time; the water slows down rather than cheat.";
+  say(find("late"), `${status.pace.toFixed(2)} × real time`);
   status.notes.forEach(note);
 });
 on("note", ({ text }) => note(text));

@@ -38,6 +38,11 @@ export function pretty(value, digits = 3) {
 /** A parameter's name in words. */
 export const words = (name) => name.charAt(0).toUpperCase() + name.slice(1).replaceAll("_", " ");
 
+/** Set an element's text; a page that is told the same again has nothing to lay out. */
+export function say(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
 let shown = [];
 /** Show a sentence for a while. */
 export function note(text) {

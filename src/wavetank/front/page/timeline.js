@@ -1,6 +1,6 @@
 // Time: play, step, back, the scrubber with its bookmarks, the pace.
 
-import { find, icon, make, pretty } from "./make.js";
+import { find, icon, make, pretty, say } from "./make.js";
 import { on, send } from "./link.js";
 
 const SPEEDS = [1 / 16, 1 / 8, 1 / 4, 1 / 2, 1, 2];
@@ -37,6 +37,8 @@ scrub.oninput = () => {
   send({ do: "rewind", time: Number(scrub.value) });
 };
 
+const clock = make("b");
+find("clock").append(clock, " s");
 let drawn = "", icon_ = null;
 on("status", (status) => {
   Object.assign(now, status);
@@ -45,7 +47,7 @@ on("status", (status) => {
     Object.assign(scrub, { min: from, max: to, value: status.time });
     scrub.style.setProperty("--share", `${100 * (status.time - from) / (to - from)}%`);
   }
-  find("clock").replaceChildren(make("b", { textContent: status.time.toFixed(2) }), " s");
+  say(clock, status.time.toFixed(2));
   if (icon_ !== status.paused) {
     icon_ = status.paused;
     find("play").replaceChildren(icon(icon_ ? "M8 5v14l11-7z" : "M7 5h3.500v14H7zM13.500 5H17v14h-3.500z"));

@@ -31,7 +31,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     spheres.clear_depth(buffers.sun_depth)
     frame = shot.frame
     spheres.splat(frame.x, frame.count, shot.radius, shot.sun, float(buffers.texels), buffers.sun_depth)
-    of_solids(shot, buffers, buffers.with_light(), 1)
+    cast(shot, buffers)
+    fall(shot, buffers, buffers.with_light(), 1)
 
 
 def draw_solids(shot: Shot, buffers: Buffers) -> None:
@@ -40,11 +41,12 @@ def draw_solids(shot: Shot, buffers: Buffers) -> None:
         fill(buffers.with_light())
     else:
         spheres.clear_depth(buffers.sun_depth)
-        of_solids(shot, buffers, buffers.with_light(), 1)
+        cast(shot, buffers)
+        fall(shot, buffers, buffers.with_light(), 1)
 
 
-def of_solids(shot: Shot, buffers: Buffers, light: Any, step: int) -> None:
-    """Add the solids to the sun's depth map and fill `light`, which holds every `step`-th row and column, from it."""
+def cast(shot: Shot, buffers: Buffers) -> None:
+    """Add the solids to the sun's depth map."""
     solid_set, texels = shot.frame.solids, buffers.texels
     if solid_set.count > solid_set.tank_count:
         solids.bound(solid_set, shot.sun, texels, texels, buffers.solid_box)
@@ -52,6 +54,10 @@ def of_solids(shot: Shot, buffers: Buffers, light: Any, step: int) -> None:
             strips_of(buffers.sun_depth), solid_set, solids.window(shot), shot.sun, buffers.solid_box,
             buffers.sun_depth,
         )  # fmt: skip
+
+
+def fall(shot: Shot, buffers: Buffers, light: Any, step: int) -> None:
+    """Fill `light`, which holds every `step`-th row and column, from the sun's depth map."""
     receive(
         strips_of(light), shot.lens, shot.sun, shot.look.to_sun, shot.look.sun_size, 0.3 * shot.radius,
         buffers.probes, step, buffers.sun_depth, buffers.depth, buffers.surface, buffers.normal, light,

@@ -25,8 +25,10 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if shot.frame.dim == 2:
         shadow.fill(water.light)
         return
-    spheres.clear_depth(buffers.sun_depth)
-    shadow.of_solids(shot, buffers, water.light, LIGHT_STEP)
+    if not buffers.shadows_rest:
+        spheres.clear_depth(buffers.sun_depth)
+        shadow.cast(shot, buffers)
+    shadow.fall(shot, buffers, water.light, LIGHT_STEP)
     occlusion.look(shot, buffers, water.light, LIGHT_STEP)
     smooth.even(shot, buffers, water.light, water.rough_light, LIGHT_STEP)
 

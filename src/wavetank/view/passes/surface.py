@@ -41,7 +41,9 @@ AWAY = 0.12  # how much an ellipsoid faces away that no eye can see
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill the water's depth and its outlines, as if the water went on behind the panes."""
     water = water_of(buffers, shot)
-    see(shot, buffers, shot.lens, water.depth, water.rim)
+    if shot.hasty:
+        water.rim.fill(0)
+    see(shot, buffers, shot.lens, water.depth, None if shot.hasty else water.rim)
 
 
 def see(shot: Shot, buffers: Buffers, lens: Lens, depth: Any, rim: Any = None) -> None:
