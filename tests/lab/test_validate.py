@@ -9,7 +9,7 @@ import pytest
 
 from wavetank import Scene, WavetankError, cli
 from wavetank.lab import validate as room
-from wavetank.lab.cases import CASES
+from wavetank.lab.cases import CASES, coiling
 from wavetank.lab.cases.case import Case, Figure, Outcome, measured, surface
 from wavetank.lab.cases.cup import holds, within
 from wavetank.lab.cases.cup import scene as cups
@@ -102,6 +102,16 @@ def test_area_of_a_hull():
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5], [0.5, 0]], float)
     assert hull_area(square, 0.0) == pytest.approx(1.0)
     assert hull_area(square, 0.1) == pytest.approx(1.0 + 0.4 + math.pi * 0.01)
+
+
+def test_a_layer_of_the_jet_is_round():
+    disc = coiling.layer(2)
+    assert len(disc) == 19
+    gaps = np.linalg.norm(disc[:, None] - disc[None], axis=-1) + 10 * np.eye(19)
+    assert gaps.min() == pytest.approx(1.0)
+    spread = disc.T @ disc / 19  # alike in all directions: it bends alike
+    assert spread[0, 0] == pytest.approx(spread[2, 2])
+    assert spread[0, 2] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_cups_hold_all_their_water_at_the_start():

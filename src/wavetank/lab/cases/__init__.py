@@ -3,6 +3,7 @@
 from wavetank.lab.cases import (
     buckling,
     calm_vorticity,
+    coiling,
     column,
     cup,
     drop,
@@ -25,5 +26,5 @@ from wavetank.lab.cases.case import Case
 CASES: tuple[Case, ...] = (
     still_tank.CASE, column.CASE, martin_moyce.CASE, standing_wave.CASE, elliptical_drop.CASE, drop.CASE, energy.CASE,
     momentum.CASE, cup.CASE, seeds.CASE, resolution.CASE, layers.CASE, lock_exchange.CASE, shear_wave.CASE,
-    gravity_current.CASE, buckling.CASE, tension_drop.CASE, calm_vorticity.CASE,
+    gravity_current.CASE, buckling.CASE, coiling.CASE, tension_drop.CASE, calm_vorticity.CASE,
 )  # fmt: skip
