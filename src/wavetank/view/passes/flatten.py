@@ -14,8 +14,9 @@ narrow range of depth, followed by a clean-up with a small window.
 Where we differ: the taps of both sides are taken in pairs, and their mean is compared with the depth in the middle.
 A plane passes that test at any slant and comes out as the plane it was (inverse depth is what is linear in a picture
 in perspective, so that is what is averaged); a pair with a side beyond an edge is left out as a whole, so an edge
-pulls nothing towards itself and leaves no halo. What lies well before a pane (its last bit is set) will not be seen
-and stays as it is. Large windows are sampled at up to `TAPS` pairs.
+pulls nothing towards itself and leaves no halo. What lies well before a pane will not be seen and stays as it is; in
+between the filter fades, in eighths that the last three bits count, because what comes and goes there at once can be
+seen to flicker beside it. Large windows are sampled at up to `TAPS` pairs.
 """
 
 from typing import Any
@@ -55,7 +56,7 @@ def even(
 def straighten(strips: Strips, lens: Lens, lower: vec3, upper: vec3, margin: qd.f32, depth: qd.types.ndarray()):
     """Put q in the place of depth; 0 (or far below any other) where there is no water.
 
-    The last bit is set where the surface lies more than `margin` [m] before the tank.
+    The last three bits say how far the surface lies before the tank: 0 up to `margin` / 2 [m], 7 from 3/2 of it on.
     """
     for task in range(strips.count):
         row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
@@ -68,8 +69,9 @@ def straighten(strips: Strips, lens: Lens, lower: vec3, upper: vec3, margin: qd.
                 ray = view_ray(lens, row, column)
                 origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
                 there = box_interval(origin, direction, lower, upper)
-                outside = qd.cast((there[0] - z) * direction.norm() > margin, qd.i32)
-            depth[row, column] = (qd.bit_cast(q, qd.i32) & ~1) | outside
+                away = (there[0] - z) * direction.norm() / margin - 0.5
+                outside = qd.cast(7.0 * qd.min(qd.max(away, 0.0), 1.0) + 0.5, qd.i32)
+            depth[row, column] = (qd.bit_cast(q, qd.i32) & ~7) | outside
 
 
 @qd.func
@@ -96,7 +98,8 @@ def blur(
         for column in range(first, end):
             key = depth[row, column]
             q = qd.bit_cast(key, qd.f32)
-            if (key & 1) == 0 and q != 0.0 and q > -1e8:
+            kept = key & 7
+            if kept < 7 and q != 0.0 and q > -1e8:
                 grain, spread = 1.0, sigma * lens.focal
                 if lens.perspective > 0.5:
                     grain = 1.0 / (q * q)
@@ -127,8 +130,8 @@ def blur(
                     w = gauss * qd.max(1.0 - bend * bend, 0.0) * qd.max(1.0 - apart * apart, 0.0)
                     total += w * pair
                     weight += w
-                q = total / weight
-                key = qd.bit_cast(q, qd.i32) & ~1
+                q += (1.0 - kept / 7.0) * (total / weight - q)
+                key = (qd.bit_cast(q, qd.i32) & ~7) | kept
             if final == 1:
                 key = depth_of(q, lens.perspective)
             result[row, column] = key

@@ -180,7 +180,7 @@ def fill_ellipse(
                     tried = inside < inner
                 if tried:
                     front = base + gx * u - half * qd.sqrt(qd.max(inside, 0.0))
-                    key = qd.bit_cast(front, qd.i32) & ~1  # the last bit is for `flatten`
+                    key = qd.bit_cast(front, qd.i32)
                     if key > 0 and key < depth[row, column]:
                         cover = 1.0
                         if qd.static(part != 0):
