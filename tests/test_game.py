@@ -16,11 +16,16 @@ SOLUTIONS = Path(__file__).parent / "levels"
 DOWN = (0.0, 0.0, -1.0)
 
 
+SLACK = 1.2  # a solution wins where this much more is asked, so that no rounding of another machine decides
+
+
 @pytest.mark.parametrize("name", bundled_levels())
 def test_level_is_won_by_its_recorded_solution(name):
     recording = Recording.load(SOLUTIONS / f"{name}.toml")
     level = wt.Scene.load(name)
     assert wt.Scene.parse(recording.scene).table() == level.table(), "the solution is one of this level"
+    for aim in recording.scene["goal"]["aims"]:
+        aim["share"] *= 1.0 / SLACK if aim["kind"] == "dry" else SLACK
     for session in replay(recording):
         assert 0.0 <= session.game.progress <= 1.0
         if session.game.outcome:
@@ -30,7 +35,7 @@ def test_level_is_won_by_its_recorded_solution(name):
     assert session.game.outcome == "won"
     assert session.game.progress == 1.0
     assert session.game.stars >= 2
-    assert session.game.elapsed <= level.goal.seconds
+    assert session.game.goal.is_endured or session.game.elapsed <= level.goal.seconds / SLACK
 
 
 @pytest.mark.parametrize("name", bundled_levels())

@@ -1,6 +1,7 @@
 """A headless Chromium and a person at its page, by the DevTools Protocol: for measuring and testing the page."""
 
 import base64
+import contextlib
 import itertools
 import json
 import shutil
@@ -43,7 +44,8 @@ class Browser:
         port = told.read_text().splitlines()[0]
         pages = json.loads(urllib.request.urlopen(f"http://127.0.0.1:{port}/json").read())
         page = next(entry for entry in pages if entry["type"] == "page")
-        self.socket = connect(page["webSocketDebuggerUrl"], max_size=None, open_timeout=60)
+        self._open = contextlib.ExitStack()
+        self.socket = self._open.enter_context(connect(page["webSocketDebuggerUrl"], max_size=None, open_timeout=60))
         self.events: list[dict[str, Any]] = []
         self._numbers = itertools.count(1)
         for domain in ("Page", "Runtime", "Network", "Log"):
@@ -141,7 +143,7 @@ class Browser:
 
     def close(self) -> None:
         """End the browser."""
-        self.socket.close()
+        self._open.close()
         self.process.terminate()
         self.process.wait(20)
 

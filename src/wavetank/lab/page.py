@@ -34,7 +34,7 @@ WATCH = """(async () => {
   window.watch = { seen, status: {}, pixels: [], delays: [] };
   on('status', (status) => Object.assign(watch.status, status));
   let pressed = null;
-  canvas.addEventListener('pointerdown', (event) => { pressed = event.timeStamp; }, true);
+  canvas.addEventListener('pointerdown', (event) => { if (event.button === 0) pressed = event.timeStamp; }, true);
   const draw = CanvasRenderingContext2D.prototype.drawImage;
   CanvasRenderingContext2D.prototype.drawImage = function (...given) {
     draw.apply(this, given);

@@ -61,10 +61,18 @@ function plot(key, value, text) {
 
 const stats = { count: make("b"), rate: make("b"), error: make("b") };
 const wide = (...parts) => make("span", { className: "wide" }, ...parts);
-find("stats").append(wide(stats.count, " particles · "), stats.rate, " fps", wide(" · compression ", stats.error));
+const unit = make("span");
+find("stats").append(wide(stats.count, " particles · "), stats.rate, unit, wide(" · compression ", stats.error));
 find("late").title = "This machine is slower than real time; the water slows down rather than cheat.";
 
-let pictures = [performance.now(), 0], rate = 0;
+let pictures = [performance.now(), 0], paused = false;
+setInterval(() => {
+  const now = performance.now(), rate = 1000 * (seen.pictures - pictures[1]) / (now - pictures[0]);
+  pictures = [now, seen.pictures];
+  const rests = paused && rate < 2; // a picture that rests is not a slow one
+  say(stats.rate, rests ? "paused" : rate.toFixed(0));
+  say(unit, rests ? "" : " fps");
+}, 1000);
 on("hello", (hello) => { about = hello; build(); });
 on("status", (status) => {
   if (status.world) { about = { ...about, ...status.world }; build(); }
@@ -72,10 +80,8 @@ on("status", (status) => {
   plot("energy", status.kinetic_energy ?? 0, `${pretty(status.kinetic_energy ?? 0)} J`);
   plot("frame", status.frame_ms || 0, `${pretty(status.frame_ms || 0)} ms`);
   plot("picture", status.picture_ms, `${pretty(status.picture_ms)} ms`);
-  const now = performance.now();
-  if (now - pictures[0] > 900) { rate = 1000 * (seen.pictures - pictures[1]) / (now - pictures[0]); pictures = [now, seen.pictures]; }
   say(stats.count, status.count.toLocaleString("en"));
-  say(stats.rate, rate.toFixed(0));
+  paused = status.paused;
   say(stats.error, `${(100 * (status.density_error_mean ?? 0)).toFixed(2)} %`);
   find("late").hidden = !status.late;
   say(find("late"), `${status.pace.toFixed(2)} × real time`);
