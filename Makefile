@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test lint figures gallery clean
+.PHONY: demo test lint figures gallery validation clean
 
 demo: .venv/demo-ready
 	$(BIN)/wavetank run obstacle-tank --seconds 4 --fps 30 --size 1280x720 --video --name demo --out out
@@ -32,6 +32,10 @@ figures: .venv/test-ready
 # A picture of every bundled scene: docs/gallery.md.
 gallery: .venv/test-ready
 	$(BIN)/python docs/figures.py gallery
+
+# All cases of `wavetank validate` in full, with a picture of each: validation/README.md. Some twenty minutes.
+validation: .venv/test-ready
+	$(BIN)/python docs/figures.py validation
 
 clean:
 	rm -rf .venv out

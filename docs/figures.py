@@ -1,9 +1,12 @@
-"""Make the pictures of README and docs anew: `make figures` and `make gallery`, some minutes on two cores.
+"""Make the pictures of README and docs anew: `make figures`, `make gallery`, `make validation`, minutes on two cores.
 
 python docs/figures.py            the pictures of README.md and docs/look.md, and the plot of docs/method.md
 python docs/figures.py gallery    docs/gallery.md with a picture of every bundled scene
+python docs/figures.py validation [case ...]
+                                  validation/: a picture of every case of `wavetank validate`, or of these, and a table
 """
 
+import json
 import shutil
 import sys
 import tempfile
@@ -15,12 +18,26 @@ from PIL import Image
 
 import wavetank as wt
 from wavetank.front.still import SHOWN_AT, USUAL_TIME
+from wavetank.lab.cases import CASES
 from wavetank.lab.converge import converge
+from wavetank.lab.validate import bounds_text, number_text, validate
 from wavetank.view.camera import Camera
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import QUALITIES
 
 DOCS = Path(__file__).parent
+VALIDATION = DOCS.parent / "validation"
+LARGEST = 80_000  # bytes of a picture there
+VALIDATION_HEAD = """# Validation
+
+What is computed beside measurements and exact solutions: the full runs of `wavetank validate`, default settings, on the
+CPU in single precision. The command of each row is `wavetank validate CASE --json`; `make validation` makes this page
+and its pictures anew. What is known of the figures outside of their bounds is in
+[docs/method.md](../docs/method.md#what-is-still-open).
+
+| case | figure | value | bounds | within | reference | source |
+|---|---|---|---|---|---|---|
+"""
 #: name -> scene, time [s], options of the picture
 SHOTS: dict[str, tuple[wt.Scene, float, dict[str, Any]]] = {
     "obstacle-tank": (wt.Scene.load("obstacle-tank").changed(spacing=0.02), 0.62, {}),
@@ -104,5 +121,50 @@ def gallery(names: list[str]) -> None:
     (DOCS / "gallery.md").write_text(head + "\n".join(rows), encoding="utf-8")
 
 
+def validation(names: list[str]) -> None:
+    """Run every case of `wavetank validate`, or these alone, and write the table of all that were ever run."""
+    VALIDATION.mkdir(exist_ok=True)
+    file = VALIDATION / "figures.json"
+    known = json.loads(file.read_text("utf-8")) if file.exists() else {}
+    for name in names or [case.name for case in CASES]:
+        with tempfile.TemporaryDirectory() as folder:
+            known |= validate([name], out=Path(folder))["cases"]
+            shrink(Path(folder) / name / f"{name}.png", VALIDATION / f"{name}.png")
+        known[name].pop("seconds_of_machine")
+        file.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+        print(name, flush=True)
+    cases = [case.name for case in CASES if case.name in known]
+    rows = []
+    for name in cases:
+        for number, figure in enumerate(known[name]["figures"]):
+            verdict = {True: "yes", False: "**no**", None: ""}[figure["pass"]]
+            cells = (
+                f"[{name}](#{name})" if number == 0 else "",
+                figure["name"],
+                number_text(figure["value"], figure["unit"]),
+                bounds_text(figure),
+                verdict,
+                figure["reference"],
+                figure["source"],
+            )
+            rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    pictures = [
+        f"## {name}\n\n![{known[name]['title']}]({name}.png)\n\n`wavetank validate {name} --out out`\n"
+        for name in cases
+    ]
+    (VALIDATION / "README.md").write_text(VALIDATION_HEAD + "\n".join(rows) + "\n\n" + "\n".join(pictures), "utf-8")
+
+
+def shrink(source: Path, target: Path) -> None:
+    """Write a plot with as many colours as fit into `LARGEST` bytes."""
+    image = Image.open(source).convert("RGB")
+    for colors in (96, 48, 24, 12):
+        image.quantize(colors, dither=Image.Dither.NONE).save(target, optimize=True)
+        if target.stat().st_size <= LARGEST:
+            return
+
+
 if __name__ == "__main__":
-    gallery(sys.argv[2:]) if sys.argv[1:2] == ["gallery"] else figures(sys.argv[1:])
+    pages = {"gallery": gallery, "validation": validation}
+    page = pages.get(sys.argv[1]) if sys.argv[1:] else None
+    page(sys.argv[2:]) if page else figures(sys.argv[1:])

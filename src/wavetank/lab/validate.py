@@ -74,18 +74,20 @@ def table(result: dict[str, Any]) -> Table:
         for number, figure in enumerate(case["figures"]):
             verdict = {True: "[green]pass[/green]", False: "[bold red]fail[/bold red]", None: ""}[figure["pass"]]
             rows.add_row(
-                name if number == 0 else "", figure["name"], _number(figure["value"], figure["unit"]),
-                _bounds(figure), figure["reference"], figure["source"], verdict,
+                name if number == 0 else "", figure["name"], number_text(figure["value"], figure["unit"]),
+                bounds_text(figure), figure["reference"], figure["source"], verdict,
             )  # fmt: skip
         rows.add_section()
     return rows
 
 
-def _number(value: float | None, unit: str) -> str:
+def number_text(value: float | None, unit: str) -> str:
+    """Write a value with its unit."""
     return "not finite" if value is None else f"{value:.4g} {unit}".rstrip()
 
 
-def _bounds(figure: dict[str, Any]) -> str:
+def bounds_text(figure: dict[str, Any]) -> str:
+    """Write the bounds of a figure, nothing where there are none."""
     low, high = figure["low"], figure["high"]
     if low is None and high is None:
         return ""

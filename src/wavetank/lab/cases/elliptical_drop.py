@@ -5,7 +5,8 @@ stays linear in space, dA/dtau = A^2 (a^4 - 1) / (a^4 + 1), da/dtau = -a A, with
 b = 1 / a, and b(1) = 2.2755. `data/` holds the solution.
 
 b is measured twice: from the second moment (a full ellipse has <y^2> = b^2 / 4) and as the farthest particle and half a
-spacing. The area is that of the convex hull of the particles, each a disc of diameter d.
+spacing. The area is that of the convex hull of the particles, each a disc of diameter d. The disc is cut out of settled
+water: the rows of a lattice would stay rows, and swell (`packing.py`).
 """
 
 import math
@@ -15,29 +16,21 @@ import numpy as np
 
 from wavetank.fluids import Points
 from wavetank.lab.cases.case import Case, Figure, Outcome, measured
+from wavetank.lab.cases.packing import settled
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.scene import Scene
 from wavetank.simulation import Simulation
 
 SOURCE = "Monaghan 1994"
+BOX = 2.4  # m: edge of the settled water that the disc is cut out of
 
 
 def run(quick: bool, arch: str) -> Outcome:
-    """Pull the disc until tau = 1, A0 = 1 / s (quick: coarser)."""
+    """Pull the disc until tau = 1, A0 = 1 / s (quick: coarser): of settled water, and of a square lattice."""
     d = 0.05 if quick else 0.02
+    times, moments, extents, areas, x = pull(disc(settled(d, (BOX, BOX), arch) - 0.5 * BOX), d, arch)
     axis = (np.arange(-math.ceil(1.0 / d), math.ceil(1.0 / d)) + 0.5) * d
-    x = np.stack(np.meshgrid(axis, axis, indexing="ij"), -1).reshape(-1, 2)
-    x = x[(x**2).sum(1) < 1.0]
-    fluid = Points(positions=x, velocities=x * (-1.0, 1.0))
-    sim = Simulation(Scene(spacing=d, gravity=(0.0, 0.0), fluids=[fluid]), arch)
-    full = hull_area(x, 0.5 * d)  # 1 % more than the lattice's own area: its edge is jagged
-    times, moments, extents, areas = [], [], [], []
-    for frame in sim.frames(1.0, 60.0):
-        x = frame.positions.astype(float)
-        times.append(sim.time)
-        moments.append(2.0 * float(np.sqrt(np.mean(x[:, 1] ** 2))))
-        extents.append(float(np.abs(x[:, 1]).max()) + 0.5 * d)
-        areas.append(hull_area(x, 0.5 * d) / full)
+    _, _, _, lattice, _ = pull(disc(np.stack(np.meshgrid(axis, axis, indexing="ij"), -1).reshape(-1, 2)), d, arch)
     exact = measured("elliptical_drop_exact.csv")
     b = float(np.interp(1.0, exact["tau"], exact["b"]))
     limit = 4.0 if quick else 3.0
@@ -46,6 +39,9 @@ def run(quick: bool, arch: str) -> Outcome:
         Figure("b at tau = 1, extent, error", 100 * (extents[-1] / b - 1), "%", -limit, limit, f"b = {b:.4f}", SOURCE),
         Figure("area at tau = 1, error", 100 * (areas[-1] - 1), "%", -limit, limit, "pi", "incompressibility"),
         Figure("area, largest error", 100 * (max(areas, key=lambda s: abs(s - 1)) - 1), "%", reference="0"),
+        Figure(
+            "area of a lattice at tau = 1, error", 100 * (lattice[-1] - 1), "%", reference="0", source="rows stay rows"
+        ),
     ]
 
     def draw(plot: Any) -> None:
@@ -56,17 +52,41 @@ def run(quick: bool, arch: str) -> Outcome:
         left.plot(exact["tau"][past], exact["b"][past], "o", color=RED, ms=4, label="exact")
         left.set(xlabel="tau", ylabel="half axis b")
         left.legend(frameon=False)
-        middle.plot(times, areas, color=BLUE)
+        middle.plot(times, areas, color=BLUE, label="settled water")
+        middle.plot(times, lattice, color=BLUE, ls=":", label="square lattice")
+        middle.legend(frameon=False)
         middle.axhspan(1 - limit / 100, 1 + limit / 100, color="0.9", zorder=0)
         middle.set(xlabel="tau", ylabel="area / area at the start")
         right.plot(x[:, 0], x[:, 1], ".", color=BLUE, ms=1)
         angle = np.linspace(0.0, 2.0 * np.pi, 200)
         right.plot(np.cos(angle) / b, b * np.sin(angle), color=RED, lw=1)
-        right.set(title="tau = 1", aspect="equal")
+        right.set(title="tau = 1", aspect="equal", xticks=(-0.4, 0.4))
         for panel in (left, middle, right):
             tidy(panel)
 
-    return Outcome(figures, {"tau": times, "b_moment": moments, "b_extent": extents, "area": areas}, draw)
+    return Outcome(
+        figures, {"tau": times, "b_moment": moments, "b_extent": extents, "area": areas, "lattice": lattice}, draw
+    )
+
+
+def disc(x: np.ndarray) -> np.ndarray:
+    """Return the points [n, 2] inside the unit circle."""
+    return x[(x**2).sum(axis=1) < 1.0]
+
+
+def pull(x: np.ndarray, d: float, arch: str) -> tuple[list[float], list[float], list[float], list[float], np.ndarray]:
+    """Return times, b by the moment and by the extent, area over that at the start, and the last positions [n, 2]."""
+    fluid = Points(positions=x, velocities=x * (-1.0, 1.0))
+    sim = Simulation(Scene(spacing=d, gravity=(0.0, 0.0), fluids=[fluid]), arch)
+    full = hull_area(x, 0.5 * d)  # its edge is jagged: 1 % more than the number of particles says
+    times, moments, extents, areas = [], [], [], []
+    for frame in sim.frames(1.0, 60.0):
+        x = frame.positions.astype(float)
+        times.append(sim.time)
+        moments.append(2.0 * float(np.sqrt(np.mean(x[:, 1] ** 2))))
+        extents.append(float(np.abs(x[:, 1]).max()) + 0.5 * d)
+        areas.append(hull_area(x, 0.5 * d) / full)
+    return times, moments, extents, areas, x
 
 
 def hull_area(x: np.ndarray, margin: float) -> float:
