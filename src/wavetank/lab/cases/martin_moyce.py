@@ -60,11 +60,12 @@ def run(quick: bool, arch: str) -> Outcome:
     h_table = measured("martin_moyce_n2_2_a225in_height_table6.csv")
     z_rate, h_rate = math.sqrt(2.0 * GRAVITY / A), math.sqrt(GRAVITY / A)
     seconds = (3.6 / z_rate) if quick else 7.4 / h_rate
-    times, fronts, heights = [], [], []
+    times, fronts, bulk, heights = [], [], [], []
     for frame in sim.frames(seconds, 240.0):
         x = frame.positions
         times.append(sim.time)
         fronts.append(front(x, d, depth) / A)
+        bulk.append(float(np.percentile(x[:, 0], 98)) / A)
         heights.append(float(np.percentile(x[x[:, 0] < 4.0 * d, 1], 98)) / (2.0 * A))
         if abs(times[-1] * z_rate - 2.5) < 0.5 * z_rate / 240.0:
             moment = x.copy()
@@ -77,6 +78,15 @@ def run(quick: bool, arch: str) -> Outcome:
         Figure("front, rms error", _rms(0.0, T, fronts, z_table), "% of Z", None, bounds[0], "Table 2", SOURCE),
         Figure("front, rms error, best time shift", lagged, "% of Z", None, bounds[1], "Table 2", SOURCE),
         Figure("that shift, measured minus computed", shift / z_rate * 1e3, "ms", reference="0", source=SOURCE),
+        Figure(
+            "front of 98 % of the water, rms error",
+            _rms(0.0, T, bulk, z_table),
+            "% of Z",
+            None,
+            None,
+            "Table 2",
+            SOURCE,
+        ),
         Figure("height, largest error", float(np.abs(height_error).max()), "", None, bounds[2], "Table 6", SOURCE),
         Figure("height, mean error", float(height_error.mean()), "", reference="Table 6", source=SOURCE),
     ]
@@ -84,6 +94,7 @@ def run(quick: bool, arch: str) -> Outcome:
     def draw(plot: Any) -> None:
         left, middle, right = plot.subplots(1, 3)
         left.plot(T, fronts, color=BLUE, label="computed")
+        left.plot(T, bulk, color=BLUE, ls=":", label="98 % of the water")
         left.plot(z_table["T"], z_table["Z"], "o", color=RED, ms=4, label=SOURCE)
         left.set(xlabel="T = t sqrt(2 g / a)", ylabel="Z = front / a", xlim=(0, 3.6), ylim=(0.9, 4.8))
         middle.plot(tau, heights, color=BLUE)
