@@ -132,7 +132,12 @@ def validation(names: list[str]) -> None:
             shrink(Path(folder) / name / f"{name}.png", VALIDATION / f"{name}.png")
         known[name].pop("seconds_of_machine")
         file.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+        validation_page(known)
         print(name, flush=True)
+
+
+def validation_page(known: dict[str, Any]) -> None:
+    """Write the table of these results of cases, and their pictures."""
     cases = [case.name for case in CASES if case.name in known]
     rows = []
     for name in cases:
@@ -158,7 +163,7 @@ def validation(names: list[str]) -> None:
 def shrink(source: Path, target: Path) -> None:
     """Write a plot with as many colours as fit into `LARGEST` bytes."""
     image = Image.open(source).convert("RGB")
-    for colors in (96, 48, 24, 12):
+    for colors in (256, 96, 48, 24):  # fewer than that, and thin lines lose theirs
         image.quantize(colors, dither=Image.Dither.NONE).save(target, optimize=True)
         if target.stat().st_size <= LARGEST:
             return

@@ -93,7 +93,8 @@ def run(quick: bool, arch: str) -> Outcome:
         panels[4].plot(1e3 * path[:, 0], 1e3 * path[:, 1], color=BLUE, label="falls 9 diameters")
         panels[4].plot(1e3 * still[:, 0], 1e3 * still[:, 1], color=RED, label="falls 3 diameters")
         panels[4].set(title="at 0.4 of the fall", xlabel="x [mm]", ylabel="z [mm]", aspect="equal")
-        panels[4].legend(frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.2))
+        panels[4].set(xlim=(-6, 6), ylim=(-9, 6))
+        panels[4].legend(frameon=False, loc="lower center")
         tidy(panels[4])
 
     return Outcome(figures, {"time": times, "x": path[:, 0].tolist(), "z": path[:, 1].tolist()}, draw)

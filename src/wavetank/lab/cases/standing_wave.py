@@ -70,8 +70,8 @@ def run(quick: bool, arch: str) -> Outcome:
         left, right = plot.subplots(1, 2, width_ratios=(2, 1))
         left.plot(t, a, color=BLUE, label="computed")
         left.plot(t, AMPLITUDE * np.cos(2.0 * np.pi * t / PERIOD), color=RED, lw=0.8, ls="--", label="linear theory")
-        left.set(xlabel="time [s]", ylabel="amplitude of the first mode [m]")
-        left.legend(frameon=False, loc="upper right")
+        left.set(xlabel="time [s]", ylabel="amplitude of the first mode [m]", ylim=(-1.15 * AMPLITUDE, 1.4 * AMPLITUDE))
+        left.legend(frameon=False, loc="upper right", ncols=2)
         right.plot(start[:, 0], start[:, 1], ".", color=BLUE, ms=1)
         right.set(title="start", xlabel="x [m]", ylabel="y [m]", aspect="equal")
         for axis in (left, right):
