@@ -4,7 +4,6 @@ import asyncio
 import os
 import time
 
-import numpy as np
 import pytest
 
 import wavetank as wt
@@ -51,10 +50,6 @@ def until(true, seconds: float = 120.0) -> None:
     assert true()
 
 
-def ids(world) -> np.ndarray:
-    return world.session.sim.world.particles.id.to_numpy()[: world.session.sim.count]
-
-
 def test_a_person_plays(open_page, browser):
     """Loads, moves, and a key, a slider, tools, the camera, the timeline and a scene do what they say."""
     world = open_page()
@@ -84,7 +79,7 @@ def test_a_person_plays(open_page, browser):
     browser.run("document.querySelector('[data-tool=dye]').click()")
     water = browser.center("#picture", 0.35, 0.6)
     browser.drag(water, browser.center("#picture", 0.42, 0.6))
-    until(lambda: (session.sim.frame().dyes != 0).any())
+    until(lambda: world.front.ask(lambda: (session.sim.frame().dyes != 0).any()).result(60))
 
     # One that needs time: the hand pushes the water.
     browser.key(" ")

@@ -206,11 +206,16 @@ class WebFront:
     async def _scene(self, request: Request) -> Response:
         return await self._download("scene.toml", lambda: self.session.present_scene().text())
 
+    def ask(self, job: Callable[[], Any]) -> concurrent.futures.Future[Any]:
+        """Have `job` done in the simulation's thread, the only one that may look at its arrays."""
+        future: concurrent.futures.Future[Any] = concurrent.futures.Future()
+        self._jobs.put((job, future))
+        self.session.wake()
+        return future
+
     async def _download(self, name: str, make: Callable[[], str]) -> Response:
         """Return a text that the simulation's thread makes, as a file."""
-        future: concurrent.futures.Future[Any] = concurrent.futures.Future()
-        self._jobs.put((make, future))
-        self.session.wake()
+        future = self.ask(make)
         headers = {"content-disposition": f"attachment; filename={name}"}
         try:
             return Response(await asyncio.wrap_future(future), media_type="application/toml", headers=headers)
