@@ -25,6 +25,7 @@ from wavetank.front.window.look import (
     set_style,
 )
 from wavetank.front.window.panels import panel
+from wavetank.front.window.plate import Plate
 from wavetank.front.window.stage import Stage
 from wavetank.session import Session
 
@@ -40,16 +41,15 @@ class Window:
         self.desk = Desk(self.engine, session.scene)
         self.stage = Stage(self.desk)
         self.frames = 0
-        self._texture: Any = None
-        self._shown = 0  # number of the picture in the texture
-        self._context: Any = None
+        self._plate: Plate | None = None
+        self._shown = 0  # number of the picture on it
         self._params = self._settings(size)
         self._stopped = False
 
     def open(self) -> None:
         """Open the window and let the water move."""
         hello_imgui.manual_render.setup_from_runner_params(self._params)
-        self._context = moderngl.create_context()
+        self._plate = Plate(moderngl.create_context())
         glfw.set_drop_callback(glfw_utils.glfw_window_hello_imgui(), self._dropped)  # type: ignore[arg-type]
         self.engine.start()
 
@@ -75,19 +75,19 @@ class Window:
     def close(self) -> None:
         """Stop the water and close the window."""
         self.engine.stop()
-        if self._context is not None:
-            if self._texture is not None:
-                self._texture.release()
+        if self._plate is not None:
+            self._plate.release()
             implot.destroy_context()
             hello_imgui.manual_render.tear_down()
-            self._context = None
+            self._plate = None
 
     def screenshot(self) -> Any:
         """Return what the window shows, uint8 [height, width, 3], from the framebuffer after `draw`."""
         import numpy as np
 
         width, height = glfw.get_framebuffer_size(glfw_utils.glfw_window_hello_imgui())
-        screen = self._context.detect_framebuffer(0)
+        assert self._plate is not None, "the window is not open"
+        screen = self._plate.context.detect_framebuffer(0)
         raw = screen.read(viewport=(0, 0, width, height), components=3, alignment=1)
         return np.frombuffer(raw, np.uint8).reshape(height, width, 3)[::-1]
 
@@ -125,7 +125,8 @@ class Window:
         em, room = imgui.get_font_size(), imgui.get_io().display_size
         rail, side, top, bottom = 9.0 * em, 22.5 * em if self.desk.panel else 0.0, 2.6 * em, 3.7 * em
         wide = room.x - rail - 3 * GAP - (side + GAP if side else 0.0)
-        texture = imgui.ImTextureRef(self._texture.glo) if self._texture is not None else None
+        shown = self._plate.texture if self._plate is not None else None
+        texture = imgui.ImTextureRef(shown.glo) if shown is not None else None
         stage = (ImVec2(2 * GAP + rail, top), ImVec2(max(64.0, wide), max(64.0, room.y - top - bottom - 2 * GAP)))
         if self._part("header", ImVec2(GAP, 0), ImVec2(room.x - 2 * GAP, top), bare=True):
             timeline.header(self.desk, imgui.get_io().framerate)
@@ -182,13 +183,6 @@ class Window:
     def _upload(self) -> None:
         """Bring a new picture of the water into the texture."""
         shown = self.engine.shown
-        if shown.image is None or shown.number == self._shown:
-            return
-        self._shown = shown.number
-        height, width = shown.image.shape[:2]
-        if self._texture is None or self._texture.size != (width, height):
-            if self._texture is not None:
-                self._texture.release()
-            self._texture = self._context.texture((width, height), 3, alignment=1)
-            self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        self._texture.write(shown.image.tobytes())
+        if self._plate is not None and shown.image is not None and shown.number != self._shown:
+            self._shown = shown.number
+            self._plate.show(shown.image)
