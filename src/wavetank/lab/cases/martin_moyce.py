@@ -65,7 +65,7 @@ def run(quick: bool, arch: str) -> Outcome:
         x = frame.positions
         times.append(sim.time)
         fronts.append(front(x, d, depth) / A)
-        bulk.append(float(np.percentile(x[:, 0], 98)) / A)
+        bulk.append((float(np.percentile(x[:, 0], 98)) + 0.5 * d) / A)
         heights.append(float(np.percentile(x[x[:, 0] < 4.0 * d, 1], 98)) / (2.0 * A))
         if abs(times[-1] * z_rate - 2.5) < 0.5 * z_rate / 240.0:
             moment = x.copy()
