@@ -1,5 +1,6 @@
 """Without any display: pictures reach a texture through EGL, at whatever size, and come back as they were."""
 
+import ctypes
 import os
 import time
 
@@ -24,6 +25,7 @@ def context(monkeypatch):
         pytest.skip(f"no EGL here ({error}): apt-get install libegl1 libgl1-mesa-dri")
     yield made
     made.release()
+    ctypes.CDLL("libEGL.so.1").eglReleaseThread()  # it is still current, and no window could open in this process
 
 
 def on_graphics(plate) -> np.ndarray:
