@@ -3,12 +3,10 @@
 Commands go in, pictures and figures come out.
 """
 
-import concurrent.futures
 import dataclasses
 import queue
 import threading
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,6 +15,7 @@ from wavetank.commands import Command
 from wavetank.errors import WavetankError
 from wavetank.front.about import figures, status, world
 from wavetank.front.hud import Hud
+from wavetank.front.jobs import Jobs
 from wavetank.front.picture import Painter
 from wavetank.pace import share_interpreter
 from wavetank.session import Session
@@ -55,7 +54,8 @@ class Engine:
         self.failure: BaseException | None = None
         self.size = self.painter.asked  # px of the place for the picture; the front sets it
         self.detail = "auto"
-        self._jobs: queue.SimpleQueue[tuple[Callable[[], Any], concurrent.futures.Future[Any]]] = queue.SimpleQueue()
+        self._jobs = Jobs(session.wake)
+        self.ask = self._jobs.ask  # have something done between two frames
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="wavetank water", daemon=True)
         self._painted, self._painted_at, self._sharp = -1, 0.0, False
@@ -81,13 +81,6 @@ class Engine:
         except WavetankError as error:
             self.notes.put(str(error))
 
-    def ask(self, job: Callable[[], Any]) -> concurrent.futures.Future[Any]:
-        """Have something done between two frames."""
-        future: concurrent.futures.Future[Any] = concurrent.futures.Future()
-        self._jobs.put((job, future))
-        self.session.wake()
-        return future
-
     def _run(self) -> None:
         try:
             while not self._stopped.is_set():
@@ -98,12 +91,8 @@ class Engine:
             self.failure = error
 
     def _turn(self) -> None:
-        while not self._jobs.empty():
-            job, future = self._jobs.get()
-            try:
-                future.set_result(job())
-            except Exception as error:  # it belongs to who asked; the water goes on
-                future.set_exception(error)
+        for _ in self._jobs.do_all():
+            pass  # who asked has the failure
         self.painter.detail = self.detail
         if self.size != self.painter.asked:
             self.painter.want(*self.size)

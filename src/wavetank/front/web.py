@@ -9,7 +9,6 @@ import concurrent.futures
 import importlib.resources
 import math
 import mimetypes
-import queue
 import socket
 import threading
 import time
@@ -26,6 +25,7 @@ from wavetank.errors import WavetankError
 from wavetank.front.about import everything, figures, status, world
 from wavetank.front.gate import Gate
 from wavetank.front.hud import Hud
+from wavetank.front.jobs import Jobs
 from wavetank.front.picture import Painter, jpeg
 from wavetank.front.viewers import Viewers
 from wavetank.pace import share_interpreter
@@ -66,7 +66,8 @@ class WebFront:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._thread = threading.Thread(target=self._serve, name="wavetank web", daemon=True)
         self._packer = concurrent.futures.ThreadPoolExecutor(1, "wavetank jpeg")
-        self._jobs: queue.SimpleQueue[tuple[Callable[[], Any], concurrent.futures.Future[Any]]] = queue.SimpleQueue()
+        self._jobs = Jobs(session.wake)
+        self.ask = self._jobs.ask  # have something done between two frames
         self._stopped = threading.Event()
         self._told: dict[str, Any] = {}
         self._heard: Any = None  # the last status, and who was there
@@ -96,14 +97,9 @@ class WebFront:
 
     def turn(self) -> None:
         """Do what is due: jobs, commands, a frame, a picture, a status."""
-        while not self._jobs.empty():
-            job, future = self._jobs.get()
-            try:
-                future.set_result(job())
-            except Exception as error:  # it belongs to who asked; the water goes on
-                if isinstance(error, WavetankError):
-                    self.session.note(str(error))
-                future.set_exception(error)
+        for error in self._jobs.do_all():
+            if isinstance(error, WavetankError):
+                self.session.note(str(error))
         driver = self.viewers.driver
         self.painter.detail = self.viewers.detail
         if driver is not None and driver.size != self.painter.asked:
@@ -205,13 +201,6 @@ class WebFront:
 
     async def _scene(self, request: Request) -> Response:
         return await self._download("scene.toml", lambda: self.session.present_scene().text())
-
-    def ask(self, job: Callable[[], Any]) -> concurrent.futures.Future[Any]:
-        """Have `job` done in the simulation's thread, the only one that may look at its arrays."""
-        future: concurrent.futures.Future[Any] = concurrent.futures.Future()
-        self._jobs.put((job, future))
-        self.session.wake()
-        return future
 
     async def _download(self, name: str, make: Callable[[], str]) -> Response:
         """Return a text that the simulation's thread makes, as a file."""

@@ -21,9 +21,8 @@ def header(desk: Desk, frames_per_second: float) -> None:
     imgui.text("wavetank")
     imgui.same_line(0, em)
     imgui.text_colored(rgba(SOFT), world["title"] or "Scene")
-    rate = (
-        "" if status["paused"] else f"{frames_per_second:.0f} pictures/s     "
-    )  # a picture that rests is not a slow one
+    # A picture that rests is not a slow one.
+    rate = "" if status["paused"] else f"{frames_per_second:.0f} pictures/s     "
     text = f"{status['count']:,} particles     {rate}{world['arch']}"
     late = status["late"] and status["ticks"] > 10
     pace = "paused" if status["paused"] else f"{status['pace']:.2f} s of water a second"
