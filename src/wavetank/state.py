@@ -56,7 +56,8 @@ class Grid:
     order: qd.types.ndarray()  # i32 [capacity]: which particle comes at each sorted place
     number: qd.types.ndarray()  # i32 [capacity]: neighbours of each particle
     visits: qd.types.ndarray()  # i32 [capacity]: the same, in whole groups of `lanes`
-    list: qd.types.ndarray()  # i32 [capacity, room]: their indices, filled up with `nowhere`; room a multiple of 16
+    list: qd.types.ndarray()  # i32 [capacity * room]: their indices, filled up with `nowhere`
+    room: qd.i32  # places for each particle, a multiple of 16
     lanes: qd.i32  # neighbours that are computed together
     nowhere: qd.i32  # index of a particle that is far from all others
     nx: qd.i32  # cells before the pattern moves on along y

@@ -117,7 +117,7 @@ def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.
     """Write every particle's neighbours within h and return the largest number found, even if it had no room."""
     most = 0
     h2 = c.h * c.h
-    room = grid.list.shape[1]
+    room = grid.room
     for i in range(count):
         p = predicted(particles, i)
         cell = grid.cell[grid.order[i]]
@@ -141,14 +141,14 @@ def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.
                     if own >= 0 and own < 32:
                         hits &= ~(qd.u32(1) << qd.cast(own, qd.u32))
                     while hits != qd.u32(0):
-                        grid.list[i, qd.min(n, room - 1)] = begin + qd.math.ffs(hits) - 1
+                        grid.list[i * room + qd.min(n, room - 1)] = begin + qd.math.ffs(hits) - 1
                         hits &= hits - qd.u32(1)
                         n += 1
                     begin += 32
         grid.number[i] = n
         visits = qd.min((n + grid.lanes - 1) // grid.lanes * grid.lanes, room)
         for k in range(n, visits):
-            grid.list[i, k] = grid.nowhere
+            grid.list[i * room + k] = grid.nowhere
         grid.visits[i] = visits
         qd.atomic_max(most, n)
     return most
@@ -174,8 +174,10 @@ def for_each_neighbor(
     `visit` adds to the vector `sums`, and nothing where |r| >= h: it is also called for the particle that is nowhere.
     """
     p = predicted(particles, i)
-    for n in range(grid.visits[i]):
-        j = grid.list[i, n]
+    # The loop runs over the places themselves: a sum in the subscript would be computed for each of eight neighbours.
+    begin = i * grid.room
+    for n in range(begin, begin + grid.visits[i]):
+        j = grid.list[n]
         visit(sums, p - predicted(particles, j), i, j, data, c, method)
 
 
@@ -224,7 +226,7 @@ def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, 
     return Grid(
         cell=integers(capacity), start=integers(total + 1), fill=integers(total),
         blocks=integers(-(-total // SCAN_BLOCK)), order=integers(capacity), number=integers(capacity),
-        visits=integers(capacity), list=integers(capacity, room),
+        visits=integers(capacity), list=integers(capacity * room), room=room,
         lanes=8 if current_backend() == "cpu" else 1, nowhere=capacity,
         nx=int(cells[0]), ny=int(cells[1]), nz=int(cells[2]), cells=total,
     )  # fmt: skip
@@ -241,8 +243,9 @@ def sort_particles(particles: Particles, spare: Particles, grid: Grid, c: Coeffi
 def find_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> Any:
     """List the neighbours of sorted particles; where a list had too little room it is made larger and built again."""
     most = list_neighbors(particles, grid, c, count)
-    if most >= grid.list.shape[1]:
-        grid.list = integers(grid.list.shape[0], _rounded(most))
+    if most >= grid.room:
+        grid.room = _rounded(most)
+        grid.list = integers(grid.cell.shape[0] * grid.room)
         list_neighbors(particles, grid, c, count)
 
 
