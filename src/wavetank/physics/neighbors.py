@@ -126,7 +126,11 @@ def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.
             layer = grid.nx * (row % 3 - 1)
             if qd.static(p.n == 3):
                 layer += grid.nx * grid.ny * (row // 3 - 1)
-            low = (cell + layer - 1) % grid.cells
+            low = cell + layer - 1
+            if low < 0:
+                low += grid.cells
+            if low >= grid.cells:
+                low -= grid.cells
             # A row that runs over the last cell goes on at the first.
             over = qd.max(low + 3 - grid.cells, 0)
             for part in range(1 + qd.min(over, 1)):
