@@ -163,7 +163,7 @@ def near_bits(particles: Particles, p: qd.template(), begin, length, h2):
     """Bits of the particles from `begin` on, at most 32, that are within the root of `h2` of the point `p`."""
     hits = qd.u32(0)
     # In whole groups of eight, up to seven particles too many: their bits are cut off.
-    for k in range((length + 7) // 8 * 8):
+    for k in range(32):
         hits |= qd.cast((p - predicted(particles, begin + k)).norm_sqr() < h2, qd.u32) << qd.cast(k, qd.u32)
     return hits & (qd.u32(0xFFFFFFFF) >> qd.cast(32 - length, qd.u32))
 
