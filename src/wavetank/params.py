@@ -71,6 +71,7 @@ class Parameters(Model):
     tensile_strength: float = parameter(0.0, 0.0, 1.0, "1/S_0", "k", "Artificial pressure against clustering (Eq. 7), relative likewise; shared by the iterations.")
     tensile_exponent: float = parameter(4.0, 1.0, 8.0, "", "n", "Exponent of the artificial pressure (Eq. 7).")
     tensile_distance: float = parameter(0.3, 0.05, 0.95, "h", "dq", "Distance at which the artificial pressure is k (Eq. 7).")
+    grid_pressure: float = parameter(1.0, 0.0, 1.0, "", "", "Share of the tank's mean density errors that a coarse grid removes before the iterations; 0 leaves all to them.")
     attraction: float = parameter(0.0, 0.0, 1.0, "", "", "Share of negative pressure that is kept; 0 keeps none, so that water parts freely.")
     viscosity: float = parameter(0.08, 0.0, 1.0, "", "c", "XSPH viscosity (Eq. 11), dimensionless; the share of one step at 240 steps a second.")
     dynamic_viscosity: float = parameter(0.0, 0.0, 1e6, "Pa s", "mu", "Dynamic viscosity of fluids whose material names none, solved implicitly; honey has 10.")
@@ -135,6 +136,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "substeps": 1,
         "courant": 100.0,
         "wave_courant": 100.0,
+        "grid_pressure": 0.0,
         "iterations": 5,
         "relaxation": 1.0 / PAPER_RELAXATION,
         "slowest_mode": 0.0,

@@ -15,11 +15,12 @@ from wavetank.frame import Frame
 from wavetank.moving_solids import MovingSolids
 from wavetank.params import LIVE
 from wavetank.physics import measure, population
+from wavetank.physics.coarse_pressure import new_levels
 from wavetank.physics.diffuse.pool import pool_from, pool_rows
 from wavetank.physics.diffuse.update import update_diffuse
 from wavetank.physics.neighbors import new_grid
 from wavetank.physics.smoothing import half_space_table
-from wavetank.physics.step import World, capillary_speed, capillary_substeps, step, update_densities
+from wavetank.physics.step import World, capillary_speed, capillary_substeps, has_grid_pressure, step, update_densities
 from wavetank.physics.time_step import largest_speed, pool_depth, substeps
 from wavetank.scene import MAX_PARTICLES, Scene
 from wavetank.snapshot import Snapshot, put_snapshot, read_snapshot, take_snapshot, write_snapshot
@@ -70,6 +71,7 @@ class Simulation:
             materials={},
             count=0,
             has_friction=self.solids.has_friction,
+            levels=new_levels(size, h) if size else [],
         )
         self._capacity, self._outdated = capacity, True
 
@@ -141,7 +143,9 @@ class Simulation:
         speed = max(self._solid_speed(duration), largest_speed(particles, count))
         speed += duration * sum(force.largest_acceleration() for force in (*self.forces, *self.pushed))
         capillary = min(capillary_substeps(self.world, scene, duration), scene.largest_substeps)
-        return max(capillary, substeps(scene, duration, speed, pool_depth(particles, count, scene.gravity, *box)))
+        deep = not has_grid_pressure(self.world, scene)  # otherwise depth does not matter
+        depth = pool_depth(particles, count, scene.gravity, *box) if deep else 0.0
+        return max(capillary, substeps(scene, duration, speed, depth))
 
     def _solid_speed(self, duration: float) -> float:
         """Return the largest speed [m/s] at which any solid moves through the tank in this frame."""

@@ -67,6 +67,28 @@ class Grid:
 
 
 @dataclasses.dataclass
+class CoarseGrid:
+    """A level of the grid of `physics/coarse_pressure.py`; nodes are the centres of its cells, x fastest."""
+
+    fill_sum: qd.types.ndarray()  # i32 [nodes]: sum of the tents of all particles, in units
+    error_sum: qd.types.ndarray()  # i32 [nodes]: sum of the tents times density errors, in units
+    room: qd.types.ndarray()  # f32 [nodes]: share of the cell that no solid takes, 0 where next to nothing is left
+    fill: qd.types.ndarray()  # f32 [nodes]: water over room
+    rhs: qd.types.ndarray()  # f32 [nodes]: mean density error over the stiffness
+    wx: qd.types.ndarray()  # f32 [nodes], 1/m^2: coupling with the next node along x
+    wy: qd.types.ndarray()  # likewise
+    wz: qd.types.ndarray()  # likewise
+    inverse: qd.types.ndarray()  # f32 [nodes], m^2: inverse diagonal, 0 outside of the water
+    lam: qd.types.ndarray()  # f32 [nodes], m^2: multiplier
+    nx: qd.i32
+    ny: qd.i32
+    nz: qd.i32  # 1 in 2-D
+    dx: qd.f32  # m: edges of a cell
+    dy: qd.f32
+    dz: qd.f32  # 1 in 2-D
+
+
+@dataclasses.dataclass
 class Diffuse:
     """Spray, foam and bubbles, packed at the front in the order of their birth."""
 

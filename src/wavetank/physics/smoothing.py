@@ -148,6 +148,7 @@ class RestLattice:
     density_scale: float  # rho / rho_0 = density_scale * sum_j w(q_ij), own particle included
     gradient_scale: float  # h grad(rho / rho_0) = gradient_scale * sum_j w'(q_ij) r_ij / |r_ij|
     squared_gradients: float  # h^2 S_0 = h^2 sum_k |grad_k C|^2
+    stiffness: float  # a field of multipliers moves particles by stiffness * grad lambda
     stiffest_mode: float  # largest eigenvalue of the Jacobi matrix D^-1 grad C grad C^T
 
 
@@ -161,6 +162,7 @@ def rest_lattice(name: str, dim: int, ratio: float) -> RestLattice:
     distance = np.linalg.norm(points, axis=1)
     _, slope = kernel_shape(gradient_kernel, distance)
     squares = float(np.sum((gradient_scale * slope) ** 2))
+    stiffness = -gradient_scale * float(np.sum(slope * distance)) / dim
     # Plane waves exp(i k x) are the eigenvectors on a lattice; grad C is odd, so only sines stay. Waves along the axes
     # and diagonals of the Brillouin zone hold the extremes.
     waves = np.linspace(0.0, math.pi * ratio, 65)[:, None, None] * np.array(
@@ -168,7 +170,7 @@ def rest_lattice(name: str, dim: int, ratio: float) -> RestLattice:
     )
     symbol = np.sin(waves.reshape(-1, dim) @ points.T) @ (points * (slope / distance)[:, None])
     stiffest = float(np.max(np.sum(symbol**2, axis=1)) / np.sum(slope**2))
-    return RestLattice(density_scale, gradient_scale, squares, stiffest)
+    return RestLattice(density_scale, gradient_scale, squares, stiffness, stiffest)
 
 
 @functools.cache

@@ -13,6 +13,7 @@ from wavetank.distance import SolidSet
 from wavetank.materials import Material
 from wavetank.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids, mark_near_solids
+from wavetank.physics.coarse_pressure import correct_pressure
 from wavetank.physics.density_constraint import correct_positions, measure_density, schedule, solve_multipliers
 from wavetank.physics.diffuse.pool import Pool
 from wavetank.physics.friction import apply_friction
@@ -25,7 +26,7 @@ from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattic
 from wavetank.physics.tension import apply_tension, limited_tensions, substeps_for
 from wavetank.physics.viscosity import apply_mixed_viscosity, apply_viscosity
 from wavetank.physics.vorticity import confine_vorticity, find_vorticity
-from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, Walls, swap_predictions
+from wavetank.state import CoarseGrid, Coefficients, Fluids, Grid, Particles, Scratch, Walls, swap_predictions
 
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
 #: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; measured, docs/method.md.
@@ -47,6 +48,7 @@ class World:
     materials: dict[int, Material]  # in use, by their numbers
     count: int
     has_friction: bool
+    levels: list[CoarseGrid]  # of the tank, the finest first; none without a tank
     frozen: int = 0  # particles that are ice
     pool: Pool | None = None  # of spray, foam and bubbles; made when the first are
 
@@ -75,6 +77,17 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     if act_on_fluids(world, now, kinds, params, c):
         mark_near_solids(now, solids, c, count)
         keep_out_of_solids(now, solids, c, count)
+
+    if has_grid_pressure(world, params):
+        measure_density(scratch, now, grid, solids, walls, c, count, 1.0, method)
+        volume = params.spacing**params.dim
+        stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
+        correct_pressure(
+            world.levels, now, scratch, solids, c, stiffness, volume, count, params.grid_pressure,
+            searched=world.has_solids,
+        )  # fmt: skip
+        if world.has_solids:
+            keep_out_of_solids(now, solids, c, count)
 
     tensile = int(params.tensile_strength > 0.0)
     for number, (relaxation, momentum) in enumerate(relaxations(params, kinds.density_ratio)):  # 8-19
@@ -106,6 +119,12 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         stop_frozen(now, count)
 
     world.particles, world.spare = now, spare
+
+
+def has_grid_pressure(world: World, params: Parameters) -> bool:
+    """Whether errors of the whole tank are removed on a grid: in a tank, of one density, without ice."""
+    possible = params.grid_pressure > 0.0 and world.levels and not world.frozen
+    return bool(possible and not blend(world.materials, params).mixed)
 
 
 def update_densities(world: World, params: Parameters) -> None:

@@ -26,7 +26,7 @@ LEVELS = 64  # whole steps of height that are summed; their rounding cancels
 
 
 def substeps(params: Parameters, duration: float, speed: float, depth: float) -> int:
-    """Return the number of time steps for `duration` [s], at least the usual rate."""
+    """Return the number of time steps for `duration` [s], at least the usual rate; `depth` is 0 where it is no matter."""
     gravity = math.hypot(*params.gravity)
     usual = params.substeps * duration / params.frame_time
     for_speed = (speed + duration * gravity) * duration / (params.courant * params.spacing)
