@@ -80,6 +80,9 @@ class CoarseGrid:
     wz: qd.types.ndarray()  # likewise
     inverse: qd.types.ndarray()  # f32 [nodes], m^2: inverse diagonal, 0 outside of the water
     lam: qd.types.ndarray()  # f32 [nodes], m^2: multiplier
+    slope_x: qd.types.ndarray()  # f32 [nodes], m: derivative of the multiplier across the face to the next node along x
+    slope_y: qd.types.ndarray()  # likewise
+    slope_z: qd.types.ndarray()  # likewise
     nx: qd.i32
     ny: qd.i32
     nz: qd.i32  # 1 in 2-D

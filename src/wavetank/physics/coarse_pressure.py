@@ -24,19 +24,18 @@ so that runs repeat bit for bit. What was tried, and what it gives: docs/method.
 """
 
 import math
-from typing import Any
-
-from wavetank.compiler import qd
+from wavetank.compiler import current_backend, qd
 from wavetank.distance import SolidSet, lift, signed_distance, vec3
 from wavetank.physics.boundary import flattened, kept_in_tank
 from wavetank.physics.places import predict_at, predicted
 from wavetank.state import CoarseGrid, Coefficients, Particles, Scratch, integers, scalars
 
 EDGE = 1.0  # of a cell, over the support
-SMALLEST = 4  # cells along an axis that is not halved any more
+SMALLEST = 8  # cells along an axis that is not halved any more
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
-SWEEPS, COARSEST_SWEEPS = 8, 24  # of a level, and of the coarsest
+SWEEPS, COARSEST_SWEEPS = 8, 32  # of a level, and of the coarsest
 OVER_RELAXATION = 1.5
+LARGE = 50_000  # nodes, from where threads gain more than they cost
 LEAST_OPEN = 0.1  # a cell that is less open is solid
 LEAST_THETA = 0.1
 INNER = (0.8, 0.95)  # from where to where `fill` lets a particle count: near a surface its density says nothing
@@ -81,8 +80,15 @@ def at_corner(low, k: qd.template()):
 
 
 @qd.kernel(fastcache=True)
-def gather_fill(grid: CoarseGrid, particles: Particles, unit: qd.f32, count: qd.i32):
-    """Sum the tents of all particles at the nodes."""
+def gather_fill(
+    grid: CoarseGrid, particles: Particles, solids: SolidSet, unit: qd.f32, volume: qd.f32, least_open: qd.f32,
+    count: qd.i32, searched: qd.template(),
+):  # fmt: skip
+    """Sum the tents of all particles at the nodes, and relate them to the room there.
+
+    `volume` is that of a particle over that of a cell and over the `unit`. Solids take their share of a cell where
+    they are `searched`; else there are only the walls of the tank, which end where the cells do.
+    """
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.fill_sum[n] = 0
         grid.error_sum[n] = 0
@@ -93,14 +99,6 @@ def gather_fill(grid: CoarseGrid, particles: Particles, unit: qd.f32, count: qd.
         share = s - qd.floor(s)
         for k in qd.static(range(2**p.n)):
             qd.atomic_add(grid.fill_sum[node(grid, at_corner(low, k))], qd.cast(qd.round(unit * tent(share, k)), qd.i32))
-
-
-@qd.kernel(fastcache=True)
-def find_room(grid: CoarseGrid, solids: SolidSet, scale: qd.f32, least_open: qd.f32, searched: qd.template()):
-    """Turn the sums of tents into fillings; `scale` is the volume of a particle over that of a cell and over the unit.
-
-    Solids that are no walls of the tank take their share of a cell where they are `searched`, else there is none.
-    """
     for n in range(grid.nx * grid.ny * grid.nz):
         room = 1.0
         if qd.static(searched):
@@ -116,15 +114,18 @@ def find_room(grid: CoarseGrid, solids: SolidSet, scale: qd.f32, least_open: qd.
                     room = qd.min(room, 0.5 + signed_distance(solids, k, center).w / edge)
         room = qd.max(room, 0.0)
         grid.room[n] = room if room >= least_open else 0.0
-        grid.fill[n] = scale * grid.fill_sum[n] / qd.max(room, least_open)
+        grid.fill[n] = volume * grid.fill_sum[n] / qd.max(room, least_open)
 
 
 @qd.kernel(fastcache=True)
 def gather_errors(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, unit: qd.f32, inner_from: qd.f32, inner_to: qd.f32,
-    count: qd.i32,
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, unit: qd.f32, scale: qd.f32, inner_from: qd.f32,
+    inner_to: qd.f32, least_open: qd.f32, count: qd.i32,
 ):  # fmt: skip
-    """Sum the density errors (Eq. 2) of the particles inside of the water at the nodes."""
+    """Sum the density errors (Eq. 2) of the particles inside of the water at the nodes, and set the right side to them.
+
+    `scale` is the volume of a particle over that of a cell, over the unit and over the stiffness M.
+    """
     for i in range(count):
         p = predicted(particles, i)
         s = in_cells(grid, p)
@@ -137,14 +138,8 @@ def gather_errors(
         error = unit * inside * qd.min(qd.max(scratch.rho[i] - 1.0, -1.0), 1.0)
         for k in qd.static(range(2**p.n)):
             qd.atomic_add(grid.error_sum[node(grid, at_corner(low, k))], qd.cast(qd.round(error * tent(share, k)), qd.i32))
-
-
-@qd.kernel(fastcache=True)
-def set_right_side(grid: CoarseGrid, scale: qd.f32, least_open: qd.f32):
-    """Turn the sums of errors into C / M; `scale` as that of `find_room`, over the stiffness M."""
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.rhs[n] = scale * grid.error_sum[n] / qd.max(grid.room[n], least_open)
-        grid.lam[n] = 0.0
 
 
 @qd.kernel(fastcache=True)
@@ -164,7 +159,6 @@ def restrict(coarse: CoarseGrid, fine: CoarseGrid):
         coarse.room[n] = room / (fx * fy * fz)
         coarse.fill[n] = fill / qd.max(room, 1e-6)
         coarse.rhs[n] = rhs / qd.max(room, 1e-6)
-        coarse.lam[n] = 0.0
 
 
 @qd.func
@@ -181,9 +175,38 @@ def coupling(grid: CoarseGrid, n, m, edge, least_theta):
     return result
 
 
+@qd.func
+def relax_node(grid: CoarseGrid, half, colour, over_relaxation):
+    """One step of projected over-relaxation, lambda <= 0, at a node of a `colour`, the `half`-th of its colour."""
+    pairs = (grid.nx + 1) // 2
+    row = half // pairs
+    y = row % grid.ny
+    z = row // grid.ny
+    x = (half - row * pairs) * 2 + (y + z + colour) % 2
+    n = x + grid.nx * row
+    if x < grid.nx and grid.inverse[n] > 0.0:
+        total = -grid.rhs[n] + grid.wx[n] * grid.lam[n + 1] + grid.wy[n] * grid.lam[n + grid.nx]
+        layer = grid.nx * grid.ny
+        total += grid.wz[n] * grid.lam[n + layer]
+        if x > 0:
+            total += grid.wx[n - 1] * grid.lam[n - 1]
+        if y > 0:
+            total += grid.wy[n - grid.nx] * grid.lam[n - grid.nx]
+        if z > 0:
+            total += grid.wz[n - layer] * grid.lam[n - layer]
+        lam = grid.lam[n]
+        grid.lam[n] = qd.min(lam + over_relaxation * (total * grid.inverse[n] - lam), 0.0)
+
+
 @qd.kernel(fastcache=True)
-def couple(grid: CoarseGrid, least_theta: qd.f32):
-    """Set up the Poisson equation: the couplings through all faces, and the inverse diagonal, 0 outside of the water."""
+def solve(
+    grid: CoarseGrid, coarser: CoarseGrid, guessed: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32, least_theta: qd.f32,
+    parallel: qd.template(),
+):  # fmt: skip
+    """Set up the Poisson equation and relax it in some sweeps of two colours; start from the `coarser` level if so.
+
+    Nodes outside of the water keep lambda = 0. The couplings of faces on the rim of the grid are 0.
+    """
     for n in range(grid.nx * grid.ny * grid.nz):
         c = coordinates(grid, n)
         wx, wy, wz, diagonal = 0.0, 0.0, 0.0, 0.0
@@ -196,6 +219,7 @@ def couple(grid: CoarseGrid, least_theta: qd.f32):
         grid.wx[n] = wx
         grid.wy[n] = wy
         grid.wz[n] = wz
+        inverse, lam = 0.0, 0.0
         if grid.fill[n] > 0.5 and grid.room[n] > 0.0:
             diagonal = wx + wy + wz
             if c[0] > 0:
@@ -204,81 +228,48 @@ def couple(grid: CoarseGrid, least_theta: qd.f32):
                 diagonal += coupling(grid, n, n - grid.nx, grid.dy, least_theta)
             if c[2] > 0:
                 diagonal += coupling(grid, n, n - grid.nx * grid.ny, grid.dz, least_theta)
-        grid.inverse[n] = 1.0 / diagonal if diagonal > 0.0 else 0.0
-
-
-@qd.func
-def relax_node(grid: CoarseGrid, n, x, y, z, over_relaxation):
-    """One step of projected over-relaxation at node `n`: lambda stays below 0."""
-    if grid.inverse[n] > 0.0:
-        total = -grid.rhs[n]
-        if x > 0:
-            total += grid.wx[n - 1] * grid.lam[n - 1]
-        if x + 1 < grid.nx:
-            total += grid.wx[n] * grid.lam[n + 1]
-        if y > 0:
-            total += grid.wy[n - grid.nx] * grid.lam[n - grid.nx]
-        if y + 1 < grid.ny:
-            total += grid.wy[n] * grid.lam[n + grid.nx]
-        layer = grid.nx * grid.ny
-        if z > 0:
-            total += grid.wz[n - layer] * grid.lam[n - layer]
-        if z + 1 < grid.nz:
-            total += grid.wz[n] * grid.lam[n + layer]
+            if diagonal > 0.0:
+                inverse = 1.0 / diagonal
+                if guessed != 0:
+                    fx = grid.nx // coarser.nx
+                    fy = grid.ny // coarser.ny
+                    fz = grid.nz // coarser.nz
+                    lam = coarser.lam[node(coarser, qd.Vector([c[0] // fx, c[1] // fy, c[2] // fz]))]
+        grid.inverse[n] = inverse
+        grid.lam[n] = lam
+    if qd.static(parallel):
+        for colour in qd.static(range(16)):
+            for half in range((grid.nx + 1) // 2 * grid.ny * grid.nz):
+                relax_node(grid, half, colour, over_relaxation)
+    else:
+        # A grid of some thousand nodes is done before other threads have started.
+        qd.loop_config(serialize=True)
+        for _ in range(1):
+            for turn in range(2 * sweeps):
+                for half in range((grid.nx + 1) // 2 * grid.ny * grid.nz):
+                    relax_node(grid, half, turn, over_relaxation)
+    for n in range(grid.nx * grid.ny * grid.nz):
         lam = grid.lam[n]
-        grid.lam[n] = qd.min(lam + over_relaxation * (total * grid.inverse[n] - lam), 0.0)
-
-
-@qd.kernel(fastcache=True)
-def relax(grid: CoarseGrid, over_relaxation: qd.f32):
-    """Two sweeps over the nodes, each in the two colours of a chessboard."""
-    for turn in qd.static(range(4)):
-        for half in range((grid.nx + 1) // 2 * grid.ny * grid.nz):
-            row = half // ((grid.nx + 1) // 2)
-            y = row % grid.ny
-            z = row // grid.ny
-            x = half % ((grid.nx + 1) // 2) * 2 + (y + z + turn) % 2
-            if x < grid.nx:
-                relax_node(grid, x + grid.nx * row, x, y, z, over_relaxation)
-
-
-@qd.kernel(fastcache=True)
-def guess(fine: CoarseGrid, coarse: CoarseGrid):
-    """Start a level from the solution of the coarser one."""
-    for n in range(fine.nx * fine.ny * fine.nz):
-        c = coordinates(fine, n)
-        fx = fine.nx // coarse.nx
-        fy = fine.ny // coarse.ny
-        fz = fine.nz // coarse.nz
-        if fine.inverse[n] > 0.0:
-            fine.lam[n] = coarse.lam[node(coarse, qd.Vector([c[0] // fx, c[1] // fy, c[2] // fz]))]
+        grid.slope_x[n] = grid.wx[n] * grid.dx * (grid.lam[n + 1] - lam)
+        grid.slope_y[n] = grid.wy[n] * grid.dy * (grid.lam[n + grid.nx] - lam)
+        grid.slope_z[n] = grid.wz[n] * grid.dz * (grid.lam[n + grid.nx * grid.ny] - lam)
 
 
 @qd.func
-def slope_along(grid: CoarseGrid, s, axis: qd.template(), dim: qd.template()):
+def slope_along(
+    grid: CoarseGrid, slope: qd.template(), coupled: qd.template(), s, axis: qd.template(), dim: qd.template()
+):
     """Derivative of lambda [m] along `axis` at the place `s` [cells], from the faces around that lead into water."""
     at = s
     at[axis] -= 0.5
-    low = qd.floor(at, qd.i32)
-    share = at - qd.floor(at)
+    low = qd.floor(at)
+    share = at - low
     total, weights = 0.0, 0.0
-    step = qd.Vector([qd.static(int(axis == 0)), qd.static(int(axis == 1)), qd.static(int(axis == 2))])
     for k in qd.static(range(2**dim)):
-        c = at_corner(low, k)
-        n = node(grid, c)
-        coupled = grid.wx[n]
-        edge = grid.dx
-        if qd.static(axis == 1):
-            coupled = grid.wy[n]
-            edge = grid.dy
-        if qd.static(axis == 2):
-            coupled = grid.wz[n]
-            edge = grid.dz
-        if coupled > 0.0:
+        n = node(grid, at_corner(qd.cast(low, qd.i32), k))
+        if coupled[n] > 0.0:
             w = tent(share, k)
-            # The next node of a face is that of its own, not of a corner that was moved into the grid.
-            m = node(grid, coordinates(grid, n) + step)
-            total += w * coupled * edge * (grid.lam[m] - grid.lam[n])
+            total += w * slope[n]
             weights += w
     return total / qd.max(weights, 1e-9)
 
@@ -293,8 +284,11 @@ def move_particles(
         p = predicted(particles, i)
         s = in_cells(grid, p)
         dp = p * 0.0
-        for axis in qd.static(range(p.n)):
-            dp[axis] = stiffness * slope_along(grid, s, axis, p.n)
+        dp[0] = slope_along(grid, grid.slope_x, grid.wx, s, 0, p.n)
+        dp[1] = slope_along(grid, grid.slope_y, grid.wy, s, 1, p.n)
+        if qd.static(p.n == 3):
+            dp[2] = slope_along(grid, grid.slope_z, grid.wz, s, 2, p.n)
+        dp *= stiffness
         p += dp * qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
         near = particles.near[i]
         if near != 0:
@@ -326,8 +320,11 @@ def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
     nx, ny, nz = [*shape, 1][:3]
     edges = [edge / n for edge, n in zip(size, shape, strict=True)]
     dx, dy, dz = [*edges, 1.0][:3]
-    sums = [integers(nx * ny * nz) for _ in range(2)]
-    return CoarseGrid(*sums, *(scalars(nx * ny * nz) for _ in range(8)), nx=nx, ny=ny, nz=nz, dx=dx, dy=dy, dz=dz)
+    nodes = nx * ny * nz
+    rim = nodes + nx * ny  # the next node of those on the rim is read, and counts nothing
+    return CoarseGrid(
+        integers(nodes), integers(nodes), *(scalars(rim) for _ in range(11)), nx=nx, ny=ny, nz=nz, dx=dx, dy=dy, dz=dz
+    )
 
 
 def correct_pressure(
@@ -340,18 +337,15 @@ def correct_pressure(
     """
     finest = levels[0]
     scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
-    gather_fill(finest, particles, UNIT, count)
-    find_room(finest, solids, scale, LEAST_OPEN, int(searched))
-    gather_errors(finest, particles, scratch, UNIT, *INNER, count)
-    set_right_side(finest, share * scale / stiffness, LEAST_OPEN)
+    gather_fill(finest, particles, solids, UNIT, scale, LEAST_OPEN, count, int(searched))
+    gather_errors(finest, particles, scratch, UNIT, share * scale / stiffness, *INNER, LEAST_OPEN, count)
     for fine, coarse in zip(levels, levels[1:], strict=False):
         restrict(coarse, fine)
-    above: Any = None
+    coarser = levels[-1]
     for level in reversed(levels):
-        couple(level, LEAST_THETA)
-        if above is not None:
-            guess(level, above)
-        for _ in range((SWEEPS if above is not None else COARSEST_SWEEPS) // 2):
-            relax(level, OVER_RELAXATION)
-        above = level
+        is_coarsest = level is coarser
+        parallel = int(current_backend() != "cpu" or level.nx * level.ny * level.nz > LARGE)
+        sweeps = COARSEST_SWEEPS if is_coarsest else SWEEPS
+        solve(level, coarser, int(not is_coarsest), sweeps, OVER_RELAXATION, LEAST_THETA, parallel)
+        coarser = level
     move_particles(finest, particles, solids, c, stiffness, REACH * c.h, count)
