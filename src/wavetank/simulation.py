@@ -143,9 +143,9 @@ class Simulation:
         speed = max(self._solid_speed(duration), largest_speed(particles, count))
         speed += duration * sum(force.largest_acceleration() for force in (*self.forces, *self.pushed))
         capillary = min(capillary_substeps(self.world, scene, duration), scene.largest_substeps)
-        deep = not has_grid_pressure(self.world, scene)  # otherwise depth does not matter
-        depth = pool_depth(particles, count, scene.gravity, *box) if deep else 0.0
-        return max(capillary, substeps(scene, duration, speed, depth))
+        on_grid = has_grid_pressure(self.world, scene)
+        depth = 0.0 if on_grid else pool_depth(particles, count, scene.gravity, *box)
+        return max(capillary, substeps(scene, duration, speed, depth, on_grid=on_grid))
 
     def _solid_speed(self, duration: float) -> float:
         """Return the largest speed [m/s] at which any solid moves through the tank in this frame."""

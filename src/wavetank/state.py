@@ -72,8 +72,10 @@ class CoarseGrid:
 
     fill_sum: qd.types.ndarray()  # i32 [nodes]: sum of the tents of all particles, in units
     error_sum: qd.types.ndarray()  # i32 [nodes]: sum of the tents times density errors, in units
+    mass_sum: qd.types.ndarray()  # i32 [nodes]: sum of the tents times densities, in units, where these differ
     room: qd.types.ndarray()  # f32 [nodes]: share of the cell that no solid takes, 0 where next to nothing is left
     fill: qd.types.ndarray()  # f32 [nodes]: water over room
+    density: qd.types.ndarray()  # f32 [nodes]: mean density over that of the heaviest fluid
     rhs: qd.types.ndarray()  # f32 [nodes]: mean density error over the stiffness
     wx: qd.types.ndarray()  # f32 [nodes], 1/m^2: coupling with the next node along x
     wy: qd.types.ndarray()  # likewise

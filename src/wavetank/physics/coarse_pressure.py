@@ -81,24 +81,30 @@ def at_corner(low, k: qd.template()):
 
 @qd.kernel(fastcache=True)
 def gather_fill(
-    grid: CoarseGrid, particles: Particles, solids: SolidSet, unit: qd.f32, volume: qd.f32, least_open: qd.f32,
-    count: qd.i32, searched: qd.template(),
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, unit: qd.f32, volume: qd.f32,
+    least_open: qd.f32, count: qd.i32, searched: qd.template(), mixed: qd.template(),
 ):  # fmt: skip
     """Sum the tents of all particles at the nodes, and relate them to the room there.
 
     `volume` is that of a particle over that of a cell and over the `unit`. Solids take their share of a cell where
-    they are `searched`; else there are only the walls of the tank, which end where the cells do.
+    they are `searched`; else there are only the walls of the tank, which end where the cells do. Where fluids are
+    `mixed`, their densities are averaged.
     """
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.fill_sum[n] = 0
         grid.error_sum[n] = 0
+        grid.mass_sum[n] = 0
     for i in range(count):
         p = predicted(particles, i)
         s = in_cells(grid, p)
         low = qd.floor(s, qd.i32)
         share = s - qd.floor(s)
         for k in qd.static(range(2**p.n)):
-            qd.atomic_add(grid.fill_sum[node(grid, at_corner(low, k))], qd.cast(qd.round(unit * tent(share, k)), qd.i32))
+            n = node(grid, at_corner(low, k))
+            w = unit * tent(share, k)
+            qd.atomic_add(grid.fill_sum[n], qd.cast(qd.round(w), qd.i32))
+            if qd.static(mixed):
+                qd.atomic_add(grid.mass_sum[n], qd.cast(qd.round(w / scratch.weight[i]), qd.i32))
     for n in range(grid.nx * grid.ny * grid.nz):
         room = 1.0
         if qd.static(searched):
@@ -115,6 +121,9 @@ def gather_fill(
         room = qd.max(room, 0.0)
         grid.room[n] = room if room >= least_open else 0.0
         grid.fill[n] = volume * grid.fill_sum[n] / qd.max(room, least_open)
+        grid.density[n] = 1.0
+        if qd.static(mixed):
+            grid.density[n] = qd.max(grid.mass_sum[n], 1) / qd.cast(qd.max(grid.fill_sum[n], 1), qd.f32)
 
 
 @qd.kernel(fastcache=True)
@@ -135,7 +144,7 @@ def gather_errors(
         for k in qd.static(range(2**p.n)):
             filled += tent(share, k) * grid.fill[node(grid, at_corner(low, k))]
         inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
-        error = unit * inside * qd.min(qd.max(scratch.rho[i] - 1.0, -1.0), 1.0)
+        error = unit * inside * qd.min(qd.max(scratch.rho[i] * scratch.weight[i] - 1.0, -1.0), 1.0)
         for k in qd.static(range(2**p.n)):
             qd.atomic_add(grid.error_sum[node(grid, at_corner(low, k))], qd.cast(qd.round(error * tent(share, k)), qd.i32))
     for n in range(grid.nx * grid.ny * grid.nz):
@@ -150,26 +159,37 @@ def restrict(coarse: CoarseGrid, fine: CoarseGrid):
         fx = fine.nx // coarse.nx
         fy = fine.ny // coarse.ny
         fz = fine.nz // coarse.nz
-        room, fill, rhs = 0.0, 0.0, 0.0
+        room, fill, rhs, density = 0.0, 0.0, 0.0, 0.0
         for k in range(fx * fy * fz):
             m = node(fine, qd.Vector([c[0] * fx + k % fx, c[1] * fy + k // fx % fy, c[2] * fz + k // (fx * fy)]))
             room += fine.room[m]
             fill += fine.fill[m] * fine.room[m]
             rhs += fine.rhs[m] * fine.room[m]
+            density += fine.density[m] * fine.fill[m] * fine.room[m]
         coarse.room[n] = room / (fx * fy * fz)
+        coarse.density[n] = density / fill if fill > 0.0 else 1.0
         coarse.fill[n] = fill / qd.max(room, 1e-6)
         coarse.rhs[n] = rhs / qd.max(room, 1e-6)
 
 
 @qd.func
 def coupling(grid: CoarseGrid, n, m, edge, least_theta):
-    """What the face between the nodes `n` and `m` couples them with [1/m^2]: 0 into solids and between air and air."""
+    """What the face between the nodes `n` and `m` couples them with [1/m^2]: 0 into solids and between air and air.
+
+    It is the inverse of the density, that of the heaviest fluid being 1, over the square of the distance.
+    """
     a = qd.min(grid.fill[n], 1.0) - 0.5
     b = qd.min(grid.fill[m], 1.0) - 0.5
     theta = 1.0
     if a * b < 0.0:
         theta = qd.max(qd.max(a, b) / qd.abs(a - b), least_theta)
-    result = 1.0 / (theta * edge * edge)
+    # Light fluid gives way more: the inverse of the mean density, and of that of the water where there is air.
+    density = 0.5 * (grid.density[n] + grid.density[m])
+    if a <= 0.0:
+        density = grid.density[m]
+    if b <= 0.0:
+        density = grid.density[n]
+    result = 1.0 / (theta * edge * edge * density)
     if (a <= 0.0 and b <= 0.0) or grid.room[n] == 0.0 or grid.room[m] == 0.0:
         result = 0.0
     return result
@@ -323,21 +343,21 @@ def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
     nodes = nx * ny * nz
     rim = nodes + nx * ny  # the next node of those on the rim is read, and counts nothing
     return CoarseGrid(
-        integers(nodes), integers(nodes), *(scalars(rim) for _ in range(11)), nx=nx, ny=ny, nz=nz, dx=dx, dy=dy, dz=dz
+        *(integers(nodes) for _ in range(3)), *(scalars(rim) for _ in range(12)), nx=nx, ny=ny, nz=nz, dx=dx, dy=dy, dz=dz
     )
 
 
 def correct_pressure(
     levels: list[CoarseGrid], particles: Particles, scratch: Scratch, solids: SolidSet, c: Coefficients,
-    stiffness: float, volume: float, count: int, share: float, *, searched: bool,
+    stiffness: float, volume: float, count: int, share: float, *, searched: bool, mixed: bool,
 ) -> None:  # fmt: skip
     """Move the predicted positions of `particles` so that the `share` of the mean errors of their densities vanishes.
 
-    `scratch.rho` holds the densities over rho_0 there, `volume` [m^dim] is that of a particle at rest.
+    `scratch.rho` holds the densities over that of the heaviest fluid there, `volume` [m^dim] is that of a particle at rest.
     """
     finest = levels[0]
     scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
-    gather_fill(finest, particles, solids, UNIT, scale, LEAST_OPEN, count, int(searched))
+    gather_fill(finest, particles, scratch, solids, UNIT, scale, LEAST_OPEN, count, int(searched), int(mixed))
     gather_errors(finest, particles, scratch, UNIT, share * scale / stiffness, *INNER, LEAST_OPEN, count)
     for fine, coarse in zip(levels, levels[1:], strict=False):
         restrict(coarse, fine)

@@ -84,7 +84,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
         correct_pressure(
             world.levels, now, scratch, solids, c, stiffness, volume, count, params.grid_pressure,
-            searched=world.has_solids,
+            searched=world.has_solids, mixed=bool(kinds.mixed),
         )  # fmt: skip
         if world.has_solids:
             keep_out_of_solids(now, solids, c, count)
@@ -122,9 +122,8 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
 
 
 def has_grid_pressure(world: World, params: Parameters) -> bool:
-    """Whether errors of the whole tank are removed on a grid: in a tank, of one density, without ice."""
-    possible = params.grid_pressure > 0.0 and world.levels and not world.frozen
-    return bool(possible and not blend(world.materials, params).mixed)
+    """Whether errors of the whole tank are removed on a grid: in a tank, and without ice, which it would move."""
+    return bool(params.grid_pressure > 0.0 and world.levels and not world.frozen)
 
 
 def update_densities(world: World, params: Parameters) -> None:
