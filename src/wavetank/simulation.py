@@ -15,7 +15,7 @@ from wavetank.frame import Frame
 from wavetank.moving_solids import MovingSolids
 from wavetank.params import LIVE
 from wavetank.physics import measure, population
-from wavetank.physics.coarse_pressure import new_levels
+from wavetank.physics.coarse_grid import new_levels
 from wavetank.physics.diffuse.pool import pool_from, pool_rows
 from wavetank.physics.diffuse.update import update_diffuse
 from wavetank.physics.neighbors import new_grid

@@ -1,0 +1,108 @@
+"""Grids over the tank of about a support an edge, each half as fine as the one before.
+
+Nodes are the centres of cells, which divide the tank without remainder; a node's number is x + nx (y + ny z). A
+particle counts at the nodes around it with the weights of linear interpolation, "tents", and at a wall at the nearest
+node alone: that is what particle-in-cell methods do (Harlow 1964).
+"""
+
+import dataclasses
+import math
+
+from wavetank.compiler import qd
+from wavetank.distance import lift, vec3
+from wavetank.state import CoarseGrid, integers, scalars
+
+EDGE = 1.0  # of a cell, over the support
+SMALLEST = 8  # cells along an axis that is not halved any more
+
+
+@qd.func
+def node(grid: CoarseGrid, c):
+    """Number of the node with the whole coordinates `c`, or of the nearest that there is."""
+    x = qd.min(qd.max(c[0], 0), grid.nx - 1)
+    y = qd.min(qd.max(c[1], 0), grid.ny - 1)
+    z = qd.min(qd.max(c[2], 0), grid.nz - 1)
+    return x + grid.nx * (y + grid.ny * z)
+
+
+@qd.func
+def coordinates(grid: CoarseGrid, n):
+    """Whole coordinates of node `n`."""
+    return qd.Vector([n % grid.nx, n // grid.nx % grid.ny, n // (grid.nx * grid.ny)])
+
+
+@qd.func
+def in_cells(grid: CoarseGrid, p: qd.template()):
+    """The place `p` [m] in cells, whole at nodes; 0 along an axis that the world does not have."""
+    point = lift(p)
+    return vec3(
+        point.x / grid.dx - 0.5, point.y / grid.dy - 0.5, point.z / grid.dz - (0.5 if qd.static(p.n == 3) else 0.0)
+    )
+
+
+@qd.func
+def tent(share, k: qd.template()):
+    """Weight of corner `k` of 8 of a cell for a place with the coordinates `share` in it."""
+    w = share.x if qd.static(k & 1) else 1.0 - share.x
+    w *= share.y if qd.static(k & 2) else 1.0 - share.y
+    w *= share.z if qd.static(k & 4) else 1.0 - share.z
+    return w
+
+
+@qd.func
+def at_corner(low, k: qd.template()):
+    """Whole coordinates of corner `k` of 8 of the cell from `low` on."""
+    return low + qd.Vector([qd.static(k & 1), qd.static(k >> 1 & 1), qd.static(k >> 2)])
+
+
+@qd.kernel(fastcache=True)
+def restrict(coarse: CoarseGrid, fine: CoarseGrid):
+    """Give the nodes of a coarser level the means of the finer ones that they stand for."""
+    for n in range(coarse.nx * coarse.ny * coarse.nz):
+        c = coordinates(coarse, n)
+        fx = fine.nx // coarse.nx
+        fy = fine.ny // coarse.ny
+        fz = fine.nz // coarse.nz
+        room, fill, rhs, density = 0.0, 0.0, 0.0, 0.0
+        for k in range(fx * fy * fz):
+            m = node(fine, qd.Vector([c[0] * fx + k % fx, c[1] * fy + k // fx % fy, c[2] * fz + k // (fx * fy)]))
+            room += fine.room[m]
+            fill += fine.fill[m] * fine.room[m]
+            rhs += fine.rhs[m] * fine.room[m]
+            density += fine.density[m] * fine.fill[m] * fine.room[m]
+        coarse.room[n] = room / (fx * fy * fz)
+        coarse.density[n] = density / fill if fill > 0.0 else 1.0
+        coarse.fill[n] = fill / qd.max(room, 1e-6)
+        coarse.rhs[n] = rhs / qd.max(room, 1e-6)
+
+
+def new_levels(size: tuple[float, ...], h: float) -> list[CoarseGrid]:
+    """Allocate the grid of a tank of that `size` [m] and its coarser levels, the finest first."""
+    shape = [_divided(edge / (EDGE * h)) for edge in size]
+    levels = [_new_level(shape, size)]
+    while any(_can_halve(n) for n in shape):
+        shape = [n // 2 if _can_halve(n) else n for n in shape]
+        levels.append(_new_level(shape, size))
+    return levels
+
+
+def _can_halve(n: int) -> bool:
+    return n % 2 == 0 and n > SMALLEST
+
+
+def _divided(cells: float) -> int:
+    """Return the number near `cells` that can be halved until `SMALLEST` or less is left."""
+    halvings = max(0, math.ceil(math.log2(max(cells, 1.0) / SMALLEST)))
+    return max(1, round(cells / 2**halvings)) * 2**halvings
+
+
+def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
+    nx, ny, nz = [*shape, 1][:3]
+    edges = [edge / n for edge, n in zip(size, shape, strict=True)]
+    dx, dy, dz = [*edges, 1.0][:3]
+    nodes = nx * ny * nz
+    rim = nodes + nx * ny  # the next node of those on the rim is read, and counts nothing
+    kinds = {field.name: field.type for field in dataclasses.fields(CoarseGrid)}
+    sums = {name: integers(nodes) for name in kinds if name.endswith("_sum")}
+    fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in (qd.i32, qd.f32) and name not in sums}
+    return CoarseGrid(**sums, **fields, nx=nx, ny=ny, nz=nz, dx=dx, dy=dy, dz=dz)
