@@ -27,7 +27,7 @@ from wavetank.state import CoarseGrid, Coefficients, Particles, Scratch
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 LEAST_OPEN = 0.1  # a cell that is less open is solid
-INNER = (0.8, 0.95)  # from where to where `fill` lets a particle count: near a surface its density says nothing
+INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 REACH = 0.2  # of the support: the longest correction
 
 
