@@ -15,7 +15,8 @@ def neighbor_sets(sim: Simulation) -> list[set[int]]:
     sim.frame()
     world = sim.world
     ids = world.particles.id.to_numpy()[: sim.count]
-    number, lists = world.grid.number.to_numpy(), world.grid.list.to_numpy()
+    number, room = world.grid.number.to_numpy(), world.grid.room
+    lists = world.grid.list.to_numpy()[: sim.count * room].reshape(sim.count, room)
     sets: list[set[int]] = [set() for _ in range(sim.count)]
     for i in range(sim.count):
         found = ids[lists[i, : number[i]]].tolist()

@@ -29,15 +29,16 @@ def test_depth_is_twice_the_mean_height_against_gravity(dim, gravity):
 
 
 def test_every_bound_holds():
-    """v dt <= courant d, sqrt(g H) dt <= wave_courant d, dt <= frame_time / substeps."""
+    """v dt <= courant d, sqrt(g H) dt <= wave_courant d where no grid carries it, dt <= frame_time / substeps."""
     scene = pool(0.5, 0.01)
     for speed, depth in [(0.0, 0.0), (0.0, 2.0), (3.0, 0.1), (5.0, 5.0)]:
-        n = substeps(scene, scene.frame_time, speed, depth)
+        n = substeps(scene, scene.frame_time, speed, depth, on_grid=False)
         dt = scene.frame_time / n
         assert speed * dt <= scene.courant * scene.spacing
         assert math.sqrt(9.81 * depth) * dt <= scene.wave_courant * scene.spacing * 1.0001
         assert n >= scene.substeps
-    assert substeps(scene, scene.frame_time, 1e6, 0.0) == scene.largest_substeps
+    assert substeps(scene, scene.frame_time, 1e6, 0.0, on_grid=True) == scene.largest_substeps
+    assert substeps(scene, scene.frame_time, 0.0, 5.0, on_grid=True) == scene.substeps
 
 
 def test_nothing_has_neither_speed_nor_depth():
@@ -46,9 +47,10 @@ def test_nothing_has_neither_speed_nor_depth():
     assert pool_depth(world.world.particles, 0, (0.0, 0.0), np.zeros(2), np.ones(2)) == 0.0
 
 
-def test_deep_water_of_fine_particles_does_not_boil():
+@pytest.mark.parametrize("on_grid", [0.0, 1.0])
+def test_deep_water_of_fine_particles_does_not_boil(on_grid):
     """80 layers in one metre: with five time steps a frame they fall into themselves and bounce (docs/method.md)."""
-    world = Simulation(pool(1.0, 0.0125))
+    world = Simulation(pool(1.0, 0.0125, grid_pressure=on_grid))
     for _ in world.frames(0.8, 20):
         pass
     x, v = world.positions, world.velocities

@@ -8,8 +8,8 @@ always three consecutive numbers, and the rows around a particle never overlap a
 Inside a cell particles stand in the order of their ids, whatever the threads did: results repeat bit for bit.
 
 Both loops over pairs are written for a compiler that computes eight neighbours at a time. Building a list tests the
-candidates of a row without a branch, up to 32 of them into the bits of one word, and then walks over the bits that
-are set. A list is walked in whole groups of `lanes`, the last filled up with the particle that is nowhere, where every
+candidates of a row without a branch, a block of them into the bits of one word, and then walks over the bits that are
+set. A list is walked in whole groups of `lanes`, the last filled up with the particle that is nowhere, where every
 smoothing kernel is zero. Both were measured: docs/performance.md.
 
 Counting sort after Green 2010 ("Particle Simulation using CUDA"); Hoetzlein 2014 ("Fast Fixed-Radius Nearest
@@ -120,6 +120,7 @@ def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.
     room = grid.room
     for i in range(count):
         p = predicted(particles, i)
+        block = qd.static(32 if p.n == 3 else 16)  # what a full row has, and some more
         cell = grid.cell[grid.order[i]]
         n = 0
         for row in range(qd.static(9 if p.n == 3 else 3)):
@@ -140,15 +141,15 @@ def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.
                     begin = 0
                     end = grid.start[over]
                 while begin < end:
-                    hits = near_bits(particles, p, begin, qd.min(end - begin, 32), h2)
+                    hits = near_bits(particles, p, begin, qd.min(end - begin, block), h2)
                     own = i - begin
-                    if own >= 0 and own < 32:
+                    if own >= 0 and own < block:
                         hits &= ~(qd.u32(1) << qd.cast(own, qd.u32))
                     while hits != qd.u32(0):
                         grid.list[i * room + qd.min(n, room - 1)] = begin + qd.math.ffs(hits) - 1
                         hits &= hits - qd.u32(1)
                         n += 1
-                    begin += 32
+                    begin += block
         grid.number[i] = n
         visits = qd.min((n + grid.lanes - 1) // grid.lanes * grid.lanes, room)
         for k in range(n, visits):
@@ -160,10 +161,10 @@ def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.
 
 @qd.func
 def near_bits(particles: Particles, p: qd.template(), begin, length, h2):
-    """Bits of the particles from `begin` on, at most 32, that are within the root of `h2` of the point `p`."""
+    """Bits of the particles from `begin` on, at most a block, that are within the root of `h2` of the point `p`."""
     hits = qd.u32(0)
-    # In whole groups of eight, up to seven particles too many: their bits are cut off.
-    for k in range(32):
+    # Always a whole block, whose number of turns the compiler knows: the bits of what is too many are cut off.
+    for k in range(qd.static(32 if p.n == 3 else 16)):
         hits |= qd.cast((p - predicted(particles, begin + k)).norm_sqr() < h2, qd.u32) << qd.cast(k, qd.u32)
     return hits & (qd.u32(0xFFFFFFFF) >> qd.cast(32 - length, qd.u32))
 

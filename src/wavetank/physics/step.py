@@ -122,8 +122,16 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
 
 
 def has_grid_pressure(world: World, params: Parameters) -> bool:
-    """Whether errors of the whole tank are removed on a grid: in a tank, and without ice, which it would move."""
-    return bool(params.grid_pressure > 0.0 and world.levels and not world.frozen)
+    """Whether errors of the whole tank are removed on a grid: in a tank, and without ice, which it would move.
+
+    It is gravity that needs it. Thick fluids, and water so fine that tension rules within a cell, are held by forces
+    that vary from particle to particle; the grid would take what they press together for a lack of room.
+    """
+    if not (params.grid_pressure > 0.0 and world.levels) or world.frozen:
+        return False
+    kinds, c = blend(world.materials, params), coefficients(params, params.frame_time / params.substeps)
+    weight = kinds.largest_density * math.hypot(*params.gravity) * c.h**2  # of water as high as a cell, per length
+    return weight >= kinds.surface_tension and not is_thick(kinds, c, params.dim, params.support)
 
 
 def update_densities(world: World, params: Parameters) -> None:

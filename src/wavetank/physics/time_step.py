@@ -22,15 +22,13 @@ from wavetank.compiler import qd
 from wavetank.params import Parameters
 from wavetank.state import Particles
 
-ALONE = 4  # time steps in a frame, at least, where there is no grid to carry the pressure
 LEVELS = 64  # whole steps of height that are summed; their rounding cancels
 
 
 def substeps(params: Parameters, duration: float, speed: float, depth: float, *, on_grid: bool) -> int:
     """Return the number of time steps for `duration` [s]. Pressure that is solved `on_grid` reaches any depth."""
     gravity = math.hypot(*params.gravity)
-    least = max(params.substeps, ALONE) if params.grid_pressure > 0.0 and not on_grid else params.substeps
-    usual = least * duration / params.frame_time
+    usual = params.substeps * duration / params.frame_time
     for_speed = (speed + duration * gravity) * duration / (params.courant * params.spacing)
     for_waves = 0.0 if on_grid else math.sqrt(gravity * depth) * duration / (params.wave_courant * params.spacing)
     steps = (usual, min(for_speed, params.largest_substeps), for_waves)
