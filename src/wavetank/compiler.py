@@ -6,8 +6,10 @@ an error while arrays of the first are alive.
 """
 
 import contextlib
+import functools
 import io
 import os
+import sys
 import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -16,6 +18,7 @@ os.environ.setdefault("QD_LOG_LEVEL", "error")
 # The compiler prints a banner on import; a library should be silent.
 with contextlib.redirect_stdout(io.StringIO()):
     import quadrants as qd
+    from quadrants.lang import _wrap_inspect, kernel_impl
 
 from wavetank.errors import WavetankError
 
@@ -25,6 +28,21 @@ __all__ = ["BACKENDS", "available_backends", "current_backend", "qd", "start", "
 BACKENDS = ("cpu", "gpu", "cuda", "vulkan", "metal", "amdgpu")
 _GPU_ORDER = ("cuda", "metal", "amdgpu", "vulkan")
 _current: str | None = None
+
+
+def _is_in_class_body(level_of_class_stackframe: int) -> bool:
+    """Say whether the frame below that level is the body of a class: only there a namespace has a qualified name."""
+    return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
+
+
+# The compiler asks Python's `inspect` for the source of a function each time it inlines it, those of its own vector
+# functions hundreds of times, and for the module of each decorated one: a fifth of the time of a cold start, and half
+# a second of a warm one (docs/performance.md). The answers stay the same.
+for _name_of_lookup in ("getsourcelines", "getsourcefile"):
+    if hasattr(_wrap_inspect, _name_of_lookup):
+        setattr(_wrap_inspect, _name_of_lookup, functools.cache(getattr(_wrap_inspect, _name_of_lookup)))
+if hasattr(kernel_impl, "_inside_class"):
+    kernel_impl._inside_class = _is_in_class_body
 
 
 def available_backends() -> list[str]:
@@ -65,6 +83,9 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
             "one process has one back end, start another process for another one."
         )
     options: dict[str, object] = {"arch": getattr(qd, wanted), "enable_fallback": False, "log_level": "error"}
+    if wanted == "cpu":
+        # LLVM does again what this pass does, in a fraction of the time: kernels are as fast without it.
+        options["cfg_optimization"] = False
     if threads is not None:
         options["cpu_max_num_threads"] = threads
     with contextlib.redirect_stdout(io.StringIO()):
