@@ -14,6 +14,8 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
+
 os.environ.setdefault("QD_LOG_LEVEL", "error")
 # The compiler prints a banner on import; a library should be silent.
 with contextlib.redirect_stdout(io.StringIO()):
@@ -22,7 +24,10 @@ with contextlib.redirect_stdout(io.StringIO()):
 
 from wavetank.errors import WavetankError
 
-__all__ = ["BACKENDS", "available_backends", "current_backend", "qd", "start", "synchronize", "threads", "watched"]
+__all__ = [
+    "BACKENDS", "available_backends", "current_backend", "download", "qd", "start", "synchronize", "threads", "upload",
+    "watched",
+]  # fmt: skip
 
 #: Names a user may pass as ``arch``; ``gpu`` means the best one present.
 BACKENDS = ("cpu", "gpu", "cuda", "vulkan", "metal", "amdgpu")
@@ -105,6 +110,25 @@ def threads() -> int:
 def synchronize() -> None:
     """Wait until the device has finished everything launched so far."""
     qd.sync()
+
+
+def download(array: Any) -> np.ndarray:
+    """Return what a device array holds, to be read at once: where the host shares its memory it is that memory."""
+    synchronize()
+    values: np.ndarray = array.to_numpy(copy=None)
+    return values
+
+
+def upload(array: Any, values: Any) -> None:
+    """Write `values` to the front of a device array; what is beyond becomes zero."""
+    # A kernel that copies takes tens of milliseconds to load, one for each type and number of axes.
+    shares = _current == "cpu"
+    memory = download(array) if shares else np.zeros_like(array.to_numpy())
+    memory[len(values) :] = 0
+    if len(values):
+        memory[: len(values)] = values
+    if not shares:
+        array.from_numpy(memory)
 
 
 @contextlib.contextmanager

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import current_backend, qd, synchronize
+from wavetank.compiler import current_backend, download, qd, synchronize, upload
 from wavetank.errors import WavetankError
 from wavetank.frame import Frame
 from wavetank.view import legend as legends
@@ -91,7 +91,7 @@ class Renderer:
         look = _look(extent.dim, style.kind.coloured)
         quantity, limits, name, colors = style.coloring(frame)
         if name != self._colors_name:
-            self._colors.from_numpy(np.ascontiguousarray(colors, np.float32))
+            upload(self._colors, colors)
             self._colors_name = name
         absorption, scattering, tint = fluid_optics(None if style.kind.coloured else style.color_by, extent)
         return Shot(
@@ -140,8 +140,7 @@ class Renderer:
         if not style.kind.still or before is None or before[0] != moment:
             self._water = moment, None
             return False
-        synchronize()
-        arrays = [array.to_numpy(copy=None)[: frame.count] for array in (frame.x, frame.id)]
+        arrays = [download(array)[: frame.count] for array in (frame.x, frame.id)]
         same = before[1] is not None and all(map(np.array_equal, before[1], arrays))
         if same and self._shaped is self.buffers.water:
             return True
@@ -206,9 +205,8 @@ def _stands(shot: Shot) -> tuple[Any, ...]:
     numbers += [shot.look.to_sun, shot.extent.lower, shot.extent.upper]
     solids = shot.frame.solids
     if solids.count > solids.tank_count:
-        synchronize()
         arrays = (solids.op, solids.size, solids.offset, solids.turn, solids.first, solids.reach, solids.position)
-        numbers += [array.to_numpy(copy=None) for array in (*arrays, solids.rotation)]
+        numbers += [download(array) for array in (*arrays, solids.rotation)]
     return shot.frame.dim, solids.count, *_bytes(numbers)
 
 
