@@ -66,15 +66,10 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if shot.frame.dim == 2:  # as deep as the water is drawn
         thick = vector(0.0, 0.0, 10.0 * shot.extent.spacing)
         lower, upper = lower - thick, upper + thick
-    optics = Optics(
-        absorption=shot.absorption, scattering=shot.scattering, glow=shot.look.glow * shot.tint, usual=shot.usual,
-        coarse=float(coarseness(shot)), unit=shot.extent.spacing / UNIT, spacing=shot.extent.spacing,
-        disc=DISC[2] * shot.extent.spacing,
-    )  # fmt: skip
     lay(
-        strips_of(buffers.depth), shot.lens, shot.look, optics, lower, upper, slack(shot), under_water(shot, buffers),
-        shot.frame.dim, water.depth, water.rim, water.thickness, water.dye, water.stained, buffers.depth, water.behind,
-        buffers.lines, buffers.color, water.spare,
+        strips_of(buffers.depth), shot.lens, shot.look, optics_of(shot), lower, upper, slack(shot),
+        under_water(shot, buffers), shot.frame.dim, water.depth, water.rim, water.thickness, water.dye, water.stained,
+        buffers.depth, water.behind, buffers.lines, buffers.color, water.spare,
     )  # fmt: skip
 
 
@@ -90,6 +85,15 @@ class Optics:
     unit: qd.f32  # m per step of it
     spacing: qd.f32  # m
     disc: qd.f32  # m: radius of a particle's disc in a plane
+
+
+def optics_of(shot: Shot) -> Optics:
+    """Return what the fluid of a picture does to light."""
+    return Optics(
+        absorption=shot.absorption, scattering=shot.scattering, glow=shot.look.glow * shot.tint, usual=shot.usual,
+        coarse=float(coarseness(shot)), unit=shot.extent.spacing / UNIT, spacing=shot.extent.spacing,
+        disc=DISC[2] * shot.extent.spacing,
+    )  # fmt: skip
 
 
 @qd.func
@@ -164,7 +168,9 @@ def lay(
     dye: qd.types.ndarray(), stained: qd.types.ndarray(), depth: qd.types.ndarray(), behind: qd.types.ndarray(),
     lines: qd.types.ndarray(), color: qd.types.ndarray(), seen: qd.types.ndarray(),
 ):  # fmt: skip
-    """Shade every pixel that shows water, and copy the backdrop to the others; `seen` is filled with its depth."""
+    """Shade every pixel that shows water, and copy the backdrop to the others; `seen` is filled with the nearer
+    of its depth and the backdrop's.
+    """
     for task in range(strips.count):
         row, begin, end = strip(strips, task, depth.shape[0], depth.shape[1])
         for column in range(begin, end):
@@ -226,7 +232,9 @@ def lay(
                 else:
                     front = 1.7e38
             color[row, column] = result
-            seen[row, column] = qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
+            seen[row, column] = qd.min(
+                qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000), depth[row, column]  # FARTHEST
+            )  # fmt: skip
 
 
 @qd.func
