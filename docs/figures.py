@@ -22,6 +22,7 @@ from wavetank.lab.cases import CASES
 from wavetank.lab.converge import converge
 from wavetank.lab.validate import bounds_text, number_text, validate
 from wavetank.view.camera import Camera
+from wavetank.view.extent import extent_of_water
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import QUALITIES
 
@@ -75,8 +76,9 @@ def picture(sim: wt.Simulation, path: Path, width: int, height: int, quality: st
     """Write a JPG of a world."""
     supersample, samples = QUALITIES[quality]
     renderer = Renderer(width, height, supersample)
-    camera = Camera.framing(sim.scene, width / height).zoom(0.96)
-    image = renderer.render(sim.frame(), camera, samples=samples, legend="view" in options, **options)
+    frame = sim.frame()
+    camera = Camera.framing_extent(extent_of_water(frame), width / height)
+    image = renderer.render(frame, camera, samples=samples, legend="view" in options, **options)
     Image.fromarray(image).save(path, quality=86, optimize=True, progressive=True)
 
 

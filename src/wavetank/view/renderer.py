@@ -254,12 +254,13 @@ _kept: collections.OrderedDict[tuple[int, int, int], Renderer] = collections.Ord
 def render(
     world: Any, width: int = 1280, height: int = 720, *, supersample: int | None = None, **options: Any
 ) -> np.ndarray:
-    """Return a picture of a `Frame`, or of anything with a ``frame()``, uint8 [height, width, 3].
+    """Return a picture of a `Frame` or a `Simulation`, uint8 [height, width, 3].
 
     `options` are those of `Renderer.render`: a view by name, a camera and the fields of `Style`. Without a number
     `supersample` is 2, or 1 for pictures of more than 16 million pixels. Renderers of the last few sizes are kept.
     """
-    frame = world.frame() if hasattr(world, "frame") else world
+    # Neighbours are searched for only where densities are seen.
+    frame = world.frame(measured=options.get("color_by") == "density") if hasattr(world, "frame") else world
     if not (hasattr(frame, "scene") and hasattr(frame, "x")):
         raise WavetankError(f"render: a {type(world).__name__} cannot be drawn; give a simulation or a frame.")
     if supersample is None:
