@@ -264,6 +264,26 @@ def normal_beside(lens: Lens, row, column, z, limit, depth: qd.template()):
 
 
 @qd.func
+def behind_drop(
+    lens: Lens, look: Look, start, direction, row, column, z, depth: qd.template(), behind: qd.template()
+):  # fmt: skip
+    """Radiance along a ray that has left a drop: that of the floor or of what stands behind, as far as they are seen."""
+    way = qd.min(qd.bit_cast(depth[row, column], qd.f32) - z, 1e3)
+    if direction.y < -1e-3:
+        way = qd.min(way, qd.max(start.y, 0.0) / -direction.y)
+    result = environment(look, direction)
+    c = to_view(lens, start + way * direction)
+    if c.z > lens.near:
+        there = to_pixel(lens, c)
+        rows, columns = depth.shape[0], depth.shape[1]
+        inside = qd.min(there.x, columns - there.x, there.y, rows - there.y) / (0.1 * rows)
+        if inside > 0.0:
+            if qd.bit_cast(depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32) > z:
+                result += smoothstep(inside) * (picture_at(behind, there) - result)
+    return result
+
+
+@qd.func
 def shine(
     lens: Lens, look: Look, optics: Optics, lower, upper, dim: qd.template(), row, column, z, normal, origin,
     direction, thickness: qd.template(), dye: qd.template(), stained, depth: qd.template(), behind: qd.template(),
@@ -294,6 +314,12 @@ def shine(
         e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), depth.shape[1] - 1)
         if qd.bit_cast(depth[r, e], qd.f32) > z:  # not what stands in front of the water
             shown = picture_at(behind, there)
+    if qd.static(dim == 3):
+        # Less water than in a sheet of single particles is a drop: a ball turns a ray twice by the same angle.
+        ball = smoothstep((0.75 - tau / optics.spacing) / 0.3)
+        if ball > 0.0:
+            out = 2.0 * bent.dot(ahead) * bent - ahead
+            shown += ball * (behind_drop(lens, look, at + travel * bent, out, row, column, z, depth, behind) - shown)
     swallow, tint = optics.absorption, optics.glow
     if stained == 1:
         dyed = dye_at(dye, place / optics.coarse)
