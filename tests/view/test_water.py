@@ -163,6 +163,18 @@ def test_the_eye_under_water_sees_through_it(make_frame):
     assert wet[:, 2].mean() > wet[:, 0].mean() + 30
 
 
+def test_a_drop_shows_the_world_upside_down(make_frame):
+    """An orange box to the right of a drop is seen in its left half: a ball turns the picture around."""
+    scene = Scene(spacing=0.2, solids=[Box(center=(0.45, 1.0, -0.4), size=(0.5, 0.8, 0.2))])
+    frame = make_frame(scene, [(0.0, 1.0, 0.0)])
+    camera = Camera(eye=(0.0, 1.0, 1.2), target=(0.0, 1.0, 0.0))
+    picture = Renderer(320, 180).render(frame, camera).astype(float)
+    left, _, right = (round(c) for c in camera.project([(-0.1, 1, 0), (0, 1, 0), (0.1, 1, 0)], 320, 180)[:, 0])
+    orange = (picture[..., 0] - picture[..., 2])[80:100, left:right].mean(axis=0)
+    half = len(orange) // 2
+    assert orange[: half - 2].max() > 60 and orange[: half - 2].mean() > orange[half + 2 :].mean() + 10
+
+
 def test_the_sky_is_seen_from_below_through_a_window_of_its_size(make_frame, monkeypatch):
     """Light enters flat water within asin(1 / 1.33) = 48.75 degrees of the zenith, and none from the sky beyond."""
     frame = pool(make_frame, 0.6)
