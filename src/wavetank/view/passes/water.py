@@ -267,7 +267,7 @@ def normal_beside(lens: Lens, row, column, z, limit, depth: qd.template()):
 def behind_drop(
     lens: Lens, look: Look, start, direction, row, column, z, depth: qd.template(), behind: qd.template()
 ):  # fmt: skip
-    """Radiance along a ray that has left a drop: that of the floor or of what stands behind, as far as they are seen."""
+    """Radiance along a ray that has left a drop: of the floor or of what stands behind, as far as they are seen."""
     way = qd.min(qd.bit_cast(depth[row, column], qd.f32) - z, 1e3)
     if direction.y < -1e-3:
         way = qd.min(way, qd.max(start.y, 0.0) / -direction.y)
