@@ -22,6 +22,7 @@ from wavetank.lab.cases import CASES
 from wavetank.lab.converge import converge
 from wavetank.lab.validate import bounds_text, number_text, validate
 from wavetank.view.camera import Camera
+from wavetank.view.extent import extent_of_water
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import QUALITIES
 
@@ -38,6 +39,7 @@ and its pictures anew. What is known of the figures outside of their bounds is i
 | case | figure | value | bounds | within | reference | source |
 |---|---|---|---|---|---|---|
 """
+UNDER_WATER = Camera(eye=(0.12, 0.07, 0.78), target=(0.6, 0.36, 0.4), field_of_view=1.65)
 #: name -> scene, time [s], options of the picture
 SHOTS: dict[str, tuple[wt.Scene, float, dict[str, Any]]] = {
     "obstacle-tank": (wt.Scene.load("obstacle-tank").changed(spacing=0.02), 0.62, {}),
@@ -45,6 +47,7 @@ SHOTS: dict[str, tuple[wt.Scene, float, dict[str, Any]]] = {
     "obstacle-tank-slice": (wt.Scene.load("obstacle-tank"), 0.55, {"view": "slice"}),
     "double-dam-2d": (wt.Scene.load("double-dam-2d").changed(spacing=0.008), 0.45, {}),
     "drop": (wt.Scene.load("drop").changed(spacing=0.02), 0.42, {}),
+    "below": (wt.Scene.load("drop").changed(spacing=0.025), 0.9, {"camera": UNDER_WATER}),
     "still-tank": (wt.Scene.load("still-tank"), 1.0, {}),
     "oil-and-water": (wt.Scene.load("oil-and-water"), 0.9, {}),
     "lock-exchange": (wt.Scene.load("lock-exchange"), 1.2, {}),
@@ -75,8 +78,9 @@ def picture(sim: wt.Simulation, path: Path, width: int, height: int, quality: st
     """Write a JPG of a world."""
     supersample, samples = QUALITIES[quality]
     renderer = Renderer(width, height, supersample)
-    camera = Camera.framing(sim.scene, width / height).zoom(0.96)
-    image = renderer.render(sim.frame(), camera, samples=samples, legend="view" in options, **options)
+    frame = sim.frame()
+    camera = options.pop("camera", None) or Camera.framing_extent(extent_of_water(frame), width / height)
+    image = renderer.render(frame, camera, samples=samples, legend="view" in options, **options)
     Image.fromarray(image).save(path, quality=86, optimize=True, progressive=True)
 
 

@@ -6,25 +6,48 @@ an error while arrays of the first are alive.
 """
 
 import contextlib
+import functools
 import io
 import os
+import sys
 import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
+
+import numpy as np
 
 os.environ.setdefault("QD_LOG_LEVEL", "error")
 # The compiler prints a banner on import; a library should be silent.
 with contextlib.redirect_stdout(io.StringIO()):
     import quadrants as qd
+    from quadrants.lang import _wrap_inspect, kernel_impl
 
 from wavetank.errors import WavetankError
 
-__all__ = ["BACKENDS", "available_backends", "current_backend", "qd", "start", "synchronize", "threads", "watched"]
+__all__ = [
+    "BACKENDS", "available_backends", "current_backend", "download", "qd", "start", "synchronize", "threads", "upload",
+    "watched",
+]  # fmt: skip
 
 #: Names a user may pass as ``arch``; ``gpu`` means the best one present.
 BACKENDS = ("cpu", "gpu", "cuda", "vulkan", "metal", "amdgpu")
 _GPU_ORDER = ("cuda", "metal", "amdgpu", "vulkan")
 _current: str | None = None
+
+
+def _is_in_class_body(level_of_class_stackframe: int) -> bool:
+    """Say whether the frame below that level is the body of a class: only there a namespace has a qualified name."""
+    return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
+
+
+# The compiler asks Python's `inspect` for the source of a function each time it inlines it, those of its own vector
+# functions hundreds of times, and for the module of each decorated one: a fifth of the time of a cold start, and half
+# a second of a warm one (docs/performance.md). The answers stay the same.
+for _name_of_lookup in ("getsourcelines", "getsourcefile"):
+    if hasattr(_wrap_inspect, _name_of_lookup):
+        setattr(_wrap_inspect, _name_of_lookup, functools.cache(getattr(_wrap_inspect, _name_of_lookup)))
+if hasattr(kernel_impl, "_inside_class"):
+    kernel_impl._inside_class = _is_in_class_body
 
 
 def available_backends() -> list[str]:
@@ -65,6 +88,9 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
             "one process has one back end, start another process for another one."
         )
     options: dict[str, object] = {"arch": getattr(qd, wanted), "enable_fallback": False, "log_level": "error"}
+    if wanted == "cpu":
+        # LLVM does again what this pass does, in a fraction of the time: kernels are as fast without it.
+        options["cfg_optimization"] = False
     if threads is not None:
         options["cpu_max_num_threads"] = threads
     with contextlib.redirect_stdout(io.StringIO()):
@@ -84,6 +110,25 @@ def threads() -> int:
 def synchronize() -> None:
     """Wait until the device has finished everything launched so far."""
     qd.sync()
+
+
+def download(array: Any) -> np.ndarray:
+    """Return what a device array holds, to be read at once: where the host shares its memory it is that memory."""
+    synchronize()
+    values: np.ndarray = array.to_numpy(copy=None)
+    return values
+
+
+def upload(array: Any, values: Any) -> None:
+    """Write `values` to the front of a device array; what is beyond becomes zero."""
+    # A kernel that copies takes tens of milliseconds to load, one for each type and number of axes.
+    shares = _current == "cpu"
+    memory = download(array) if shares else np.zeros_like(array.to_numpy())
+    memory[len(values) :] = 0
+    if len(values):
+        memory[: len(values)] = values
+    if not shares:
+        array.from_numpy(memory)
 
 
 @contextlib.contextmanager

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.compiler import download
 from wavetank.distance import SolidSet
 from wavetank.scene import Scene
 from wavetank.state import Diffuse
@@ -65,7 +66,7 @@ class Frame:
 
     @functools.cached_property
     def _order(self) -> np.ndarray:
-        return np.argsort(self.id.to_numpy()[: self.count], kind="stable")
+        return np.argsort(download(self.id)[: self.count], kind="stable")
 
     @functools.cached_property
     def materials(self) -> np.ndarray:
@@ -127,9 +128,9 @@ class Frame:
     def _of_foam(self, name: str, nothing: np.ndarray) -> np.ndarray:
         if self.diffuse is None:
             return nothing
-        host: np.ndarray = getattr(self.diffuse, name).to_numpy()[: self.foam_count].copy()
+        host: np.ndarray = download(getattr(self.diffuse, name))[: self.foam_count].copy()
         return host
 
     def _by_id(self, array: Any) -> np.ndarray:
-        ordered: np.ndarray = array.to_numpy()[: self.count][self._order]
+        ordered: np.ndarray = download(array)[: self.count][self._order]
         return ordered

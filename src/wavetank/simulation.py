@@ -234,7 +234,7 @@ class Simulation:
 
     def remove(self, ids: Any) -> int:
         """Remove the particles with these ids and return how many there were; the others keep theirs."""
-        gone = np.isin(self.world.particles.id.to_numpy()[: self.count], np.asarray(ids))
+        gone = np.isin(compiler.download(self.world.particles.id)[: self.count], np.asarray(ids))
         return self._keep(~gone)
 
     def remove_inside(self, start: np.ndarray, end: np.ndarray, radius: float) -> int:
@@ -342,7 +342,7 @@ class Simulation:
     def stats(self) -> dict[str, float]:
         """Measure this instant; see `physics.measure.statistics` for the keys, and foam in numbers of particles."""
         frame = self.frame()
-        neighbors = self.world.grid.number.to_numpy()[: self.count]
+        neighbors = compiler.download(self.world.grid.number)[: self.count]
         figures = measure.statistics(
             frame.positions, frame.velocities, frame.densities, neighbors, self.scene, frame.rest_densities
         )

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from typing_extensions import override
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, upload
 from wavetank.distance import (
     DIFFERENCE,
     DISTANCES,
@@ -281,10 +281,7 @@ def build(solids: Sequence[Solid], tank_count: int, friction: float, spacing: fl
 
     def array(values: Any, kind: Any, length: int) -> Any:
         result = qd.ndarray(kind, shape=(length,))
-        host = np.zeros(result.to_numpy().shape, np.int32 if kind is qd.i32 else np.float32)
-        if len(values):
-            host[: len(values)] = np.asarray(values)
-        result.from_numpy(host)
+        upload(result, values)
         return result
 
     return SolidSet(
@@ -315,6 +312,4 @@ def resize(device: SolidSet, solids: Sequence[Solid], scales: Sequence[float]) -
         (device.size, [scale * node.size for node, scale in nodes]),
         (device.offset, [scale * node.offset for node, scale in nodes]),
     ):
-        host = np.zeros_like(array.to_numpy())
-        host[: len(values)] = values
-        array.from_numpy(host)
+        upload(array, values)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.compiler import qd
+from wavetank.compiler import upload as upload
 
 NOWHERE = 1e6  # m, in every direction
 
@@ -212,13 +213,6 @@ def integers(*shape: int) -> Any:
     return qd.ndarray(qd.i32, shape=tuple(max(n, 1) for n in shape))
 
 
-def upload(array: Any, values: np.ndarray) -> None:
-    """Write `values` to the front of a device array; what is beyond becomes zero."""
-    host = np.zeros_like(array.to_numpy())
-    host[: len(values)] = values
-    array.from_numpy(host)
-
-
 def new_particles(dim: int, capacity: int) -> Particles:
     """Allocate particles that all rest at the origin, and the one that is nowhere."""
     rows = capacity + 1
@@ -226,7 +220,7 @@ def new_particles(dim: int, capacity: int) -> Particles:
     places = np.zeros(capacity + 32, np.float32)
     places[capacity] = NOWHERE
     for component in (px, py, pz)[:dim]:
-        component.from_numpy(places)
+        upload(component, places)
     return Particles(vectors(dim, rows), px, py, pz, vectors(dim, rows), *(integers(rows) for _ in range(5)))
 
 

@@ -2,11 +2,12 @@ import math
 
 import numpy as np
 import pytest
+from worlds import frame_of
 
 from wavetank import Block, Scene, Sphere, Tank
 from wavetank.errors import WavetankError
 from wavetank.view.camera import Camera
-from wavetank.view.extent import extent_of
+from wavetank.view.extent import extent_of, extent_of_water
 
 CAMERA = Camera(eye=(1.0, 2.0, 3.0), target=(0.2, 0.1, -0.3))
 
@@ -99,3 +100,22 @@ def test_impossible_cameras_are_refused(wrong):
 def test_impossible_zoom_is_refused():
     with pytest.raises(WavetankError, match="zoom"):
         CAMERA.zoom(0.0)
+
+
+def test_a_still_frames_the_water_and_the_solids_but_no_single_drop():
+    """A puddle in a tall tank fills the picture; a drop that flies high is no reason to step back."""
+    scene = Scene(spacing=0.05, tank=Tank(size=(2, 3, 1)), solids=[Sphere(center=(1.7, 0.2, 0.5), radius=0.1)])
+    puddle = np.random.default_rng(2).uniform((0.2, 0.0, 0.3), (0.8, 0.2, 0.6), (2000, 3))
+    box = extent_of_water(frame_of(scene, np.concatenate([puddle, [(1.0, 2.9, 0.5)]])))
+    assert (box.lower <= (0.22, 0.0, 0.32)).all() and (box.lower >= (0.05, 0.0, 0.15)).all()
+    assert (box.upper >= (1.8, 0.3, 0.6)).all() and (box.upper <= (2.0, 0.45, 0.75)).all()
+    pixels = Camera.framing_extent(box).project(puddle, 1600, 900)
+    assert (pixels[:, :2] > 0).all() and (pixels[:, 0] < 1600).all() and (pixels[:, 1] < 900).all()
+
+
+def test_a_still_frames_the_floor_below_what_floats_and_all_of_an_empty_tank():
+    scene = Scene(spacing=0.05, tank=Tank(size=(1, 2, 1)))
+    assert extent_of_water(frame_of(scene, [(0.5, 1.5, 0.5)])).lower[1] == 0.0
+    np.testing.assert_array_equal(extent_of_water(frame_of(scene, np.zeros((0, 3)))).upper, (1, 2, 1))
+    plane = Scene(spacing=0.05, tank=Tank(size=(2, 3)))
+    np.testing.assert_array_equal(extent_of_water(frame_of(plane, [(0.1, 0.1)])).upper, (2, 3, 0))

@@ -16,11 +16,13 @@ from worlds import frame_of
 
 from wavetank import Box, Scene, Sphere, Tank
 from wavetank.view import views
+from wavetank.view.camera import Camera
 from wavetank.view.colormaps import oklab, to_linear
 from wavetank.view.renderer import Renderer
 
 FOLDER = Path(__file__).parent / "pictures"
 SIZE = (320, 180)
+UNDER = Camera(eye=(0.12, 0.08, 0.35), target=(0.6, 0.32, 0.3), field_of_view=1.5)  # an eye in the water
 
 
 def lattice(size, spacing):
@@ -72,8 +74,8 @@ def looks_like(image, kept):
 
 
 def picture(dim, view):
-    frame = world(dim)
-    return Renderer(*SIZE).render(frame, view=view, legend=False)
+    frame, camera = world(dim), UNDER if view == "under" else None
+    return Renderer(*SIZE).render(frame, camera, view="water" if camera else view, legend=False)
 
 
 def kept_picture(dim, view):
@@ -81,7 +83,7 @@ def kept_picture(dim, view):
 
 
 PARTS = ("still", "once", "passes")
-CASES = [(dim, view) for dim in (2, 3) for view in views.VIEWS]
+CASES = [*((dim, view) for dim in (2, 3) for view in views.VIEWS), (3, "under")]
 
 
 @pytest.mark.parametrize(("dim", "view"), CASES)
@@ -99,7 +101,8 @@ def test_no_pass_can_be_left_out(monkeypatch, name):
     kind = views.VIEWS["water"]
     without = {part: tuple(f for f in getattr(kind, part) if f.__module__.rpartition(".")[2] != name) for part in PARTS}
     monkeypatch.setitem(views.VIEWS, "water", dataclasses.replace(kind, **without))
-    assert not looks_like(picture(3, "water"), kept_picture(3, "water"))
+    view = "under" if name == "below" else "water"
+    assert not looks_like(picture(3, view), kept_picture(3, view))
 
 
 def test_the_tolerance_forgives_what_no_eye_sees():

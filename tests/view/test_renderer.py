@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wavetank import Box, HalfSpace, Scene, Tank
+from wavetank import Block, Box, HalfSpace, Scene, Tank, compiler
 from wavetank.errors import WavetankError
 from wavetank.simulation import Simulation
 from wavetank.view import renderer as module
@@ -249,3 +249,19 @@ def test_renderers_are_kept_but_not_without_end(splash):
     kept = module._kept[(width, 20, 2)]
     render(splash, width, 20)
     assert module._kept[(width, 20, 2)] is kept
+
+
+def test_neighbours_are_searched_for_only_where_densities_are_seen():
+    sim = Simulation(Scene(spacing=0.1, tank=Tank(size=(1, 1, 1)), fluids=[Block(lower=(0, 0, 0), upper=(1, 0.4, 1))]))
+    sim.step()
+    names: list[str] = []
+
+    def around(module, name, launch):
+        names.append(name)
+        return launch()
+
+    with compiler.watched(around):
+        render(sim, 32, 18)
+        assert "lay" in names and "list_neighbors" not in names
+        render(sim, 32, 18, view="particles", color_by="density")
+        assert "list_neighbors" in names

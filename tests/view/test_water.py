@@ -9,7 +9,10 @@ from test_ellipsoids import lattice
 
 from wavetank import Box, Scene, Simulation, Tank
 from wavetank.compiler import qd
+from wavetank.view import renderer as renderer_module
 from wavetank.view.camera import Camera
+from wavetank.view.lens import vector
+from wavetank.view.look import pool as pool_look
 from wavetank.view.passes import ellipsoids, flatten, thickness
 from wavetank.view.renderer import Renderer, affordable
 
@@ -158,6 +161,42 @@ def test_the_eye_under_water_sees_through_it(make_frame):
     dry = Renderer(64, 48).render(make_frame(frame.scene, []), inside).reshape(-1, 3).astype(float)
     assert wet[:, 0].mean() < dry[:, 0].mean() - 20
     assert wet[:, 2].mean() > wet[:, 0].mean() + 30
+
+
+def test_a_drop_shows_the_world_upside_down(make_frame):
+    """An orange box to the right of a drop is seen in its left half: a ball turns the picture around."""
+    scene = Scene(spacing=0.2, solids=[Box(center=(0.45, 1.0, -0.4), size=(0.5, 0.8, 0.2))])
+    frame = make_frame(scene, [(0.0, 1.0, 0.0)])
+    camera = Camera(eye=(0.0, 1.0, 1.2), target=(0.0, 1.0, 0.0))
+    picture = Renderer(320, 180).render(frame, camera).astype(float)
+    left, _, right = (round(c) for c in camera.project([(-0.1, 1, 0), (0, 1, 0), (0.1, 1, 0)], 320, 180)[:, 0])
+    orange = (picture[..., 0] - picture[..., 2])[80:100, left:right].mean(axis=0)
+    half = len(orange) // 2
+    assert orange[: half - 2].max() > 60 and orange[: half - 2].mean() > orange[half + 2 :].mean() + 10
+
+
+def test_the_sky_is_seen_from_below_through_a_window_of_its_size(make_frame, monkeypatch):
+    """Light enters flat water within asin(1 / 1.33) = 48.75 degrees of the zenith, and none from the sky beyond."""
+    frame = pool(make_frame, 0.6)
+    camera = Camera(eye=(0.5, 0.3, 0.4), target=(0.5, 0.6, 0.38), field_of_view=2.2)
+    pictures = []
+    for color in (0.0, 3.0):
+        look = dataclasses.replace(
+            pool_look(), zenith=vector(color, color, color), horizon=vector(color, color, color),
+            lamp=vector(0.0, 0.0, 0.0), sparkle=0.0,
+        )  # fmt: skip
+        monkeypatch.setattr(renderer_module, "_look", lambda dim, coloured, look=look: look)
+        pictures.append(Renderer(160, 120).render(frame, camera).astype(int))
+    change = np.abs(pictures[1] - pictures[0]).max(axis=2)
+    rays = np.array([[camera.ray(c + 0.5, r + 0.5, 160, 120)[1] for c in range(160)] for r in range(120)])
+    angle = np.degrees(np.arccos(rays[..., 1]))
+    reach = np.abs(0.3 / rays[..., 1:2] * rays[..., ::2] + (0.5, 0.4) - 0.5).max(
+        axis=2
+    )  # on the surface, from its middle
+    surface = (rays[..., 1] > 0.1) & (reach < 0.42)  # a fillet of water climbs the panes
+    assert (surface & (angle > 51)).sum() > 300 and (surface & (angle < 46)).sum() > 300
+    assert change[surface & (angle < 46)].min() > 40
+    assert np.percentile(change[surface & (angle > 51)], 95) <= 3
 
 
 def test_many_samples_agree_with_one_but_are_smoother(make_frame):

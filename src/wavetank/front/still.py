@@ -8,9 +8,11 @@ from wavetank import __version__
 from wavetank.errors import WavetankError
 from wavetank.export import exporter_for
 from wavetank.export.replacing import partial_path
+from wavetank.frame import Frame
 from wavetank.scene import Scene
 from wavetank.simulation import Simulation
 from wavetank.view.camera import Camera
+from wavetank.view.extent import extent_of_water
 from wavetank.view.renderer import Renderer, affordable
 from wavetank.view.style import QUALITIES, Style, quality_named
 
@@ -35,8 +37,8 @@ def take(
     style = {**options, "samples": samples}
     view = Style(**style).kind
     sim = _open(world, scene, at, arch)
-    camera = _camera_of(sim, eye, target, width / max(height, 1))
-    renderer, frame = Renderer(width, height, affordable(width, height, supersample)), sim.frame()
+    renderer, frame = Renderer(width, height, affordable(width, height, supersample)), sim.frame(view.coloured)
+    camera = _camera_of(frame, eye, target, width / max(height, 1))
     began = time.perf_counter()
     image = renderer.render(frame, camera, **style)
     figures: dict[str, Any] = {
@@ -65,11 +67,9 @@ def _open(world: str, scene: Scene | None, at: float | None, arch: str) -> Simul
     return sim
 
 
-def _camera_of(sim: Simulation, eye: str | None, target: str | None, aspect: float) -> Camera | None:
-    """Return the camera that two texts of the form ``2,1,3`` ask for, or None for the usual one."""
-    if eye is None and target is None:
-        return None
-    usual = Camera.framing(sim.scene, aspect)
+def _camera_of(frame: Frame, eye: str | None, target: str | None, aspect: float) -> Camera:
+    """Return the camera that two texts of the form ``2,1,3`` ask for; what neither says frames the water."""
+    usual = Camera.framing_extent(extent_of_water(frame), aspect)
     return Camera(
         eye=_point("eye", eye) if eye else usual.eye,
         target=_point("target", target) if target else usual.target,

@@ -23,7 +23,7 @@ import dataclasses
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, upload
 from wavetank.distance import vec3
 from wavetank.errors import WavetankError
 from wavetank.meshes.tree import Tree, box_square, leaving, next_node, plant, triangle_square
@@ -90,7 +90,7 @@ def _inside(corners: np.ndarray, counts: tuple[int, int, int], cells: int, name:
         crossings.fill(0)
         sides = [qd.ndarray(vec3, shape=(len(corners),)) for _ in range(3)]
         for array, values in zip(sides, corners.transpose(1, 0, 2), strict=True):
-            array.from_numpy(np.ascontiguousarray(values[:, order]))
+            upload(array, values[:, order])
         count_crossings(*sides, crossings, na, nb, nc, *_ASIDE, len(corners))
         before = np.cumsum(crossings.to_numpy().reshape(nc, nb, na), axis=2, dtype=np.int16)
         both = (before != 0).astype(np.int8) + (before != before[:, :, -1:])

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, upload
 from wavetank.meshes.grid import DistanceGrid
 from wavetank.solid import Node
 
@@ -30,7 +30,7 @@ def put_grids(nodes: Sequence[Node], spacing: float) -> tuple[list[int], Any, An
     if grids:
         first = np.cumsum([0, *sizes[:-1]])
         rows = [[at, *grid.distances.shape[::-1]] for at, grid in zip(first, grids, strict=True)]
-        places.from_numpy(np.array(rows, np.int32))
+        upload(places, rows)
         flat = [part for grid in grids for part in ([grid.cell], grid.distances.reshape(-1))]
-        samples.from_numpy(np.concatenate(flat).astype(np.float32))
+        upload(samples, np.concatenate(flat))
     return codes, places, samples

@@ -10,7 +10,7 @@ import dataclasses
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, upload
 from wavetank.distance import vec3
 
 LEAF = 4  # triangles
@@ -63,7 +63,7 @@ def _along_curve(points: np.ndarray) -> np.ndarray:
 
 def _device(values: np.ndarray) -> qd.types.ndarray():
     array = qd.ndarray(qd.f32 if values.ndim == 1 else vec3, shape=(len(values),))
-    array.from_numpy(np.ascontiguousarray(values))
+    upload(array, values)
     return array
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import qd, synchronize
+from wavetank.compiler import download, qd, upload
 from wavetank.view.colormaps import to_srgb
 from wavetank.view.lens import vec2, vec3
 
@@ -64,11 +64,8 @@ class Buffers:
 
     def host_picture(self) -> np.ndarray:
         """Return a copy of the finished picture, uint8 [height, width, 3]."""
-        synchronize()
         shape = (self.rows // self.supersample, self.columns // self.supersample, 3)
-        # Without a copy where the device shares memory with the host; the one below is ours to keep.
-        words: np.ndarray = self.picture.to_numpy(copy=None)
-        return words.view(np.uint8)[: shape[0] * shape[1] * 3].reshape(shape).copy()
+        return download(self.picture).view(np.uint8)[: shape[0] * shape[1] * 3].reshape(shape).copy()
 
 
 def allocate(width: int, height: int, supersample: int) -> Buffers:
@@ -77,7 +74,7 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
     # As fine as the picture, within what a shadow needs and a device likes.
     texels = min(2048, max(256, shape[0]))
     curve = qd.ndarray(qd.i32, shape=(CURVE_ENTRIES,))
-    curve.from_numpy((255.0 * to_srgb(np.linspace(0.0, 1.0, CURVE_ENTRIES)) + 0.5).astype(np.int32))
+    upload(curve, (255.0 * to_srgb(np.linspace(0.0, 1.0, CURVE_ENTRIES)) + 0.5).astype(np.int32))
     return Buffers(
         depth=qd.ndarray(qd.i32, shape=shape),
         surface=qd.ndarray(qd.i32, shape=shape),

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+IN_SIGHT = 99.8  # per cent of the water that a still shows for certain
 ENDLESS = 1e4  # m: what reaches that far, a half-space, is no reason to step back
 
 
@@ -53,6 +54,24 @@ def extent_of(scene: Any) -> Extent:
     return Extent(
         scene.dim, float(scene.spacing), lower - 0.5 * scene.spacing * thin, upper + 0.5 * scene.spacing * thin
     )
+
+
+def extent_of_water(frame: Any) -> Extent:
+    """Return the box around the water and the solids of a frame, without single drops that fly high, on the floor.
+
+    What a still of a tall tank with little water in it shows; a 2-D world is shown as a whole.
+    """
+    whole = extent_of(frame.scene)
+    if whole.dim == 2 or frame.count == 0:
+        return whole
+    x = frame.positions
+    boxes = [np.percentile(x, (100.0 - IN_SIGHT, IN_SIGHT), axis=0)]
+    boxes += [(s.origin - s.reach(), s.origin + s.reach()) for s in frame.scene.solids if s.reach() < ENDLESS]
+    margin = 0.04 * whole.radius
+    lower = np.maximum(np.min([low for low, _ in boxes], axis=0) - margin, whole.lower)
+    upper = np.minimum(np.max([high for _, high in boxes], axis=0) + margin, whole.upper)
+    lower[1] = whole.lower[1]  # what floats, with its shadow
+    return Extent(whole.dim, whole.spacing, lower, np.maximum(upper, lower + whole.spacing))
 
 
 def _in_space(point: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import current_backend, qd, synchronize
+from wavetank.compiler import current_backend, download, qd, synchronize, upload
 from wavetank.errors import WavetankError
 from wavetank.frame import Frame
 from wavetank.view import legend as legends
@@ -91,7 +91,7 @@ class Renderer:
         look = _look(extent.dim, style.kind.coloured)
         quantity, limits, name, colors = style.coloring(frame)
         if name != self._colors_name:
-            self._colors.from_numpy(np.ascontiguousarray(colors, np.float32))
+            upload(self._colors, colors)
             self._colors_name = name
         absorption, scattering, tint = fluid_optics(None if style.kind.coloured else style.color_by, extent)
         return Shot(
@@ -140,8 +140,7 @@ class Renderer:
         if not style.kind.still or before is None or before[0] != moment:
             self._water = moment, None
             return False
-        synchronize()
-        arrays = [array.to_numpy(copy=None)[: frame.count] for array in (frame.x, frame.id)]
+        arrays = [download(array)[: frame.count] for array in (frame.x, frame.id)]
         same = before[1] is not None and all(map(np.array_equal, before[1], arrays))
         if same and self._shaped is self.buffers.water:
             return True
@@ -206,9 +205,8 @@ def _stands(shot: Shot) -> tuple[Any, ...]:
     numbers += [shot.look.to_sun, shot.extent.lower, shot.extent.upper]
     solids = shot.frame.solids
     if solids.count > solids.tank_count:
-        synchronize()
         arrays = (solids.op, solids.size, solids.offset, solids.turn, solids.first, solids.reach, solids.position)
-        numbers += [array.to_numpy(copy=None) for array in (*arrays, solids.rotation)]
+        numbers += [download(array) for array in (*arrays, solids.rotation)]
     return shot.frame.dim, solids.count, *_bytes(numbers)
 
 
@@ -256,12 +254,13 @@ _kept: collections.OrderedDict[tuple[int, int, int], Renderer] = collections.Ord
 def render(
     world: Any, width: int = 1280, height: int = 720, *, supersample: int | None = None, **options: Any
 ) -> np.ndarray:
-    """Return a picture of a `Frame`, or of anything with a ``frame()``, uint8 [height, width, 3].
+    """Return a picture of a `Frame` or a `Simulation`, uint8 [height, width, 3].
 
     `options` are those of `Renderer.render`: a view by name, a camera and the fields of `Style`. Without a number
     `supersample` is 2, or 1 for pictures of more than 16 million pixels. Renderers of the last few sizes are kept.
     """
-    frame = world.frame() if hasattr(world, "frame") else world
+    # Neighbours are searched for only where densities are seen.
+    frame = world.frame(measured=options.get("color_by") == "density") if hasattr(world, "frame") else world
     if not (hasattr(frame, "scene") and hasattr(frame, "x")):
         raise WavetankError(f"render: a {type(world).__name__} cannot be drawn; give a simulation or a frame.")
     if supersample is None:

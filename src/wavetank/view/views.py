@@ -6,6 +6,7 @@ from collections.abc import Callable
 from wavetank.view.buffers import Buffers
 from wavetank.view.passes import (
     backdrop,
+    below,
     cut,
     ellipsoids,
     flatten,
@@ -50,7 +51,7 @@ VIEWS: dict[str, View] = {
         once=(ellipsoids.draw,),
         sunny=(sunlight.see_water,),
         passes=(
-            backdrop.draw, surface.draw, flatten.draw, thickness.draw, water.draw,
+            backdrop.draw, surface.draw, flatten.draw, thickness.draw, water.draw, below.draw,
             foam.draw_over_water,
         ),
         coloured=False,

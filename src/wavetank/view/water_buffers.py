@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, upload
 from wavetank.frame import Frame
 from wavetank.view.buffers import Buffers
 from wavetank.view.extent import Extent
@@ -35,7 +35,9 @@ class WaterBuffers:
     ellipsoids: Ellipsoids
     depth: Any  # i32 [rows, columns]: bits of the depth [m] of the water's surface, FARTHEST where there is none
     rim: Any  # i32 [rows, columns]: share 0 to 127 that an outline covers, << 24, | 2^24 - 1 - depth >> 7; or 0
-    spare: Any  # i32 [rows, columns]: the same while it is being smoothed, then as seen through the panes
+    spare: (
+        Any  # i32 [rows, columns]: the same while it is being smoothed, then of the nearest that is seen, water or not
+    )
     thickness: Any  # i32 [rows / 2, columns / 2]: water along the view, in 1 / 4096 of a spacing
     dye: Any  # i32 [rows / 2, columns / 2, 4]: the dyed part of it, and that part times linear red, green, blue
     stained: Any  # i32 [1]: 1 where any of it is dyed, else `dye` holds nothing of use
@@ -90,7 +92,7 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
         fields = {name: getattr(water, name) for name in fields}
     fields["stained"] = qd.ndarray(qd.i32, shape=(1,))
     fields["stains"] = qd.ndarray(qd.i32, shape=stains.shape)
-    fields["stains"].from_numpy(stains)
+    upload(fields["stains"], stains)
     texels = sun_texels(extent)
     fields |= {name: qd.ndarray(qd.i32, shape=(texels, texels)) for name in SUN_MAPS}
     buffers.water = WaterBuffers(

@@ -70,7 +70,7 @@ def set_style() -> None:
         (p.axis_text, SOFT, 1), (p.legend_bg, PANEL, 0), (p.legend_border, PANEL, 0), (p.inlay_text, SOFT, 1),
     ):  # fmt: skip
         plots.set_color_(part, rgba(tint, share))
-    plots.plot_padding = ImVec2(4, 6)
+    plots.plot_padding = ImVec2(0.9 * imgui.get_style().font_size_base, 6)  # room for half a label at either end
     plots.label_padding = ImVec2(4, 3)
 
 

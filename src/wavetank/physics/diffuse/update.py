@@ -11,6 +11,7 @@ from wavetank.physics.diffuse.pool import bear, compact, new_pool, scan
 from wavetank.physics.diffuse.potentials import count_births, find_surface
 from wavetank.physics.smoothing import sigma
 from wavetank.physics.step import World, coefficients, method_number
+from wavetank.physics.time_step import largest_speed
 from wavetank.state import Air
 
 RATE = 24.0  # births of a most agitated water particle in the time L / U, at foam = 1
@@ -18,23 +19,27 @@ SPRAY_DRAG = 0.25  # U / L: the terminal speed of spray is U / 0.25
 BUBBLE_RISE = 0.1  # U
 BUBBLE_PULL = 2.0  # g
 SPREAD = 1.0  # d
+#: Energy in U^2 up to which no water foams; a little below what `potentials.potential` spells out.
+LEAST_ENERGY = 0.0499
 
 
 def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> None:
     """Move what there is by `dt` [s] and add what the water makes in this frame."""
+    if (world.pool is None or not world.pool.count) and not _can_foam(world, params, dt, frame):
+        return
     if world.pool is None:
-        if params.foam == 0.0 or not world.count:
-            return
         world.pool = new_pool(params.dim, params.foam_capacity, world.particles.id.shape[0])
     pool, water, grid, solids, count = world.pool, world.particles, world.grid, world.solids, world.count
     c, method = coefficients(params, dt), method_number(params)
     a = air(params, count, pool.count / pool.capacity, dt, frame)
     gravity = np.array([*params.gravity, 0.0][:3], np.float32)
 
-    move(pool.now, pool.births, water, grid, solids, c, a, pool.count, gravity)
+    if pool.count:
+        move(pool.now, pool.births, water, grid, solids, c, a, pool.count, gravity)
     scan(pool.births.kept, pool.births.blocks, pool.count)
-    compact(pool.spare, pool.now, pool.births, pool.count)
-    pool.now, pool.spare = pool.spare, pool.now
+    if pool.count:
+        compact(pool.spare, pool.now, pool.births, pool.count)
+        pool.now, pool.spare = pool.spare, pool.now
 
     makes = count if a.made > 0.0 else 0
     if makes:
@@ -44,6 +49,14 @@ def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> N
     scan(pool.births.first, pool.births.blocks, makes)
     total, births = bear(pool.now, pool.births, water, grid, solids, c, a, makes, pool.count, pool.born)
     pool.count, pool.born = int(total), (pool.born + int(births)) % 2**31
+
+
+def _can_foam(world: World, params: Parameters, dt: float, frame: int) -> bool:
+    """Say whether any of the water is fast enough to make foam: where none is, not even the kernels are compiled."""
+    if params.foam == 0.0 or not world.count:
+        return False
+    a = air(params, world.count, 0.0, dt, frame)
+    return a.made > 0.0 and largest_speed(world.particles, world.count) ** 2 > LEAST_ENERGY * a.speed**2
 
 
 def air(params: Parameters, water: int, filled: float, dt: float, frame: int) -> Air:

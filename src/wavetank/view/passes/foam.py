@@ -45,16 +45,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
 def draw_over_water(shot: Shot, buffers: Buffers) -> None:
     """Do the same where the water is not part of the picture's depth but lies in front of it."""
     if shot.frame.foam_count > 0:
-        water = water_of(buffers, shot)
-        merge(buffers.depth, water.spare, water.spare)
-        lay(shot, buffers, water.spare, 0.25 * shot.extent.spacing)
-
-
-@qd.kernel(fastcache=True)
-def merge(depth: qd.types.ndarray(), water_depth: qd.types.ndarray(), nearest: qd.types.ndarray()):
-    """Take the nearer of two depths."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        nearest[row, column] = qd.min(depth[row, column], water_depth[row, column])
+        lay(shot, buffers, water_of(buffers, shot).spare, 0.25 * shot.extent.spacing)
 
 
 def lay(shot: Shot, buffers: Buffers, depth: Any, sunk: float) -> None:

@@ -47,13 +47,7 @@ def draw_solids(shot: Shot, buffers: Buffers) -> None:
 
 def cast(shot: Shot, buffers: Buffers) -> None:
     """Add the solids to the sun's depth map."""
-    solid_set, texels = shot.frame.solids, buffers.texels
-    if solid_set.count > solid_set.tank_count:
-        solids.bound(solid_set, shot.sun, texels, texels, buffers.solid_box)
-        solids.trace_depth(
-            strips_of(buffers.sun_depth), solid_set, solids.window(shot), shot.sun, buffers.solid_box,
-            buffers.sun_depth,
-        )  # fmt: skip
+    solids.lower_depth(shot, buffers, shot.sun, buffers.sun_depth, 0)
 
 
 def fall(shot: Shot, buffers: Buffers, light: Any, step: int) -> None:

@@ -12,6 +12,7 @@ particles, which are balls around that plane and would cover the rim of every so
 """
 
 import dataclasses
+from typing import Any
 
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, grain, signed_distance
@@ -36,12 +37,18 @@ class Window:
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Draw the solids that are not walls of the tank, in front of or behind what is there."""
+    lower_depth(shot, buffers, shot.lens, buffers.depth, 1)
+
+
+def lower_depth(shot: Shot, buffers: Buffers, lens: Lens, depth: Any, is_seen: int) -> None:
+    """Lower `depth` to the solids that `lens` sees; with `is_seen` (1 or 0) draw them into the picture's buffers."""
     solids = shot.frame.solids
     if solids.count > solids.tank_count:
-        bound(solids, shot.lens, buffers.rows, buffers.columns, buffers.solid_box)
+        rows, columns = depth.shape
+        bound(solids, lens, rows, columns, buffers.solid_box)
         trace(
-            strips_of(buffers.depth), solids, window(shot), shot.lens, shot.look.solid, buffers.solid_box,
-            buffers.depth, buffers.surface, buffers.normal, buffers.color,
+            strips_of(depth), solids, window(shot), lens, shot.look.solid, is_seen, buffers.solid_box,
+            depth, buffers.surface, buffers.normal, buffers.color,
         )  # fmt: skip
 
 
@@ -180,10 +187,15 @@ def bound(solids: SolidSet, lens: Lens, rows: qd.i32, columns: qd.i32, box: qd.t
 
 @qd.kernel(fastcache=True)
 def trace(
-    strips: Strips, solids: SolidSet, window: Window, lens: Lens, albedo: vec3, box: qd.types.ndarray(),
-    depth: qd.types.ndarray(), surface: qd.types.ndarray(), normal: qd.types.ndarray(), color: qd.types.ndarray(),
+    strips: Strips, solids: SolidSet, window: Window, lens: Lens, albedo: vec3, is_seen: qd.i32,
+    box: qd.types.ndarray(), depth: qd.types.ndarray(), surface: qd.types.ndarray(), normal: qd.types.ndarray(),
+    color: qd.types.ndarray(),
 ):  # fmt: skip
-    """Draw the nearest solid at every pixel where it is nearer than what is there."""
+    """Lower `depth` to that of the nearest solid at every pixel; with `is_seen` draw the solid there as well.
+
+    One kernel for eye and sun, because tracing takes long to compile; without `is_seen` the last three may be of any
+    size.
+    """
     for task in range(strips.count):
         row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
         for column in range(first, last):
@@ -191,20 +203,7 @@ def trace(
                 hit = nearest_solid(solids, window, lens, row, column, qd.bit_cast(depth[row, column], qd.f32))
                 if hit.w > 0.0:
                     depth[row, column] = qd.bit_cast(hit.w, qd.i32)
-                    surface[row, column] = -1  # SOLID
-                    normal[row, column] = vec3(hit.x, hit.y, hit.z)
-                    color[row, column] = albedo
-
-
-@qd.kernel(fastcache=True)
-def trace_depth(
-    strips: Strips, solids: SolidSet, window: Window, lens: Lens, box: qd.types.ndarray(), depth: qd.types.ndarray()
-):  # fmt: skip
-    """Lower `depth` to that of the nearest solid."""
-    for task in range(strips.count):
-        row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
-        for column in range(first, last):
-            if in_box(box, row, column):
-                hit = nearest_solid(solids, window, lens, row, column, qd.bit_cast(depth[row, column], qd.f32))
-                if hit.w > 0.0:
-                    depth[row, column] = qd.bit_cast(hit.w, qd.i32)
+                    if is_seen == 1:
+                        surface[row, column] = -1  # SOLID
+                        normal[row, column] = vec3(hit.x, hit.y, hit.z)
+                        color[row, column] = albedo

@@ -77,7 +77,7 @@ def develop(
     # As an argument: portable back ends cannot divide before they start a loop.
     for group in range(groups):
         first, second, third = 0, 0, 0
-        for k in qd.static(range(4)):
+        for k in range(4):
             pixel = qd.min(4 * group + k, pixels - 1)
             total = vec3(0.0, 0.0, 0.0)
             for m in range(samples):
@@ -89,13 +89,13 @@ def develop(
             last = curve.shape[0] - 1
             place = total * (last / (samples * samples)) + 0.5
             for channel in qd.static(range(3)):
-                byte = qd.static(3 * k + channel)
+                byte = 3 * k + channel
                 entry = qd.min(qd.max(qd.cast(place[channel], qd.i32), 0), last)
                 bits = curve[entry] << (8 * (byte % 4))
                 # Spelled out: an operator in place on part of a vector is more than every back end can do.
-                if qd.static(byte // 4 == 0):
+                if byte < 4:
                     first = first | bits
-                elif qd.static(byte // 4 == 1):
+                elif byte < 8:
                     second = second | bits
                 else:
                     third = third | bits

@@ -66,15 +66,10 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if shot.frame.dim == 2:  # as deep as the water is drawn
         thick = vector(0.0, 0.0, 10.0 * shot.extent.spacing)
         lower, upper = lower - thick, upper + thick
-    optics = Optics(
-        absorption=shot.absorption, scattering=shot.scattering, glow=shot.look.glow * shot.tint, usual=shot.usual,
-        coarse=float(coarseness(shot)), unit=shot.extent.spacing / UNIT, spacing=shot.extent.spacing,
-        disc=DISC[2] * shot.extent.spacing,
-    )  # fmt: skip
     lay(
-        strips_of(buffers.depth), shot.lens, shot.look, optics, lower, upper, slack(shot), under_water(shot, buffers),
-        shot.frame.dim, water.depth, water.rim, water.thickness, water.dye, water.stained, buffers.depth, water.behind,
-        buffers.lines, buffers.color, water.spare,
+        strips_of(buffers.depth), shot.lens, shot.look, optics_of(shot), lower, upper, slack(shot),
+        under_water(shot, buffers), shot.frame.dim, water.depth, water.rim, water.thickness, water.dye, water.stained,
+        buffers.depth, water.behind, buffers.lines, buffers.color, water.spare,
     )  # fmt: skip
 
 
@@ -90,6 +85,15 @@ class Optics:
     unit: qd.f32  # m per step of it
     spacing: qd.f32  # m
     disc: qd.f32  # m: radius of a particle's disc in a plane
+
+
+def optics_of(shot: Shot) -> Optics:
+    """Return what the fluid of a picture does to light."""
+    return Optics(
+        absorption=shot.absorption, scattering=shot.scattering, glow=shot.look.glow * shot.tint, usual=shot.usual,
+        coarse=float(coarseness(shot)), unit=shot.extent.spacing / UNIT, spacing=shot.extent.spacing,
+        disc=DISC[2] * shot.extent.spacing,
+    )  # fmt: skip
 
 
 @qd.func
@@ -164,7 +168,9 @@ def lay(
     dye: qd.types.ndarray(), stained: qd.types.ndarray(), depth: qd.types.ndarray(), behind: qd.types.ndarray(),
     lines: qd.types.ndarray(), color: qd.types.ndarray(), seen: qd.types.ndarray(),
 ):  # fmt: skip
-    """Shade every pixel that shows water, and copy the backdrop to the others; `seen` is filled with its depth."""
+    """Shade every pixel that shows water, and copy the backdrop to the others; `seen` is filled with the nearer
+    of its depth and the backdrop's.
+    """
     for task in range(strips.count):
         row, begin, end = strip(strips, task, depth.shape[0], depth.shape[1])
         for column in range(begin, end):
@@ -226,7 +232,9 @@ def lay(
                 else:
                     front = 1.7e38
             color[row, column] = result
-            seen[row, column] = qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
+            seen[row, column] = qd.min(
+                qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000), depth[row, column]  # FARTHEST
+            )  # fmt: skip
 
 
 @qd.func
@@ -253,6 +261,26 @@ def normal_beside(lens: Lens, row, column, z, limit, depth: qd.template()):
         there = qd.bit_cast(depth[r, c], qd.f32)
         n = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * limit, depth))
     return n
+
+
+@qd.func
+def behind_drop(
+    lens: Lens, look: Look, start, direction, row, column, z, depth: qd.template(), behind: qd.template()
+):  # fmt: skip
+    """Radiance along a ray that has left a drop: of the floor or of what stands behind, as far as they are seen."""
+    way = qd.min(qd.bit_cast(depth[row, column], qd.f32) - z, 1e3)
+    if direction.y < -1e-3:
+        way = qd.min(way, qd.max(start.y, 0.0) / -direction.y)
+    result = environment(look, direction)
+    c = to_view(lens, start + way * direction)
+    if c.z > lens.near:
+        there = to_pixel(lens, c)
+        rows, columns = depth.shape[0], depth.shape[1]
+        inside = qd.min(there.x, columns - there.x, there.y, rows - there.y) / (0.1 * rows)
+        if inside > 0.0:
+            if qd.bit_cast(depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32) > z:
+                result += smoothstep(inside) * (picture_at(behind, there) - result)
+    return result
 
 
 @qd.func
@@ -286,6 +314,12 @@ def shine(
         e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), depth.shape[1] - 1)
         if qd.bit_cast(depth[r, e], qd.f32) > z:  # not what stands in front of the water
             shown = picture_at(behind, there)
+    if qd.static(dim == 3):
+        # Less water than in a sheet of single particles is a drop: a ball turns a ray twice by the same angle.
+        ball = smoothstep((0.75 - tau / optics.spacing) / 0.3)
+        if ball > 0.0:
+            out = 2.0 * bent.dot(ahead) * bent - ahead
+            shown += ball * (behind_drop(lens, look, at + travel * bent, out, row, column, z, depth, behind) - shown)
     swallow, tint = optics.absorption, optics.glow
     if stained == 1:
         dyed = dye_at(dye, place / optics.coarse)

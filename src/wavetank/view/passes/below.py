@@ -1,0 +1,152 @@
+"""The surface as an eye in the water sees it: a window to the sky, and around it a mirror.
+
+Light from the whole sky reaches an eye under water through a circle of 48.6 degrees around the zenith (Snell's window,
+R. W. Wood 1911); beyond it the surface reflects all that is below. The surface is the one that the sun sees
+(`sunlight.py`): a ray is followed in even steps through the sun's map of depths until it comes out of the water, and
+the place is then found by halving. What bulges beyond the sun's view is not known to the map.
+
+    code      symbol   meaning                                                        unit
+    under              depth of a point below the surface along the sun's rays        m
+    out                depth along the view ray at which it leaves the water          m
+    n                  normal of the surface there, out of the water                  1
+    cosi               cosine of the ray's angle with it, from inside                 1
+    k         cos^2    of the refracted ray's angle; negative: total reflection       1
+"""
+
+from wavetank.compiler import qd
+from wavetank.view.buffers import Buffers
+from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, view_ray
+from wavetank.view.look import Look
+from wavetank.view.passes.ellipsoids import walls
+from wavetank.view.passes.shade import smoothstep
+from wavetank.view.passes.solids import box_interval
+from wavetank.view.passes.surface import normal_of, rise_at
+from wavetank.view.passes.water import Optics, environment, optics_of, picture_at, under_water
+from wavetank.view.shot import Shot
+from wavetank.view.strips import Strips, strip, strips_of
+from wavetank.view.water_buffers import water_of
+
+STEPS, HALVINGS = 64, 6
+
+
+def draw(shot: Shot, buffers: Buffers) -> None:
+    """Draw the surface over what an eye in the water sees straight on; any other eye is left alone."""
+    if not under_water(shot, buffers):
+        return
+    water = water_of(buffers, shot)
+    look_up(
+        strips_of(buffers.depth), shot.lens, shot.water_sun, shot.look, optics_of(shot), *walls(shot), STEPS, HALVINGS,
+        water.sun_first, buffers.depth, water.behind, buffers.color, water.spare,
+    )  # fmt: skip
+
+
+@qd.func
+def depth_below(sun: Lens, first: qd.template(), at):
+    """How far [m] the point `at` lies below the surface along the sun's rays, between four texels; -1 outside of it."""
+    c = to_view(sun, at)
+    place = to_pixel(sun, c) - 0.5
+    column, row = qd.cast(qd.floor(place.x), qd.i32), qd.cast(qd.floor(place.y), qd.i32)
+    result = -1.0
+    if row >= 0 and column >= 0 and row < first.shape[0] - 1 and column < first.shape[1] - 1:
+        total, weight = 0.0, 0.0
+        for k in qd.static(range(4)):
+            z = qd.bit_cast(first[row + k // 2, column + k % 2], qd.f32)
+            share = (1.0 - qd.abs(column + k % 2 - place.x)) * (1.0 - qd.abs(row + k // 2 - place.y))
+            if z < 1e30:
+                total += share * z
+                weight += share
+        if weight > 0.25:
+            result = c.z - total / weight
+    return result
+
+
+@qd.func
+def normal_above(sun: Lens, first: qd.template(), at, spacing):
+    """Normal of the surface at the point `at` on it, out of the water, between four texels of the sun's map."""
+    place = to_pixel(sun, to_view(sun, at)) - 0.5
+    n = 1e-6 * -sun.forward
+    for k in qd.static(range(4)):
+        row = qd.min(qd.max(qd.cast(qd.floor(place.y), qd.i32) + k // 2, 0), first.shape[0] - 1)
+        column = qd.min(qd.max(qd.cast(qd.floor(place.x), qd.i32) + k % 2, 0), first.shape[1] - 1)
+        z = qd.bit_cast(first[row, column], qd.f32)
+        if z < 1e30:
+            share = qd.max(1.0 - qd.abs(column - place.x), 0.0) * qd.max(1.0 - qd.abs(row - place.y), 0.0)
+            n += share * normal_of(sun, row, column, z, rise_at(row, column, z, 3.0 * spacing, first))
+    return n.normalized(1e-12)
+
+
+@qd.kernel(fastcache=True)
+def look_up(
+    strips: Strips, lens: Lens, sun: Lens, look: Look, optics: Optics, lower: vec3, upper: vec3, steps: qd.i32,
+    halvings: qd.i32, first: qd.types.ndarray(), depth: qd.types.ndarray(), behind: qd.types.ndarray(),
+    color: qd.types.ndarray(), seen: qd.types.ndarray(),
+):  # fmt: skip
+    """Shade every pixel whose ray leaves the water through its surface before it meets anything."""
+    for task in range(strips.count):
+        row, begin, end = strip(strips, task, depth.shape[0], depth.shape[1])
+        for column in range(begin, end):
+            ray = view_ray(lens, row, column)
+            origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
+            pace = direction.norm()
+            ends = box_interval(origin, direction, lower, upper)
+            last = qd.min(ends[1], qd.bit_cast(depth[row, column], qd.f32))
+            low, out, step = 0.0, -1.0, last / steps
+            k = 1
+            while k <= steps and out < 0.0:
+                if depth_below(sun, first, origin + (k * step) * direction) < 0.0:
+                    low, out = (k - 1) * step, k * step
+                k += 1
+            # Where it leaves through a pane the backdrop is right.
+            if out > 0.0 and out < last - 1.5 * step:
+                for _ in range(halvings):
+                    middle = 0.5 * (low + out)
+                    if depth_below(sun, first, origin + middle * direction) < 0.0:
+                        out = middle
+                    else:
+                        low = middle
+                at, ahead = origin + out * direction, direction / pace
+                n = normal_above(sun, first, at, optics.spacing)
+                cosi = ahead.dot(n)
+                if cosi > 0.0:
+                    color[row, column] = through(lens, look, optics, at, ahead, n, cosi, out * pace, depth, behind)
+                    seen[row, column] = qd.bit_cast(out, qd.i32)
+
+
+@qd.func
+def through(
+    lens: Lens, look: Look, optics: Optics, at, ahead, n, cosi, way, depth: qd.template(), behind: qd.template()
+):
+    """Radiance of the surface at `at`: what it lets in from above and mirrors from below, `way` [m] of water away."""
+    k = 1.0 - 1.7689 * (1.0 - cosi * cosi)
+    mirror, above = 1.0, vec3(0.0, 0.0, 0.0)
+    if k > 0.0:
+        cost = qd.sqrt(k)
+        # Fresnel, unpolarised, from water to air.
+        s = (1.33 * cosi - cost) / (1.33 * cosi + cost)
+        p = (cosi - 1.33 * cost) / (cosi + 1.33 * cost)
+        mirror = 0.5 * (s * s + p * p)
+        up = 1.33 * ahead + (cost - 1.33 * cosi) * n
+        above = environment(look, up)
+        above += qd.min(qd.max(up.dot(look.to_sun), 0.0), 1.0) ** 600 * look.sparkle * look.sun
+    # What is mirrored comes from the floor or out of deep water.
+    down = ahead - 2.0 * cosi * n
+    below, more = optics.glow, 1e3
+    if down.y < -1e-3:
+        more = at.y / -down.y
+        c = to_view(lens, at + more * down)
+        # The floor as the picture shows it, and towards its margins and beyond as it is under so much water.
+        shown = look.floor * (
+            0.75 * look.sky + 0.75 * look.to_sun.y * look.sun * qd.exp(-0.6 * at.y * optics.absorption)
+        )
+        if c.z > lens.near:
+            there = to_pixel(lens, c)
+            rows, columns = depth.shape[0], depth.shape[1]
+            inside = qd.min(there.x, columns - there.x, there.y, rows - there.y) / (0.12 * rows)
+            if inside > 0.0:
+                z = qd.bit_cast(depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32)
+                if qd.abs(z - c.z) < 0.1 * c.z:
+                    shown += smoothstep(inside) * (picture_at(behind, there) - shown)
+        left = qd.exp(-more * optics.absorption)
+        below = shown * left + (1.0 - qd.exp(-more * optics.scattering)) * optics.glow
+    radiance = above + mirror * (below - above)
+    return radiance * qd.exp(-way * optics.absorption) + (1.0 - qd.exp(-way * optics.scattering)) * optics.glow
