@@ -18,13 +18,15 @@ STAGES = (
     ("wavetank.physics.neighbors", "neighbours"),
     ("wavetank.physics.boundary", "contact"),
     ("wavetank.physics.density_constraint", "constraint"),
+    ("wavetank.physics.coarse", "grid"),
+    ("wavetank.physics.poisson", "grid"),
     ("wavetank.physics.time_step", "time step"),
     ("wavetank.physics.diffuse", "foam"),
     ("wavetank.physics", "velocities"),
     ("wavetank.view", "render"),
 )
 #: In the order of a frame, as tables show them.
-STAGE_NAMES = ("contact", "neighbours", "constraint", "velocities", "foam", "time step", "other", "host")
+STAGE_NAMES = ("contact", "neighbours", "grid", "constraint", "velocities", "foam", "time step", "other", "host")
 
 
 def stage_of(module: str) -> str:

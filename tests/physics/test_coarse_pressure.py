@@ -1,0 +1,147 @@
+"""Pressure on a grid before the iterations: its equation is solved, and water of any depth rests."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import wavetank as wt
+from wavetank.materials import Material
+from wavetank.physics import poisson
+from wavetank.physics.coarse_grid import new_levels, restrict
+from wavetank.physics.poisson import solve_levels
+from wavetank.physics.smoothing import NAMES, kernel_shape, rest_lattice
+from wavetank.physics.step import has_grid_pressure
+from wavetank.simulation import Simulation
+
+
+def filled(level, heights) -> None:
+    """Water up to `heights` [cells] in every column of a 2-D level, and no solid."""
+    rows = np.arange(level.ny)[:, None]
+    fill = np.clip(np.asarray(heights)[None, :] - rows, 0.0, 1.0)
+    for array, values in ((level.fill, fill), (level.room, np.ones_like(fill)), (level.density, np.ones_like(fill))):
+        whole = array.to_numpy()
+        whole[: values.size] = values.ravel()
+        array.from_numpy(whole)
+
+
+def test_weight_at_the_bottom_becomes_hydrostatic_pressure():
+    """laplace lambda = C with C in the lowest cells alone: a straight line from the surface down to C H dy."""
+    level = new_levels((0.8, 1.6), 0.1)[0]
+    assert (level.nx, level.ny) == (8, 16)
+    surface = 12.75  # the filling of the 13th cell is 0.75: its surface is a quarter of a cell above its centre
+    filled(level, np.full(8, surface))
+    rhs = np.zeros(level.rhs.shape[0], np.float32)
+    rhs[: level.nx] = 1.0
+    level.rhs.from_numpy(rhs)
+    for _ in range(4):
+        poisson.solve(level, level, 1, 200, 1.8, 0.1, 0)
+    lam = level.lam.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
+    # Between the full cell below and the air above, the level set f - 1/2 is zero a third of the way up.
+    depth = level.dy * (12.0 + 0.25 / 0.75 - np.arange(13))
+    np.testing.assert_allclose(lam[:13], np.repeat(-depth[:, None] * level.dy, 8, axis=1), rtol=2e-3)
+    assert not lam[13:].any()
+
+
+def test_few_sweeps_on_all_levels_come_close():
+    """The grids together reach within a tenth what one grid needs hundreds of sweeps for."""
+    levels = new_levels((1.6, 3.2), 0.05)
+    finest = levels[0]
+    rng = np.random.default_rng(0)
+    heights = 40.0 + 4.0 * np.sin(np.arange(finest.nx))
+    filled(finest, heights)
+    rhs = np.zeros(finest.rhs.shape[0], np.float32)
+    rhs[: finest.nx * finest.ny] = np.maximum(rng.normal(0.2, 1.0, finest.nx * finest.ny), -0.5)
+    finest.rhs.from_numpy(rhs)
+    for fine, coarse in itertools.pairwise(levels):
+        restrict(coarse, fine)
+    solve_levels(levels)
+    few = finest.lam.to_numpy()
+    for _ in range(10):
+        poisson.solve(finest, finest, 1, 200, 1.8, 0.1, 0)
+    many = finest.lam.to_numpy()
+    assert np.linalg.norm(few - many) < 0.12 * np.linalg.norm(many)
+    poisson.solve(finest, finest, 0, 8, 1.5, 0.1, 0)
+    alone = finest.lam.to_numpy()
+    assert np.linalg.norm(alone - many) > 0.3 * np.linalg.norm(many), "one level alone does not"
+
+
+@pytest.mark.parametrize("kernel", ["spiky", "wendland"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_stiffness_is_what_a_field_of_multipliers_moves_by(dim, kernel):
+    """Eq. 6 on a lattice with lambda = b . x moves its particles by M b."""
+    support = 2.2
+    rest = rest_lattice(kernel, dim, support)
+    n = 3
+    axes = np.stack(np.meshgrid(*[np.arange(-n, n + 1)] * dim, indexing="ij"), -1).reshape(-1, dim)
+    r = -axes[(axes != 0).any(1)] / support  # p_i - p_j in units of h, particle i at the origin
+    distance = np.linalg.norm(r, axis=1)
+    slope = rest.gradient_scale * kernel_shape(NAMES[kernel][1], distance)[1]
+    b = np.arange(1.0, dim + 1)
+    moved = ((-r @ b) * slope / distance) @ r  # lambda_i = 0
+    np.testing.assert_allclose(moved, rest.stiffness * b, rtol=1e-6)
+
+
+def test_cells_divide_the_tank_and_are_halved_together():
+    levels = new_levels((2.1, 1.05, 0.33), 0.0475)
+    finest = levels[0]
+    assert finest.nx * finest.dx == pytest.approx(2.1) and finest.nz * finest.dz == pytest.approx(0.33)
+    assert max(finest.dx, finest.dy, finest.dz) < 1.35 * 0.0475 and min(finest.dx, finest.dy, finest.dz) > 0.7 * 0.0475
+    for fine, coarse in itertools.pairwise(levels):
+        for axis in "xyz":
+            assert getattr(fine, f"n{axis}") in (getattr(coarse, f"n{axis}"), 2 * getattr(coarse, f"n{axis}"))
+    assert max(levels[-1].nx, levels[-1].ny, levels[-1].nz) <= 8
+
+
+def rms_speed(sim: Simulation, seconds: float) -> float:
+    sim.advance(seconds)
+    return float(np.sqrt((sim.velocities.astype(float) ** 2).sum(1).mean()))
+
+
+@pytest.mark.parametrize("wall", ["tank", "box"])
+def test_deep_water_rests_with_two_steps_a_frame(wall):
+    """40 layers between walls of a tank, or of a box in the tank, are pressed together by less than 0.1 %."""
+    d = 0.025
+    solids = [wt.Box(center=(0.7, 0.75), size=(0.4, 1.5))] if wall == "box" else []
+    tank = wt.Tank(size=(0.9, 1.5) if wall == "box" else (0.5, 1.5))
+    scene = wt.Scene(spacing=d, tank=tank, solids=solids, fluids=[wt.Block(lower=(0, 0), upper=(0.5, 1.0))])
+    sim = Simulation(scene)
+    assert rms_speed(sim, 1.0) < 0.01
+    assert sim.time_steps == 2
+    assert sim.stats()["density_error_mean"] < 1e-3
+    assert 2.0 * sim.positions[:, 1].mean() == pytest.approx(1.0, abs=5e-3)
+
+
+def test_layers_of_different_density_rest():
+    d = 0.025
+    scene = wt.Scene(
+        spacing=d, tank=wt.Tank(size=(0.5, 1.2)), materials=[Material(name="heavy", density=3000.0)],
+        fluids=[
+            wt.Block(lower=(0, 0), upper=(0.5, 0.4), material="heavy"),
+            wt.Block(lower=(0, 0.4), upper=(0.5, 0.8)),
+        ],
+    )  # fmt: skip
+    sim = Simulation(scene)
+    assert has_grid_pressure(sim.world, sim.scene)
+    assert rms_speed(sim, 1.0) < 0.02
+    assert sim.time_steps == 2
+
+
+def test_the_grid_is_for_gravity():
+    """No tank, ice, thick fluids and drops that tension holds: there the time steps follow the waves."""
+    pool = {"spacing": 0.05, "fluids": [wt.Block(lower=(0, 0), upper=(0.5, 0.5))]}
+    tank = wt.Tank(size=(1.0, 1.0))
+
+    def used(**more) -> bool:
+        sim = Simulation(wt.Scene(**{**pool, **more}))
+        return has_grid_pressure(sim.world, sim.scene)
+
+    assert used(tank=tank)
+    assert used(tank=tank, surface_tension=0.072)
+    assert not used()
+    assert not used(tank=tank, grid_pressure=0.0)
+    assert not used(tank=tank, dynamic_viscosity=100.0)
+    assert not used(tank=tank, surface_tension=0.072, gravity=(0.0, 0.0))
+    sim = Simulation(wt.Scene(**pool, tank=tank))
+    sim.freeze_inside(np.array([0.2, 0.2, 0.0]), np.array([0.3, 0.2, 0.0]), 0.1)
+    assert not has_grid_pressure(sim.world, sim.scene)
