@@ -234,7 +234,7 @@ def test_impossible_sizes_are_refused(wrong):
 
 
 def test_render_takes_frames_and_whatever_has_one(splash):
-    world = SimpleNamespace(frame=lambda: splash)
+    world = SimpleNamespace(frame=lambda measured: splash)
     image = render(world, *SIZE)
     assert (image == render(splash, *SIZE)).all()
     assert (image == Renderer(*SIZE, 2).render(splash)).all()
