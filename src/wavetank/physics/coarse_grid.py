@@ -105,4 +105,4 @@ def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
     kinds = {field.name: field.type for field in dataclasses.fields(CoarseGrid)}
     sums = {name: integers(nodes) for name in kinds if name.endswith("_sum")}
     fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in (qd.i32, qd.f32) and name not in sums}
-    return CoarseGrid(**sums, **fields, nx=nx, ny=ny, nz=nz, dx=dx, dy=dy, dz=dz)
+    return CoarseGrid(**sums, **fields, nx=nx, ny=ny, nz=nz, pairs=(nx + 1) // 2, dx=dx, dy=dy, dz=dz)

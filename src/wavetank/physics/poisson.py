@@ -19,6 +19,7 @@ from wavetank.state import CoarseGrid
 SWEEPS, COARSEST_SWEEPS = 8, 32  # of a level, and of the coarsest
 OVER_RELAXATION = 1.5
 LEAST_THETA = 0.1
+ZERO, FROM_COARSER, GO_ON = 0, 1, 2  # where a level starts
 LARGE = 50_000  # nodes, from where threads gain more than they cost
 
 
@@ -48,11 +49,10 @@ def coupling(grid: CoarseGrid, n, m, edge, least_theta):
 @qd.func
 def relax_node(grid: CoarseGrid, half, colour, over_relaxation):
     """One step of projected over-relaxation, lambda <= 0, at a node of a `colour`, the `half`-th of its colour."""
-    pairs = (grid.nx + 1) // 2
-    row = half // pairs
+    row = half // grid.pairs
     y = row % grid.ny
     z = row // grid.ny
-    x = (half - row * pairs) * 2 + (y + z + colour) % 2
+    x = half % grid.pairs * 2 + (y + z + colour) % 2
     n = x + grid.nx * row
     if x < grid.nx and grid.inverse[n] > 0.0:
         total = -grid.rhs[n] + grid.wx[n] * grid.lam[n + 1] + grid.wy[n] * grid.lam[n + grid.nx]
@@ -70,10 +70,10 @@ def relax_node(grid: CoarseGrid, half, colour, over_relaxation):
 
 @qd.kernel(fastcache=True)
 def solve(
-    grid: CoarseGrid, coarser: CoarseGrid, guessed: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32,
+    grid: CoarseGrid, coarser: CoarseGrid, start: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32,
     least_theta: qd.f32, shared: qd.template(),
 ):  # fmt: skip
-    """Set up the Poisson equation and relax it in sweeps of two colours, from a guess of the `coarser` level if so.
+    """Set up the Poisson equation and relax it in sweeps of two colours, starting as `start` says.
 
     One thread does the `sweeps`, or all threads share as many as `shared` says. Nodes outside of the water keep
     lambda = 0. The couplings of faces on the rim of the grid are 0.
@@ -101,7 +101,9 @@ def solve(
                 diagonal += coupling(grid, n, n - grid.nx * grid.ny, grid.dz, least_theta)
             if diagonal > 0.0:
                 inverse = 1.0 / diagonal
-                if guessed != 0:
+                if start == 2:  # GO_ON
+                    lam = grid.lam[n]
+                if start == 1:  # FROM_COARSER
                     fx = grid.nx // coarser.nx
                     fy = grid.ny // coarser.ny
                     fz = grid.nz // coarser.nz
@@ -110,14 +112,14 @@ def solve(
         grid.lam[n] = lam
     if qd.static(shared):
         for colour in qd.static(range(2 * shared)):
-            for half in range((grid.nx + 1) // 2 * grid.ny * grid.nz):
+            for half in range(grid.pairs * grid.ny * grid.nz):
                 relax_node(grid, half, colour, over_relaxation)
     else:
         # A grid of some thousand nodes is done before other threads have started.
         qd.loop_config(serialize=True)
         for _ in range(1):
             for turn in range(2 * sweeps):
-                for half in range((grid.nx + 1) // 2 * grid.ny * grid.nz):
+                for half in range(grid.pairs * grid.ny * grid.nz):
                     relax_node(grid, half, turn, over_relaxation)
     for n in range(grid.nx * grid.ny * grid.nz):
         lam = grid.lam[n]
@@ -133,6 +135,9 @@ def solve_levels(levels: list[CoarseGrid]) -> None:
         is_coarsest = level is coarser
         sweeps = COARSEST_SWEEPS if is_coarsest else SWEEPS
         is_large = current_backend() != "cpu" or level.nx * level.ny * level.nz > LARGE
-        shared = sweeps if is_large else 0
-        solve(level, coarser, int(not is_coarsest), sweeps, OVER_RELAXATION, LEAST_THETA, shared)
+        start = ZERO if is_coarsest else FROM_COARSER
+        solve(level, coarser, start, sweeps, OVER_RELAXATION, LEAST_THETA, SWEEPS if is_large else 0)
+        if is_large and is_coarsest:
+            for _ in range(COARSEST_SWEEPS // SWEEPS - 1):
+                solve(level, coarser, GO_ON, sweeps, OVER_RELAXATION, LEAST_THETA, SWEEPS)
         coarser = level
