@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from wavetank import solids
+from wavetank.compiler import upload
 from wavetank.errors import WavetankError
 from wavetank.rotations import interpolate, turned, unit_quaternion
 from wavetank.solid import Solid
-from wavetank.state import upload
 
 Pose = tuple[np.ndarray, np.ndarray]  # position [m], shape [3], and rotation (w, x, y, z)
 SMALLEST = 0.02  # size at which a growing solid starts, of its full size

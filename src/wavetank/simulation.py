@@ -25,7 +25,7 @@ from wavetank.physics.time_step import largest_speed, pool_depth, substeps
 from wavetank.scene import MAX_PARTICLES, Scene
 from wavetank.snapshot import Snapshot, put_snapshot, read_snapshot, take_snapshot, write_snapshot
 from wavetank.solid import Solid
-from wavetank.state import KINDS, Fluids, Walls, new_particles, new_scratch, upload, vectors
+from wavetank.state import KINDS, Fluids, Walls, new_particles, new_scratch, vectors
 
 
 class Simulation:
@@ -58,7 +58,7 @@ class Simulation:
         h = scene.support * scene.spacing
         table = half_space_table(scene.kernel, dim, scene.support)
         walls = Walls(vectors(2, len(table)))
-        upload(walls.table, table)
+        compiler.upload(walls.table, table)
         size = scene.tank.size if scene.tank else None
         self.world = World(
             particles=new_particles(dim, capacity),

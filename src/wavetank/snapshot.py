@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wavetank.compiler import upload
 from wavetank.errors import WavetankError
 from wavetank.moving_solids import MovingSolids, Pose
 from wavetank.physics.diffuse.pool import pool_from, pool_rows
 from wavetank.solid import Solid
-from wavetank.state import upload
 
 if TYPE_CHECKING:
     from wavetank.simulation import Simulation

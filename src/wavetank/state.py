@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import qd
-from wavetank.compiler import upload as upload
+from wavetank.compiler import qd, upload
 
 NOWHERE = 1e6  # m, in every direction
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from clouds import Cloud
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, upload
 from wavetank.physics.diffuse.noise import stream, uniform
 from wavetank.physics.diffuse.pool import new_pool, scan
 from wavetank.physics.diffuse.potentials import find_surface, limited, potential
 from wavetank.physics.diffuse.update import air
-from wavetank.state import Air, Births, Coefficients, Grid, Particles, integers, scalars, upload
+from wavetank.state import Air, Births, Coefficients, Grid, Particles, integers, scalars
 
 
 @qd.kernel

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from wavetank import Camera, Scene, Tank
-from wavetank.state import new_diffuse, upload
+from wavetank.compiler import upload
+from wavetank.state import new_diffuse
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import Style
 from wavetank.view.views import VIEWS

@@ -14,6 +14,7 @@ import numpy as np
 from rich.table import Table
 
 from wavetank import compiler
+from wavetank.compiler import upload
 from wavetank.errors import WavetankError
 from wavetank.lab.counts import device_bytes
 from wavetank.lab.machine import cores, load, machine
@@ -21,7 +22,7 @@ from wavetank.physics.integrate import forget_predictions
 from wavetank.physics.neighbors import find_neighbors, new_grid, sort_particles
 from wavetank.physics.step import coefficients
 from wavetank.scene import Scene
-from wavetank.state import new_particles, upload
+from wavetank.state import new_particles
 
 SIZES = (10_000, 100_000, 1_000_000)
 SPACING = 0.01  # m

@@ -32,7 +32,7 @@ import math
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, upload
 from wavetank.distance import SolidSet, lift, signed_distance, vec3, vec4
 from wavetank.physics.boundary import is_near
 from wavetank.physics.density_constraint import schedule
@@ -42,7 +42,7 @@ from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import for_each_neighbor
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
-from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars, upload
+from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars
 
 TOLERANCE = 1e-2  # of the slowest mode's error after the iterations
 WORTH = 1e-5  # smallest kappa - 1 on the rest lattice for which a substep solves anything

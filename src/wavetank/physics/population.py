@@ -12,11 +12,11 @@ does it on threads, as every particle or place is judged by itself.
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, upload
 from wavetank.distance import SolidSet, lift, signed_distance, vec3
 from wavetank.physics.neighbors import reorder
 from wavetank.physics.places import predict_at
-from wavetank.state import Grid, Particles, integers, new_particles, upload, vectors
+from wavetank.state import Grid, Particles, integers, new_particles, vectors
 
 _FIELDS = ("x", "v", "id", "material", "near", "dye", "frozen")
 

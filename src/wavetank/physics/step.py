@@ -1,7 +1,8 @@
 """One step of Position Based Fluids: Algorithm 1 of Macklin and Müller 2013, top to bottom.
 
 The numbers on the right are the lines of Algorithm 1. Where we differ: forces and neighbours are renewed in every
-substep, particles are sorted rather than hashed, and contact is part of every correction.
+substep, particles are sorted rather than hashed, errors of the whole tank are removed on a grid before the iterations,
+and contact is part of every correction.
 """
 
 import dataclasses
@@ -79,13 +80,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         keep_out_of_solids(now, solids, c, count)
 
     if has_grid_pressure(world, params):
-        measure_density(scratch, now, grid, solids, walls, c, count, 1.0, method)
-        volume = params.spacing**params.dim
-        stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
-        correct_pressure(
-            world.levels, now, scratch, solids, c, stiffness, volume, count, params.grid_pressure,
-            searched=world.has_solids, mixed=bool(kinds.mixed),
-        )  # fmt: skip
+        correct_on_grid(world, now, kinds, params, c)
         if world.has_solids:
             keep_out_of_solids(now, solids, c, count)
 
@@ -119,6 +114,17 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         stop_frozen(now, count)
 
     world.particles, world.spare = now, spare
+
+
+def correct_on_grid(world: World, particles: Particles, kinds: Blend, params: Parameters, c: Coefficients) -> None:
+    """Remove what the densities of the whole tank are off, before the iterations between particles."""
+    method, count = method_number(params), world.count
+    measure_density(world.scratch, particles, world.grid, world.solids, world.walls, c, count, 1.0, method)
+    stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
+    correct_pressure(
+        world.levels, particles, world.scratch, world.solids, c, stiffness, params.spacing**params.dim, count,
+        params.grid_pressure, searched=world.has_solids, mixed=bool(kinds.mixed),
+    )  # fmt: skip
 
 
 def has_grid_pressure(world: World, params: Parameters) -> bool:

@@ -34,7 +34,7 @@ import math
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, upload
 from wavetank.distance import SolidSet, lift, signed_distance, vec3, vec4
 from wavetank.physics.boundary import is_near
 from wavetank.physics.integrate import accelerate
@@ -42,7 +42,7 @@ from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import for_each_neighbor
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
-from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars, upload
+from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars
 
 COHESION = 0.2  # share of the bond that alone would give the tension
 #: Brings the measured period of an oscillating drop to Rayleigh's: curved surfaces pull otherwise than flat ones.
