@@ -1,6 +1,7 @@
 """Water, foam and pictures are the same to the last bit on any number of threads, and looking changes nothing."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -43,3 +44,43 @@ def test_the_number_of_threads_and_looking_do_not_matter(runs, what):
     assert runs[0]["size"][0] > 2000
     assert runs[0]["size"][1] > 1000
     assert len({str(run[what]) for run in runs}) == 1
+
+
+BOUND = """
+import os
+from wavetank import compiler
+from wavetank.compiler import qd
+
+@qd.kernel
+def fill(x: qd.types.ndarray()):
+    for i in range(4096):
+        x[i] = 1
+
+compiler.start("cpu")
+x = qd.ndarray(qd.i32, 4096)
+
+def switches():
+    lines = {t: open(f"/proc/self/task/{t}/status").read() for t in os.listdir("/proc/self/task")}
+    return {t: int(text.split("nonvoluntary")[0].split("voluntary_ctxt_switches:")[1]) for t, text in lines.items()}
+
+before = switches()
+for _ in range(300):
+    fill(x)
+after = switches()
+busy = [int(t) for t in after if int(t) != os.getpid() and after[t] - before.get(t, 0) > 100]
+print(sorted(sorted(os.sched_getaffinity(t)) for t in busy))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="only Linux lets a process choose its cores")
+@pytest.mark.parametrize("bound", ["1", "0"])
+def test_every_thread_that_computes_has_a_core_of_its_own(bound, tmp_path):
+    program = tmp_path / "bound.py"  # the compiler reads the source of a kernel from its file
+    program.write_text(BOUND)
+    cores = sorted(os.sched_getaffinity(0))
+    told = subprocess.run(
+        [sys.executable, str(program)], capture_output=True, text=True, check=True,
+        env={**os.environ, "WAVETANK_BIND_THREADS": bound},
+    ).stdout  # fmt: skip
+    expected = [[core] for core in cores] if bound == "1" else [cores] * len(cores)
+    assert json.loads(told.splitlines()[-1]) == expected

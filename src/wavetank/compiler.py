@@ -93,18 +93,45 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
         options["cfg_optimization"] = False
     if threads is not None:
         options["cpu_max_num_threads"] = threads
+    before = _thread_ids()
     with contextlib.redirect_stdout(io.StringIO()):
         qd.init(**options)
     came_up = {"x64": "cpu", "arm64": "cpu"}.get(_name(qd.lang.impl.current_cfg().arch), wanted)
     if came_up != wanted:
         raise WavetankError(f"arch = {arch!r} was asked for, but the compiler came up on {came_up!r}.")
     _current = wanted
+    if wanted == "cpu":
+        _keep_apart(sorted(_thread_ids() - before)[-int(qd.lang.impl.current_cfg().cpu_max_num_threads) :])
     return wanted
 
 
 def threads() -> int:
     """Return how many threads of the processor compute, 0 where a graphics processor does."""
     return int(qd.lang.impl.current_cfg().cpu_max_num_threads) if _current == "cpu" else 0
+
+
+def _thread_ids() -> set[int]:
+    """Return the numbers of this process's threads, none where the system does not tell."""
+    try:
+        return {int(name) for name in os.listdir("/proc/self/task")}
+    except OSError:
+        return set()
+
+
+def _keep_apart(pool: list[int]) -> None:
+    """Give every thread of the `pool` that computes a core of its own, where Linux lets us and each can have one.
+
+    The pool sleeps between loops. Woken, two of its threads often start on one core, and the loop is over before the
+    system has moved one of them: two cores were as slow as one for loops of less than a few milliseconds.
+    """
+    if not hasattr(os, "sched_setaffinity") or os.environ.get("WAVETANK_BIND_THREADS") == "0":
+        return
+    cores = sorted(os.sched_getaffinity(0))
+    if len(pool) != len(cores):
+        return  # fewer threads than cores: which to take is the system's choice
+    for thread, core in zip(pool, cores, strict=True):
+        with contextlib.suppress(OSError):
+            os.sched_setaffinity(thread, {core})
 
 
 def synchronize() -> None:
