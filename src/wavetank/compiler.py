@@ -12,6 +12,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -113,7 +114,7 @@ def threads() -> int:
 def _thread_ids() -> set[int]:
     """Return the numbers of this process's threads, none where the system does not tell."""
     try:
-        return {int(name) for name in os.listdir("/proc/self/task")}
+        return {int(thread.name) for thread in Path("/proc/self/task").iterdir()}
     except OSError:
         return set()
 

@@ -55,27 +55,6 @@ def at_corner(low, k: qd.template()):
     return low + qd.Vector([qd.static(k & 1), qd.static(k >> 1 & 1), qd.static(k >> 2)])
 
 
-@qd.kernel(fastcache=True)
-def restrict(coarse: CoarseGrid, fine: CoarseGrid):
-    """Give the nodes of a coarser level the means of the finer ones that they stand for."""
-    for n in range(coarse.nx * coarse.ny * coarse.nz):
-        c = coordinates(coarse, n)
-        fx = fine.nx // coarse.nx
-        fy = fine.ny // coarse.ny
-        fz = fine.nz // coarse.nz
-        room, fill, rhs, density = 0.0, 0.0, 0.0, 0.0
-        for k in range(fx * fy * fz):
-            m = node(fine, qd.Vector([c[0] * fx + k % fx, c[1] * fy + k // fx % fy, c[2] * fz + k // (fx * fy)]))
-            room += fine.room[m]
-            fill += fine.fill[m] * fine.room[m]
-            rhs += fine.rhs[m] * fine.room[m]
-            density += fine.density[m] * fine.fill[m] * fine.room[m]
-        coarse.room[n] = room / (fx * fy * fz)
-        coarse.density[n] = density / fill if fill > 0.0 else 1.0
-        coarse.fill[n] = fill / qd.max(room, 1e-6)
-        coarse.rhs[n] = rhs / qd.max(room, 1e-6)
-
-
 def new_levels(size: tuple[float, ...], h: float) -> list[CoarseGrid]:
     """Allocate the grid of a tank of that `size` [m] and its coarser levels, the finest first."""
     shape = [_divided(edge / (EDGE * h)) for edge in size]

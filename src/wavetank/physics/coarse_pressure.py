@@ -15,14 +15,12 @@ that volume does not drift, and it is the positions that are moved. The sums are
 bit for bit. What was tried, and what it gives: docs/method.md.
 """
 
-import itertools
-
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, signed_distance, vec3
 from wavetank.physics.boundary import flattened, kept_in_tank
-from wavetank.physics.coarse_grid import at_corner, coordinates, in_cells, node, restrict, tent
+from wavetank.physics.coarse_grid import at_corner, coordinates, in_cells, node, tent
 from wavetank.physics.places import predict_at, predicted
-from wavetank.physics.poisson import solve_levels
+from wavetank.physics.poisson import LEAST_THETA, couple_node, solve_levels
 from wavetank.state import CoarseGrid, Coefficients, Particles, Scratch
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
@@ -38,14 +36,10 @@ def gather_fill(
 ):  # fmt: skip
     """Sum the tents of all particles at the nodes, and relate them to the room there.
 
-    `volume` is that of a particle over that of a cell and over the `unit`. Solids take their share of a cell where
-    they are `searched`; else there are only the walls of the tank, which end where the cells do. Where fluids are
-    `mixed`, their densities are averaged.
+    The sums are 0 before. `volume` is that of a particle over that of a cell and over the `unit`. Solids take their
+    share of a cell where they are `searched`; else there are only the walls of the tank, which end where the cells do.
+    Where fluids are `mixed`, their densities are averaged.
     """
-    for n in range(grid.nx * grid.ny * grid.nz):
-        grid.fill_sum[n] = 0
-        grid.error_sum[n] = 0
-        grid.mass_sum[n] = 0
     for i in range(count):
         p = predicted(particles, i)
         s = in_cells(grid, p)
@@ -76,14 +70,16 @@ def gather_fill(
         grid.density[n] = 1.0
         if qd.static(mixed):
             grid.density[n] = qd.max(grid.mass_sum[n], 1) / qd.cast(qd.max(grid.fill_sum[n], 1), qd.f32)
+        grid.fill_sum[n] = 0
+        grid.mass_sum[n] = 0
 
 
 @qd.kernel(fastcache=True)
 def gather_errors(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, unit: qd.f32, scale: qd.f32, inner_from: qd.f32,
-    inner_to: qd.f32, least_open: qd.f32, count: qd.i32,
+    inner_to: qd.f32, least_open: qd.f32, least_theta: qd.f32, count: qd.i32,
 ):  # fmt: skip
-    """Sum the density errors (Eq. 2) of the particles inside of the water at the nodes, and set the right side to them.
+    """Sum the density errors (Eq. 2) of the particles inside of the water at the nodes, and set up the equation.
 
     `scale` is the volume of a particle over that of a cell, over the unit and over the stiffness M.
     """
@@ -103,6 +99,8 @@ def gather_errors(
             )
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.rhs[n] = scale * grid.error_sum[n] / qd.max(grid.room[n], least_open)
+        grid.error_sum[n] = 0
+        couple_node(grid, n, least_theta)
 
 
 @qd.func
@@ -130,6 +128,11 @@ def move_particles(
     count: qd.i32,
 ):  # fmt: skip
     """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank."""
+    for n in range(grid.nx * grid.ny * grid.nz):
+        lam = grid.lam[n]
+        grid.slope_x[n] = grid.wx[n] * grid.dx * (grid.lam[n + 1] - lam)
+        grid.slope_y[n] = grid.wy[n] * grid.dy * (grid.lam[n + grid.nx] - lam)
+        grid.slope_z[n] = grid.wz[n] * grid.dz * (grid.lam[n + grid.nx * grid.ny] - lam)
     for i in range(count):
         p = predicted(particles, i)
         s = in_cells(grid, p)
@@ -157,8 +160,6 @@ def correct_pressure(
     finest = levels[0]
     scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
     gather_fill(finest, particles, scratch, solids, UNIT, scale, LEAST_OPEN, count, int(searched), int(mixed))
-    gather_errors(finest, particles, scratch, UNIT, share * scale / stiffness, *INNER, LEAST_OPEN, count)
-    for fine, coarse in itertools.pairwise(levels):
-        restrict(coarse, fine)
+    gather_errors(finest, particles, scratch, UNIT, share * scale / stiffness, *INNER, LEAST_OPEN, LEAST_THETA, count)
     solve_levels(levels)
     move_particles(finest, particles, solids, c, stiffness, REACH * c.h, count)
