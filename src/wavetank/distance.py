@@ -145,7 +145,7 @@ def lift(x: qd.template()):
     return point
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class SolidSet:
     """All solids of a world on the device. Shapes in `model.py` words, frames nested: node in solid in world."""
 

@@ -5,9 +5,13 @@ support, and stands in neighbour lists where there is no neighbour.
 
 Two sets of the moving arrays exist so that sorting and Jacobi updates can read one and write the other; which is
 which is swapped on the host, nothing is copied.
+
+What kernels take is frozen, and the same arrays and numbers are the same object each time (`exchanged`, `remembered`):
+the compiler then knows the arguments of a launch, which else cost more than a small kernel (docs/performance.md).
 """
 
 import dataclasses
+import functools
 from typing import Any
 
 import numpy as np
@@ -17,7 +21,7 @@ from wavetank.compiler import qd, upload
 NOWHERE = 1e6  # m, in every direction
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Particles:
     """What a particle carries, in device order (sorted by cell)."""
 
@@ -33,7 +37,7 @@ class Particles:
     frozen: qd.types.ndarray()  # i32 [capacity]: 1 where a particle is ice and keeps its place
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Scratch:
     """What a substep computes and forgets."""
 
@@ -45,7 +49,7 @@ class Scratch:
     weight: qd.types.ndarray()  # f32 [capacity]: largest rest density of all fluids over its own; 1 where all are equal
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Grid:
     """Cells of edge h and the neighbour lists. Cells repeat: see `physics/neighbors.py`."""
 
@@ -66,7 +70,7 @@ class Grid:
     cells: qd.i32
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class CoarseGrid:
     """A level of the grid of `physics/coarse_pressure.py`; nodes are the centres of its cells, x fastest."""
 
@@ -94,7 +98,7 @@ class CoarseGrid:
     dz: qd.f32  # 1 in 2-D
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Diffuse:
     """Spray, foam and bubbles, packed at the front in the order of their birth."""
 
@@ -106,7 +110,7 @@ class Diffuse:
     id: qd.types.ndarray()  # i32 [capacity]: number of the birth
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Births:
     """What a frame's births need and forget."""
 
@@ -117,7 +121,7 @@ class Births:
     reluctance: qd.types.ndarray()  # f32 [materials]: energy at which a fluid foams, in that of one without viscosity
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Air:
     """Scalars of a frame of spray, foam and bubbles, from the scene's parameters; see `physics/diffuse/`."""
 
@@ -138,7 +142,7 @@ class Air:
     seed: qd.i32
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Walls:
     """What a flat wall adds to the density: see `half_space_table`."""
 
@@ -162,7 +166,7 @@ class Fluids:
         return self.arrays[name]
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True)
 class Coefficients:
     """Scalars of a substep, from the scene's parameters."""
 
@@ -189,9 +193,24 @@ class Coefficients:
     cohesion: qd.f32 = 0.0  # m^(dim - 2), likewise
 
 
-def swap_predictions(a: Particles, b: Particles) -> None:
-    """Exchange the predicted positions of two sets; nothing is copied."""
-    a.px, b.px, a.py, b.py, a.pz, b.pz = b.px, a.px, b.py, a.py, b.pz, a.pz
+@functools.lru_cache(maxsize=256)
+def remembered(c: Coefficients) -> Coefficients:
+    """Return the first object that equals `c`, which the compiler then knows."""
+    return c
+
+
+def exchanged(
+    known: dict[tuple[int, ...], Particles], a: Particles, b: Particles, *names: str
+) -> tuple[Particles, Particles]:
+    """Return `a` and `b` with the arrays of those `names` exchanged; nothing is copied.
+
+    What it returns stays `known`: the same arrays are the same object the next time.
+    """
+    pair = []
+    for own, other in ((a, b), (b, a)):
+        arrays = {name: getattr(other if name in names else own, name) for name in own.__dataclass_fields__}
+        pair.append(known.setdefault(tuple(map(id, arrays.values())), Particles(**arrays)))
+    return pair[0], pair[1]
 
 
 #: What a particle is, by its number in files and on the device.

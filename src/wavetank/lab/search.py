@@ -101,7 +101,7 @@ def _grid(x: np.ndarray, c: Any, repeats: int) -> tuple[list[float], int, int]:
         compiler.synchronize()
         began = time.perf_counter()
         sort_particles(particles, spare, grid, c, count)
-        find_neighbors(spare, grid, c, count)
+        grid = find_neighbors(spare, grid, c, count)
         compiler.synchronize()
         if repeat:
             seconds.append(time.perf_counter() - began)

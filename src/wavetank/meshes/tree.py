@@ -17,7 +17,7 @@ LEAF = 4  # triangles
 _FAR = 1e9  # where the triangles are that fill the last leaves
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Tree:
     """Triangles in leaves on the device, in cells of the grid."""
 

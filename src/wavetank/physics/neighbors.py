@@ -16,8 +16,8 @@ Counting sort after Green 2010 ("Particle Simulation using CUDA"); Hoetzlein 201
 Neighbors") for the counting by integer atomics.
 """
 
+import dataclasses
 import math
-from typing import Any
 
 import numpy as np
 
@@ -245,13 +245,14 @@ def sort_particles(particles: Particles, spare: Particles, grid: Grid, c: Coeffi
     reorder(spare, particles, grid, count)
 
 
-def find_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> Any:
-    """List the neighbours of sorted particles; where a list had too little room it is made larger and built again."""
-    most = list_neighbors(particles, grid, c, count)
+def find_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> Grid:
+    """List the neighbours of sorted particles; return the grid, with larger lists where there was too little room."""
+    most = int(list_neighbors(particles, grid, c, count))
     if most >= grid.room:
-        grid.room = _rounded(most)
-        grid.list = integers(grid.cell.shape[0] * grid.room)
+        room = _rounded(most)
+        grid = dataclasses.replace(grid, room=room, list=integers(grid.cell.shape[0] * room))
         list_neighbors(particles, grid, c, count)
+    return grid
 
 
 def _rounded(most: int) -> int:

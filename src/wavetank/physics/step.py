@@ -27,7 +27,7 @@ from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattic
 from wavetank.physics.tension import apply_tension, limited_tensions, substeps_for
 from wavetank.physics.viscosity import apply_mixed_viscosity, apply_viscosity
 from wavetank.physics.vorticity import confine_vorticity, find_vorticity
-from wavetank.state import CoarseGrid, Coefficients, Fluids, Grid, Particles, Scratch, Walls, swap_predictions
+from wavetank.state import CoarseGrid, Coefficients, Fluids, Grid, Particles, Scratch, Walls, exchanged, remembered
 
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
 #: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; measured, docs/method.md.
@@ -51,6 +51,7 @@ class World:
     has_friction: bool
     levels: list[CoarseGrid]  # of the tank, the finest first; none without a tank
     frozen: int = 0  # particles that are ice
+    known: dict[tuple[int, ...], Particles] = dataclasses.field(default_factory=dict)  # see `exchanged`
     pool: Pool | None = None  # of spray, foam and bubbles; made when the first are
 
     @property
@@ -73,7 +74,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
 
     sort_particles(now, spare, grid, c, count)  # 5-7
     now, spare = spare, now
-    find_neighbors(now, grid, c, count)
+    grid = world.grid = find_neighbors(now, grid, c, count)
     kinds = prepare_fluids(world, now, params, dt)
     if act_on_fluids(world, now, kinds, params, c):
         mark_near_solids(now, solids, c, count)
@@ -86,11 +87,11 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
 
     tensile = int(params.tensile_strength > 0.0)
     for number, (relaxation, momentum) in enumerate(relaxations(params, kinds.density_ratio)):  # 8-19
-        c = dataclasses.replace(c, relaxation=relaxation, momentum=momentum)
+        c = remembered(dataclasses.replace(c, relaxation=relaxation, momentum=momentum))
         first = int(number == 0)
         solve_multipliers(scratch, now, grid, solids, walls, c, count, first, method, kinds.mixed)  # 9-11
         correct_positions(spare, now, scratch, grid, solids, c, count, method, tensile, kinds.mixed)  # 12-18
-        swap_predictions(now, spare)
+        now, spare = exchanged(world.known, now, spare, "px", "py", "pz")
         if world.has_solids:
             keep_out_of_solids(now, solids, c, count)
         if world.frozen:
@@ -109,7 +110,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
             apply_mixed_viscosity(spare, now, packed, grid, c, count, method)
         else:
             apply_viscosity(spare, now, grid, c, count, method)
-        now.v, spare.v = spare.v, now.v
+        now, spare = exchanged(world.known, now, spare, "v")
     if world.frozen:
         stop_frozen(now, count)
 
@@ -146,7 +147,7 @@ def update_densities(world: World, params: Parameters) -> None:
     forget_predictions(world.particles, count)
     sort_particles(world.particles, world.spare, world.grid, c, count)
     world.particles, world.spare = world.spare, world.particles
-    find_neighbors(world.particles, world.grid, c, count)
+    world.grid = find_neighbors(world.particles, world.grid, c, count)
     mark_near_solids(world.particles, world.solids, c, count)
     kinds = prepare_fluids(world, world.particles, params, params.frame_time)
     measure_density(
@@ -212,24 +213,26 @@ def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf) -
     rest = rest_lattice(params.kernel, params.dim, params.support)
     s_0 = rest.squared_gradients / h**2
     w_dq = float(kernel_shape(NAMES[params.kernel][0], np.array(params.tensile_distance))[0])
-    return Coefficients(
-        dt=dt,
-        h=h,
-        inverse_h=1.0 / h,
-        density_scale=rest.density_scale,
-        gradient_scale=rest.gradient_scale / h,
-        eps=params.force_mixing * s_0,
-        relaxation=params.relaxation,
-        momentum=0.0,
-        attraction=params.attraction,
-        tensile=params.tensile_strength / s_0 / params.iterations / w_dq**params.tensile_exponent,
-        tensile_exponent=params.tensile_exponent,
-        largest_correction=h / params.iterations,
-        viscosity=min(1.0, params.viscosity * REFERENCE_RATE * dt),
-        vorticity=params.vorticity,
-        coherence=params.vorticity_coherence,
-        calm=CALM * math.sqrt(math.hypot(*params.gravity) / h),
-        speed_limit=speed_limit,
-        wall_density=params.wall_density,
-        wall_gap=params.wall_gap * params.spacing,
+    return remembered(
+        Coefficients(
+            dt=dt,
+            h=h,
+            inverse_h=1.0 / h,
+            density_scale=rest.density_scale,
+            gradient_scale=rest.gradient_scale / h,
+            eps=params.force_mixing * s_0,
+            relaxation=params.relaxation,
+            momentum=0.0,
+            attraction=params.attraction,
+            tensile=params.tensile_strength / s_0 / params.iterations / w_dq**params.tensile_exponent,
+            tensile_exponent=params.tensile_exponent,
+            largest_correction=h / params.iterations,
+            viscosity=min(1.0, params.viscosity * REFERENCE_RATE * dt),
+            vorticity=params.vorticity,
+            coherence=params.vorticity_coherence,
+            calm=CALM * math.sqrt(math.hypot(*params.gravity) / h),
+            speed_limit=speed_limit,
+            wall_density=params.wall_density,
+            wall_gap=params.wall_gap * params.spacing,
+        )
     )

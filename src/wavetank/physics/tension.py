@@ -42,7 +42,7 @@ from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import for_each_neighbor
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
-from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars
+from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, remembered, scalars
 
 COHESION = 0.2  # share of the bond that alone would give the tension
 #: Brings the measured period of an oscillating drop to Rayleigh's: curved surfaces pull otherwise than flat ones.
@@ -228,9 +228,8 @@ def apply_tension(
     flat = flat_surface(dim, ratio)
     adhesion = flat.bond * d ** (dim - 2) / ratio
     pull = CALIBRATION[dim]
-    c = dataclasses.replace(
-        c, skin=pull * (1.0 - COHESION) * d ** (dim - 2) / flat.stress, cohesion=pull * COHESION * adhesion
-    )
+    stretch = pull * (1.0 - COHESION) * d ** (dim - 2) / flat.stress
+    c = remembered(dataclasses.replace(c, skin=stretch, cohesion=pull * COHESION * adhesion))
     find_tensions(tension, particles, fluids.rows, count)
     find_surface(surface, tension, particles, grid, c, count, flat.gradient_scale, flat.quiet)
     rate = c.dt / (kinds.largest_density * d**dim)

@@ -21,7 +21,7 @@ vec3 = qd.types.vector(3, qd.f32)
 vec4 = qd.types.vector(4, qd.f32)
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Lens:
     """One eye on the device; rows run down, columns to the right, pixel centres at halves."""
 

@@ -13,7 +13,7 @@ from wavetank.view.extent import Extent
 from wavetank.view.lens import vec3, vector
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Look:
     """Light and colours of a picture, on the device."""
 
@@ -71,13 +71,19 @@ def studio() -> Look:
 
 def pool() -> Look:
     """A tiled floor in the open: worlds in space, seen as water."""
-    look = studio()
-    look.sun, look.sky = vector(1.25, 1.16, 1.02), vector(0.42, 0.50, 0.60)
-    look.ground = vector(0.30, 0.31, 0.31)
-    look.horizon, look.zenith = _linear("#d9e4ec"), _linear("#4f7ba6")
-    look.floor, look.solid, look.line = _linear("#b9bcb9"), _linear("#e09a5c"), _linear("#eef4f7")
-    look.tile, look.sun_size = 0.1, 0.04
-    return look
+    return dataclasses.replace(
+        studio(),
+        sun=vector(1.25, 1.16, 1.02),
+        sky=vector(0.42, 0.50, 0.60),
+        ground=vector(0.30, 0.31, 0.31),
+        horizon=_linear("#d9e4ec"),
+        zenith=_linear("#4f7ba6"),
+        floor=_linear("#b9bcb9"),
+        solid=_linear("#e09a5c"),
+        line=_linear("#eef4f7"),
+        tile=0.1,
+        sun_size=0.04,
+    )
 
 
 def paper() -> Look:

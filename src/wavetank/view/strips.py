@@ -15,7 +15,7 @@ from wavetank.compiler import qd, threads
 LEAST_TASKS = 512  # that the compiler gives to a processor's thread, whatever they cost
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Strips:
     """Strips of one picture, on the device."""
 

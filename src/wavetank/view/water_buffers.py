@@ -15,7 +15,7 @@ from wavetank.view.quantities import usual
 from wavetank.view.shot import Shot
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Ellipsoids:
     """One ellipsoid per particle, in the order of `cells`, and after them room for the mirror image of each."""
 

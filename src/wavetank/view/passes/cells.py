@@ -18,7 +18,7 @@ from wavetank.view.lens import vec3
 SCAN_BLOCK = 1024
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Cells:
     """Cells of one edge length and what is in them."""
 

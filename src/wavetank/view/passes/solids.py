@@ -24,7 +24,7 @@ from wavetank.view.strips import Strips, strip, strips_of
 UNBOUNDED = 1e4  # m
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Window:
     """Where solids are drawn, on the device."""
 

@@ -73,7 +73,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     )  # fmt: skip
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
 class Optics:
     """What the fluid does to light, and the scale of the maps of its thickness, on the device."""
 
