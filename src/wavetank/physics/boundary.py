@@ -177,9 +177,9 @@ def near_walls(x, p, solids: SolidSet, h):
 
 
 @qd.func
-def near_solids(x, p, solids: SolidSet, h):
-    """Bits of all solids that a particle on its way from `x` to `p` may touch or feel, and a little beyond."""
-    near = near_walls(x, p, solids, h)
+def near_bodies(x, p, solids: SolidSet, h):
+    """Bits, as `near_walls`, of the solids that are no walls of the tank."""
+    near = 0
     way = 1.2 * h + (p - x).norm()
     for k in range(solids.tank_count, solids.count):
         away = (p - solids.position[k]).norm()
@@ -203,7 +203,9 @@ def flattened(point, x: qd.template()):
 def mark_near_solids(particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
     """Mark for every particle the solids that it may touch or feel on its way and a little beyond."""
     for i in range(count):
-        particles.near[i] = near_solids(lift(particles.x[i]), lift(predicted(particles, i)), solids, c.h)
+        x = lift(particles.x[i])
+        p = lift(predicted(particles, i))
+        particles.near[i] = near_walls(x, p, solids, c.h) | near_bodies(x, p, solids, c.h)
 
 
 @qd.kernel(fastcache=True)

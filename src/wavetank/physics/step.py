@@ -66,12 +66,10 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         world.particles, world.spare, world.scratch, world.grid, world.solids, world.walls,
     )  # fmt: skip
 
-    predict(now, solids, c, count, np.array([*params.gravity, 0.0][:3], np.float32))  # 1-4
-    if world.has_solids:
-        mark_near_solids(now, solids, c, count)
-        keep_out_of_solids(now, solids, c, count)
+    searched = int(world.has_solids)
+    predict(now, grid, solids, c, count, np.array([*params.gravity, 0.0][:3], np.float32), searched)  # 1-4
 
-    sort_particles(now, spare, grid, c, count)  # 5-7
+    sort_particles(now, spare, grid, count)  # 5-7
     now, spare = spare, now
     find_neighbors(now, grid, c, count)
     kinds = prepare_fluids(world, now, params, dt)
@@ -143,8 +141,8 @@ def has_grid_pressure(world: World, params: Parameters) -> bool:
 def update_densities(world: World, params: Parameters) -> None:
     """Measure the densities [kg/m^3] of `world` as it stands. The order of particles changes, the motion does not."""
     c, method, count = coefficients(params, params.frame_time), method_number(params), world.count
-    forget_predictions(world.particles, count)
-    sort_particles(world.particles, world.spare, world.grid, c, count)
+    forget_predictions(world.particles, world.grid, c, count)
+    sort_particles(world.particles, world.spare, world.grid, count)
     world.particles, world.spare = world.spare, world.particles
     find_neighbors(world.particles, world.grid, c, count)
     mark_near_solids(world.particles, world.solids, c, count)
