@@ -19,7 +19,7 @@ def solve(cloud: Cloud) -> None:
     )
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, cloud.c, count,
-        cloud.method, int(cloud.scene.tensile_strength > 0), 0,
+        cloud.method, int(cloud.scene.tensile_strength > 0), 0, 0,
     )  # fmt: skip
 
 

@@ -36,7 +36,7 @@ def solve(cloud: Cloud, mixed: int) -> np.ndarray:
     )
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, cloud.c, cloud.count,
-        cloud.method, 0, mixed,
+        cloud.method, 0, mixed, 0,
     )  # fmt: skip
     return cloud.predictions(world.spare) - cloud.x
 

@@ -87,10 +87,8 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         c = dataclasses.replace(c, relaxation=relaxation, momentum=momentum)
         first = int(number == 0)
         solve_multipliers(scratch, now, grid, solids, walls, c, count, first, method, kinds.mixed)  # 9-11
-        correct_positions(spare, now, scratch, grid, solids, c, count, method, tensile, kinds.mixed)  # 12-18
+        correct_positions(spare, now, scratch, grid, solids, c, count, method, tensile, kinds.mixed, searched)  # 12-18
         swap_predictions(now, spare)
-        if world.has_solids:
-            keep_out_of_solids(now, solids, c, count)
         if world.frozen:
             hold_frozen(now, count)
 
