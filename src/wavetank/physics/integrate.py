@@ -34,7 +34,8 @@ def predict(
 ):  # fmt: skip
     """Accelerate, move freely (Algorithm 1, lines 2-3), mark what is near, stay out of it, and find the cell.
 
-    Where solids are not `searched` there are only the walls of the tank.
+    Where solids are not `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they
+    are, wherever that is.
     """
     for i in range(count):
         x = particles.x[i]
@@ -44,11 +45,11 @@ def predict(
         particles.v[i] = v
         p = free_motion(x, v, c)
         near = near_walls(lift(x), lift(p), solids, c.h)
-        if near != 0:
+        if near != 0 and c.dt > 0.0:
             p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), x)
         if qd.static(searched):
             near |= near_bodies(lift(x), lift(p), solids, c.h)
-            if near >> solids.tank_count != 0:
+            if near >> solids.tank_count != 0 and c.dt > 0.0:
                 p = flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap), x)
         particles.near[i] = near
         predict_at(particles, i, p)
@@ -73,7 +74,7 @@ def update_velocities(particles: Particles, c: Coefficients, count: qd.i32):
 
 @qd.kernel(fastcache=True)
 def forget_predictions(particles: Particles, grid: Grid, c: Coefficients, count: qd.i32):
-    """Set p = x, to measure the particles where they are, and find the cell."""
+    """Set p = x and find the cell, to search neighbours without a step and without solids."""
     for i in range(count):
         p = particles.x[i]
         predict_at(particles, i, p)

@@ -13,13 +13,13 @@ import numpy as np
 from wavetank.distance import SolidSet
 from wavetank.materials import Material
 from wavetank.params import Parameters
-from wavetank.physics.boundary import keep_out_of_solids, mark_near_solids
+from wavetank.physics.boundary import keep_out_of_solids
 from wavetank.physics.coarse_pressure import correct_pressure
 from wavetank.physics.density_constraint import correct_positions, measure_density, schedule, solve_multipliers
 from wavetank.physics.diffuse.pool import Pool
 from wavetank.physics.friction import apply_friction
 from wavetank.physics.implicit_viscosity import is_thick, solve_viscosity
-from wavetank.physics.integrate import forget_predictions, predict, update_velocities
+from wavetank.physics.integrate import predict, update_velocities
 from wavetank.physics.mixture import Blend, blend, fill_table, pack_weights, stiffening, weigh
 from wavetank.physics.neighbors import find_neighbors, sort_particles
 from wavetank.physics.population import hold_frozen, stop_frozen
@@ -74,13 +74,9 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     find_neighbors(now, grid, c, count)
     kinds = prepare_fluids(world, now, params, dt)
     if act_on_fluids(world, now, kinds, params, c):
-        mark_near_solids(now, solids, c, count)
         keep_out_of_solids(now, solids, c, count)
-
     if has_grid_pressure(world, params):
         correct_on_grid(world, now, kinds, params, c)
-        if world.has_solids:
-            keep_out_of_solids(now, solids, c, count)
 
     tensile = int(params.tensile_strength > 0.0)
     for number, (relaxation, momentum) in enumerate(relaxations(params, kinds.density_ratio)):  # 8-19
@@ -138,12 +134,11 @@ def has_grid_pressure(world: World, params: Parameters) -> bool:
 
 def update_densities(world: World, params: Parameters) -> None:
     """Measure the densities [kg/m^3] of `world` as it stands. The order of particles changes, the motion does not."""
-    c, method, count = coefficients(params, params.frame_time), method_number(params), world.count
-    forget_predictions(world.particles, world.grid, c, count)
+    c, method, count = coefficients(params, 0.0), method_number(params), world.count
+    predict(world.particles, world.grid, world.solids, c, count, np.zeros(3, np.float32), int(world.has_solids))
     sort_particles(world.particles, world.spare, world.grid, count)
     world.particles, world.spare = world.spare, world.particles
     find_neighbors(world.particles, world.grid, c, count)
-    mark_near_solids(world.particles, world.solids, c, count)
     kinds = prepare_fluids(world, world.particles, params, params.frame_time)
     measure_density(
         world.scratch, world.particles, world.grid, world.solids, world.walls, c, count, kinds.largest_density, method
