@@ -26,7 +26,7 @@ from wavetank.physics.population import hold_frozen, stop_frozen
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
 from wavetank.physics.tension import apply_tension, limited_tensions, substeps_for
 from wavetank.physics.viscosity import apply_mixed_viscosity, apply_viscosity
-from wavetank.physics.vorticity import confine_vorticity, find_vorticity
+from wavetank.physics.vorticity import confine_vorticity
 from wavetank.state import CoarseGrid, Coefficients, Fluids, Grid, Particles, Scratch, Walls, swap_predictions
 
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
@@ -91,17 +91,8 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     update_velocities(now, c, count)  # 21, 23
     if world.has_friction:
         apply_friction(now, scratch, solids, walls, c, count)
-    if params.vorticity > 0.0:
-        find_vorticity(scratch, now, grid, c, count, method)  # 22
-        confine_vorticity(now, scratch, grid, c, count, method)
-    if params.viscosity > 0.0:
-        if kinds.mixed:
-            packed = world.fluids.array("packed")
-            pack_weights(packed, now, scratch, count)
-            apply_mixed_viscosity(spare, now, packed, grid, c, count, method)
-        else:
-            apply_viscosity(spare, now, grid, c, count, method)
-        now.v, spare.v = spare.v, now.v
+    if params.viscosity > 0.0 or params.vorticity > 0.0:
+        smooth_and_confine(world, now, spare, kinds, params, c)  # 22
     if world.frozen:
         stop_frozen(now, count)
 
@@ -117,6 +108,23 @@ def correct_on_grid(world: World, particles: Particles, kinds: Blend, params: Pa
         world.levels, particles, world.scratch, world.solids, c, stiffness, params.spacing**params.dim, count,
         params.grid_pressure, searched=world.has_solids, mixed=bool(kinds.mixed),
     )  # fmt: skip
+
+
+def smooth_and_confine(
+    world: World, particles: Particles, spare: Particles, kinds: Blend, params: Parameters, c: Coefficients
+) -> None:
+    """Apply XSPH viscosity and vorticity confinement, both of the velocities as they are before either."""
+    scratch, grid, count, method = world.scratch, world.grid, world.count, method_number(params)
+    turning, mixed = int(params.vorticity > 0.0), bool(kinds.mixed) and params.viscosity > 0.0
+    if turning or not mixed:
+        apply_viscosity(spare, particles, scratch, grid, c, count, method, turning)
+    if mixed:
+        packed = world.fluids.array("packed")
+        pack_weights(packed, particles, scratch, count)
+        apply_mixed_viscosity(spare, particles, packed, grid, c, count, method)
+    particles.v, spare.v = spare.v, particles.v
+    if turning:
+        confine_vorticity(particles, scratch, grid, c, count, method)
 
 
 def has_grid_pressure(world: World, params: Parameters) -> bool:
