@@ -53,7 +53,7 @@ def add_mixed_xsph(sums: qd.template(), r, i, j, data: qd.template(), c: Coeffic
     a = data[i]
     b = data[j]
     inverse = inverse_length(r)
-    share = kernel(method, r.norm_sqr() * inverse * c.inverse_h)[0] * qd.min(1.0, a[r.n] / b[r.n])
+    share = kernel(method, r.norm_sqr() * inverse * c.inverse_h)[0] * qd.min(1.0, a[3] / b[3])
     for k in qd.static(range(r.n)):
         sums[k] += (b[k] - a[k]) * share
 
