@@ -51,6 +51,18 @@ if hasattr(kernel_impl, "_inside_class"):
     kernel_impl._inside_class = _is_in_class_body
 
 
+def _forget(*_: Any) -> None:
+    """Do nothing, in place of keeping the prepared arguments of a launch."""
+
+
+# Prepared arguments of a launch are kept under the addresses of frozen objects, for as long as their arrays live: an
+# object of numbers that takes the address of one that is gone would get the numbers of that one. What else the
+# compiler remembers of frozen objects it keeps in them.
+_launch_cache = getattr(sys.modules["quadrants.lang.kernel"], "LaunchContextBufferCache", None)
+if hasattr(_launch_cache, "cache"):
+    _launch_cache.cache = _forget
+
+
 def available_backends() -> list[str]:
     """Return the concrete back ends that this machine can start, best first, ``cpu`` last."""
     with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():

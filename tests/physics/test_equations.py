@@ -1,12 +1,14 @@
 """The report's equations, each against a sum over all pairs in double precision."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from clouds import Cloud
 
 from wavetank.physics.density_constraint import correct_positions, schedule, solve_multipliers
 from wavetank.physics.viscosity import apply_viscosity
-from wavetank.physics.vorticity import confine_vorticity, find_vorticity
+from wavetank.physics.vorticity import confine_vorticity
 
 CASES = [(2, "spiky"), (3, "spiky"), (3, "poly6-spiky"), (2, "cubic"), (3, "wendland")]
 cases = pytest.mark.parametrize(("dim", "kernel"), CASES)
@@ -19,7 +21,7 @@ def solve(cloud: Cloud) -> None:
     )
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, cloud.c, count,
-        cloud.method, int(cloud.scene.tensile_strength > 0), 0,
+        cloud.method, int(cloud.scene.tensile_strength > 0), 0, 0,
     )  # fmt: skip
 
 
@@ -91,7 +93,7 @@ def test_corrections_keep_the_centre_of_mass(dim, kernel):
 def test_vorticity_eq_9(dim, kernel):
     cloud = Cloud(dim, kernel=kernel)
     world = cloud.world
-    find_vorticity(world.scratch, world.particles, world.grid, cloud.c, cloud.count, cloud.method)
+    apply_viscosity(world.spare, world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method, 1)
     v_ij = cloud.v[None, :, :] - cloud.v[:, None, :]
     grad_j = -cloud.grad_w()
     pad = ((0, 0), (0, 0), (0, 3 - dim))
@@ -105,7 +107,7 @@ def test_vorticity_eq_9(dim, kernel):
 def test_vorticity_confinement_eq_10(dim):
     cloud = Cloud(dim, vorticity=2.0, vorticity_coherence=0.0)
     world = cloud.world
-    find_vorticity(world.scratch, world.particles, world.grid, cloud.c, cloud.count, cloud.method)
+    apply_viscosity(world.spare, world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method, 1)
     omega = world.scratch.omega.to_numpy()[: cloud.count].astype(np.float64)
     confine_vorticity(world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method)
     size = np.linalg.norm(omega, axis=1)
@@ -120,6 +122,19 @@ def test_vorticity_confinement_eq_10(dim):
     )
 
 
+def test_calm_water_is_not_pushed():
+    """Where the water turns slower than the smallest waves do there is no force, and else there is."""
+    cloud = Cloud(3, vorticity=2.0, vorticity_coherence=0.01)
+    world = cloud.world
+    apply_viscosity(world.spare, world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method, 1)
+    size = np.linalg.norm(world.scratch.omega.to_numpy()[: cloud.count], axis=1)
+    c = dataclasses.replace(cloud.c, calm=float(np.median(size)))
+    confine_vorticity(world.particles, world.scratch, world.grid, c, cloud.count, cloud.method)
+    pushed = np.any(world.particles.v.to_numpy()[: cloud.count] != cloud.v.astype(np.float32), axis=1)
+    assert not pushed[size <= c.calm].any()
+    assert pushed[size > 1.5 * c.calm].mean() > 0.8
+
+
 def test_solid_rotation_has_twice_its_rate_as_vorticity():
     """curl of omega x r is 2 omega; inside a lattice Eq. 9 finds it up to the kernel's lattice error."""
     import wavetank as wt
@@ -132,25 +147,32 @@ def test_solid_rotation_has_twice_its_rate_as_vorticity():
     sim = Simulation(wt.Scene(spacing=0.1, kernel="cubic", support=2.5, fluids=[wt.Points(positions=x, velocities=v)]))
     sim.frame()
     world = sim.world
-    find_vorticity(world.scratch, world.particles, world.grid, coefficients(sim.scene, 0.01), sim.count, 2)
+    c = coefficients(sim.scene, 0.01)
+    apply_viscosity(world.spare, world.particles, world.scratch, world.grid, c, sim.count, 2, 1)
     middle = np.argmin(np.linalg.norm(world.particles.x.to_numpy()[: sim.count], axis=1))
     assert world.scratch.omega.to_numpy()[middle] == pytest.approx([0, 0, 6], rel=0.05, abs=1e-3)
 
 
+@pytest.mark.parametrize("turning", [0, 1])
 @cases
-def test_xsph_eq_11(dim, kernel):
+def test_xsph_eq_11(dim, kernel, turning):
     cloud = Cloud(dim, kernel=kernel, viscosity=0.2)
     world = cloud.world
-    apply_viscosity(world.spare, world.particles, world.grid, cloud.c, cloud.count, cloud.method)
+    apply_viscosity(
+        world.spare, world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method, turning
+    )
     v_ij = cloud.v[None, :, :] - cloud.v[:, None, :]
     expected = cloud.v + 0.2 * cloud.mass_over_rest_density() * np.sum(v_ij * cloud.w()[..., None], axis=1)
     np.testing.assert_allclose(world.spare.v.to_numpy()[: cloud.count], expected, atol=1e-5 * np.abs(expected).max())
 
 
-def test_xsph_keeps_momentum():
+@pytest.mark.parametrize("turning", [0, 1])
+def test_xsph_keeps_momentum(turning):
     cloud = Cloud(3, viscosity=0.5)
     world = cloud.world
-    apply_viscosity(world.spare, world.particles, world.grid, cloud.c, cloud.count, cloud.method)
+    apply_viscosity(
+        world.spare, world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method, turning
+    )
     change = world.spare.v.to_numpy()[: cloud.count].astype(np.float64).sum(axis=0) - cloud.v.sum(axis=0)
     assert np.abs(change).max() < 1e-6 * np.abs(cloud.v).sum()
 

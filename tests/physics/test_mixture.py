@@ -36,7 +36,7 @@ def solve(cloud: Cloud, mixed: int) -> np.ndarray:
     )
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, cloud.c, cloud.count,
-        cloud.method, 0, mixed,
+        cloud.method, 0, mixed, 0,
     )  # fmt: skip
     return cloud.predictions(world.spare) - cloud.x
 
@@ -70,8 +70,9 @@ def test_equal_masses_give_the_result_of_one_fluid():
     np.testing.assert_allclose(solve(cloud, 0), solve(cloud, 1), atol=1e-6)
 
 
-def test_smoothing_keeps_momentum_and_is_eq_11_for_equal_masses():
-    cloud, w = mixed_cloud(3, viscosity=0.5)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_smoothing_keeps_momentum_and_is_eq_11_for_equal_masses(dim):
+    cloud, w = mixed_cloud(dim, viscosity=0.5)
     world = cloud.world
     packed = world.fluids.array("packed")
     pack_weights(packed, world.particles, world.scratch, cloud.count)

@@ -74,9 +74,9 @@ def test_order_does_not_depend_on_the_order_given():
     for seed in (0, 1):
         shuffle = np.random.default_rng(seed).permutation(500)
         world.particles.x.from_numpy(np.vstack([x[shuffle], np.zeros((1, 3), np.float32)]))
-        forget_predictions(world.particles, 500)
+        forget_predictions(world.particles, world.grid, c, 500)
         world.particles.id.from_numpy(np.append(shuffle, 0).astype(np.int32))
-        sort_particles(world.particles, world.spare, world.grid, c, 500)
+        sort_particles(world.particles, world.spare, world.grid, 500)
         orders.append(world.spare.id.to_numpy()[:500])
         find_neighbors(world.spare, world.grid, c, 500)
     np.testing.assert_array_equal(*orders)

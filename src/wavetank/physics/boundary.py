@@ -177,9 +177,9 @@ def near_walls(x, p, solids: SolidSet, h):
 
 
 @qd.func
-def near_solids(x, p, solids: SolidSet, h):
-    """Bits of all solids that a particle on its way from `x` to `p` may touch or feel, and a little beyond."""
-    near = near_walls(x, p, solids, h)
+def near_bodies(x, p, solids: SolidSet, h):
+    """Bits, as `near_walls`, of the solids that are no walls of the tank."""
+    near = 0
     way = 1.2 * h + (p - x).norm()
     for k in range(solids.tank_count, solids.count):
         away = (p - solids.position[k]).norm()
@@ -200,21 +200,12 @@ def flattened(point, x: qd.template()):
 
 
 @qd.kernel(fastcache=True)
-def mark_near_solids(particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
-    """Mark for every particle the solids that it may touch or feel on its way and a little beyond."""
-    for i in range(count):
-        particles.near[i] = near_solids(lift(particles.x[i]), lift(predicted(particles, i)), solids, c.h)
-
-
-@qd.kernel(fastcache=True)
 def keep_out_of_solids(particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
-    """Move the predicted positions out of the marked solids, as reached from the positions before.
-
-    Particles that only walls of the tank are near are left to `kept_in_tank`, of which every correction is followed.
-    """
+    """Mark the solids that are near the predicted positions as they are now, and move these out of them."""
     for i in range(count):
-        near = particles.near[i]
+        x = particles.x[i]
+        p = predicted(particles, i)
+        near = near_walls(lift(x), lift(p), solids, c.h) | near_bodies(lift(x), lift(p), solids, c.h)
+        particles.near[i] = near
         if near >> solids.tank_count != 0:
-            x = particles.x[i]
-            target = stopped(lift(x), lift(predicted(particles, i)), near, solids, c.wall_gap)
-            predict_at(particles, i, flattened(target, x))
+            predict_at(particles, i, flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap), x))

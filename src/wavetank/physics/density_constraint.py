@@ -30,7 +30,7 @@ multiplier: Moreau and Jean's projected iteration, as in Tonge et al. 2012 (10.1
 
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, vec4
-from wavetank.physics.boundary import flattened, kept_in_tank, wall_density
+from wavetank.physics.boundary import flattened, kept_in_tank, stopped, wall_density
 from wavetank.physics.neighbors import for_each_neighbor
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.smoothing import inverse_length, kernel
@@ -129,9 +129,12 @@ def solve_multipliers(
 @qd.kernel(fastcache=True)
 def correct_positions(
     corrected: Particles, particles: Particles, scratch: Scratch, grid: Grid, solids: SolidSet, c: Coefficients,
-    count: qd.i32, method: qd.template(), correction: qd.template(), mixed: qd.template(),
+    count: qd.i32, method: qd.template(), correction: qd.template(), mixed: qd.template(), searched: qd.template(),
 ):  # fmt: skip
-    """Move the predicted positions by the corrections (Eq. 6 or 8, by its number in CORRECTIONS), inside the tank."""
+    """Move the predicted positions by the corrections (Eq. 6 or 8, by its number in CORRECTIONS), inside the tank.
+
+    Where solids are `searched` they stay out of those as well.
+    """
     for i in range(count):
         p = predicted(particles, i)
         dp = p * 0.0
@@ -146,6 +149,9 @@ def correct_positions(
         p += dp * qd.min(1.0, c.largest_correction / qd.max(dp.norm(), 1e-12))
         if near != 0:
             p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
+            if qd.static(searched):
+                if near >> solids.tank_count != 0:
+                    p = flattened(stopped(lift(particles.x[i]), lift(p), near, solids, c.wall_gap), p)
         predict_at(corrected, i, p)
 
 

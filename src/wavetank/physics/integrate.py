@@ -2,9 +2,10 @@
 
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift
-from wavetank.physics.boundary import flattened, kept_in_tank, near_walls
+from wavetank.physics.boundary import flattened, kept_in_tank, near_bodies, near_walls, stopped
+from wavetank.physics.neighbors import cell_of
 from wavetank.physics.places import predict_at, predicted
-from wavetank.state import Coefficients, Particles
+from wavetank.state import Coefficients, Grid, Particles
 
 
 @qd.func
@@ -28,9 +29,14 @@ def accelerate(particles: Particles, i, v, c: Coefficients):
 
 @qd.kernel(fastcache=True)
 def predict(
-    particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32, gravity: qd.types.vector(3, qd.f32)
-):
-    """Accelerate, move freely (Algorithm 1, lines 2-3), mark the walls of the tank that are near and stay inside."""
+    particles: Particles, grid: Grid, solids: SolidSet, c: Coefficients, count: qd.i32,
+    gravity: qd.types.vector(3, qd.f32), searched: qd.template(),
+):  # fmt: skip
+    """Accelerate, move freely (Algorithm 1, lines 2-3), mark what is near, stay out of it, and find the cell.
+
+    Where solids are not `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they
+    are, wherever that is.
+    """
     for i in range(count):
         x = particles.x[i]
         v = particles.v[i]
@@ -39,10 +45,15 @@ def predict(
         particles.v[i] = v
         p = free_motion(x, v, c)
         near = near_walls(lift(x), lift(p), solids, c.h)
-        particles.near[i] = near
-        if near != 0:
+        if near != 0 and c.dt > 0.0:
             p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), x)
+        if qd.static(searched):
+            near |= near_bodies(lift(x), lift(p), solids, c.h)
+            if near >> solids.tank_count != 0 and c.dt > 0.0:
+                p = flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap), x)
+        particles.near[i] = near
         predict_at(particles, i, p)
+        grid.cell[i] = cell_of(grid, p, c.h)
 
 
 @qd.kernel(fastcache=True)
@@ -62,7 +73,9 @@ def update_velocities(particles: Particles, c: Coefficients, count: qd.i32):
 
 
 @qd.kernel(fastcache=True)
-def forget_predictions(particles: Particles, count: qd.i32):
-    """Set p = x, to measure the particles where they are."""
+def forget_predictions(particles: Particles, grid: Grid, c: Coefficients, count: qd.i32):
+    """Set p = x and find the cell, to search neighbours without a step and without solids."""
     for i in range(count):
-        predict_at(particles, i, particles.x[i])
+        p = particles.x[i]
+        predict_at(particles, i, p)
+        grid.cell[i] = cell_of(grid, p, c.h)

@@ -26,6 +26,7 @@ from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles, integers
 
 SCAN_BLOCK = 1024
+LARGE = 100_000  # cells and particles, from where threads gain more than they cost
 
 
 @qd.func
@@ -45,71 +46,82 @@ def cell_number(grid: Grid, c):
 
 
 @qd.kernel(fastcache=True)
-def count_cells(particles: Particles, grid: Grid, c: Coefficients, count: qd.i32):
-    """Find the cell of every particle and count the particles of every cell."""
-    for k in range(grid.cells + 1):
-        grid.start[k] = 0
-    for i in range(count):
-        cell = cell_of(grid, predicted(particles, i), c.h)
-        grid.cell[i] = cell
-        qd.atomic_add(grid.start[cell], 1)
+def reorder(sorted_: Particles, particles: Particles, grid: Grid, count: qd.i32, shared: qd.template()):
+    """Copy the particles into their sorted order, given the cell of each: count, sum up, fill in, copy.
 
-
-@qd.kernel(fastcache=True)
-def scan_cells(grid: Grid):
-    """Turn the counts into first places: an exclusive prefix sum in blocks of 1024."""
-    blocks = (grid.cells + 1023) // 1024
-    for b in range(blocks):
-        total = 0
-        for k in range(b * 1024, qd.min((b + 1) * 1024, grid.cells)):
-            total += grid.start[k]
-        grid.blocks[b] = total
-    qd.loop_config(serialize=True)
-    for _ in range(1):
-        total = 0
+    One thread does all but copying, or all threads share it where `shared`.
+    """
+    if qd.static(shared):
+        for k in range(grid.cells):
+            grid.fill[k] = 0
+        for i in range(count):
+            qd.atomic_add(grid.fill[grid.cell[i]], 1)
+        # An exclusive prefix sum in blocks of 1024.
+        blocks = (grid.cells + 1023) // 1024
         for b in range(blocks):
-            own = grid.blocks[b]
+            total = 0
+            for k in range(b * 1024, qd.min((b + 1) * 1024, grid.cells)):
+                total += grid.fill[k]
             grid.blocks[b] = total
-            total += own
-        grid.start[grid.cells] = total
-    for b in range(blocks):
-        total = grid.blocks[b]
-        for k in range(b * 1024, qd.min((b + 1) * 1024, grid.cells)):
-            own = grid.start[k]
-            grid.start[k] = total
-            grid.fill[k] = total
-            total += own
+        qd.loop_config(serialize=True)
+        for _ in range(1):
+            total = 0
+            for b in range(blocks):
+                own = grid.blocks[b]
+                grid.blocks[b] = total
+                total += own
+            grid.start[grid.cells] = total
+        for b in range(blocks):
+            total = grid.blocks[b]
+            for k in range(b * 1024, qd.min((b + 1) * 1024, grid.cells)):
+                own = grid.fill[k]
+                grid.start[k] = total
+                grid.fill[k] = total
+                total += own
+        for i in range(count):
+            grid.order[qd.atomic_add(grid.fill[grid.cell[i]], 1)] = i
+    else:
+        # Some ten thousand particles are done before other threads have started.
+        qd.loop_config(serialize=True)
+        for _ in range(1):
+            for k in range(grid.cells):
+                grid.fill[k] = 0
+            for i in range(count):
+                cell = grid.cell[i]
+                grid.fill[cell] = grid.fill[cell] + 1
+            total = 0
+            for k in range(grid.cells):
+                own = grid.fill[k]
+                grid.start[k] = total
+                grid.fill[k] = total
+                total += own
+            grid.start[grid.cells] = total
+            for i in range(count):
+                cell = grid.cell[i]
+                place = grid.fill[cell]
+                grid.order[place] = i
+                grid.fill[cell] = place + 1
+    for n in range(count):
+        i = grid.order[n]
+        own = particles.id[i]
+        cell = grid.cell[i]
+        place = grid.start[cell]
+        for k in range(place, grid.start[cell + 1]):
+            place += qd.cast(particles.id[grid.order[k]] < own, qd.i32)
+        copy_particle(sorted_, place, particles, i)
 
 
-@qd.kernel(fastcache=True)
-def place_particles(particles: Particles, grid: Grid, count: qd.i32):
-    """Give every particle a place in its cell, then put each cell into the order of ids."""
-    for i in range(count):
-        grid.order[qd.atomic_add(grid.fill[grid.cell[i]], 1)] = i
-    for k in range(grid.cells):
-        for a in range(grid.start[k] + 1, grid.start[k + 1]):
-            moved = grid.order[a]
-            key = particles.id[moved]
-            b = a - 1
-            while b >= grid.start[k] and particles.id[grid.order[b]] > key:
-                grid.order[b + 1] = grid.order[b]
-                b -= 1
-            grid.order[b + 1] = moved
-
-
-@qd.kernel(fastcache=True)
-def reorder(sorted_: Particles, particles: Particles, grid: Grid, count: qd.i32):
-    """Copy the particles into their sorted order."""
-    for i in range(count):
-        j = grid.order[i]
-        sorted_.x[i] = particles.x[j]
-        predict_at(sorted_, i, predicted(particles, j))
-        sorted_.v[i] = particles.v[j]
-        sorted_.id[i] = particles.id[j]
-        sorted_.material[i] = particles.material[j]
-        sorted_.near[i] = particles.near[j]
-        sorted_.dye[i] = particles.dye[j]
-        sorted_.frozen[i] = particles.frozen[j]
+@qd.func
+def copy_particle(target: Particles, to, source: Particles, i):
+    """Copy particle `i` of `source` to the place `to` of `target`."""
+    target.x[to] = source.x[i]
+    predict_at(target, to, predicted(source, i))
+    target.v[to] = source.v[i]
+    target.id[to] = source.id[i]
+    target.material[to] = source.material[i]
+    target.near[to] = source.near[i]
+    target.dye[to] = source.dye[i]
+    target.frozen[to] = source.frozen[i]
 
 
 @qd.kernel(fastcache=True)
@@ -237,12 +249,9 @@ def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, 
     )  # fmt: skip
 
 
-def sort_particles(particles: Particles, spare: Particles, grid: Grid, c: Coefficients, count: int) -> None:
-    """Sort `particles` by cell into `spare`."""
-    count_cells(particles, grid, c, count)
-    scan_cells(grid)
-    place_particles(particles, grid, count)
-    reorder(spare, particles, grid, count)
+def sort_particles(particles: Particles, spare: Particles, grid: Grid, count: int) -> None:
+    """Sort `particles` by cell into `spare`; `grid.cell` holds the cell of each."""
+    reorder(spare, particles, grid, count, int(current_backend() != "cpu" or grid.cells + count > LARGE))
 
 
 def find_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> Grid:

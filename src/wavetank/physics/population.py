@@ -14,7 +14,7 @@ import numpy as np
 
 from wavetank.compiler import qd, upload
 from wavetank.distance import SolidSet, lift, signed_distance, vec3
-from wavetank.physics.neighbors import reorder
+from wavetank.physics.neighbors import copy_particle
 from wavetank.physics.places import predict_at
 from wavetank.state import Grid, Particles, integers, new_particles, vectors
 
@@ -93,6 +93,13 @@ def append_rows(
 
 
 @qd.kernel(fastcache=True)
+def copy_chosen(target: Particles, particles: Particles, grid: Grid, count: qd.i32):
+    """Copy the first `count` particles that `grid.order` names to the front of `target`."""
+    for n in range(count):
+        copy_particle(target, n, particles, grid.order[n])
+
+
+@qd.kernel(fastcache=True)
 def find_taken(
     taken: qd.types.ndarray(), places: qd.types.ndarray(), particles: Particles, solids: SolidSet, middle: vec3,
     reach: qd.f32, gap: qd.f32, wall: qd.f32, count: qd.i32, number: qd.i32,
@@ -151,7 +158,7 @@ def keep_only(particles: Particles, spare: Particles, grid: Grid, keep: np.ndarr
     """Copy the particles where `keep`, bool [count] in device order, to the front of `spare`."""
     chosen = np.flatnonzero(keep)
     upload(grid.order, chosen)
-    reorder(spare, particles, grid, len(chosen))
+    copy_chosen(spare, particles, grid, len(chosen))
 
 
 def at_capacity(particles: Particles, dim: int, capacity: int) -> Particles:

@@ -13,20 +13,20 @@ import numpy as np
 from wavetank.distance import SolidSet
 from wavetank.materials import Material
 from wavetank.params import Parameters
-from wavetank.physics.boundary import keep_out_of_solids, mark_near_solids
+from wavetank.physics.boundary import keep_out_of_solids
 from wavetank.physics.coarse_pressure import correct_pressure
 from wavetank.physics.density_constraint import correct_positions, measure_density, schedule, solve_multipliers
 from wavetank.physics.diffuse.pool import Pool
 from wavetank.physics.friction import apply_friction
 from wavetank.physics.implicit_viscosity import is_thick, solve_viscosity
-from wavetank.physics.integrate import forget_predictions, predict, update_velocities
+from wavetank.physics.integrate import predict, update_velocities
 from wavetank.physics.mixture import Blend, blend, fill_table, pack_weights, stiffening, weigh
 from wavetank.physics.neighbors import find_neighbors, sort_particles
 from wavetank.physics.population import hold_frozen, stop_frozen
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
 from wavetank.physics.tension import apply_tension, limited_tensions, substeps_for
 from wavetank.physics.viscosity import apply_mixed_viscosity, apply_viscosity
-from wavetank.physics.vorticity import confine_vorticity, find_vorticity
+from wavetank.physics.vorticity import confine_vorticity
 from wavetank.state import CoarseGrid, Coefficients, Fluids, Grid, Particles, Scratch, Walls, exchanged, remembered
 
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
@@ -67,50 +67,33 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         world.particles, world.spare, world.scratch, world.grid, world.solids, world.walls,
     )  # fmt: skip
 
-    predict(now, solids, c, count, np.array([*params.gravity, 0.0][:3], np.float32))  # 1-4
-    if world.has_solids:
-        mark_near_solids(now, solids, c, count)
-        keep_out_of_solids(now, solids, c, count)
+    searched = int(world.has_solids)
+    predict(now, grid, solids, c, count, np.array([*params.gravity, 0.0][:3], np.float32), searched)  # 1-4
 
-    sort_particles(now, spare, grid, c, count)  # 5-7
+    sort_particles(now, spare, grid, count)  # 5-7
     now, spare = spare, now
     grid = world.grid = find_neighbors(now, grid, c, count)
     kinds = prepare_fluids(world, now, params, dt)
     if act_on_fluids(world, now, kinds, params, c):
-        mark_near_solids(now, solids, c, count)
         keep_out_of_solids(now, solids, c, count)
-
     if has_grid_pressure(world, params):
         correct_on_grid(world, now, kinds, params, c)
-        if world.has_solids:
-            keep_out_of_solids(now, solids, c, count)
 
     tensile = int(params.tensile_strength > 0.0)
     for number, (relaxation, momentum) in enumerate(relaxations(params, kinds.density_ratio)):  # 8-19
         c = remembered(dataclasses.replace(c, relaxation=relaxation, momentum=momentum))
         first = int(number == 0)
         solve_multipliers(scratch, now, grid, solids, walls, c, count, first, method, kinds.mixed)  # 9-11
-        correct_positions(spare, now, scratch, grid, solids, c, count, method, tensile, kinds.mixed)  # 12-18
+        correct_positions(spare, now, scratch, grid, solids, c, count, method, tensile, kinds.mixed, searched)  # 12-18
         now, spare = exchanged(world.known, now, spare, "px", "py", "pz")
-        if world.has_solids:
-            keep_out_of_solids(now, solids, c, count)
         if world.frozen:
             hold_frozen(now, count)
 
     update_velocities(now, c, count)  # 21, 23
     if world.has_friction:
         apply_friction(now, scratch, solids, walls, c, count)
-    if params.vorticity > 0.0:
-        find_vorticity(scratch, now, grid, c, count, method)  # 22
-        confine_vorticity(now, scratch, grid, c, count, method)
-    if params.viscosity > 0.0:
-        if kinds.mixed:
-            packed = world.fluids.array("packed")
-            pack_weights(packed, now, scratch, count)
-            apply_mixed_viscosity(spare, now, packed, grid, c, count, method)
-        else:
-            apply_viscosity(spare, now, grid, c, count, method)
-        now, spare = exchanged(world.known, now, spare, "v")
+    if params.viscosity > 0.0 or params.vorticity > 0.0:
+        now, spare = smooth_and_confine(world, now, spare, kinds, params, c)  # 22
     if world.frozen:
         stop_frozen(now, count)
 
@@ -128,6 +111,27 @@ def correct_on_grid(world: World, particles: Particles, kinds: Blend, params: Pa
     )  # fmt: skip
 
 
+def smooth_and_confine(
+    world: World, particles: Particles, spare: Particles, kinds: Blend, params: Parameters, c: Coefficients
+) -> tuple[Particles, Particles]:
+    """Apply XSPH viscosity and vorticity confinement, both of the velocities as they are before either.
+
+    Returns the two sets of particles, the velocities in the first.
+    """
+    scratch, grid, count, method = world.scratch, world.grid, world.count, method_number(params)
+    turning, mixed = int(params.vorticity > 0.0), bool(kinds.mixed) and params.viscosity > 0.0
+    if turning or not mixed:
+        apply_viscosity(spare, particles, scratch, grid, c, count, method, turning)
+    if mixed:
+        packed = world.fluids.array("packed")
+        pack_weights(packed, particles, scratch, count)
+        apply_mixed_viscosity(spare, particles, packed, grid, c, count, method)
+    particles, spare = exchanged(world.known, particles, spare, "v")
+    if turning:
+        confine_vorticity(particles, scratch, grid, c, count, method)
+    return particles, spare
+
+
 def has_grid_pressure(world: World, params: Parameters) -> bool:
     """Whether errors of the whole tank are removed on a grid: in a tank, and without ice, which it would move.
 
@@ -143,12 +147,11 @@ def has_grid_pressure(world: World, params: Parameters) -> bool:
 
 def update_densities(world: World, params: Parameters) -> None:
     """Measure the densities [kg/m^3] of `world` as it stands. The order of particles changes, the motion does not."""
-    c, method, count = coefficients(params, params.frame_time), method_number(params), world.count
-    forget_predictions(world.particles, count)
-    sort_particles(world.particles, world.spare, world.grid, c, count)
+    c, method, count = coefficients(params, 0.0), method_number(params), world.count
+    predict(world.particles, world.grid, world.solids, c, count, np.zeros(3, np.float32), int(world.has_solids))
+    sort_particles(world.particles, world.spare, world.grid, count)
     world.particles, world.spare = world.spare, world.particles
     world.grid = find_neighbors(world.particles, world.grid, c, count)
-    mark_near_solids(world.particles, world.solids, c, count)
     kinds = prepare_fluids(world, world.particles, params, params.frame_time)
     measure_density(
         world.scratch, world.particles, world.grid, world.solids, world.walls, c, count, kinds.largest_density, method

@@ -1,20 +1,50 @@
-"""XSPH viscosity: velocities drawn towards the mean of the neighbours.
+"""XSPH viscosity, velocities drawn towards the mean of the neighbours; and the vorticity, found in the same sweep.
 
-Schechter and Bridson 2012 (10.1145/2185520.2185557), Eq. 11 of the report. Where we differ: the sum is a mean, with
-the volume of a particle, so that c has no unit; pairs are weighted alike from both sides, so momentum is kept exactly.
-Of two fluids the heavier follows less, by the ratio of the masses: m_i dv_i is antisymmetric, no share exceeds c.
+Schechter and Bridson 2012 (10.1145/2185520.2185557), Eq. 11 of the report; the vorticity is its Eq. 9. Both are of the
+velocities before either acts. Where we differ: the sum is a mean, with the volume of a particle, so that c has no unit;
+pairs are weighted alike from both sides, so momentum is kept exactly. Of two fluids the heavier follows less, by the
+ratio of the masses: m_i dv_i is antisymmetric, no share exceeds c.
+
+    code     symbol     meaning                                                       unit
+    sums                sum_j (v_j - v_i) w_ij, and behind it omega_i                 m/s, 1/s
+    omega    omega_i    vorticity; in a 2-D world it points along z                   1/s
 """
 
 from wavetank.compiler import qd
+from wavetank.distance import vec3
 from wavetank.physics.neighbors import for_each_neighbor
-from wavetank.physics.smoothing import kernel
-from wavetank.state import Coefficients, Grid, Particles
+from wavetank.physics.smoothing import inverse_length, kernel
+from wavetank.state import Coefficients, Grid, Particles, Scratch
 
 
 @qd.func
 def add_xsph(sums: qd.template(), r, i, j, v: qd.template(), c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j (v_j - v_i) w_ij."""
-    sums += (v[j] - v[i]) * kernel(method, r.norm() * c.inverse_h)[0]
+    inverse = inverse_length(r)
+    dv = (v[j] - v[i]) * kernel(method, r.norm_sqr() * inverse * c.inverse_h)[0]
+    for k in qd.static(range(r.n)):
+        sums[k] += dv[k]
+
+
+@qd.func
+def add_vorticity(sums: qd.template(), r, i, j, v: qd.template(), c: Coefficients, method: qd.template()):
+    """Add neighbour j to sum_j (v_j - v_i) w_ij and to omega_i = sum_j (v_j - v_i) x grad_j W (Eq. 9)."""
+    inverse = inverse_length(r)
+    w = kernel(method, r.norm_sqr() * inverse * c.inverse_h)
+    dv = v[j] - v[i]
+    for k in qd.static(range(r.n)):
+        sums[k] += dv[k] * w[0]
+    # grad_j W = -grad_i W, and a x b = -b x a.
+    turn = (r * (c.gradient_scale * w[1] * inverse)).cross(dv)
+    if qd.static(r.n == 3):
+        for k in qd.static(range(3)):
+            sums[3 + k] += turn[k]
+    else:
+        sums[2] += turn
+
+
+#: By `turning`; append only, as `smoothing.KERNELS`.
+SUMS = (add_xsph, add_vorticity)
 
 
 @qd.func
@@ -22,20 +52,30 @@ def add_mixed_xsph(sums: qd.template(), r, i, j, data: qd.template(), c: Coeffic
     """Add neighbour j to sum_j (v_j - v_i) w_ij min(1, m_j / m_i); the inverse masses w are in `data`, behind v."""
     a = data[i]
     b = data[j]
-    share = kernel(method, r.norm() * c.inverse_h)[0] * qd.min(1.0, a[r.n] / b[r.n])
+    inverse = inverse_length(r)
+    share = kernel(method, r.norm_sqr() * inverse * c.inverse_h)[0] * qd.min(1.0, a[3] / b[3])
     for k in qd.static(range(r.n)):
         sums[k] += (b[k] - a[k]) * share
 
 
 @qd.kernel(fastcache=True)
 def apply_viscosity(
-    smoothed: Particles, particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, method: qd.template()
-):
-    """Smooth the velocities (Eq. 11)."""
+    smoothed: Particles, particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32,
+    method: qd.template(), turning: qd.template(),
+):  # fmt: skip
+    """Smooth the velocities (Eq. 11); where `turning`, estimate the vorticity (Eq. 9)."""
     for i in range(count):
-        dv = particles.v[i] * 0.0
-        for_each_neighbor(dv, add_xsph, i, particles, particles.v, grid, c, method)
-        smoothed.v[i] = particles.v[i] + c.viscosity * c.density_scale * dv
+        v = particles.v[i]
+        sums = qd.Vector([0.0] * qd.static(v.n if not turning else 2 * v.n if v.n == 3 else 3))
+        for_each_neighbor(sums, qd.static(SUMS[turning]), i, particles, particles.v, grid, c, method)
+        for k in qd.static(range(v.n)):
+            v[k] += c.viscosity * c.density_scale * sums[k]
+        smoothed.v[i] = v
+        if qd.static(turning):
+            if qd.static(v.n == 3):
+                scratch.omega[i] = vec3(sums[3], sums[4], sums[5])
+            else:
+                scratch.omega[i] = vec3(0.0, 0.0, sums[2])
 
 
 @qd.kernel(fastcache=True)

@@ -10,50 +10,28 @@ Macklin and Müller 2013; Eq. 9 and 10 of the report. In a 2-D world the vortici
 Where we differ, and why: N has length one even where eta is noise, so that Eq. 10 stirs water at rest. Noise differs
 from particle to particle, a vortex does not: |sum w omega_j| / sum w |omega_j| is 1 in a vortex and about 1 / sqrt(n)
 for n neighbours that turn at random. Below `vorticity_coherence` of it there is no force, nor where the water turns
-slower than the smallest waves do (`CALM` in step.py); a coherence of 0 leaves Eq. 10 as it is.
+slower than the smallest waves do (`CALM` in step.py); a coherence of 0 leaves Eq. 10 as it is. The vorticity itself,
+Eq. 9, is summed in the sweep of XSPH (`viscosity.py`).
 """
 
 from wavetank.compiler import qd
 from wavetank.distance import lift, vec3
 from wavetank.physics.neighbors import for_each_neighbor
-from wavetank.physics.smoothing import kernel
+from wavetank.physics.smoothing import inverse_length, kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch
-
-
-@qd.func
-def gradient(r, c: Coefficients, method: qd.template()):
-    """V grad_i W(r), as a vector in space [1/m]."""
-    length = r.norm()
-    return lift(r) * (c.gradient_scale * kernel(method, length / c.h)[1] / qd.max(length, 1e-12))
-
-
-@qd.func
-def add_vorticity(sums: qd.template(), r, i, j, v: qd.template(), c: Coefficients, method: qd.template()):
-    """Add neighbour j to omega_i (Eq. 9); v_ij = v_j - v_i, and grad_j W = -grad_i W."""
-    sums += lift(v[j] - v[i]).cross(-gradient(r, c, method))
 
 
 @qd.func
 def add_eta(sums: qd.template(), r, i, j, omega: qd.template(), c: Coefficients, method: qd.template()):
     """Add neighbour j to (grad |omega|, sum_j w omega_j, sum_j w |omega_j|)."""
+    inverse = inverse_length(r)
+    w = kernel(method, r.norm_sqr() * inverse * c.inverse_h)
     size = omega[j].norm()
-    slope = (size - omega[i].norm()) * gradient(r, c, method)
-    w = kernel(method, r.norm() / c.h)[0]
+    slope = lift(r) * ((size - omega[i].norm()) * c.gradient_scale * w[1] * inverse)
     for k in qd.static(range(3)):
         sums[k] += slope[k]
-        sums[3 + k] += w * omega[j][k]
-    sums[6] += w * size
-
-
-@qd.kernel(fastcache=True)
-def find_vorticity(
-    scratch: Scratch, particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, method: qd.template()
-):
-    """Estimate the vorticity of every particle (Eq. 9)."""
-    for i in range(count):
-        omega = vec3(0.0, 0.0, 0.0)
-        for_each_neighbor(omega, add_vorticity, i, particles, particles.v, grid, c, method)
-        scratch.omega[i] = omega
+        sums[3 + k] += w[0] * omega[j][k]
+    sums[6] += w[0] * size
 
 
 @qd.kernel(fastcache=True)
@@ -63,20 +41,22 @@ def confine_vorticity(
     """Push around every vortex: dv = dt eps_w s (N x omega), N = eta / |eta| (Eq. 10)."""
     for i in range(count):
         omega = scratch.omega[i]
-        sums = qd.Vector([0.0] * 7)
-        for_each_neighbor(sums, add_eta, i, particles, scratch.omega, grid, c, method)
-        eta = vec3(sums[0], sums[1], sums[2])
-        n = eta / qd.max(eta.norm(), 1e-6)
-        mean = vec3(sums[3], sums[4], sums[5])
-        agreement = mean.norm() / qd.max(sums[6], 1e-12)
-        if mean.dot(omega) < 0.0:
-            agreement = 0.0
-        share = 1.0
-        if c.coherence > 0.0:
-            share = qd.min(qd.max((agreement - c.coherence) / qd.max(1.0 - c.coherence, 1e-3), 0.0), 1.0)
-            share *= qd.min(qd.max(omega.norm() / qd.max(c.calm, 1e-9) - 1.0, 0.0), 1.0)
-        force = share * n.cross(omega)
-        v = particles.v[i]
-        for k in qd.static(range(v.n)):
-            v[k] += c.dt * c.vorticity * force[k]
-        particles.v[i] = v
+        # Calm water, most of a tank, is not asked for its neighbours.
+        if c.coherence <= 0.0 or omega.norm() > c.calm:
+            sums = qd.Vector([0.0] * 7)
+            for_each_neighbor(sums, add_eta, i, particles, scratch.omega, grid, c, method)
+            eta = vec3(sums[0], sums[1], sums[2])
+            n = eta / qd.max(eta.norm(), 1e-6)
+            mean = vec3(sums[3], sums[4], sums[5])
+            agreement = mean.norm() / qd.max(sums[6], 1e-12)
+            if mean.dot(omega) < 0.0:
+                agreement = 0.0
+            share = 1.0
+            if c.coherence > 0.0:
+                share = qd.min(qd.max((agreement - c.coherence) / qd.max(1.0 - c.coherence, 1e-3), 0.0), 1.0)
+                share *= qd.min(qd.max(omega.norm() / qd.max(c.calm, 1e-9) - 1.0, 0.0), 1.0)
+            force = share * n.cross(omega)
+            v = particles.v[i]
+            for k in qd.static(range(v.n)):
+                v[k] += c.dt * c.vorticity * force[k]
+            particles.v[i] = v
