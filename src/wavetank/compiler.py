@@ -58,7 +58,7 @@ def _forget(*_: Any) -> None:
 # Prepared arguments of a launch are kept under the addresses of frozen objects, for as long as their arrays live: an
 # object of numbers that takes the address of one that is gone would get the numbers of that one. What else the
 # compiler remembers of frozen objects it keeps in them.
-_launch_cache = getattr(sys.modules["quadrants.lang.kernel"], "LaunchContextBufferCache", None)
+_launch_cache: Any = getattr(sys.modules["quadrants.lang.kernel"], "LaunchContextBufferCache", None)
 if hasattr(_launch_cache, "cache"):
     _launch_cache.cache = _forget
 
