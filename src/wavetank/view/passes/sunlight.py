@@ -74,10 +74,13 @@ def gather(
             moved = to_pixel(sun, to_view(sun, at + travel * bent)) - to_pixel(sun, to_view(sun, at))
         # Light that the water does not touch adds up to one everywhere and is not sent.
         if moved.x != 0.0 or moved.y != 0.0:
-            for part in qd.static(range(4)):
-                start = vec2(column - 0.25 + 0.5 * (part % 2), row - 0.25 + 0.5 * (part // 2))
-                deposit(caustic, start, -1)
-                deposit(caustic, start + moved, 1)
+            for part in range(8):  # one copy of the code, not eight to compile
+                place = vec2(column - 0.25 + 0.5 * (part % 2), row - 0.25 + 0.5 * (part // 2 % 2))
+                sign = -1
+                if part >= 4:
+                    place += moved
+                    sign = 1
+                deposit(caustic, place, sign)
 
 
 @qd.func
