@@ -9,6 +9,7 @@ import contextlib
 import functools
 import io
 import os
+import pathlib
 import sys
 import textwrap
 import types
@@ -141,7 +142,7 @@ def threads() -> int:
 def _thread_ids() -> set[int]:
     """Return the numbers of this process's threads, none where the system does not tell."""
     try:
-        return {int(name) for name in os.listdir("/proc/self/task")}
+        return {int(path.name) for path in pathlib.Path("/proc/self/task").iterdir()}
     except OSError:
         return set()
 
