@@ -6,9 +6,9 @@ its thickness along the sun's rays, and of the depth at which they meet it.
 """
 
 from wavetank.compiler import qd
-from wavetank.view.buffers import Buffers
+from wavetank.view.buffers import FARTHEST, Buffers
 from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec2, vec3
-from wavetank.view.passes import flatten, occlusion, panes, shadow, smooth, spheres, surface, thickness
+from wavetank.view.passes import flatten, occlusion, panes, shadow, smooth, surface, thickness
 from wavetank.view.passes.ellipsoids import walls
 from wavetank.view.passes.surface import normal_of, rise_at
 from wavetank.view.passes.thickness import thickness_at
@@ -26,7 +26,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         shadow.fill(water.light)
         return
     if not buffers.shadows_rest:
-        spheres.clear_depth(buffers.sun_depth)
+        buffers.sun_depth.fill(FARTHEST)
         shadow.cast(shot, buffers)
     shadow.fall(shot, buffers, water.light, LIGHT_STEP)
     occlusion.look(shot, buffers, water.light, LIGHT_STEP)
