@@ -9,10 +9,12 @@ import contextlib
 import functools
 import io
 import os
+import pathlib
 import sys
+import textwrap
+import types
 import warnings
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,9 @@ os.environ.setdefault("QD_LOG_LEVEL", "error")
 # The compiler prints a banner on import; a library should be silent.
 with contextlib.redirect_stdout(io.StringIO()):
     import quadrants as qd
-    from quadrants.lang import _wrap_inspect, kernel_impl
+    from quadrants.lang import _func_base, _kernel_impl_dataclass, _wrap_inspect, kernel_impl
+    from quadrants.lang._fast_caching import function_hasher
+    from quadrants.lang.ast import ast_transformer_utils
 
 from wavetank.errors import WavetankError
 
@@ -41,14 +45,38 @@ def _is_in_class_body(level_of_class_stackframe: int) -> bool:
     return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
 
 
+class _OneLineWrapper(textwrap.TextWrapper):
+    """Python's own, with a short way for a line that needs no breaking: nearly every line of a source."""
+
+    def wrap(self, text: str) -> list[str]:
+        if len(text) <= self.width and text.isprintable():
+            return [text.rstrip()] if text.strip() else []
+        return super().wrap(text)
+
+
+def _flatten_fields(tree: Any, struct_locals: set[str]) -> Any:
+    """Do what the compiler's function of that place does, less a walk for places that are all there."""
+    return _kernel_impl_dataclass.FlattenAttributeNameTransformer(struct_locals=struct_locals).visit(tree)
+
+
 # The compiler asks Python's `inspect` for the source of a function each time it inlines it, those of its own vector
-# functions hundreds of times, and for the module of each decorated one: a fifth of the time of a cold start, and half
-# a second of a warm one (docs/performance.md). The answers stay the same.
+# functions hundreds of times, and for the module of each decorated one; wraps every line of it as text, for error
+# messages; and reads the same functions again for each kernel, to see whether they have changed. A third of a cold
+# start went there, and half a second of a warm one (docs/performance.md). The answers stay the same.
 for _name_of_lookup in ("getsourcelines", "getsourcefile"):
     if hasattr(_wrap_inspect, _name_of_lookup):
         setattr(_wrap_inspect, _name_of_lookup, functools.cache(getattr(_wrap_inspect, _name_of_lookup)))
 if hasattr(kernel_impl, "_inside_class"):
     kernel_impl._inside_class = _is_in_class_body
+if hasattr(function_hasher, "_hash_function"):
+    function_hasher._hash_function = functools.cache(function_hasher._hash_function)
+if getattr(_func_base, "textwrap", None) is textwrap:
+    _func_base.textwrap = types.ModuleType("textwrap")
+    _func_base.textwrap.__dict__.update(vars(textwrap), fill=functools.cache(textwrap.fill))
+if getattr(ast_transformer_utils, "TextWrapper", None) is textwrap.TextWrapper:
+    ast_transformer_utils.TextWrapper = _OneLineWrapper
+if hasattr(_kernel_impl_dataclass, "FlattenAttributeNameTransformer"):
+    _kernel_impl_dataclass.unpack_ast_struct_expressions = _flatten_fields
 
 
 def _forget(*_: Any) -> None:
@@ -126,7 +154,7 @@ def threads() -> int:
 def _thread_ids() -> set[int]:
     """Return the numbers of this process's threads, none where the system does not tell."""
     try:
-        return {int(thread.name) for thread in Path("/proc/self/task").iterdir()}
+        return {int(path.name) for path in pathlib.Path("/proc/self/task").iterdir()}
     except OSError:
         return set()
 

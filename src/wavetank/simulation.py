@@ -61,10 +61,10 @@ class Simulation:
         compiler.upload(walls.table, table)
         size = scene.tank.size if scene.tank else None
         self.world = World(
+            grid=new_grid(dim, capacity, size, h, _list_room(dim, scene.support)),  # first: it may be refused
             particles=new_particles(dim, capacity),
             spare=new_particles(dim, capacity),
             scratch=new_scratch(capacity),
-            grid=new_grid(dim, capacity, size, h, _list_room(dim, scene.support)),
             solids=self.solids.device,
             walls=walls,
             fluids=Fluids(capacity, rows=vectors(4, len(scene.materials) + 1)),

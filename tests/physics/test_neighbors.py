@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 import wavetank as wt
+from wavetank.physics import neighbors
 from wavetank.physics.integrate import forget_predictions
 from wavetank.physics.neighbors import find_neighbors, new_grid, sort_particles
 from wavetank.physics.step import coefficients
@@ -87,3 +88,17 @@ def test_cells_follow_the_particles_not_the_box():
     grid = new_grid(3, 1000, (1000.0, 1000.0, 1000.0), 0.1, 32)
     assert grid.cells <= 4096
     assert min(grid.nx, grid.ny, grid.nz) >= 3
+
+
+def test_more_lists_than_an_array_can_hold_are_refused():
+    with pytest.raises(wt.WavetankError, match="enough for 33,554,431 particles; use a larger spacing"):
+        new_grid(3, 2**25, None, 0.1, 64)
+
+
+def test_a_list_that_would_grow_too_long_is_refused_and_kept(monkeypatch):
+    sim = Simulation(wt.Scene(spacing=0.1, fluids=[wt.Points(positions=np.zeros((400, 2)))], gravity=(0.0, 0.0)))
+    room = sim.world.grid.room
+    monkeypatch.setattr(neighbors, "MAX_ENTRIES", 400 * room)
+    with pytest.raises(wt.WavetankError, match="400 particles with room for [0-9]+ neighbours each are too many"):
+        sim.step()
+    assert sim.world.grid.room == room

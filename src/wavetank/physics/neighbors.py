@@ -22,11 +22,13 @@ import math
 import numpy as np
 
 from wavetank.compiler import current_backend, qd
+from wavetank.errors import WavetankError
 from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles, integers
 
 SCAN_BLOCK = 1024
 LARGE = 100_000  # cells and particles, from where threads gain more than they cost
+MAX_ENTRIES = 2**31 - 1  # of a device array: the compiler counts them, and computes places in them, with 32 bits
 
 
 @qd.func
@@ -228,8 +230,9 @@ def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, 
     """Allocate a grid for `capacity` particles.
 
     `size` [m] is that of the tank, or None in the open. The number of cells follows the tank as long as that is not
-    much more than there are particles.
+    much more than there are particles. Raises `WavetankError` for more particles than lists have room for.
     """
+    entries = _new_list(capacity, room)
     limit = max(4 * capacity, 4096)
     cells = np.full(3, 3, np.int64)
     if size is None:
@@ -243,7 +246,7 @@ def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, 
     return Grid(
         cell=integers(capacity), start=integers(total + 1), fill=integers(total),
         blocks=integers(-(-total // SCAN_BLOCK)), order=integers(capacity), number=integers(capacity),
-        visits=integers(capacity), list=integers(capacity * room), room=room,
+        visits=integers(capacity), list=entries, room=room,
         lanes=8 if current_backend() == "cpu" else 1, nowhere=capacity,
         nx=int(cells[0]), ny=int(cells[1]), nz=int(cells[2]), cells=total,
     )  # fmt: skip
@@ -259,9 +262,19 @@ def find_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int
     most = int(list_neighbors(particles, grid, c, count))
     if most >= grid.room:
         room = _rounded(most)
-        grid = dataclasses.replace(grid, room=room, list=integers(grid.cell.shape[0] * room))
+        grid = dataclasses.replace(grid, room=room, list=_new_list(grid.cell.shape[0], room))
         list_neighbors(particles, grid, c, count)
     return grid
+
+
+def _new_list(capacity: int, room: int) -> Any:
+    """Allocate `room` places for each of `capacity` particles, or say how many particles there may be."""
+    if capacity * room > MAX_ENTRIES:
+        raise WavetankError(
+            f"{capacity:,} particles with room for {room} neighbours each are too many: a list has at most "
+            f"{MAX_ENTRIES:,} places, enough for {MAX_ENTRIES // room:,} particles; use a larger spacing or less fluid."
+        )
+    return integers(capacity * room)
 
 
 def _rounded(most: int) -> int:

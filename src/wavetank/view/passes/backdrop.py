@@ -113,8 +113,13 @@ def divide(
                 if what == -1:  # SOLID
                     n, seen = normal[row, column], -direction.normalized()
                     gloss, wrap = 0.3 * look.gloss, 0.4 * look.wrap
-                    sun = surface_radiance(look, albedo, n, seen, vec2(share.x, 0.0), wrap, gloss)
-                    sky = surface_radiance(look, albedo, n, seen, vec2(0.0, share.y), wrap, gloss)
+                    for part in range(2):  # one copy of the code to compile
+                        sky = surface_radiance(
+                            look, albedo, n, seen, qd.select(part == 0, vec2(share.x, 0.0), vec2(0.0, share.y)), wrap,
+                            gloss,
+                        )  # fmt: skip
+                        if part == 0:
+                            sun = sky
                 else:
                     sun, sky = albedo * look.sun * (look.to_sun.y * share.x), albedo * look.sky * share.y
             in_sun[row, column] = (1.0 - far) * sun

@@ -15,7 +15,7 @@ smooth pass averages that pattern away.
 from typing import Any
 
 from wavetank.compiler import qd
-from wavetank.view.buffers import Buffers
+from wavetank.view.buffers import FARTHEST, Buffers
 from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec2, vec3
 from wavetank.view.passes import solids, spheres
 from wavetank.view.passes.probes import pattern_turn, spiral, turned
@@ -28,7 +28,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if shot.frame.dim == 2:
         fill(buffers.with_light())
         return
-    spheres.clear_depth(buffers.sun_depth)
+    buffers.sun_depth.fill(FARTHEST)
     frame = shot.frame
     spheres.splat(frame.x, frame.count, shot.radius, shot.sun, float(buffers.texels), buffers.sun_depth)
     cast(shot, buffers)
@@ -40,7 +40,7 @@ def draw_solids(shot: Shot, buffers: Buffers) -> None:
     if shot.frame.dim == 2:
         fill(buffers.with_light())
     else:
-        spheres.clear_depth(buffers.sun_depth)
+        buffers.sun_depth.fill(FARTHEST)
         cast(shot, buffers)
         fall(shot, buffers, buffers.with_light(), 1)
 

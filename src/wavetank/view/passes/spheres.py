@@ -29,6 +29,7 @@ from wavetank.view.lens import (
     vec3,
     view_ray,
 )
+from wavetank.view.passes import nothing
 from wavetank.view.quantities import DEVICE_FUNCTIONS
 from wavetank.view.shot import Shot
 
@@ -38,7 +39,7 @@ LARGEST = 0.25  # of the picture's height: radius up to which a ball is drawn at
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Start the picture with the particles: fills depth, surface, normal and color."""
     frame, largest = shot.frame, max(LARGEST * buffers.rows, 1.0)
-    clear(buffers.depth, buffers.surface)
+    nothing.draw(shot, buffers)
     splat(frame.x, frame.count, shot.radius, shot.lens, largest, buffers.depth)
     claim(frame.x, frame.count, shot.radius, shot.lens, largest, buffers.depth, buffers.surface)
     low, high = shot.limits
@@ -47,21 +48,6 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         shot.colors,
         buffers.depth, buffers.surface, buffers.normal, buffers.color,
     )  # fmt: skip
-
-
-@qd.kernel(fastcache=True)
-def clear(depth: qd.types.ndarray(), surface: qd.types.ndarray()):
-    """Empty the picture: nothing anywhere, infinitely far."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        depth[row, column] = 0x7F000000  # FARTHEST
-        surface[row, column] = 0x7FFFFFFF  # NOTHING
-
-
-@qd.kernel(fastcache=True)
-def clear_depth(depth: qd.types.ndarray()):
-    """Nothing to see, infinitely far."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        depth[row, column] = 0x7F000000  # FARTHEST
 
 
 @qd.kernel(fastcache=True)

@@ -6,9 +6,9 @@ its thickness along the sun's rays, and of the depth at which they meet it.
 """
 
 from wavetank.compiler import qd
-from wavetank.view.buffers import Buffers
+from wavetank.view.buffers import FARTHEST, Buffers
 from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec2, vec3
-from wavetank.view.passes import flatten, occlusion, panes, shadow, smooth, spheres, surface, thickness
+from wavetank.view.passes import flatten, occlusion, panes, shadow, smooth, surface, thickness
 from wavetank.view.passes.ellipsoids import walls
 from wavetank.view.passes.surface import normal_of, rise_at
 from wavetank.view.passes.thickness import thickness_at
@@ -26,7 +26,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         shadow.fill(water.light)
         return
     if not buffers.shadows_rest:
-        spheres.clear_depth(buffers.sun_depth)
+        buffers.sun_depth.fill(FARTHEST)
         shadow.cast(shot, buffers)
     shadow.fall(shot, buffers, water.light, LIGHT_STEP)
     occlusion.look(shot, buffers, water.light, LIGHT_STEP)
@@ -74,10 +74,13 @@ def gather(
             moved = to_pixel(sun, to_view(sun, at + travel * bent)) - to_pixel(sun, to_view(sun, at))
         # Light that the water does not touch adds up to one everywhere and is not sent.
         if moved.x != 0.0 or moved.y != 0.0:
-            for part in qd.static(range(4)):
-                start = vec2(column - 0.25 + 0.5 * (part % 2), row - 0.25 + 0.5 * (part // 2))
-                deposit(caustic, start, -1)
-                deposit(caustic, start + moved, 1)
+            for part in range(8):  # one copy of the code, not eight to compile
+                place = vec2(column - 0.25 + 0.5 * (part % 2), row - 0.25 + 0.5 * (part // 2 % 2))
+                sign = -1
+                if part >= 4:
+                    place += moved
+                    sign = 1
+                deposit(caustic, place, sign)
 
 
 @qd.func

@@ -213,7 +213,8 @@ def times(axes, mixed, v):
 def rise_along(row, column, down, across, z, limit, depth: qd.template()):
     """Change of depth [m] to the next pixel of a row or column, taken more from the side where it is less."""
     total, weight = 0.0, 1e-30
-    for side in qd.static((-1, 1)):
+    for k in range(2):
+        side = 2 * k - 1
         r = qd.min(qd.max(row + side * down, 0), depth.shape[0] - 1)
         c = qd.min(qd.max(column + side * across, 0), depth.shape[1] - 1)
         rise = qd.bit_cast(depth[r, c], qd.f32) - z

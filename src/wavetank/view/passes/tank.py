@@ -43,19 +43,12 @@ def _mark_over(shot: Shot, buffers: Buffers, depth: Any) -> tuple[Any, Any]:
     lower, upper = vector(*shot.extent.lower), vector(*shot.extent.upper)
     width = max(1.0, buffers.rows / 420.0)
     edges = 12 if shot.frame.dim == 3 else 4
-    erase(buffers.lines)
+    buffers.lines.fill(0)
     mark(
         shot.lens, lower, upper, edges, max(buffers.rows, buffers.columns) + 2, width, slack(shot), depth,
         buffers.lines,
     )  # fmt: skip
     return lower, upper
-
-
-@qd.kernel(fastcache=True)
-def erase(lines: qd.types.ndarray()):
-    """No lines anywhere."""
-    for row, column in qd.ndrange(lines.shape[0], lines.shape[1]):
-        lines[row, column] = 0
 
 
 @qd.func

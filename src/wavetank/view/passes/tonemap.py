@@ -80,12 +80,12 @@ def develop(
         for k in range(4):
             pixel = qd.min(4 * group + k, pixels - 1)
             total = vec3(0.0, 0.0, 0.0)
-            for m in range(samples):
-                for n in range(samples):
-                    sample = color[pixel // columns * samples + m, pixel % columns * samples + n]
-                    if mapped == 0:
-                        sample = neutral(sample)
-                    total += sample
+            row, column = pixel // columns * samples, pixel % columns * samples
+            for n in range(samples * samples):
+                sample = color[row + n // samples, column + n % samples]
+                if mapped == 0:
+                    sample = neutral(sample)
+                total += sample
             last = curve.shape[0] - 1
             place = total * (last / (samples * samples)) + 0.5
             for channel in qd.static(range(3)):
