@@ -26,7 +26,7 @@ from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles, integers
 
 SCAN_BLOCK = 1024
-LARGE = 100_000  # cells and particles, from where threads gain more than they cost
+LARGE = 50_000  # cells and particles, from where threads gain more than they cost
 
 
 @qd.func
