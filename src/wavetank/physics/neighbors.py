@@ -13,7 +13,8 @@ set. A list is walked in whole groups of `lanes`, the last filled up with the pa
 smoothing kernel is zero. Both were measured: docs/performance.md.
 
 Counting sort after Green 2010 ("Particle Simulation using CUDA"); Hoetzlein 2014 ("Fast Fixed-Radius Nearest
-Neighbors") for the counting by integer atomics.
+Neighbors") for the counting by integer atomics. What there is little of is counted by one thread: waking the others
+costs more than they save.
 """
 
 import math
