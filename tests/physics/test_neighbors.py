@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -82,7 +84,7 @@ def test_order_does_not_depend_on_the_order_given(shared):
     np.testing.assert_array_equal(*orders)
     np.testing.assert_array_equal(np.sort(orders[0]), np.arange(500))
     starts, cells = world.grid.start.to_numpy(), world.grid.cell.to_numpy()[np.argsort(shuffle)]
-    for first, end in zip(starts, starts[1:], strict=False):
+    for first, end in itertools.pairwise(starts):
         inside = orders[0][first:end]
         assert (np.diff(inside) > 0).all()
         assert len(set(cells[inside])) <= 1
