@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -7,7 +9,7 @@ from scipy.spatial import cKDTree
 import wavetank as wt
 from wavetank.physics import neighbors
 from wavetank.physics.integrate import forget_predictions
-from wavetank.physics.neighbors import find_neighbors, new_grid, sort_particles
+from wavetank.physics.neighbors import new_grid, reorder
 from wavetank.physics.step import coefficients
 from wavetank.simulation import Simulation
 
@@ -66,8 +68,9 @@ def test_a_crowd_larger_than_its_list_is_listed_completely():
     assert all(len(found) == 599 for found in neighbor_sets(sim))
 
 
-def test_order_does_not_depend_on_the_order_given():
-    """Inside a cell particles stand by id, so sorting twice from any permutation gives one order."""
+@pytest.mark.parametrize("shared", [0, 1])
+def test_order_does_not_depend_on_the_order_given(shared):
+    """Inside a cell particles stand by id, so sorting twice from any permutation gives one order, on any threads."""
     x = np.random.default_rng(1).uniform(0, 1, (500, 3)).astype(np.float32)
     sim = Simulation(wt.Scene(spacing=0.1, fluids=[wt.Points(positions=x)]))
     world, c = sim.world, coefficients(sim.scene, 1 / 240)
@@ -75,12 +78,17 @@ def test_order_does_not_depend_on_the_order_given():
     for seed in (0, 1):
         shuffle = np.random.default_rng(seed).permutation(500)
         world.particles.x.from_numpy(np.vstack([x[shuffle], np.zeros((1, 3), np.float32)]))
-        forget_predictions(world.particles, world.grid, c, 500)
         world.particles.id.from_numpy(np.append(shuffle, 0).astype(np.int32))
-        sort_particles(world.particles, world.spare, world.grid, 500)
+        forget_predictions(world.particles, world.grid, c, 500)
+        reorder(world.spare, world.particles, world.grid, 500, shared)
         orders.append(world.spare.id.to_numpy()[:500])
-        find_neighbors(world.spare, world.grid, c, 500)
     np.testing.assert_array_equal(*orders)
+    np.testing.assert_array_equal(np.sort(orders[0]), np.arange(500))
+    starts, cells = world.grid.start.to_numpy(), world.grid.cell.to_numpy()[np.argsort(shuffle)]
+    for first, end in itertools.pairwise(starts):
+        inside = orders[0][first:end]
+        assert (np.diff(inside) > 0).all()
+        assert len(set(cells[inside])) <= 1
 
 
 def test_cells_follow_the_particles_not_the_box():

@@ -53,18 +53,13 @@ class Cost:
 
 #: By the name of the kernel. Vectors are three words of four bytes.
 COSTS: dict[str, Cost] = {
-    "predict": Cost(vectors=4, words=1, operations=110),  # x, v twice, p
-    "mark_near_solids": Cost(vectors=2, words=1, operations=150),
-    "keep_out_of_solids": Cost(words=1),  # nearly all particles are far from every wall
-    "count_cells": Cost(vectors=1, words=3, operations=6),
-    "place_particles": Cost(words=7),
-    "reorder": Cost(vectors=6, words=5),
+    "predict": Cost(vectors=4, words=2, operations=266),  # x, v twice, p
+    "reorder": Cost(vectors=6, words=13),
     "list_neighbors": Cost(vectors=1, words=4, pair_words=1, test_operations=9),
     "solve_multipliers": Cost(vectors=1, words=6, pair_words=1, operations=25, pair_operations=26),
     "correct_positions": Cost(vectors=2, words=3, pair_words=1, operations=12, pair_operations=24),
     "update_velocities": Cost(vectors=5, operations=24),
     "apply_viscosity": Cost(vectors=3, words=1, pair_words=1, operations=7, pair_operations=22),
-    "find_vorticity": Cost(vectors=3, words=1, pair_words=1, pair_operations=38),
     "confine_vorticity": Cost(vectors=4, words=1, pair_words=1, operations=25, pair_operations=36),
 }
 

@@ -13,7 +13,8 @@ set. A list is walked in whole groups of `lanes`, the last filled up with the pa
 smoothing kernel is zero. Both were measured: docs/performance.md.
 
 Counting sort after Green 2010 ("Particle Simulation using CUDA"); Hoetzlein 2014 ("Fast Fixed-Radius Nearest
-Neighbors") for the counting by integer atomics.
+Neighbors") for the counting by integer atomics. What there is little of is counted by one thread: waking the others
+costs more than they save.
 """
 
 import dataclasses
@@ -27,7 +28,7 @@ from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles, integers
 
 SCAN_BLOCK = 1024
-LARGE = 100_000  # cells and particles, from where threads gain more than they cost
+LARGE = 50_000  # cells and particles, from where threads gain more than they cost
 MAX_ENTRIES = 2**31 - 1  # of a device array: the compiler counts them, and computes places in them, with 32 bits
 
 

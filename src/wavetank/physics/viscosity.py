@@ -66,13 +66,14 @@ def apply_viscosity(
     """Smooth the velocities (Eq. 11); where `turning`, estimate the vorticity (Eq. 9)."""
     for i in range(count):
         v = particles.v[i]
-        sums = qd.Vector([0.0] * qd.static(v.n if not turning else 2 * v.n if v.n == 3 else 3))
+        dim = qd.static(v.n)
+        sums = qd.Vector([0.0] * (dim + turning * (2 * dim - 3)))
         for_each_neighbor(sums, qd.static(SUMS[turning]), i, particles, particles.v, grid, c, method)
-        for k in qd.static(range(v.n)):
+        for k in qd.static(range(dim)):
             v[k] += c.viscosity * c.density_scale * sums[k]
         smoothed.v[i] = v
         if qd.static(turning):
-            if qd.static(v.n == 3):
+            if qd.static(dim == 3):
                 scratch.omega[i] = vec3(sums[3], sums[4], sums[5])
             else:
                 scratch.omega[i] = vec3(0.0, 0.0, sums[2])
