@@ -19,6 +19,7 @@ costs more than they save.
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 
