@@ -80,7 +80,7 @@ def test_every_thread_that_computes_has_a_core_of_its_own(bound, tmp_path):
     cores = sorted(os.sched_getaffinity(0))
     told = subprocess.run(
         [sys.executable, str(program)], capture_output=True, text=True, check=True,
-        env={**os.environ, "WAVETANK_BIND_THREADS": bound},
+        env={**os.environ, "WAVETANK_BIND_THREADS": bound, "QD_CPU_MAX_NUM_THREADS": str(len(cores))},
     ).stdout  # fmt: skip
     expected = [[core] for core in cores] if bound == "1" else [cores] * len(cores)
     assert json.loads(told.splitlines()[-1]) == expected
