@@ -28,7 +28,7 @@ from wavetank.view.camera import Camera
 
 MOST_PARTICLES = 200_000
 SLUGGISH, SWIFT = 0.045, 0.025  # s: a frame that takes longer is made shorter, one that takes less longer again
-MOST_PARTS = 5  # of a frame; shorter time steps would turn density errors into velocity
+MOST_PARTS = 8  # of a frame; shorter time steps would turn density errors into velocity
 WORTH = 1.0  # a frame takes no less than so many times its picture, or pictures would eat the time
 MOST_WAITING = 4096  # commands in the queue; what comes on top is dropped
 CARRY_PACE = 0.8  # of sqrt(g L): how fast a command carries a solid
