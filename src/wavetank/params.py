@@ -155,7 +155,7 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 #: Operating points of the method: what `quality` puts in place of the defaults. Figures of each: docs/method.md.
 QUALITIES: dict[str, dict[str, Any]] = {
-    "draft": {"substeps": 1, "wave_courant": 0.6, "courant": 1.0},
+    "draft": {"substeps": 1, "iterations": 3, "wave_courant": 0.6, "courant": 0.9},
     "standard": {},
     "high": {"substeps": 4, "wave_courant": 0.2, "courant": 0.4},
 }
