@@ -64,10 +64,10 @@ def switches():
     return {t: int(text.split("nonvoluntary")[0].split("voluntary_ctxt_switches:")[1]) for t, text in lines.items()}
 
 before = switches()
-for _ in range(300):
+for _ in range(1000):
     fill(x)
 after = switches()
-busy = [int(t) for t in after if int(t) != os.getpid() and after[t] - before.get(t, 0) > 100]
+busy = [int(t) for t in after if int(t) != os.getpid() and after[t] - before.get(t, 0) > 50]
 print(sorted(sorted(os.sched_getaffinity(t)) for t in busy))
 """
 
@@ -82,5 +82,8 @@ def test_every_thread_that_computes_has_a_core_of_its_own(bound, tmp_path):
         [sys.executable, str(program)], capture_output=True, text=True, check=True,
         env={**os.environ, "WAVETANK_BIND_THREADS": bound, "QD_CPU_MAX_NUM_THREADS": str(len(cores))},
     ).stdout  # fmt: skip
-    expected = [[core] for core in cores] if bound == "1" else [cores] * len(cores)
-    assert json.loads(told.splitlines()[-1]) == expected
+    found = json.loads(told.splitlines()[-1])
+    if bound == "1":
+        assert found == [[core] for core in cores]
+    else:  # where a busy machine leaves the work to fewer threads, that is its choice
+        assert found and all(each == cores for each in found)
