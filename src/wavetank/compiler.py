@@ -141,8 +141,7 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
     if came_up != wanted:
         raise WavetankError(f"arch = {arch!r} was asked for, but the compiler came up on {came_up!r}.")
     _current = wanted
-    if wanted == "cpu":
-        _keep_apart(sorted(_thread_ids() - before)[-int(qd.lang.impl.current_cfg().cpu_max_num_threads) :])
+    _keep_apart(_thread_ids() - before)
     return wanted
 
 
@@ -159,15 +158,16 @@ def _thread_ids() -> set[int]:
         return set()
 
 
-def _keep_apart(pool: list[int]) -> None:
-    """Give every thread of the `pool` that computes a core of its own, where Linux lets us and each can have one.
+def _keep_apart(made: set[int]) -> None:
+    """Give every thread that computes a core of its own, where Linux lets us and each can have one.
 
-    The pool sleeps between loops. Woken, two of its threads often start on one core, and the loop is over before the
-    system has moved one of them: two cores were as slow as one for loops of less than a few milliseconds.
+    They are the last of those that the compiler has `made`, its pool. The pool sleeps between loops. Woken, two of its
+    threads often start on one core, and the loop is over before the system has moved one of them: two cores were as
+    slow as one for loops of less than a few milliseconds.
     """
     if not hasattr(os, "sched_setaffinity") or os.environ.get("WAVETANK_BIND_THREADS") == "0":
         return
-    cores = sorted(os.sched_getaffinity(0))
+    pool, cores = sorted(made)[-threads() :] if threads() else [], sorted(os.sched_getaffinity(0))
     if len(pool) != len(cores):
         return  # fewer threads than cores: which to take is the system's choice
     for thread, core in zip(pool, cores, strict=True):

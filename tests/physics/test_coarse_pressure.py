@@ -80,6 +80,17 @@ def test_few_sweeps_on_all_levels_come_close(size):
     assert error_of(finest.lam.to_numpy(), finest) > (0.02 if size[1] < 1.0 else 0.3), "one level alone does not"
 
 
+@pytest.mark.xfail(reason="0.16: levels see different surfaces, and the coarsest is solved now", strict=True)
+def test_few_sweeps_come_close_under_a_rough_surface():
+    """A surface that leaps by a cell or two from column to column is another one to each level."""
+    levels = new_levels((1.6, 3.2), 0.05)
+    finest = levels[0]
+    filled(finest, 40.0 + 4.0 * np.sin(np.arange(finest.nx)))
+    random_errors(finest)
+    poisson.solve_levels(levels)
+    assert error_of(finest.lam.to_numpy(), finest) < 0.12
+
+
 @pytest.mark.parametrize("kernel", ["spiky", "wendland"])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_stiffness_is_what_a_field_of_multipliers_moves_by(dim, kernel):
