@@ -18,9 +18,17 @@ from wavetank.physics import measure, population
 from wavetank.physics.coarse_grid import new_levels
 from wavetank.physics.diffuse.pool import pool_from, pool_rows
 from wavetank.physics.diffuse.update import update_diffuse
-from wavetank.physics.neighbors import new_grid
+from wavetank.physics.neighbors import list_room, new_grid
 from wavetank.physics.smoothing import half_space_table
-from wavetank.physics.step import World, capillary_speed, capillary_substeps, has_grid_pressure, step, update_densities
+from wavetank.physics.step import (
+    World,
+    capillary_speed,
+    capillary_substeps,
+    has_grid_pressure,
+    neighbor_numbers,
+    step,
+    update_densities,
+)
 from wavetank.physics.time_step import largest_speed, pool_depth, substeps
 from wavetank.scene import MAX_PARTICLES, Scene
 from wavetank.snapshot import Snapshot, put_snapshot, read_snapshot, take_snapshot, write_snapshot
@@ -61,7 +69,7 @@ class Simulation:
         compiler.upload(walls.table, table)
         size = scene.tank.size if scene.tank else None
         self.world = World(
-            grid=new_grid(dim, capacity, size, h, _list_room(dim, scene.support)),  # first: it may be refused
+            grid=new_grid(dim, capacity, size, h, list_room(dim, scene.support)),  # first: it may be refused
             particles=new_particles(dim, capacity),
             spare=new_particles(dim, capacity),
             scratch=new_scratch(capacity),
@@ -342,9 +350,13 @@ class Simulation:
     def stats(self) -> dict[str, float]:
         """Measure this instant; see `physics.measure.statistics` for the keys, and foam in numbers of particles."""
         frame = self.frame()
-        neighbors = compiler.download(self.world.grid.number)[: self.count]
         figures = measure.statistics(
-            frame.positions, frame.velocities, frame.densities, neighbors, self.scene, frame.rest_densities
+            frame.positions,
+            frame.velocities,
+            frame.densities,
+            neighbor_numbers(self.world, self.scene),
+            self.scene,
+            frame.rest_densities,
         )
         return {
             "time": self.time,
@@ -392,9 +404,3 @@ class Simulation:
         self = cls(Scene.model_validate_json(text), arch)
         self.resume(snapshot)
         return self
-
-
-def _list_room(dim: int, support: float) -> int:
-    """Places of a neighbour list at the start: a third more than the rest lattice has, in whole cache lines."""
-    volume = math.pi * support**2 if dim == 2 else 4.0 / 3.0 * math.pi * support**3
-    return 16 * math.ceil(1.33 * volume / 16) + 16

@@ -1,7 +1,7 @@
 """The arrays of a world on the device, with unit and shape; allocated once at capacity.
 
-Arrays of particles have one row more than there is room: row `capacity` is nowhere, farther from everything than any
-support, and stands in neighbour lists where there is no neighbour.
+Arrays of particles have `MARGIN` rows more than there is room: loops over whole blocks and groups read them, whatever
+they hold, and drop what they found.
 
 Two sets of the moving arrays exist so that sorting and Jacobi updates can read one and write the other; which is
 which is swapped on the host, nothing is copied.
@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import qd, upload
+from wavetank.compiler import qd
 
-NOWHERE = 1e6  # m, in every direction
+MARGIN = 32  # rows behind the last particle that loops over whole blocks and groups may read
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -58,12 +58,10 @@ class Grid:
     fill: qd.types.ndarray()  # i32 [cells]: particles placed so far
     blocks: qd.types.ndarray()  # i32 [blocks]: partial sums of the scan
     order: qd.types.ndarray()  # i32 [capacity]: which particle comes at each sorted place
-    number: qd.types.ndarray()  # i32 [capacity]: neighbours of each particle
-    visits: qd.types.ndarray()  # i32 [capacity]: the same, in whole groups of `lanes`
-    list: qd.types.ndarray()  # i32 [capacity * room]: their indices, filled up with `nowhere`
-    room: qd.i32  # places for each particle, a multiple of 16
-    lanes: qd.i32  # neighbours that are computed together
-    nowhere: qd.i32  # index of a particle that is far from all others
+    number: qd.types.ndarray()  # i32 [groups]: entries of each group's list
+    list: qd.types.ndarray()  # i32 [groups * room]: who is a neighbour of any of a group's eight particles
+    room: qd.i32  # places for each group, a multiple of 16
+    lanes: qd.i32  # particles that are computed together: a group's, or one
     nx: qd.i32  # cells before the pattern moves on along y
     ny: qd.i32
     nz: qd.i32
@@ -162,7 +160,7 @@ class Fluids:
     def array(self, name: str) -> Any:
         """Return the vec4 [capacity] of that name, made when it is first asked for."""
         if name not in self.arrays:
-            self.arrays[name] = vectors(4, self.capacity + 1)
+            self.arrays[name] = vectors(4, self.capacity + MARGIN)
         return self.arrays[name]
 
 
@@ -234,18 +232,14 @@ def integers(*shape: int) -> Any:
 
 def new_particles(dim: int, capacity: int) -> Particles:
     """Allocate particles that all rest at the origin, and the one that is nowhere."""
-    rows = capacity + 1
-    px, py, pz = (scalars(capacity + 32 if k < dim else 1) for k in range(3))
-    places = np.zeros(capacity + 32, np.float32)
-    places[capacity] = NOWHERE
-    for component in (px, py, pz)[:dim]:
-        upload(component, places)
+    rows = capacity + MARGIN
+    px, py, pz = (scalars(rows if k < dim else 1) for k in range(3))
     return Particles(vectors(dim, rows), px, py, pz, vectors(dim, rows), *(integers(rows) for _ in range(5)))
 
 
 def new_scratch(capacity: int) -> Scratch:
     """Allocate the scratch arrays."""
-    rows = capacity + 1
+    rows = capacity + MARGIN
     rho, lam, dlam, weight = (scalars(rows) for _ in range(4))
     weight.fill(1.0)
     return Scratch(rho, lam, dlam, omega=vectors(3, rows), wall=vectors(4, rows), weight=weight)

@@ -13,7 +13,7 @@ import numpy as np
 
 from wavetank import compiler
 from wavetank.compiler import qd
-from wavetank.physics.neighbors import for_each_around
+from wavetank.physics.neighbors import count_neighbors, for_each_around
 from wavetank.physics.step import coefficients
 from wavetank.simulation import Simulation
 from wavetank.state import Coefficients, Grid, Particles, integers
@@ -35,8 +35,10 @@ def count_tests(tests: qd.types.ndarray(), particles: Particles, grid: Grid, c: 
 
 
 def pairs(sim: Simulation) -> int:
-    """Return the number of ordered pairs (i, j) in the neighbour lists of the last search."""
-    return int(sim.world.grid.number.to_numpy()[: sim.count].sum(dtype=np.int64))
+    """Return the number of ordered pairs (i, j) within h of each other in the neighbour lists."""
+    world = sim.world
+    c = coefficients(sim.scene, sim.scene.frame_time)
+    return int(count_neighbors(world.particles, world.grid, c, sim.count).sum(dtype=np.int64))
 
 
 def distance_tests(sim: Simulation) -> int:

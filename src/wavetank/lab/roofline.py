@@ -27,7 +27,7 @@ from wavetank.errors import WavetankError
 from wavetank.lab.bench import check, measured, sized, timed
 from wavetank.lab.counts import water_bytes
 from wavetank.lab.machine import load, machine
-from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.physics.neighbors import add_neighbors, column, count_neighbors, teams
 from wavetank.physics.step import coefficients
 from wavetank.scene import Scene
 from wavetank.simulation import Simulation
@@ -88,18 +88,21 @@ def spin(values: qd.types.ndarray(), count: qd.i32, a: qd.f32, b: qd.f32):
 
 
 @qd.func
-def add_way(sums: qd.template(), r, i, j, data: qd.template(), c: Coefficients, method: qd.template()):
+def add_way(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add up the ways to the neighbours: the least that a pass over the lists can do."""
     sums += r
 
 
 @qd.kernel(fastcache=True)
-def walk(total: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32):
+def walk(
+    total: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()
+):
     """Go once over all neighbour lists."""
-    for i in range(count):
-        way = particles.x[i] * 0.0
-        for_each_neighbor(way, add_way, i, particles, particles.v, grid, c, 0)
-        total[i] = way.norm_sqr()
+    for team in range(teams(count, lanes)):
+        ways = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+        add_neighbors(ways, add_way, team, particles, particles.v, grid, c, 0)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            total[i] = column(ways, i - team * lanes).norm_sqr()
 
 
 def roofline(
@@ -156,12 +159,12 @@ def measure_ceilings(scene: Scene, arch: str) -> dict[str, float]:
     own = min(LARGE, max(1024, water_bytes(sim) // 8))
     target, source, c = scalars(LARGE), scalars(LARGE), coefficients(scene, scene.frame_time)
     source.fill(1.0)
-    lists = int(world.grid.number.to_numpy()[:count].sum())
+    lists = int(count_neighbors(world.particles, world.grid, c, count).sum())
     return {
         "copy": 8.0 * own / _fastest(lambda: copy(target, source, own)),
         "copy_large": 8.0 * LARGE / _fastest(lambda: copy(target, source, LARGE)),
         "arithmetic": CHAINS * OPERATIONS / _fastest(lambda: spin(target, CHAINS, 0.999, 0.001)),
-        "walk": lists / _fastest(lambda: walk(target, world.particles, world.grid, c, count)),
+        "walk": lists / _fastest(lambda: walk(target, world.particles, world.grid, c, count, world.grid.lanes)),
     }
 
 

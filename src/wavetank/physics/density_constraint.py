@@ -31,14 +31,14 @@ multiplier: Moreau and Jean's projected iteration, as in Tonge et al. 2012 (10.1
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, vec4
 from wavetank.physics.boundary import flattened, kept_in_tank, stopped, wall_density
-from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.physics.neighbors import add_neighbors, column, teams
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.smoothing import inverse_length, kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch, Walls
 
 
 @qd.func
-def add_density(sums: qd.template(), r, i, j, data: qd.template(), c: Coefficients, method: qd.template()):
+def add_density(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to (sum w, grad_i C, sum_j |grad_j C|^2): Eq. 1 and the denominator of Eq. 4."""
     inverse = inverse_length(r)
     w = kernel(method, r.norm_sqr() * inverse * c.inverse_h)
@@ -51,25 +51,31 @@ def add_density(sums: qd.template(), r, i, j, data: qd.template(), c: Coefficien
 
 
 @qd.func
-def add_correction(sums: qd.template(), r, i, j, dlam: qd.template(), c: Coefficients, method: qd.template()):
-    """Add neighbour j to the correction of particle i: Eq. 6."""
-    inverse = inverse_length(r)
-    slope = c.gradient_scale * kernel(method, r.norm_sqr() * inverse * c.inverse_h)[1]
-    sums += r * ((dlam[i] + dlam[j]) * slope * inverse)
+def add_weight(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+    """Add neighbour j to sum w: Eq. 1."""
+    sums[0] += kernel(method, r.norm_sqr() * inverse_length(r) * c.inverse_h)[0]
 
 
 @qd.func
-def add_tensile_correction(sums: qd.template(), r, i, j, dlam: qd.template(), c: Coefficients, method: qd.template()):
+def add_correction(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+    """Add neighbour j to the correction of particle i: Eq. 6."""
+    inverse = inverse_length(r)
+    slope = c.gradient_scale * kernel(method, r.norm_sqr() * inverse * c.inverse_h)[1]
+    sums += r * ((a[0] + b[0]) * slope * inverse)
+
+
+@qd.func
+def add_tensile_correction(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to the correction of particle i: Eq. 8, Eq. 6 with the artificial pressure of Eq. 7."""
     inverse = inverse_length(r)
     w = kernel(method, r.norm_sqr() * inverse * c.inverse_h)
     s_corr = -c.tensile * w[0] ** c.tensile_exponent  # Eq. 7
-    sums += r * ((dlam[i] + dlam[j] + s_corr) * c.gradient_scale * w[1] * inverse)
+    sums += r * ((a[0] + b[0] + s_corr) * c.gradient_scale * w[1] * inverse)
 
 
 @qd.func
-def add_weighted_density(sums: qd.template(), r, i, j, w: qd.template(), c: Coefficients, method: qd.template()):
-    """`add_density` for fluids of different density: squared gradients count with the inverse masses `w`."""
+def add_weighted_density(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+    """`add_density` for fluids of different density: squared gradients count with the inverse masses."""
     inverse = inverse_length(r)
     value = kernel(method, r.norm_sqr() * inverse * c.inverse_h)
     slope = c.gradient_scale * value[1]
@@ -77,7 +83,7 @@ def add_weighted_density(sums: qd.template(), r, i, j, w: qd.template(), c: Coef
     direction = r * (slope * inverse)
     for k in qd.static(range(r.n)):
         sums[1 + k] += direction[k]
-    sums[1 + r.n] += w[j] * slope * slope
+    sums[1 + r.n] += b[0] * slope * slope
 
 
 #: By `mixed`; append only, as `smoothing.KERNELS`.
@@ -89,86 +95,90 @@ CORRECTIONS = (add_correction, add_tensile_correction)
 @qd.kernel(fastcache=True)
 def solve_multipliers(
     scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
-    count: qd.i32, first: qd.i32, method: qd.template(), mixed: qd.template(),
+    count: qd.i32, first: qd.i32, method: qd.template(), mixed: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Estimate densities (Eq. 1) and move the multipliers towards the solution (Eq. 5).
 
     The `first` iteration of a substep starts without pressure.
     """
-    for i in range(count):
-        p = predicted(particles, i)
-        dim = qd.static(p.n)
-        sums = qd.Vector([0.0] * (dim + 2))
-        for_each_neighbor(sums, qd.static(DENSITIES[mixed]), i, particles, scratch.weight, grid, c, method)
-        rho = c.density_scale * (sums[0] + kernel(method, 0.0)[0])
-        own = 0.0
-        wall = vec4(0.0, 0.0, 0.0, 0.0)
-        if particles.near[i] != 0:
-            wall = wall_density(p, particles.near[i], solids, walls, c)
-            scratch.wall[i] = wall
-        for k in qd.static(range(dim)):
-            own += (sums[1 + k] + wall[k]) ** 2
-        rho += wall.w
-        constraint = rho - 1.0  # Eq. 2
-        squares = sums[dim + 1] + own + c.eps
-        if qd.static(mixed):
-            squares = sums[dim + 1] + scratch.weight[i] * (own + c.eps)
-        newton = -constraint / squares  # Eq. 5
-        before = 0.0
-        change = c.relaxation * newton
-        if first == 0:
-            before = scratch.lam[i]
-            change += c.momentum * scratch.dlam[i]
-        lam = before + change
-        if lam > 0.0:
-            lam *= c.attraction
-        scratch.dlam[i] = lam - before
-        scratch.lam[i] = lam
+    for team in range(teams(count, lanes)):
+        dim = qd.static(particles.x[team].n)
+        sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
+        add_neighbors(sums, qd.static(DENSITIES[mixed]), team, particles, scratch.weight, grid, c, method)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            sum = column(sums, i - team * lanes)
+            rho = c.density_scale * (sum[0] + kernel(method, 0.0)[0])
+            own = 0.0
+            wall = vec4(0.0, 0.0, 0.0, 0.0)
+            if particles.near[i] != 0:
+                wall = wall_density(predicted(particles, i), particles.near[i], solids, walls, c)
+                scratch.wall[i] = wall
+            for k in qd.static(range(dim)):
+                own += (sum[1 + k] + wall[k]) ** 2
+            rho += wall.w
+            constraint = rho - 1.0  # Eq. 2
+            squares = sum[dim + 1] + own + c.eps
+            if qd.static(mixed):
+                squares = sum[dim + 1] + scratch.weight[i] * (own + c.eps)
+            newton = -constraint / squares  # Eq. 5
+            before = 0.0
+            change = c.relaxation * newton
+            if first == 0:
+                before = scratch.lam[i]
+                change += c.momentum * scratch.dlam[i]
+            lam = before + change
+            if lam > 0.0:
+                lam *= c.attraction
+            scratch.dlam[i] = lam - before
+            scratch.lam[i] = lam
 
 
 @qd.kernel(fastcache=True)
 def correct_positions(
     corrected: Particles, particles: Particles, scratch: Scratch, grid: Grid, solids: SolidSet, c: Coefficients,
     count: qd.i32, method: qd.template(), correction: qd.template(), mixed: qd.template(), searched: qd.template(),
+    lanes: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by the corrections (Eq. 6 or 8, by its number in CORRECTIONS), inside the tank.
 
     Where solids are `searched` they stay out of those as well.
     """
-    for i in range(count):
-        p = predicted(particles, i)
-        dp = p * 0.0
-        for_each_neighbor(dp, qd.static(CORRECTIONS[correction]), i, particles, scratch.dlam, grid, c, method)
-        near = particles.near[i]
-        if near != 0:
-            for k in qd.static(range(p.n)):
-                dp[k] += scratch.dlam[i] * scratch.wall[i][k]
-        if qd.static(mixed):
-            dp *= scratch.weight[i]
-        # Within one substep a particle must not run past the solids that were marked for it.
-        p += dp * qd.min(1.0, c.largest_correction / qd.max(dp.norm(), 1e-12))
-        if near != 0:
-            p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
-            if qd.static(searched):
-                if near >> solids.tank_count != 0:
-                    p = flattened(stopped(lift(particles.x[i]), lift(p), near, solids, c.wall_gap), p)
-        predict_at(corrected, i, p)
+    for team in range(teams(count, lanes)):
+        sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+        add_neighbors(sums, qd.static(CORRECTIONS[correction]), team, particles, scratch.dlam, grid, c, method)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            p = predicted(particles, i)
+            dp = column(sums, i - team * lanes)
+            near = particles.near[i]
+            if near != 0:
+                for k in qd.static(range(p.n)):
+                    dp[k] += scratch.dlam[i] * scratch.wall[i][k]
+            if qd.static(mixed):
+                dp *= scratch.weight[i]
+            # Within one substep a particle must not run past the solids that were marked for it.
+            p += dp * qd.min(1.0, c.largest_correction / qd.max(dp.norm(), 1e-12))
+            if near != 0:
+                p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
+                if qd.static(searched):
+                    if near >> solids.tank_count != 0:
+                        p = flattened(stopped(lift(particles.x[i]), lift(p), near, solids, c.wall_gap), p)
+            predict_at(corrected, i, p)
 
 
 @qd.kernel(fastcache=True)
 def measure_density(
     scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
-    count: qd.i32, largest_density: qd.f32, method: qd.template(),
+    count: qd.i32, largest_density: qd.f32, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Estimate the densities [kg/m^3] at the positions p (Eq. 1), walls included."""
-    for i in range(count):
-        p = predicted(particles, i)
-        sums = qd.Vector([0.0] * (p.n + 2))
-        for_each_neighbor(sums, add_density, i, particles, scratch.weight, grid, c, method)
-        rho = c.density_scale * (sums[0] + kernel(method, 0.0)[0])
-        if particles.near[i] != 0:
-            rho += wall_density(p, particles.near[i], solids, walls, c).w
-        scratch.rho[i] = largest_density * rho / scratch.weight[i]
+    for team in range(teams(count, lanes)):
+        sums = qd.Matrix.zero(qd.f32, 1, lanes)
+        add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            rho = c.density_scale * (sums[0, i - team * lanes] + kernel(method, 0.0)[0])
+            if particles.near[i] != 0:
+                rho += wall_density(predicted(particles, i), particles.near[i], solids, walls, c).w
+            scratch.rho[i] = largest_density * rho / scratch.weight[i]
 
 
 def schedule(iterations: int, slowest: float, stiffest: float) -> list[tuple[float, float]]:

@@ -39,7 +39,7 @@ from wavetank.physics.density_constraint import schedule
 from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend
-from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.physics.neighbors import add_neighbors, column, teams
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars
@@ -74,10 +74,8 @@ def drag_table(dim: int, ratio: float) -> np.ndarray:
 
 
 @qd.func
-def add_damping(sums: qd.template(), r, i, j, packed: qd.template(), c: Coefficients, method: qd.template()):
+def add_damping(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j mu_ij f(q) ((v_j - v_i) . n) n."""
-    a = packed[i]
-    b = packed[j]
     square = qd.max(r.norm_sqr(), 1e-20)
     approach = 0.0
     for k in qd.static(range(r.n)):
@@ -88,11 +86,11 @@ def add_damping(sums: qd.template(), r, i, j, packed: qd.template(), c: Coeffici
 
 
 @qd.func
-def add_stiffness(sums: qd.template(), r, i, j, packed: qd.template(), c: Coefficients, method: qd.template()):
+def add_stiffness(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to the rows' sums of |sum_j mu_ij f(q) n n^T|, element by element from above."""
     square = qd.max(r.norm_sqr(), 1e-20)
     f = qd.max(1.0 - qd.sqrt(square) / c.h, 0.0)
-    mu = 2.0 * packed[i][3] * packed[j][3] / qd.max(packed[i][3] + packed[j][3], 1e-20)
+    mu = 2.0 * a[3] * b[3] / qd.max(a[3] + b[3], 1e-20)
     for k in qd.static(range(r.n)):
         for m in qd.static(range(r.n)):
             sums[k * r.n + m] += mu * f * r[k] * r[m] / square
@@ -145,25 +143,27 @@ def find_drag(
 @qd.kernel(fastcache=True)
 def stiffest_particle(
     packed: qd.types.ndarray(), drag: qd.types.ndarray(), particles: Particles, scratch: Scratch, grid: Grid,
-    c: Coefficients, count: qd.i32, rate: qd.f32,
+    c: Coefficients, count: qd.i32, rate: qd.f32, lanes: qd.template(),
 ) -> qd.i32:  # fmt: skip
     """Return the bits of kappa - 1: twice the largest row sum of a particle's own dampers, and the walls' drag.
 
     The matrix of one damper is at most twice its diagonal blocks, hence so is their sum.
     """
     most = 0
-    for i in range(count):
-        dim = qd.static(particles.x[i].n)
-        sums = qd.Vector([0.0] * (dim * dim))
-        for_each_neighbor(sums, add_stiffness, i, particles, packed, grid, c, 0)
-        largest = 0.0
-        for k in qd.static(range(dim)):
-            row = 0.0
-            for m in qd.static(range(dim)):
-                row += qd.abs(sums[k * dim + m])
-            largest = qd.max(largest, row)
-        own = rate * scratch.weight[i] * (2.0 * largest + drag[i].w)
-        qd.atomic_max(most, qd.bit_cast(own, qd.i32))
+    for team in range(teams(count, lanes)):
+        dim = qd.static(particles.x[team].n)
+        sums = qd.Matrix.zero(qd.f32, dim * dim, lanes)
+        add_neighbors(sums, add_stiffness, team, particles, packed, grid, c, 0)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            sum = column(sums, i - team * lanes)
+            largest = 0.0
+            for k in qd.static(range(dim)):
+                row = 0.0
+                for m in qd.static(range(dim)):
+                    row += qd.abs(sum[k * dim + m])
+                largest = qd.max(largest, row)
+            own = rate * scratch.weight[i] * (2.0 * largest + drag[i].w)
+            qd.atomic_max(most, qd.bit_cast(own, qd.i32))
     return most
 
 
@@ -171,24 +171,26 @@ def stiffest_particle(
 def relax_velocities(
     following: qd.types.ndarray(), packed: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(),
     particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, rate: qd.f32,
-    relaxation: qd.f32, momentum: qd.f32,
+    relaxation: qd.f32, momentum: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """One Chebyshev iteration; `following` holds the iterate before `packed` and receives the next."""
-    for i in range(count):
-        v = particles.v[i]
-        row = packed[i]
-        before = following[i]
-        force = v * 0.0
-        for_each_neighbor(force, add_damping, i, particles, packed, grid, c, 0)
-        wall = vec3(drag[i].x, drag[i].y, drag[i].z) - vec3(row.x, row.y, row.z) * drag[i].w
-        n = vec3(normal[i].x, normal[i].y, normal[i].z)
-        wall -= n * n.dot(wall)
-        share = rate * scratch.weight[i]
-        result = row
-        for k in qd.static(range(v.n)):
-            residual = v[k] - row[k] + share * (force[k] + wall[k])
-            result[k] = row[k] + relaxation * residual + momentum * (row[k] - before[k])
-        following[i] = result
+    for team in range(teams(count, lanes)):
+        sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
+        add_neighbors(sums, add_damping, team, particles, packed, grid, c, 0)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            v = particles.v[i]
+            row = packed[i]
+            before = following[i]
+            force = column(sums, i - team * lanes)
+            wall = vec3(drag[i].x, drag[i].y, drag[i].z) - vec3(row.x, row.y, row.z) * drag[i].w
+            n = vec3(normal[i].x, normal[i].y, normal[i].z)
+            wall -= n * n.dot(wall)
+            share = rate * scratch.weight[i]
+            result = row
+            for k in qd.static(range(v.n)):
+                residual = v[k] - row[k] + share * (force[k] + wall[k])
+                result[k] = row[k] + relaxation * residual + momentum * (row[k] - before[k])
+            following[i] = result
 
 
 @qd.kernel(fastcache=True)
@@ -224,12 +226,13 @@ def solve_viscosity(
     rate = c.dt * damper_scale(dim, ratio, d) / kinds.largest_density
     pack_velocities(packed, spare, particles, fluids.rows, count)
     find_drag(drag, normal, particles, fluids.rows, solids, fluids.arrays["drag table"], c, count, no_slip)
-    bits = stiffest_particle(packed, drag, particles, scratch, grid, c, count, rate)
+    bits = stiffest_particle(packed, drag, particles, scratch, grid, c, count, rate, grid.lanes)
     stiffest = 1.0 + 1.01 * float(np.int32(bits).view(np.float32))
     number = iterations(stiffest, largest_number)
     for relaxation, momentum in schedule(number, 1.0, stiffest) if number else []:
         relax_velocities(
-            spare, packed, drag, normal, particles, scratch, grid, c, count, rate, relaxation, momentum
+            spare, packed, drag, normal, particles, scratch, grid, c, count, rate, relaxation, momentum,
+            grid.lanes,
         )  # fmt: skip
         packed, spare = spare, packed
     take_velocities(particles, packed, c, count)

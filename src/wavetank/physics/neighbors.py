@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import current_backend, qd
+from wavetank.compiler import current_backend, download, qd
 from wavetank.errors import WavetankError
 from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles, integers
@@ -107,11 +107,13 @@ def reorder(sorted_: Particles, particles: Particles, grid: Grid, count: qd.i32,
                 grid.fill[cell] = place + 1
     for n in range(count):
         i = grid.order[n]
-        own = particles.id[i]
+        own = particles.px[i]
         cell = grid.cell[i]
         place = grid.start[cell]
         for k in range(place, grid.start[cell + 1]):
-            place += qd.cast(particles.id[grid.order[k]] < own, qd.i32)
+            other = grid.order[k]
+            x = particles.px[other]
+            place += qd.cast(x < own or (x == own and particles.id[other] < particles.id[i]), qd.i32)
         copy_particle(sorted_, place, particles, i)
 
 
@@ -130,76 +132,149 @@ def copy_particle(target: Particles, to, source: Particles, i):
 
 @qd.kernel(fastcache=True)
 def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.i32) -> qd.i32:
-    """Write every particle's neighbours within h and return the largest number found, even if it had no room."""
+    """Write the neighbours of every group and return the largest number found, even if it had no room."""
     most = 0
     h2 = c.h * c.h
     room = grid.room
-    for i in range(count):
-        p = predicted(particles, i)
-        block = qd.static(32 if p.n == 3 else 16)  # what a full row has, and some more
-        cell = grid.cell[grid.order[i]]
+    for group in range((count + 7) >> 3):
+        dim = qd.static(particles.x[group].n)
+        block = qd.static(32 if dim == 3 else 16)  # what a full row has, and some more
+        first = 8 * group
+        last = qd.min(first + 8, count)
         n = 0
-        for row in range(qd.static(9 if p.n == 3 else 3)):
-            layer = grid.nx * (row % 3 - 1)
-            if qd.static(p.n == 3):
-                layer += grid.nx * grid.ny * (row // 3 - 1)
-            low = cell + layer - 1
-            if low < 0:
-                low += grid.cells
-            if low >= grid.cells:
-                low -= grid.cells
-            # A row that runs over the last cell goes on at the first.
-            over = qd.max(low + 3 - grid.cells, 0)
-            for part in range(1 + qd.min(over, 1)):
-                begin = grid.start[low]
-                end = grid.start[low + 3 - over]
-                if part == 1:
-                    begin = 0
-                    end = grid.start[over]
-                while begin < end:
-                    hits = near_bits(particles, p, begin, qd.min(end - begin, block), h2)
-                    own = i - begin
-                    if own >= 0 and own < block:
-                        hits &= ~(qd.u32(1) << qd.cast(own, qd.u32))
-                    while hits != qd.u32(0):
-                        grid.list[i * room + qd.min(n, room - 1)] = begin + qd.math.ffs(hits) - 1
-                        hits &= hits - qd.u32(1)
-                        n += 1
-                    begin += block
-        grid.number[i] = n
-        visits = qd.min((n + grid.lanes - 1) // grid.lanes * grid.lanes, room)
-        for k in range(n, visits):
-            grid.list[i * room + k] = grid.nowhere
-        grid.visits[i] = visits
+        begin_run = first
+        while begin_run < last:
+            # A run: particles in cells that follow each other, so that the rows around them are one as well.
+            low_cell = grid.cell[grid.order[begin_run]]
+            cells = 3
+            end_run = begin_run + 1
+            while end_run < last and grid.cell[grid.order[end_run]] - low_cell <= qd.min(cells, grid.nx - 3):
+                cells = grid.cell[grid.order[end_run]] - low_cell + 3
+                end_run += 1
+            run = places_of(particles, first, begin_run, end_run)
+            earlier = places_of(particles, first, first, begin_run)
+            for row in range(qd.static(9 if dim == 3 else 3)):
+                layer = grid.nx * (row % 3 - 1)
+                if qd.static(dim == 3):
+                    layer += grid.nx * grid.ny * (row // 3 - 1)
+                low = low_cell + layer - 1
+                if low < 0:
+                    low += grid.cells
+                if low >= grid.cells:
+                    low -= grid.cells
+                # A row that runs over the last cell goes on at the first.
+                over = qd.max(low + cells - grid.cells, 0)
+                for part in range(1 + qd.min(over, 1)):
+                    begin = grid.start[low]
+                    end = grid.start[low + cells - over]
+                    if part == 1:
+                        begin = 0
+                        end = grid.start[over]
+                    while begin < end:
+                        length = qd.min(end - begin, block)
+                        hits = near_bits(particles, run, begin, length, h2)
+                        if begin_run > first:
+                            hits &= ~near_bits(particles, earlier, begin, length, h2)
+                        while hits != qd.u32(0):
+                            grid.list[group * room + qd.min(n, room - 1)] = begin + qd.math.ffs(hits) - 1
+                            hits &= hits - qd.u32(1)
+                            n += 1
+                        begin += block
+            begin_run = end_run
+        grid.number[group] = n
         qd.atomic_max(most, n)
     return most
 
 
 @qd.func
-def near_bits(particles: Particles, p: qd.template(), begin, length, h2):
-    """Bits of the particles from `begin` on, at most a block, that are within the root of `h2` of the point `p`."""
+def places_of(particles: Particles, first, begin, end):
+    """Places of the eight particles from `first` on, as columns; those outside of `begin` to `end` - 1 are nowhere."""
+    places = qd.Matrix.zero(qd.f32, particles.x[first].n, 8)
+    for k in qd.static(range(8)):
+        p = predicted(particles, first + k)
+        inside = first + k >= begin and first + k < end
+        for axis in qd.static(range(p.n)):
+            places[axis, k] = p[axis] if inside else 1e6
+    return places
+
+
+@qd.func
+def near_bits(particles: Particles, places: qd.template(), begin, length, h2):
+    """Bits of the particles from `begin` on, at most a block, that are within the root of `h2` of any of `places`."""
     hits = qd.u32(0)
     # Always a whole block, whose number of turns the compiler knows: the bits of what is too many are cut off.
-    for k in range(qd.static(32 if p.n == 3 else 16)):
-        hits |= qd.cast((p - predicted(particles, begin + k)).norm_sqr() < h2, qd.u32) << qd.cast(k, qd.u32)
+    for k in range(qd.static(32 if places.n == 3 else 16)):
+        p = predicted(particles, begin + k)
+        nearest = 2.0 * h2
+        for column in qd.static(range(8)):
+            square = 0.0
+            for axis in qd.static(range(places.n)):
+                square += (p[axis] - places[axis, column]) ** 2
+            nearest = qd.min(nearest, square)
+        hits |= qd.cast(nearest < h2, qd.u32) << qd.cast(k, qd.u32)
     return hits & (qd.u32(0xFFFFFFFF) >> qd.cast(32 - length, qd.u32))
 
 
 @qd.func
-def for_each_neighbor(
-    sums: qd.template(), visit: qd.template(), i, particles: Particles, data: qd.template(), grid: Grid,
+def teams(count, lanes: qd.template()):
+    """Number of teams of `lanes` particles."""
+    if qd.static(lanes == 1):
+        return count
+    return (count + lanes - 1) // lanes
+
+
+@qd.func
+def add_neighbors(
+    sums: qd.template(), visit: qd.template(), team, particles: Particles, data: qd.template(), grid: Grid,
     c: Coefficients, method: qd.template(),
 ):  # fmt: skip
-    """Call ``visit(sums, r, i, j, data, c, method)`` for every neighbour j of particle i, r = p_i - p_j [m].
+    """Add up what ``visit(sum, r, a, b, c, method)`` adds for each neighbour j of each particle i of a team.
 
-    `visit` adds to the vector `sums`, and nothing where |r| >= h: it is also called for the particle that is nowhere.
+    `sums` has a column for each of the team's particles, r = p_i - p_j [m], a and b are what `data` holds of i and j,
+    as vectors. `visit` is called for others than neighbours as well, and for the particle itself as if it were far
+    away: it adds nothing where |r| >= h.
     """
-    p = predicted(particles, i)
-    # The loop runs over the places themselves: a sum in the subscript would be computed for each of eight neighbours.
-    begin = i * grid.room
-    for n in range(begin, begin + grid.visits[i]):
+    lanes, width = qd.static(sums.m, _width(data))
+    first = team * lanes
+    own = qd.Matrix.zero(qd.f32, width, lanes)
+    for lane in range(lanes):
+        a = _row(data, first + lane)
+        for k in qd.static(range(width)):
+            own[k, lane] = a[k]
+    begin = (first >> 3) * grid.room
+    for n in range(begin, begin + grid.number[first >> 3]):
         j = grid.list[n]
-        visit(sums, p - predicted(particles, j), i, j, data, c, method)
+        p = predicted(particles, j)
+        b = _row(data, j)
+        for lane in range(lanes):
+            r = predicted(particles, first + lane) - p
+            r[0] = qd.select(first + lane == j, 1e6, r[0])
+            part = qd.Vector([0.0] * sums.n)
+            visit(part, r, column(own, lane), b, c, method)
+            for k in qd.static(range(sums.n)):
+                sums[k, lane] += part[k]
+
+
+def _width(data: Any) -> int:
+    """Numbers in an element of a device array."""
+    return int((data.element_shape() or (1,))[0])
+
+
+@qd.func
+def _row(data: qd.template(), i):
+    """Element `i` of a device array, as a vector."""
+    if qd.static(len(data.element_shape()) == 0):
+        return qd.Vector([data[i]])
+    return data[i]
+
+
+@qd.func
+def column(sums: qd.template(), lane):
+    """Sums of one particle of a team, as a vector."""
+    result = qd.Vector([0.0] * sums.n)
+    for k in qd.static(range(sums.n)):
+        result[k] = sums[k, lane]
+    return result
 
 
 @qd.func
@@ -247,11 +322,19 @@ def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, 
     total = int(cells.prod())
     return Grid(
         cell=integers(capacity), start=integers(total + 1), fill=integers(total),
-        blocks=integers(-(-total // SCAN_BLOCK)), order=integers(capacity), number=integers(capacity),
-        visits=integers(capacity), list=entries, room=room,
-        lanes=8 if current_backend() == "cpu" else 1, nowhere=capacity,
+        blocks=integers(-(-total // SCAN_BLOCK)), order=integers(capacity), number=integers(_groups(capacity)),
+        list=entries, room=room, lanes=8 if current_backend() == "cpu" else 1,
         nx=int(cells[0]), ny=int(cells[1]), nz=int(cells[2]), cells=total,
     )  # fmt: skip
+
+
+def list_room(dim: int, support: float) -> int:
+    """Places of a list at the start, in cache lines: those near a cube (2-D: a square) of four particles, and more."""
+    edge = 4.0 ** (1.0 / dim)
+    near = edge**2 + 4.0 * edge * support + math.pi * support**2
+    if dim == 3:
+        near = edge**3 + 6.0 * edge**2 * support + math.pi * support**2 * (3.0 * edge + 4.0 / 3.0 * support)
+    return 16 * math.ceil(near / 16) + 16
 
 
 def sort_particles(particles: Particles, spare: Particles, grid: Grid, count: int) -> None:
@@ -264,19 +347,50 @@ def find_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int
     most = int(list_neighbors(particles, grid, c, count))
     if most >= grid.room:
         room = _rounded(most)
-        grid = dataclasses.replace(grid, room=room, list=_new_list(grid.cell.shape[0], room))
+        grid = dataclasses.replace(grid, room=room, list=_new_list(grid.order.shape[0], room))
         list_neighbors(particles, grid, c, count)
     return grid
 
 
+@qd.func
+def add_one(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+    """Count neighbour j."""
+    if r.norm_sqr() < c.h * c.h:
+        sums[0] += 1.0
+
+
+@qd.kernel(fastcache=True)
+def write_numbers(
+    number: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()
+):
+    """Write how many neighbours every particle has."""
+    for team in range(teams(count, lanes)):
+        sums = qd.Matrix.zero(qd.f32, 1, lanes)
+        add_neighbors(sums, add_one, team, particles, particles.x, grid, c, 0)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            number[i] = qd.cast(sums[0, i - team * lanes], qd.i32)
+
+
+def count_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> np.ndarray:
+    """Return how many neighbours within h every particle has, int32 [count], in device order."""
+    number = integers(count)
+    write_numbers(number, particles, grid, c, count, grid.lanes)
+    return np.array(download(number)[:count])
+
+
 def _new_list(capacity: int, room: int) -> Any:
     """Allocate `room` places for each of `capacity` particles, or say how many particles there may be."""
-    if capacity * room > MAX_ENTRIES:
+    if _groups(capacity) * room > MAX_ENTRIES:
         raise WavetankError(
-            f"{capacity:,} particles with room for {room} neighbours each are too many: a list has at most "
-            f"{MAX_ENTRIES:,} places, enough for {MAX_ENTRIES // room:,} particles; use a larger spacing or less fluid."
+            f"{capacity:,} particles with room for {room} neighbours of every eight are too many: lists have at most "
+            f"{MAX_ENTRIES:,} places, enough for {MAX_ENTRIES // room * 8:,} particles; use a larger spacing or less "
+            "fluid."
         )
-    return integers(capacity * room)
+    return integers(_groups(capacity) * room)
+
+
+def _groups(capacity: int) -> int:
+    return -(-capacity // 8)
 
 
 def _rounded(most: int) -> int:

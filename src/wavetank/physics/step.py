@@ -21,7 +21,7 @@ from wavetank.physics.friction import apply_friction
 from wavetank.physics.implicit_viscosity import is_thick, solve_viscosity
 from wavetank.physics.integrate import predict, update_velocities
 from wavetank.physics.mixture import Blend, blend, fill_table, pack_weights, stiffening, weigh
-from wavetank.physics.neighbors import find_neighbors, sort_particles
+from wavetank.physics.neighbors import count_neighbors, find_neighbors, sort_particles
 from wavetank.physics.population import hold_frozen, stop_frozen
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
 from wavetank.physics.tension import apply_tension, limited_tensions, substeps_for
@@ -79,12 +79,14 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     if has_grid_pressure(world, params):
         correct_on_grid(world, now, kinds, params, c)
 
-    tensile = int(params.tensile_strength > 0.0)
+    tensile, lanes = int(params.tensile_strength > 0.0), grid.lanes
     for number, (relaxation, momentum) in enumerate(relaxations(params, kinds.density_ratio)):  # 8-19
         c = remembered(dataclasses.replace(c, relaxation=relaxation, momentum=momentum))
         first = int(number == 0)
-        solve_multipliers(scratch, now, grid, solids, walls, c, count, first, method, kinds.mixed)  # 9-11
-        correct_positions(spare, now, scratch, grid, solids, c, count, method, tensile, kinds.mixed, searched)  # 12-18
+        solve_multipliers(scratch, now, grid, solids, walls, c, count, first, method, kinds.mixed, lanes)  # 9-11
+        correct_positions(
+            spare, now, scratch, grid, solids, c, count, method, tensile, kinds.mixed, searched, lanes
+        )  # 12-18
         now, spare = exchanged(world.known, now, spare, "px", "py", "pz")
         if world.frozen:
             hold_frozen(now, count)
@@ -103,7 +105,9 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
 def correct_on_grid(world: World, particles: Particles, kinds: Blend, params: Parameters, c: Coefficients) -> None:
     """Remove what the densities of the whole tank are off, before the iterations between particles."""
     method, count = method_number(params), world.count
-    measure_density(world.scratch, particles, world.grid, world.solids, world.walls, c, count, 1.0, method)
+    measure_density(
+        world.scratch, particles, world.grid, world.solids, world.walls, c, count, 1.0, method, world.grid.lanes
+    )
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     correct_pressure(
         world.levels, particles, world.scratch, world.solids, c, stiffness, params.spacing**params.dim, count,
@@ -121,14 +125,14 @@ def smooth_and_confine(
     scratch, grid, count, method = world.scratch, world.grid, world.count, method_number(params)
     turning, mixed = int(params.vorticity > 0.0), bool(kinds.mixed) and params.viscosity > 0.0
     if turning or not mixed:
-        apply_viscosity(spare, particles, scratch, grid, c, count, method, turning)
+        apply_viscosity(spare, particles, scratch, grid, c, count, method, turning, grid.lanes)
     if mixed:
         packed = world.fluids.array("packed")
         pack_weights(packed, particles, scratch, count)
-        apply_mixed_viscosity(spare, particles, packed, grid, c, count, method)
+        apply_mixed_viscosity(spare, particles, packed, grid, c, count, method, grid.lanes)
     particles, spare = exchanged(world.known, particles, spare, "v")
     if turning:
-        confine_vorticity(particles, scratch, grid, c, count, method)
+        confine_vorticity(particles, scratch, grid, c, count, method, grid.lanes)
     return particles, spare
 
 
@@ -154,8 +158,14 @@ def update_densities(world: World, params: Parameters) -> None:
     world.grid = find_neighbors(world.particles, world.grid, c, count)
     kinds = prepare_fluids(world, world.particles, params, params.frame_time)
     measure_density(
-        world.scratch, world.particles, world.grid, world.solids, world.walls, c, count, kinds.largest_density, method
-    )
+        world.scratch, world.particles, world.grid, world.solids, world.walls, c, count, kinds.largest_density, method,
+        world.grid.lanes,
+    )  # fmt: skip
+
+
+def neighbor_numbers(world: World, params: Parameters) -> np.ndarray:
+    """Return how many neighbours every particle had in the last search, int32 [count], in device order."""
+    return count_neighbors(world.particles, world.grid, coefficients(params, 0.0), world.count)
 
 
 def act_on_fluids(world: World, particles: Particles, kinds: Blend, params: Parameters, c: Coefficients) -> bool:

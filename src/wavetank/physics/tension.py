@@ -39,10 +39,10 @@ from wavetank.distance import SolidSet, lift, signed_distance, vec3, vec4
 from wavetank.physics.boundary import is_near
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend
-from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.physics.neighbors import add_neighbors, column, teams
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
-from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, remembered, scalars
+from wavetank.state import MARGIN, Coefficients, Fluids, Grid, Particles, Scratch, remembered, scalars
 
 COHESION = 0.2  # share of the bond that alone would give the tension
 #: Brings the measured period of an oscillating drop to Rayleigh's: curved surfaces pull otherwise than flat ones.
@@ -127,17 +127,15 @@ def substeps_for(kinds: Blend, dim: int, ratio: float, d: float, duration: float
 
 
 @qd.func
-def add_gradient(sums: qd.template(), r, i, j, tension: qd.template(), c: Coefficients, method: qd.template()):
+def add_gradient(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to -sum_j 20 q t^3 n (Wendland C2); of another fluid only as far as its tension reaches."""
     t = qd.max(1.0 - r.norm() / c.h, 0.0)
-    sums -= r * (20.0 * t * t * t / c.h * qd.min(1.0, tension[j] / qd.max(tension[i], 1e-20)))
+    sums -= r * (20.0 * t * t * t / c.h * qd.min(1.0, b[0] / qd.max(a[0], 1e-20)))
 
 
 @qd.func
-def add_pull(sums: qd.template(), r, i, j, surface: qd.template(), c: Coefficients, method: qd.template()):
+def add_pull(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to the force on i, over the scale of the force: (skin, cohesion) are in c."""
-    a = surface[i]
-    b = surface[j]
     length = r.norm()
     q = length / c.h
     n = lift(r) / qd.max(length, 1e-12)
@@ -164,43 +162,47 @@ def find_tensions(tension: qd.types.ndarray(), particles: Particles, rows: qd.ty
 @qd.kernel(fastcache=True)
 def find_surface(
     surface: qd.types.ndarray(), tension: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients,
-    count: qd.i32, scale: qd.f32, quiet: qd.f32,
+    count: qd.i32, scale: qd.f32, quiet: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """Find where the surface is and which way it faces: g, without what is noise."""
-    for i in range(count):
-        g = particles.x[i] * 0.0
-        for_each_neighbor(g, add_gradient, i, particles, tension, grid, c, 0)
-        size = scale * g.norm()
-        g3 = lift(g) * (scale * qd.max(size - quiet, 0.0) / qd.max(size, 1e-12))
-        surface[i] = vec4(g3.x, g3.y, g3.z, tension[i])
+    for team in range(teams(count, lanes)):
+        sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+        add_neighbors(sums, add_gradient, team, particles, tension, grid, c, 0)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            g = column(sums, i - team * lanes)
+            size = scale * g.norm()
+            g3 = lift(g) * (scale * qd.max(size - quiet, 0.0) / qd.max(size, 1e-12))
+            surface[i] = vec4(g3.x, g3.y, g3.z, tension[i])
 
 
 @qd.kernel(fastcache=True)
 def attract(
     pulled: qd.types.ndarray(), surface: qd.types.ndarray(), particles: Particles, scratch: Scratch,
     rows: qd.types.ndarray(), grid: Grid, solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, count: qd.i32,
-    rate: qd.f32, adhesion: qd.f32,
+    rate: qd.f32, adhesion: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """Find the velocities after the pull of neighbours and solids; `rate` is dt over the largest mass of a particle."""
-    for i in range(count):
-        p = predicted(particles, i)
-        force = p * 0.0
-        for_each_neighbor(force, add_pull, i, particles, surface, grid, c, 0)
-        if particles.near[i] != 0:
-            last = table.shape[0] - 1
-            wetting = adhesion * surface[i].w * rows[particles.material[i]][3]
-            for k in range(solids.count):
-                if is_near(particles.near[i], k) == 1:
-                    value = signed_distance(solids, k, lift(p))
-                    if value.w < c.h:
-                        t = qd.min(qd.max(value.w / c.h, 0.0), 1.0) * last
-                        m = qd.min(qd.cast(t, qd.i32), last - 1)
-                        n = vec3(value.x, value.y, value.z)
-                        share = wetting * (table[m] + (table[m + 1] - table[m]) * (t - m))
-                        for axis in qd.static(range(p.n)):
-                            force[axis] -= share * n[axis]
-        v = lift(particles.v[i] + force * (rate * scratch.weight[i]))
-        pulled[i] = vec4(v.x, v.y, v.z, 0.0)
+    for team in range(teams(count, lanes)):
+        sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+        add_neighbors(sums, add_pull, team, particles, surface, grid, c, 0)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            p = predicted(particles, i)
+            force = column(sums, i - team * lanes)
+            if particles.near[i] != 0:
+                last = table.shape[0] - 1
+                wetting = adhesion * surface[i].w * rows[particles.material[i]][3]
+                for k in range(solids.count):
+                    if is_near(particles.near[i], k) == 1:
+                        value = signed_distance(solids, k, lift(p))
+                        if value.w < c.h:
+                            t = qd.min(qd.max(value.w / c.h, 0.0), 1.0) * last
+                            m = qd.min(qd.cast(t, qd.i32), last - 1)
+                            n = vec3(value.x, value.y, value.z)
+                            share = wetting * (table[m] + (table[m + 1] - table[m]) * (t - m))
+                            for axis in qd.static(range(p.n)):
+                                force[axis] -= share * n[axis]
+            v = lift(particles.v[i] + force * (rate * scratch.weight[i]))
+            pulled[i] = vec4(v.x, v.y, v.z, 0.0)
 
 
 @qd.kernel(fastcache=True)
@@ -222,7 +224,7 @@ def apply_tension(
     if "adhesion table" not in fluids.arrays:
         fluids.arrays["adhesion table"] = scalars(TABLE_SIZE + 1)
         upload(fluids.arrays["adhesion table"], adhesion_table(dim, ratio))
-        fluids.arrays["tension"] = scalars(fluids.capacity + 1)
+        fluids.arrays["tension"] = scalars(fluids.capacity + MARGIN)
     pulled, surface = fluids.array("packed"), fluids.array("normal")
     tension, table = fluids.arrays["tension"], fluids.arrays["adhesion table"]
     flat = flat_surface(dim, ratio)
@@ -231,7 +233,7 @@ def apply_tension(
     stretch = pull * (1.0 - COHESION) * d ** (dim - 2) / flat.stress
     c = remembered(dataclasses.replace(c, skin=stretch, cohesion=pull * COHESION * adhesion))
     find_tensions(tension, particles, fluids.rows, count)
-    find_surface(surface, tension, particles, grid, c, count, flat.gradient_scale, flat.quiet)
+    find_surface(surface, tension, particles, grid, c, count, flat.gradient_scale, flat.quiet, grid.lanes)
     rate = c.dt / (kinds.largest_density * d**dim)
-    attract(pulled, surface, particles, scratch, fluids.rows, grid, solids, table, c, count, rate, adhesion)
+    attract(pulled, surface, particles, scratch, fluids.rows, grid, solids, table, c, count, rate, adhesion, grid.lanes)
     take_pull(particles, pulled, c, count)

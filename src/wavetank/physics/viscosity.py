@@ -12,26 +12,26 @@ ratio of the masses: m_i dv_i is antisymmetric, no share exceeds c.
 
 from wavetank.compiler import qd
 from wavetank.distance import vec3
-from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.physics.neighbors import add_neighbors, column, teams
 from wavetank.physics.smoothing import inverse_length, kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch
 
 
 @qd.func
-def add_xsph(sums: qd.template(), r, i, j, v: qd.template(), c: Coefficients, method: qd.template()):
+def add_xsph(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j (v_j - v_i) w_ij."""
     inverse = inverse_length(r)
-    dv = (v[j] - v[i]) * kernel(method, r.norm_sqr() * inverse * c.inverse_h)[0]
+    dv = (b - a) * kernel(method, r.norm_sqr() * inverse * c.inverse_h)[0]
     for k in qd.static(range(r.n)):
         sums[k] += dv[k]
 
 
 @qd.func
-def add_vorticity(sums: qd.template(), r, i, j, v: qd.template(), c: Coefficients, method: qd.template()):
+def add_vorticity(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j (v_j - v_i) w_ij and to omega_i = sum_j (v_j - v_i) x grad_j W (Eq. 9)."""
     inverse = inverse_length(r)
     w = kernel(method, r.norm_sqr() * inverse * c.inverse_h)
-    dv = v[j] - v[i]
+    dv = b - a
     for k in qd.static(range(r.n)):
         sums[k] += dv[k] * w[0]
     # grad_j W = -grad_i W, and a x b = -b x a.
@@ -48,10 +48,8 @@ SUMS = (add_xsph, add_vorticity)
 
 
 @qd.func
-def add_mixed_xsph(sums: qd.template(), r, i, j, data: qd.template(), c: Coefficients, method: qd.template()):
+def add_mixed_xsph(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j (v_j - v_i) w_ij min(1, m_j / m_i); the inverse masses w are in `data`, behind v."""
-    a = data[i]
-    b = data[j]
     inverse = inverse_length(r)
     share = kernel(method, r.norm_sqr() * inverse * c.inverse_h)[0] * qd.min(1.0, a[3] / b[3])
     for k in qd.static(range(r.n)):
@@ -61,31 +59,35 @@ def add_mixed_xsph(sums: qd.template(), r, i, j, data: qd.template(), c: Coeffic
 @qd.kernel(fastcache=True)
 def apply_viscosity(
     smoothed: Particles, particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32,
-    method: qd.template(), turning: qd.template(),
+    method: qd.template(), turning: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Smooth the velocities (Eq. 11); where `turning`, estimate the vorticity (Eq. 9)."""
-    for i in range(count):
-        v = particles.v[i]
-        dim = qd.static(v.n)
-        sums = qd.Vector([0.0] * (dim + turning * (2 * dim - 3)))
-        for_each_neighbor(sums, qd.static(SUMS[turning]), i, particles, particles.v, grid, c, method)
-        for k in qd.static(range(dim)):
-            v[k] += c.viscosity * c.density_scale * sums[k]
-        smoothed.v[i] = v
-        if qd.static(turning):
-            if qd.static(dim == 3):
-                scratch.omega[i] = vec3(sums[3], sums[4], sums[5])
-            else:
-                scratch.omega[i] = vec3(0.0, 0.0, sums[2])
+    for team in range(teams(count, lanes)):
+        dim = qd.static(particles.v[team].n)
+        sums = qd.Matrix.zero(qd.f32, dim + turning * (2 * dim - 3), lanes)
+        add_neighbors(sums, qd.static(SUMS[turning]), team, particles, particles.v, grid, c, method)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            sum = column(sums, i - team * lanes)
+            v = particles.v[i]
+            for k in qd.static(range(dim)):
+                v[k] += c.viscosity * c.density_scale * sum[k]
+            smoothed.v[i] = v
+            if qd.static(turning):
+                if qd.static(dim == 3):
+                    scratch.omega[i] = vec3(sum[3], sum[4], sum[5])
+                else:
+                    scratch.omega[i] = vec3(0.0, 0.0, sum[2])
 
 
 @qd.kernel(fastcache=True)
 def apply_mixed_viscosity(
     smoothed: Particles, particles: Particles, packed: qd.types.ndarray(), grid: Grid, c: Coefficients, count: qd.i32,
-    method: qd.template(),
+    method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Smooth the velocities (Eq. 11) of fluids of different density; `packed` as `mixture.pack_weights` leaves it."""
-    for i in range(count):
-        dv = particles.v[i] * 0.0
-        for_each_neighbor(dv, add_mixed_xsph, i, particles, packed, grid, c, method)
-        smoothed.v[i] = particles.v[i] + c.viscosity * c.density_scale * dv
+    for team in range(teams(count, lanes)):
+        sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
+        add_neighbors(sums, add_mixed_xsph, team, particles, packed, grid, c, method)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            dv = column(sums, i - team * lanes)
+            smoothed.v[i] = particles.v[i] + c.viscosity * c.density_scale * dv

@@ -16,47 +16,55 @@ Eq. 9, is summed in the sweep of XSPH (`viscosity.py`).
 
 from wavetank.compiler import qd
 from wavetank.distance import lift, vec3
-from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.physics.neighbors import add_neighbors, column, teams
 from wavetank.physics.smoothing import inverse_length, kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch
 
 
 @qd.func
-def add_eta(sums: qd.template(), r, i, j, omega: qd.template(), c: Coefficients, method: qd.template()):
+def add_eta(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to (grad |omega|, sum_j w omega_j, sum_j w |omega_j|)."""
     inverse = inverse_length(r)
     w = kernel(method, r.norm_sqr() * inverse * c.inverse_h)
-    size = omega[j].norm()
-    slope = lift(r) * ((size - omega[i].norm()) * c.gradient_scale * w[1] * inverse)
+    size = b.norm()
+    slope = lift(r) * ((size - a.norm()) * c.gradient_scale * w[1] * inverse)
     for k in qd.static(range(3)):
         sums[k] += slope[k]
-        sums[3 + k] += w[0] * omega[j][k]
+        sums[3 + k] += w[0] * b[k]
     sums[6] += w[0] * size
 
 
 @qd.kernel(fastcache=True)
 def confine_vorticity(
-    particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, method: qd.template()
-):
+    particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, method: qd.template(),
+    lanes: qd.template(),
+):  # fmt: skip
     """Push around every vortex: dv = dt eps_w s (N x omega), N = eta / |eta| (Eq. 10)."""
-    for i in range(count):
-        omega = scratch.omega[i]
+    for team in range(teams(count, lanes)):
+        first = team * lanes
+        last = qd.min(first + lanes, count)
+        fastest = 0.0
+        for i in range(first, last):
+            fastest = qd.max(fastest, scratch.omega[i].norm())
         # Calm water, most of a tank, is not asked for its neighbours.
-        if c.coherence <= 0.0 or omega.norm() > c.calm:
-            sums = qd.Vector([0.0] * 7)
-            for_each_neighbor(sums, add_eta, i, particles, scratch.omega, grid, c, method)
-            eta = vec3(sums[0], sums[1], sums[2])
-            n = eta / qd.max(eta.norm(), 1e-6)
-            mean = vec3(sums[3], sums[4], sums[5])
-            agreement = mean.norm() / qd.max(sums[6], 1e-12)
-            if mean.dot(omega) < 0.0:
-                agreement = 0.0
-            share = 1.0
-            if c.coherence > 0.0:
-                share = qd.min(qd.max((agreement - c.coherence) / qd.max(1.0 - c.coherence, 1e-3), 0.0), 1.0)
-                share *= qd.min(qd.max(omega.norm() / qd.max(c.calm, 1e-9) - 1.0, 0.0), 1.0)
-            force = share * n.cross(omega)
-            v = particles.v[i]
-            for k in qd.static(range(v.n)):
-                v[k] += c.dt * c.vorticity * force[k]
-            particles.v[i] = v
+        if c.coherence <= 0.0 or fastest > c.calm:
+            sums = qd.Matrix.zero(qd.f32, 7, lanes)
+            add_neighbors(sums, add_eta, team, particles, scratch.omega, grid, c, method)
+            for i in range(first, last):
+                sum = column(sums, i - first)
+                omega = scratch.omega[i]
+                eta = vec3(sum[0], sum[1], sum[2])
+                n = eta / qd.max(eta.norm(), 1e-6)
+                mean = vec3(sum[3], sum[4], sum[5])
+                agreement = mean.norm() / qd.max(sum[6], 1e-12)
+                if mean.dot(omega) < 0.0:
+                    agreement = 0.0
+                share = 1.0
+                if c.coherence > 0.0:
+                    share = qd.min(qd.max((agreement - c.coherence) / qd.max(1.0 - c.coherence, 1e-3), 0.0), 1.0)
+                    share *= qd.min(qd.max(omega.norm() / qd.max(c.calm, 1e-9) - 1.0, 0.0), 1.0)
+                force = share * n.cross(omega)
+                v = particles.v[i]
+                for k in qd.static(range(v.n)):
+                    v[k] += c.dt * c.vorticity * force[k]
+                particles.v[i] = v

@@ -8,11 +8,12 @@ import dataclasses
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, upload
 from wavetank.distance import SolidSet, lift
 from wavetank.physics.diffuse.motion import kind_in, surroundings, water_at
 from wavetank.physics.diffuse.noise import stream, uniform
 from wavetank.state import (
+    MARGIN,
     Air,
     Births,
     Coefficients,
@@ -22,9 +23,8 @@ from wavetank.state import (
     integers,
     new_diffuse,
     scalars,
-    upload,
     vectors,
-)
+)  # fmt: skip
 
 SCAN_BLOCK = 1024
 #: What a saved state holds of spray, foam and bubbles, and the array of it.
@@ -59,7 +59,7 @@ class Pool:
 def new_pool(dim: int, capacity: int, water: int) -> Pool:
     """Allocate an empty pool beside room for `water` particles."""
     births = Births(
-        normal=vectors(dim, water + 1), first=integers(water + 1), kept=integers(capacity + 1),
+        normal=vectors(dim, water + MARGIN), first=integers(water + 1), kept=integers(capacity + 1),
         blocks=integers(-(-max(capacity, water) // SCAN_BLOCK)), reluctance=scalars(1),
     )  # fmt: skip
     births.reluctance.fill(1.0)

@@ -26,7 +26,7 @@ from wavetank.distance import SolidSet
 from wavetank.physics.boundary import wall_density
 from wavetank.physics.density_constraint import add_density
 from wavetank.physics.diffuse.noise import stream, uniform
-from wavetank.physics.neighbors import for_each_neighbor
+from wavetank.physics.neighbors import add_neighbors, column, teams
 from wavetank.physics.places import predicted
 from wavetank.state import Air, Births, Coefficients, Grid, Particles, Walls
 
@@ -38,32 +38,27 @@ def limited(value, low, high):
 
 
 @qd.func
-def add_approach(sums: qd.template(), r, i, j, v: qd.template(), c: Coefficients, method: qd.template()):
+def add_approach(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum |v_ij| (1 - v_ij^ . x_ij^) W: Eq. 2; twice the speed head-on, nothing for what parts."""
     length = qd.max(r.norm(), 1e-12)
-    difference = v[i] - v[j]
+    difference = a - b
     sums += (difference.norm() - difference.dot(r) / length) * qd.max(1.0 - length / c.h, 0.0)
 
 
 @qd.func
-def add_bend(sums: qd.template(), r, i, j, normal: qd.template(), c: Coefficients, method: qd.template()):
+def add_bend(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum (1 - n_i . n_j) W over the surface below the tangent plane: Eq. 4 to 6."""
-    n = normal[j]
-    if n.norm_sqr() > 0.0 and r.dot(normal[i]) > 0.0:
-        sums += (1.0 - n.dot(normal[i])) * qd.max(1.0 - r.norm() / c.h, 0.0)
+    if b.norm_sqr() > 0.0 and r.dot(a) > 0.0:
+        sums += (1.0 - b.dot(a)) * qd.max(1.0 - r.norm() / c.h, 0.0)
 
 
 @qd.func
-def outward_normal(
-    i, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, method: qd.template()
-):
+def outward_normal(i, sum, particles: Particles, solids: SolidSet, walls: Walls, c: Coefficients):
     """Unit normal of the water's surface at particle `i`, zero inside the water: the density falls along it."""
     p = predicted(particles, i)
-    sums = qd.Vector([0.0] * (p.n + 2))
-    for_each_neighbor(sums, add_density, i, particles, particles.v, grid, c, method)
     n = p * 0.0
     for k in qd.static(range(p.n)):
-        n[k] = -sums[1 + k]
+        n[k] = -sum[1 + k]
     if particles.near[i] != 0:
         wall = wall_density(p, particles.near[i], solids, walls, c)
         for k in qd.static(range(p.n)):
@@ -76,40 +71,71 @@ def outward_normal(
 @qd.kernel(fastcache=True)
 def find_surface(
     births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
-    count: qd.i32, method: qd.template(),
+    count: qd.i32, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Set the normals of the surface, except where the water is too slow to matter for a crest."""
-    for i in range(count):
-        n = particles.x[i] * 0.0
-        if particles.v[i].norm_sqr() > 0.01 * a.speed * a.speed:
-            n = outward_normal(i, particles, grid, solids, walls, c, method)
-        births.normal[i] = n
+    for team in range(teams(count, lanes)):
+        first = team * lanes
+        last = qd.min(first + lanes, count)
+        dim = qd.static(particles.x[team].n)
+        slow = 0.01 * a.speed * a.speed
+        fastest = 0.0
+        for i in range(first, last):
+            fastest = qd.max(fastest, particles.v[i].norm_sqr())
+        sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
+        if fastest > slow:
+            add_neighbors(sums, add_density, team, particles, particles.v, grid, c, method)
+        for i in range(first, last):
+            n = particles.x[i] * 0.0
+            if particles.v[i].norm_sqr() > slow:
+                n = outward_normal(i, column(sums, i - first), particles, solids, walls, c)
+            births.normal[i] = n
 
 
 @qd.func
-def potential(i, births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air, method: qd.template()):
-    """Births of water particle `i` where one of the most agitated makes one: Phi_k (Phi_ta + 2 Phi_wc), Eq. 8."""
-    v = particles.v[i]
-    n = births.normal[i]
-    result = 0.0
+def energy(i, births: Births, particles: Particles, a: Air):
+    """How agitated water particle `i` is: Phi_k."""
     scale = a.speed * a.speed * births.reluctance[particles.material[i]]
-    energy = limited(v.norm_sqr() / scale, 0.05, 0.5)
-    if energy > 0.0:
-        trapped = qd.Vector([0.0])
-        for_each_neighbor(trapped, add_approach, i, particles, particles.v, grid, c, method)
-        result = limited(trapped[0] * a.mean / a.speed, 0.12, 0.5)
-        if n.dot(v) > 0.6 * v.norm():  # Eq. 7: only where the surface moves outwards
-            crest = qd.Vector([0.0])
-            for_each_neighbor(crest, add_bend, i, particles, births.normal, grid, c, method)
-            result += 2.0 * limited(crest[0] * a.mean, 0.2, 0.6)
-    return energy * result
+    return limited(particles.v[i].norm_sqr() / scale, 0.05, 0.5)
+
+
+@qd.func
+def is_crest(i, births: Births, particles: Particles):
+    """Whether the surface at particle `i` moves outwards: Eq. 7."""
+    v = particles.v[i]
+    return births.normal[i].dot(v) > 0.6 * v.norm()
 
 
 @qd.kernel(fastcache=True)
 def count_births(
-    births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air, count: qd.i32, method: qd.template()
-):
-    """Draw how many each water particle bears in this frame."""
-    for i in range(count):
-        expected = a.made * potential(i, births, particles, grid, c, a, method)
-        births.first[i] = qd.cast(expected + uniform(stream(a.seed, a.frame, particles.id[i]), 0), qd.i32)
+    births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air, count: qd.i32, method: qd.template(),
+    lanes: qd.template(),
+):  # fmt: skip
+    """Draw how many each water particle bears in this frame.
+
+    Of the most agitated each is expected to bear `a.made`, of the others Phi_k (Phi_ta + 2 Phi_wc) of that: Eq. 8.
+    """
+    for team in range(teams(count, lanes)):
+        first = team * lanes
+        last = qd.min(first + lanes, count)
+        agitated = False
+        crested = False
+        for i in range(first, last):
+            if energy(i, births, particles, a) > 0.0:
+                agitated = True
+                crested = crested or is_crest(i, births, particles)
+        trapped = qd.Matrix.zero(qd.f32, 1, lanes)
+        crest = qd.Matrix.zero(qd.f32, 1, lanes)
+        if agitated:
+            add_neighbors(trapped, add_approach, team, particles, particles.v, grid, c, method)
+        if crested:
+            add_neighbors(crest, add_bend, team, particles, births.normal, grid, c, method)
+        for i in range(first, last):
+            expected = 0.0
+            share = energy(i, births, particles, a)
+            if share > 0.0:
+                expected = limited(trapped[0, i - first] * a.mean / a.speed, 0.12, 0.5)
+                if is_crest(i, births, particles):
+                    expected += 2.0 * limited(crest[0, i - first] * a.mean, 0.2, 0.6)
+                expected *= a.made * share
+            births.first[i] = qd.cast(expected + uniform(stream(a.seed, a.frame, particles.id[i]), 0), qd.i32)

@@ -44,8 +44,8 @@ def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> N
     makes = count if a.made > 0.0 else 0
     if makes:
         pool.set_reluctance(reluctance(world.materials, params))
-        find_surface(pool.births, water, grid, solids, world.walls, c, a, count, method)
-        count_births(pool.births, water, grid, c, a, count, method)
+        find_surface(pool.births, water, grid, solids, world.walls, c, a, count, method, grid.lanes)
+        count_births(pool.births, water, grid, c, a, count, method, grid.lanes)
     scan(pool.births.first, pool.births.blocks, makes)
     total, births = bear(pool.now, pool.births, water, grid, solids, c, a, makes, pool.count, pool.born)
     pool.count, pool.born = int(total), (pool.born + int(births)) % 2**31
