@@ -1,7 +1,8 @@
 """The arrays of a world on the device, with unit and shape; allocated once at capacity.
 
 Arrays of particles have `MARGIN` rows more than there is room: loops over whole blocks and groups read them, whatever
-they hold, and drop what they found.
+they hold, and drop what they found. Row `capacity` is nowhere, farther from everything than any support, and stands in
+neighbour lists where there is no neighbour.
 
 Two sets of the moving arrays exist so that sorting and Jacobi updates can read one and write the other; which is
 which is swapped on the host, nothing is copied.
@@ -16,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, upload
 
+NOWHERE = 1e6  # m, in every direction
 MARGIN = 32  # rows behind the last particle that loops over whole blocks and groups may read
 
 
@@ -62,6 +64,7 @@ class Grid:
     list: qd.types.ndarray()  # i32 [groups * room]: who is a neighbour of any of a group's eight particles
     room: qd.i32  # places for each group, a multiple of 16
     lanes: qd.i32  # particles that are computed together: a group's, or one
+    nowhere: qd.i32  # index of a particle that is far from all others
     nx: qd.i32  # cells before the pattern moves on along y
     ny: qd.i32
     nz: qd.i32
@@ -234,6 +237,10 @@ def new_particles(dim: int, capacity: int) -> Particles:
     """Allocate particles that all rest at the origin, and the one that is nowhere."""
     rows = capacity + MARGIN
     px, py, pz = (scalars(rows if k < dim else 1) for k in range(3))
+    places = np.zeros(rows, np.float32)
+    places[capacity] = NOWHERE
+    for component in (px, py, pz)[:dim]:
+        upload(component, places)
     return Particles(vectors(dim, rows), px, py, pz, vectors(dim, rows), *(integers(rows) for _ in range(5)))
 
 

@@ -41,12 +41,14 @@ from wavetank.state import Coefficients, Grid, Particles, Scratch, Walls
 def add_density(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to (sum w, grad_i C, sum_j |grad_j C|^2): Eq. 1 and the denominator of Eq. 4."""
     inverse = inverse_length(r)
-    w = kernel(method, r.norm_sqr() * inverse * c.inverse_h)
-    slope = c.gradient_scale * w[1]
+    length = r.norm_sqr() * inverse
+    w = kernel(method, length * c.inverse_h)
+    share = c.gradient_scale * w[1] * inverse
     sums[0] += w[0]
-    direction = r * (slope * inverse)
+    direction = r * share
     for k in qd.static(range(r.n)):
         sums[1 + k] += direction[k]
+    slope = share * length  # none for the particle itself
     sums[1 + r.n] += slope * slope
 
 
@@ -77,12 +79,14 @@ def add_tensile_correction(sums: qd.template(), r, a, b, c: Coefficients, method
 def add_weighted_density(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """`add_density` for fluids of different density: squared gradients count with the inverse masses."""
     inverse = inverse_length(r)
-    value = kernel(method, r.norm_sqr() * inverse * c.inverse_h)
-    slope = c.gradient_scale * value[1]
-    sums[0] += value[0]
-    direction = r * (slope * inverse)
+    length = r.norm_sqr() * inverse
+    w = kernel(method, length * c.inverse_h)
+    share = c.gradient_scale * w[1] * inverse
+    sums[0] += w[0]
+    direction = r * share
     for k in qd.static(range(r.n)):
         sums[1 + k] += direction[k]
+    slope = share * length
     sums[1 + r.n] += b[0] * slope * slope
 
 
@@ -107,7 +111,7 @@ def solve_multipliers(
         add_neighbors(sums, qd.static(DENSITIES[mixed]), team, particles, scratch.weight, grid, c, method)
         for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
             sum = column(sums, i - team * lanes)
-            rho = c.density_scale * (sum[0] + kernel(method, 0.0)[0])
+            rho = c.density_scale * sum[0]
             own = 0.0
             wall = vec4(0.0, 0.0, 0.0, 0.0)
             if particles.near[i] != 0:
@@ -175,7 +179,7 @@ def measure_density(
         sums = qd.Matrix.zero(qd.f32, 1, lanes)
         add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
         for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            rho = c.density_scale * (sums[0, i - team * lanes] + kernel(method, 0.0)[0])
+            rho = c.density_scale * sums[0, i - team * lanes]
             if particles.near[i] != 0:
                 rho += wall_density(predicted(particles, i), particles.near[i], solids, walls, c).w
             scratch.rho[i] = largest_density * rho / scratch.weight[i]

@@ -182,6 +182,8 @@ def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.
                         begin += block
             begin_run = end_run
         grid.number[group] = n
+        if n < room:
+            grid.list[group * room + n] = grid.nowhere
         qd.atomic_max(most, n)
     return most
 
@@ -231,8 +233,8 @@ def add_neighbors(
     """Add up what ``visit(sum, r, a, b, c, method)`` adds for each neighbour j of each particle i of a team.
 
     `sums` has a column for each of the team's particles, r = p_i - p_j [m], a and b are what `data` holds of i and j,
-    as vectors. `visit` is called for others than neighbours as well, and for the particle itself as if it were far
-    away: it adds nothing where |r| >= h.
+    as vectors. `visit` is called for others than neighbours as well and adds nothing where |r| >= h; it is called for
+    the particle itself, with r = 0 and a = b.
     """
     lanes, width = qd.static(sums.m, _width(data))
     first = team * lanes
@@ -242,15 +244,16 @@ def add_neighbors(
         for k in qd.static(range(width)):
             own[k, lane] = a[k]
     begin = (first >> 3) * grid.room
-    for n in range(begin, begin + grid.number[first >> 3]):
-        j = grid.list[n]
-        p = predicted(particles, j)
-        b = _row(data, j)
+    end = begin + grid.number[first >> 3]
+    # A short loop over lanes would be unrolled before it can be computed as vectors: its neighbours come in pairs.
+    pace = qd.static(1 if sums.n > 2 and particles.x[first].n == 3 else 2)
+    for turn in range((end - begin + pace - 1) // pace):
         for lane in range(lanes):
-            r = predicted(particles, first + lane) - p
-            r[0] = qd.select(first + lane == j, 1e6, r[0])
+            p = predicted(particles, first + lane)
             part = qd.Vector([0.0] * sums.n)
-            visit(part, r, column(own, lane), b, c, method)
+            for k in qd.static(range(pace)):
+                j = grid.list[begin + pace * turn + k]
+                visit(part, p - predicted(particles, j), column(own, lane), _row(data, j), c, method)
             for k in qd.static(range(sums.n)):
                 sums[k, lane] += part[k]
 
@@ -324,6 +327,7 @@ def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, 
         cell=integers(capacity), start=integers(total + 1), fill=integers(total),
         blocks=integers(-(-total // SCAN_BLOCK)), order=integers(capacity), number=integers(_groups(capacity)),
         list=entries, room=room, lanes=8 if current_backend() == "cpu" else 1,
+        nowhere=capacity,
         nx=int(cells[0]), ny=int(cells[1]), nz=int(cells[2]), cells=total,
     )  # fmt: skip
 
@@ -368,7 +372,7 @@ def write_numbers(
         sums = qd.Matrix.zero(qd.f32, 1, lanes)
         add_neighbors(sums, add_one, team, particles, particles.x, grid, c, 0)
         for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            number[i] = qd.cast(sums[0, i - team * lanes], qd.i32)
+            number[i] = qd.cast(sums[0, i - team * lanes], qd.i32) - 1  # without itself
 
 
 def count_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> np.ndarray:

@@ -53,6 +53,9 @@ def confine_vorticity(
             for i in range(first, last):
                 sum = column(sums, i - first)
                 omega = scratch.omega[i]
+                for k in qd.static(range(3)):  # without itself
+                    sum[3 + k] -= kernel(method, 0.0)[0] * omega[k]
+                sum[6] -= kernel(method, 0.0)[0] * omega.norm()
                 eta = vec3(sum[0], sum[1], sum[2])
                 n = eta / qd.max(eta.norm(), 1e-6)
                 mean = vec3(sum[3], sum[4], sum[5])
