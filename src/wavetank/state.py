@@ -46,6 +46,7 @@ class Scratch:
     rho: qd.types.ndarray()  # f32 [capacity]: density over rest density
     lam: qd.types.ndarray()  # f32 [capacity], m^2: multiplier, the sum over the iterations of a substep
     dlam: qd.types.ndarray()  # f32 [capacity], m^2: its change in the last iteration
+    squares: qd.types.ndarray()  # f32 [capacity], 1/m^2: denominator of the multiplier
     omega: qd.types.ndarray()  # vec3 [capacity], 1/s: vorticity
     wall: qd.types.ndarray()  # vec4 [capacity]: (gradient [1/m], share of rho_0) of the solids, where any is near
     weight: qd.types.ndarray()  # f32 [capacity]: largest rest density of all fluids over its own; 1 where all are equal
@@ -247,9 +248,9 @@ def new_particles(dim: int, capacity: int) -> Particles:
 def new_scratch(capacity: int) -> Scratch:
     """Allocate the scratch arrays."""
     rows = capacity + MARGIN
-    rho, lam, dlam, weight = (scalars(rows) for _ in range(4))
+    rho, lam, dlam, squares, weight = (scalars(rows) for _ in range(5))
     weight.fill(1.0)
-    return Scratch(rho, lam, dlam, omega=vectors(3, rows), wall=vectors(4, rows), weight=weight)
+    return Scratch(rho, lam, dlam, squares, omega=vectors(3, rows), wall=vectors(4, rows), weight=weight)
 
 
 def new_diffuse(dim: int, capacity: int) -> Diffuse:
