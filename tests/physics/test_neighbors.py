@@ -119,6 +119,8 @@ def test_a_list_that_would_grow_too_long_is_refused_and_kept(monkeypatch):
     sim = Simulation(wt.Scene(spacing=0.1, fluids=[wt.Points(positions=np.zeros((400, 2)))], gravity=(0.0, 0.0)))
     room = sim.world.grid.room
     monkeypatch.setattr(neighbors, "MAX_ENTRIES", 50 * room)
-    with pytest.raises(wt.WavetankError, match="400 particles with room for [0-9]+ neighbours of every eight are too many"):
+    with pytest.raises(
+        wt.WavetankError, match="400 particles with room for [0-9]+ neighbours of every eight are too many"
+    ):
         sim.step()
     assert sim.world.grid.room == room

@@ -58,7 +58,7 @@ def add_density(sums: qd.template(), r, a, b, c: Coefficients, method: qd.templa
 @qd.func
 def add_weight(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum w: Eq. 1."""
-    sums[0] += kernel(method, r.norm_sqr() * inverse_length(r) * c.inverse_h)[0]
+    sums[0] += kernel(method, r.norm() * c.inverse_h)[0]
 
 
 @qd.func
