@@ -82,7 +82,7 @@ def test_a_crowd_larger_than_its_list_is_listed_completely():
 
 @pytest.mark.parametrize("shared", [0, 1])
 def test_order_does_not_depend_on_the_order_given(shared):
-    """Inside a cell particles stand by x and id, so sorting twice from any permutation gives one order, on any threads."""
+    """Inside a cell particles stand by x and id: sorting twice from any permutation gives one order, on any threads."""
     x = np.random.default_rng(1).uniform(0, 1, (500, 3)).astype(np.float32)
     sim = Simulation(wt.Scene(spacing=0.1, fluids=[wt.Points(positions=x)]))
     world, c = sim.world, coefficients(sim.scene, 1 / 240)
