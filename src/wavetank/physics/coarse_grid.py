@@ -50,9 +50,12 @@ def tent(share, k: qd.template()):
 
 
 @qd.func
-def at_corner(low, k: qd.template()):
-    """Whole coordinates of corner `k` of 8 of the cell from `low` on."""
-    return low + qd.Vector([qd.static(k & 1), qd.static(k >> 1 & 1), qd.static(k >> 2)])
+def corners(grid: CoarseGrid, low, dim: qd.template()):
+    """Numbers of the nodes at the corners of the cell from the whole coordinates `low` on, or of the nearest."""
+    x = qd.Vector([qd.min(qd.max(low[0] + k, 0), grid.nx - 1) for k in qd.static(range(2))])
+    y = qd.Vector([qd.min(qd.max(low[1] + k, 0), grid.ny - 1) * grid.nx for k in qd.static(range(2))])
+    z = qd.Vector([qd.min(qd.max(low[2] + k, 0), grid.nz - 1) * grid.nx * grid.ny for k in qd.static(range(2))])
+    return qd.Vector([x[k & 1] + y[k >> 1 & 1] + z[k >> 2] for k in qd.static(range(2**dim))])
 
 
 def new_levels(size: tuple[float, ...], h: float) -> list[CoarseGrid]:

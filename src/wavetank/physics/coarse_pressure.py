@@ -18,7 +18,7 @@ bit for bit. What was tried, and what it gives: docs/method.md.
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, signed_distance, vec3
 from wavetank.physics.boundary import flattened, kept_in_tank
-from wavetank.physics.coarse_grid import at_corner, coordinates, in_cells, node, tent
+from wavetank.physics.coarse_grid import coordinates, corners, in_cells, tent
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.poisson import LEAST_THETA, couple_node, solve_levels
 from wavetank.state import CoarseGrid, Coefficients, Particles, Scratch
@@ -43,14 +43,13 @@ def gather_fill(
     for i in range(count):
         p = predicted(particles, i)
         s = in_cells(grid, p)
-        low = qd.floor(s, qd.i32)
+        at = corners(grid, qd.floor(s, qd.i32), p.n)
         share = s - qd.floor(s)
         for k in qd.static(range(2**p.n)):
-            n = node(grid, at_corner(low, k))
             w = unit * tent(share, k)
-            qd.atomic_add(grid.fill_sum[n], qd.cast(qd.round(w), qd.i32))
+            qd.atomic_add(grid.fill_sum[at[k]], qd.cast(qd.round(w), qd.i32))
             if qd.static(mixed):
-                qd.atomic_add(grid.mass_sum[n], qd.cast(qd.round(w / scratch.weight[i]), qd.i32))
+                qd.atomic_add(grid.mass_sum[at[k]], qd.cast(qd.round(w / scratch.weight[i]), qd.i32))
     for n in range(grid.nx * grid.ny * grid.nz):
         room = 1.0
         if qd.static(searched):
@@ -86,17 +85,15 @@ def gather_errors(
     for i in range(count):
         p = predicted(particles, i)
         s = in_cells(grid, p)
-        low = qd.floor(s, qd.i32)
+        at = corners(grid, qd.floor(s, qd.i32), p.n)
         share = s - qd.floor(s)
         filled = 0.0
         for k in qd.static(range(2**p.n)):
-            filled += tent(share, k) * grid.fill[node(grid, at_corner(low, k))]
+            filled += tent(share, k) * grid.fill[at[k]]
         inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
         error = unit * inside * qd.min(qd.max(scratch.rho[i] * scratch.weight[i] - 1.0, -1.0), 1.0)
         for k in qd.static(range(2**p.n)):
-            qd.atomic_add(
-                grid.error_sum[node(grid, at_corner(low, k))], qd.cast(qd.round(error * tent(share, k)), qd.i32)
-            )
+            qd.atomic_add(grid.error_sum[at[k]], qd.cast(qd.round(error * tent(share, k)), qd.i32))
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.rhs[n] = scale * grid.error_sum[n] / qd.max(grid.room[n], least_open)
         grid.error_sum[n] = 0
@@ -108,17 +105,15 @@ def slope_along(
     grid: CoarseGrid, slope: qd.template(), coupled: qd.template(), s, axis: qd.template(), dim: qd.template()
 ):
     """Derivative of lambda [m] along `axis` at the place `s` [cells], from the faces around that lead into water."""
-    at = s
-    at[axis] -= 0.5
-    low = qd.floor(at)
-    share = at - low
+    place = s
+    place[axis] -= 0.5
+    at = corners(grid, qd.floor(place, qd.i32), dim)
+    share = place - qd.floor(place)
     total, weights = 0.0, 0.0
     for k in qd.static(range(2**dim)):
-        n = node(grid, at_corner(qd.cast(low, qd.i32), k))
-        if coupled[n] > 0.0:
-            w = tent(share, k)
-            total += w * slope[n]
-            weights += w
+        w = tent(share, k) * qd.cast(coupled[at[k]] > 0.0, qd.f32)
+        total += w * slope[at[k]]
+        weights += w
     return total / qd.max(weights, 1e-9)
 
 
