@@ -182,8 +182,8 @@ def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.
                         begin += block
             begin_run = end_run
         grid.number[group] = n
-        if n < room:
-            grid.list[group * room + n] = grid.nowhere
+        for k in range(n, qd.min(n + 3, room)):
+            grid.list[group * room + k] = grid.nowhere
         qd.atomic_max(most, n)
     return most
 
@@ -245,17 +245,27 @@ def add_neighbors(
             own[k, lane] = a[k]
     begin = (first >> 3) * grid.room
     end = begin + grid.number[first >> 3]
-    # A short loop over lanes would be unrolled before it can be computed as vectors: its neighbours come in pairs.
-    pace = qd.static(1 if sums.n > 2 and particles.x[first].n == 3 else 2)
+    # A short loop over lanes would be unrolled before it can be computed as vectors: its visits come in twos or fours.
+    size, dim = qd.static(sums.n, particles.x[first].n)
+    pace = qd.static(1 if size > 2 else 4 if dim == 2 and size == 1 else 2)
+    # Each of them has sums of its own: in which order more than two numbers are added is the compiler's choice.
+    others = qd.Matrix.zero(qd.f32, size * (pace - 1 if pace > 1 else 1), lanes)
     for turn in range((end - begin + pace - 1) // pace):
         for lane in range(lanes):
-            p = predicted(particles, first + lane)
-            part = qd.Vector([0.0] * sums.n)
             for k in qd.static(range(pace)):
                 j = grid.list[begin + pace * turn + k]
-                visit(part, p - predicted(particles, j), column(own, lane), _row(data, j), c, method)
-            for k in qd.static(range(sums.n)):
-                sums[k, lane] += part[k]
+                r = predicted(particles, first + lane) - predicted(particles, j)
+                part = qd.Vector([0.0] * size)
+                visit(part, r, column(own, lane), _row(data, j), c, method)
+                for n in qd.static(range(size)):
+                    if qd.static(k == 0):
+                        sums[n, lane] += part[n]
+                    else:
+                        others[(k - 1) * size + n, lane] += part[n]
+    for k in qd.static(range(pace - 1)):
+        for lane in range(lanes):
+            for n in qd.static(range(size)):
+                sums[n, lane] += others[k * size + n, lane]
 
 
 def _width(data: Any) -> int:
