@@ -28,7 +28,7 @@ from wavetank.physics.step import (
     neighbor_numbers,
     step,
     update_densities,
-)
+)  # fmt: skip
 from wavetank.physics.time_step import largest_speed, pool_depth, substeps
 from wavetank.scene import MAX_PARTICLES, Scene
 from wavetank.snapshot import Snapshot, put_snapshot, read_snapshot, take_snapshot, write_snapshot
@@ -350,13 +350,9 @@ class Simulation:
     def stats(self) -> dict[str, float]:
         """Measure this instant; see `physics.measure.statistics` for the keys, and foam in numbers of particles."""
         frame = self.frame()
+        numbers = neighbor_numbers(self.world, self.scene)
         figures = measure.statistics(
-            frame.positions,
-            frame.velocities,
-            frame.densities,
-            neighbor_numbers(self.world, self.scene),
-            self.scene,
-            frame.rest_densities,
+            frame.positions, frame.velocities, frame.densities, numbers, self.scene, frame.rest_densities
         )
         return {
             "time": self.time,
@@ -370,9 +366,7 @@ class Simulation:
 
     def _measure(self) -> None:
         """Renew neighbours and densities for the positions as they are."""
-        if not self._outdated:
-            return
-        if self.count:
+        if self._outdated and self.count:
             update_densities(self.world, self.scene)
         self._outdated = False
 

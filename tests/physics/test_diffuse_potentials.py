@@ -7,18 +7,22 @@ from clouds import Cloud
 from wavetank.compiler import qd, upload
 from wavetank.physics.diffuse.noise import stream, uniform
 from wavetank.physics.diffuse.pool import new_pool, scan
-from wavetank.physics.diffuse.potentials import find_surface, limited, potential
+from wavetank.physics.diffuse.potentials import add_potentials, find_surface, limited
 from wavetank.physics.diffuse.update import air
+from wavetank.physics.pairs import teams
 from wavetank.state import Air, Births, Coefficients, Grid, Particles, integers, scalars
 
 
 @qd.kernel
 def fill_potentials(
     out: qd.types.ndarray(), births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air,
-    count: qd.i32, method: qd.template(),
+    count: qd.i32, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
-    for i in range(count):
-        out[i] = potential(i, births, particles, grid, c, a, method)
+    for team in range(teams(count, lanes)):
+        sums = qd.Matrix.zero(qd.f32, 1, lanes)
+        add_potentials(sums, team, births, particles, grid, c, a, count, method)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            out[i] = sums[0, i - team * lanes]
 
 
 @qd.kernel
@@ -37,9 +41,10 @@ def potentials(cloud: Cloud, speed: float) -> tuple[np.ndarray, np.ndarray]:
     """Normals and potentials of a cloud whose U is `speed`, in device order."""
     world, births = cloud.world, new_pool(cloud.dim, 1, cloud.count).births
     a = dataclasses.replace(air(cloud.scene, cloud.count, 0.0, 1 / 60, 0), speed=speed)
-    find_surface(births, world.particles, world.grid, world.solids, world.walls, cloud.c, a, cloud.count, cloud.method)
+    particles, grid, lanes = world.particles, world.grid, world.grid.lanes
+    find_surface(births, particles, grid, world.solids, world.walls, cloud.c, a, cloud.count, cloud.method, lanes)
     out = scalars(cloud.count)
-    fill_potentials(out, births, world.particles, world.grid, cloud.c, a, cloud.count, cloud.method)
+    fill_potentials(out, births, particles, grid, cloud.c, a, cloud.count, cloud.method, lanes)
     return births.normal.to_numpy()[: cloud.count], out.to_numpy()
 
 

@@ -17,12 +17,20 @@ cases = pytest.mark.parametrize(("dim", "kernel"), CASES)
 def solve(cloud: Cloud) -> None:
     world, count = cloud.world, cloud.count
     solve_multipliers(
-        world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, 1, cloud.method, 0
-    )
+        world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, 1, cloud.method, 0,
+        world.grid.lanes,
+    )  # fmt: skip
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, cloud.c, count,
-        cloud.method, int(cloud.scene.tensile_strength > 0), 0, 0,
+        cloud.method, int(cloud.scene.tensile_strength > 0), 0, 0, world.grid.lanes,
     )  # fmt: skip
+
+
+def smooth(cloud: Cloud, turning: int) -> None:
+    world, grid = cloud.world, cloud.world.grid
+    apply_viscosity(
+        world.spare, world.particles, world.scratch, grid, cloud.c, cloud.count, cloud.method, turning, grid.lanes
+    )
 
 
 def multipliers(cloud: Cloud) -> np.ndarray:
@@ -93,7 +101,7 @@ def test_corrections_keep_the_centre_of_mass(dim, kernel):
 def test_vorticity_eq_9(dim, kernel):
     cloud = Cloud(dim, kernel=kernel)
     world = cloud.world
-    apply_viscosity(world.spare, world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method, 1)
+    smooth(cloud, 1)
     v_ij = cloud.v[None, :, :] - cloud.v[:, None, :]
     grad_j = -cloud.grad_w()
     pad = ((0, 0), (0, 0), (0, 3 - dim))
@@ -107,9 +115,9 @@ def test_vorticity_eq_9(dim, kernel):
 def test_vorticity_confinement_eq_10(dim):
     cloud = Cloud(dim, vorticity=2.0, vorticity_coherence=0.0)
     world = cloud.world
-    apply_viscosity(world.spare, world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method, 1)
+    smooth(cloud, 1)
     omega = world.scratch.omega.to_numpy()[: cloud.count].astype(np.float64)
-    confine_vorticity(world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method)
+    confine_vorticity(world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method, world.grid.lanes)
     size = np.linalg.norm(omega, axis=1)
     pad = ((0, 0), (0, 0), (0, 3 - dim))
     eta = cloud.mass_over_rest_density() * np.sum(
@@ -126,10 +134,10 @@ def test_calm_water_is_not_pushed():
     """Where the water turns slower than the smallest waves do there is no force, and else there is."""
     cloud = Cloud(3, vorticity=2.0, vorticity_coherence=0.01)
     world = cloud.world
-    apply_viscosity(world.spare, world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method, 1)
+    smooth(cloud, 1)
     size = np.linalg.norm(world.scratch.omega.to_numpy()[: cloud.count], axis=1)
     c = dataclasses.replace(cloud.c, calm=float(np.median(size)))
-    confine_vorticity(world.particles, world.scratch, world.grid, c, cloud.count, cloud.method)
+    confine_vorticity(world.particles, world.scratch, world.grid, c, cloud.count, cloud.method, world.grid.lanes)
     pushed = np.any(world.particles.v.to_numpy()[: cloud.count] != cloud.v.astype(np.float32), axis=1)
     assert not pushed[size <= c.calm].any()
     assert pushed[size > 1.5 * c.calm].mean() > 0.8
@@ -148,7 +156,7 @@ def test_solid_rotation_has_twice_its_rate_as_vorticity():
     sim.frame()
     world = sim.world
     c = coefficients(sim.scene, 0.01)
-    apply_viscosity(world.spare, world.particles, world.scratch, world.grid, c, sim.count, 2, 1)
+    apply_viscosity(world.spare, world.particles, world.scratch, world.grid, c, sim.count, 2, 1, world.grid.lanes)
     middle = np.argmin(np.linalg.norm(world.particles.x.to_numpy()[: sim.count], axis=1))
     assert world.scratch.omega.to_numpy()[middle] == pytest.approx([0, 0, 6], rel=0.05, abs=1e-3)
 
@@ -158,9 +166,7 @@ def test_solid_rotation_has_twice_its_rate_as_vorticity():
 def test_xsph_eq_11(dim, kernel, turning):
     cloud = Cloud(dim, kernel=kernel, viscosity=0.2)
     world = cloud.world
-    apply_viscosity(
-        world.spare, world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method, turning
-    )
+    smooth(cloud, turning)
     v_ij = cloud.v[None, :, :] - cloud.v[:, None, :]
     expected = cloud.v + 0.2 * cloud.mass_over_rest_density() * np.sum(v_ij * cloud.w()[..., None], axis=1)
     np.testing.assert_allclose(world.spare.v.to_numpy()[: cloud.count], expected, atol=1e-5 * np.abs(expected).max())
@@ -170,9 +176,7 @@ def test_xsph_eq_11(dim, kernel, turning):
 def test_xsph_keeps_momentum(turning):
     cloud = Cloud(3, viscosity=0.5)
     world = cloud.world
-    apply_viscosity(
-        world.spare, world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method, turning
-    )
+    smooth(cloud, turning)
     change = world.spare.v.to_numpy()[: cloud.count].astype(np.float64).sum(axis=0) - cloud.v.sum(axis=0)
     assert np.abs(change).max() < 1e-6 * np.abs(cloud.v).sum()
 

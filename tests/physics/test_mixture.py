@@ -33,10 +33,11 @@ def solve(cloud: Cloud, mixed: int) -> np.ndarray:
         1,
         cloud.method,
         mixed,
+        world.grid.lanes,
     )
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, cloud.c, cloud.count,
-        cloud.method, 0, mixed, 0,
+        cloud.method, 0, mixed, 0, world.grid.lanes,
     )  # fmt: skip
     return cloud.predictions(world.spare) - cloud.x
 
@@ -76,7 +77,8 @@ def test_smoothing_keeps_momentum_and_is_eq_11_for_equal_masses(dim):
     world = cloud.world
     packed = world.fluids.array("packed")
     pack_weights(packed, world.particles, world.scratch, cloud.count)
-    apply_mixed_viscosity(world.spare, world.particles, packed, world.grid, cloud.c, cloud.count, cloud.method)
+    grid = world.grid
+    apply_mixed_viscosity(world.spare, world.particles, packed, grid, cloud.c, cloud.count, cloud.method, grid.lanes)
     smoothed = world.spare.v.to_numpy()[: cloud.count].astype(np.float64)
     momentum = (smoothed - cloud.v) / w[:, None]
     assert np.abs(momentum.sum(axis=0)).max() < 1e-6 * np.abs(cloud.v).sum()

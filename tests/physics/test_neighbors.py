@@ -10,7 +10,8 @@ import wavetank as wt
 from wavetank.compiler import upload
 from wavetank.physics import neighbors
 from wavetank.physics.integrate import forget_predictions
-from wavetank.physics.neighbors import count_neighbors, new_grid, reorder
+from wavetank.physics.neighbors import new_grid, reorder
+from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.step import coefficients
 from wavetank.simulation import Simulation
 

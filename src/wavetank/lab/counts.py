@@ -13,7 +13,8 @@ import numpy as np
 
 from wavetank import compiler
 from wavetank.compiler import qd
-from wavetank.physics.neighbors import count_neighbors, for_each_around
+from wavetank.physics.neighbors import for_each_around
+from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.step import coefficients
 from wavetank.simulation import Simulation
 from wavetank.state import Coefficients, Grid, Particles, integers

@@ -27,7 +27,7 @@ from wavetank.errors import WavetankError
 from wavetank.lab.bench import check, measured, sized, timed
 from wavetank.lab.counts import water_bytes
 from wavetank.lab.machine import load, machine
-from wavetank.physics.neighbors import add_neighbors, column, count_neighbors, teams
+from wavetank.physics.pairs import add_neighbors, column, count_neighbors, teams
 from wavetank.physics.step import coefficients
 from wavetank.scene import Scene
 from wavetank.simulation import Simulation

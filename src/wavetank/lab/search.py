@@ -19,7 +19,8 @@ from wavetank.errors import WavetankError
 from wavetank.lab.counts import device_bytes
 from wavetank.lab.machine import cores, load, machine
 from wavetank.physics.integrate import forget_predictions
-from wavetank.physics.neighbors import count_neighbors, find_neighbors, new_grid, sort_particles
+from wavetank.physics.neighbors import find_neighbors, new_grid, sort_particles
+from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.step import coefficients
 from wavetank.scene import Scene
 from wavetank.state import new_particles

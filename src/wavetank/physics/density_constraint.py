@@ -34,7 +34,7 @@ multiplier: Moreau and Jean's projected iteration, as in Tonge et al. 2012 (10.1
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, vec4
 from wavetank.physics.boundary import flattened, kept_in_tank, stopped, wall_density
-from wavetank.physics.neighbors import add_neighbors, column, teams
+from wavetank.physics.pairs import add_neighbors, column, teams
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.smoothing import inverse_length, kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch, Walls

@@ -39,7 +39,7 @@ from wavetank.physics.density_constraint import schedule
 from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend
-from wavetank.physics.neighbors import add_neighbors, column, teams
+from wavetank.physics.pairs import add_neighbors, column, teams
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import current_backend, download, qd
+from wavetank.compiler import current_backend, qd
 from wavetank.errors import WavetankError
 from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles, integers
@@ -218,79 +218,6 @@ def near_bits(particles: Particles, places: qd.template(), begin, length, h2):
 
 
 @qd.func
-def teams(count, lanes: qd.template()):
-    """Number of teams of `lanes` particles."""
-    if qd.static(lanes == 1):
-        return count
-    return (count + lanes - 1) // lanes
-
-
-@qd.func
-def add_neighbors(
-    sums: qd.template(), visit: qd.template(), team, particles: Particles, data: qd.template(), grid: Grid,
-    c: Coefficients, method: qd.template(),
-):  # fmt: skip
-    """Add up what ``visit(sum, r, a, b, c, method)`` adds for each neighbour j of each particle i of a team.
-
-    `sums` has a column for each of the team's particles, r = p_i - p_j [m], a and b are what `data` holds of i and j,
-    as vectors. `visit` is called for others than neighbours as well and adds nothing where |r| >= h; it is called for
-    the particle itself, with r = 0 and a = b.
-    """
-    lanes, width = qd.static(sums.m, _width(data))
-    first = team * lanes
-    own = qd.Matrix.zero(qd.f32, width, lanes)
-    for lane in range(lanes):
-        a = _row(data, first + lane)
-        for k in qd.static(range(width)):
-            own[k, lane] = a[k]
-    begin = (first >> 3) * grid.room
-    end = begin + grid.number[first >> 3]
-    # A short loop over lanes would be unrolled before it can be computed as vectors: its visits come in twos or fours.
-    size, dim = qd.static(sums.n, particles.x[first].n)
-    pace = qd.static(1 if size > 2 else 4 if dim == 2 and size == 1 else 2)
-    # Each of them has sums of its own: in which order more than two numbers are added is the compiler's choice.
-    others = qd.Matrix.zero(qd.f32, size * (pace - 1 if pace > 1 else 1), lanes)
-    for turn in range((end - begin + pace - 1) // pace):
-        for lane in range(lanes):
-            for k in qd.static(range(pace)):
-                j = grid.list[begin + pace * turn + k]
-                r = predicted(particles, first + lane) - predicted(particles, j)
-                part = qd.Vector([0.0] * size)
-                visit(part, r, column(own, lane), _row(data, j), c, method)
-                for n in qd.static(range(size)):
-                    if qd.static(k == 0):
-                        sums[n, lane] += part[n]
-                    else:
-                        others[(k - 1) * size + n, lane] += part[n]
-    for k in qd.static(range(pace - 1)):
-        for lane in range(lanes):
-            for n in qd.static(range(size)):
-                sums[n, lane] += others[k * size + n, lane]
-
-
-def _width(data: Any) -> int:
-    """Numbers in an element of a device array."""
-    return int((data.element_shape() or (1,))[0])
-
-
-@qd.func
-def _row(data: qd.template(), i):
-    """Element `i` of a device array, as a vector."""
-    if qd.static(len(data.element_shape()) == 0):
-        return qd.Vector([data[i]])
-    return data[i]
-
-
-@qd.func
-def column(sums: qd.template(), lane):
-    """Sums of one particle of a team, as a vector."""
-    result = qd.Vector([0.0] * sums.n)
-    for k in qd.static(range(sums.n)):
-        result[k] = sums[k, lane]
-    return result
-
-
-@qd.func
 def for_each_around(
     sums: qd.template(), visit: qd.template(), point, p: qd.template(), data: qd.template(), grid: Grid, c: Coefficients
 ):
@@ -364,32 +291,6 @@ def find_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int
         grid = dataclasses.replace(grid, room=room, list=_new_list(grid.order.shape[0], room))
         list_neighbors(particles, grid, c, count)
     return grid
-
-
-@qd.func
-def add_one(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
-    """Count neighbour j."""
-    if r.norm_sqr() < c.h * c.h:
-        sums[0] += 1.0
-
-
-@qd.kernel(fastcache=True)
-def write_numbers(
-    number: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()
-):
-    """Write how many neighbours every particle has."""
-    for team in range(teams(count, lanes)):
-        sums = qd.Matrix.zero(qd.f32, 1, lanes)
-        add_neighbors(sums, add_one, team, particles, particles.x, grid, c, 0)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            number[i] = qd.cast(sums[0, i - team * lanes], qd.i32) - 1  # without itself
-
-
-def count_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> np.ndarray:
-    """Return how many neighbours within h every particle has, int32 [count], in device order."""
-    number = integers(count)
-    write_numbers(number, particles, grid, c, count, grid.lanes)
-    return np.array(download(number)[:count])
 
 
 def _new_list(capacity: int, room: int) -> Any:

@@ -21,7 +21,8 @@ from wavetank.physics.friction import apply_friction
 from wavetank.physics.implicit_viscosity import is_thick, solve_viscosity
 from wavetank.physics.integrate import predict, update_velocities
 from wavetank.physics.mixture import Blend, blend, fill_table, pack_weights, stiffening, weigh
-from wavetank.physics.neighbors import count_neighbors, find_neighbors, sort_particles
+from wavetank.physics.neighbors import find_neighbors, sort_particles
+from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.population import hold_frozen, stop_frozen
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
 from wavetank.physics.tension import apply_tension, limited_tensions, substeps_for

@@ -39,7 +39,7 @@ from wavetank.distance import SolidSet, lift, signed_distance, vec3, vec4
 from wavetank.physics.boundary import is_near
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend
-from wavetank.physics.neighbors import add_neighbors, column, teams
+from wavetank.physics.pairs import add_neighbors, column, teams
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.state import MARGIN, Coefficients, Fluids, Grid, Particles, Scratch, remembered, scalars

@@ -12,7 +12,7 @@ ratio of the masses: m_i dv_i is antisymmetric, no share exceeds c.
 
 from wavetank.compiler import qd
 from wavetank.distance import vec3
-from wavetank.physics.neighbors import add_neighbors, column, teams
+from wavetank.physics.pairs import add_neighbors, column, teams
 from wavetank.physics.smoothing import inverse_length, kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch
 

@@ -16,7 +16,7 @@ Eq. 9, is summed in the sweep of XSPH (`viscosity.py`).
 
 from wavetank.compiler import qd
 from wavetank.distance import lift, vec3
-from wavetank.physics.neighbors import add_neighbors, column, teams
+from wavetank.physics.pairs import add_neighbors, column, teams
 from wavetank.physics.smoothing import inverse_length, kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch
 

@@ -26,7 +26,7 @@ from wavetank.distance import SolidSet
 from wavetank.physics.boundary import wall_density
 from wavetank.physics.density_constraint import add_density
 from wavetank.physics.diffuse.noise import stream, uniform
-from wavetank.physics.neighbors import add_neighbors, column, teams
+from wavetank.physics.pairs import add_neighbors, column, teams
 from wavetank.physics.places import predicted
 from wavetank.state import Air, Births, Coefficients, Grid, Particles, Walls
 
@@ -106,36 +106,45 @@ def is_crest(i, births: Births, particles: Particles):
     return births.normal[i].dot(v) > 0.6 * v.norm()
 
 
+@qd.func
+def add_potentials(
+    sums: qd.template(), team, births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air, count,
+    method: qd.template(),
+):  # fmt: skip
+    """Births of a team's particles where one of the most agitated makes one: Phi_k (Phi_ta + 2 Phi_wc), Eq. 8."""
+    lanes = qd.static(sums.m)
+    first = team * lanes
+    last = qd.min(first + lanes, count)
+    agitated = False
+    crested = False
+    for i in range(first, last):
+        if energy(i, births, particles, a) > 0.0:
+            agitated = True
+            crested = crested or is_crest(i, births, particles)
+    trapped = qd.Matrix.zero(qd.f32, 1, lanes)
+    crest = qd.Matrix.zero(qd.f32, 1, lanes)
+    if agitated:
+        add_neighbors(trapped, add_approach, team, particles, particles.v, grid, c, method)
+    if crested:
+        add_neighbors(crest, add_bend, team, particles, births.normal, grid, c, method)
+    for i in range(first, last):
+        share = energy(i, births, particles, a)
+        if share > 0.0:
+            result = limited(trapped[0, i - first] * a.mean / a.speed, 0.12, 0.5)
+            if is_crest(i, births, particles):
+                result += 2.0 * limited(crest[0, i - first] * a.mean, 0.2, 0.6)
+            sums[0, i - first] += share * result
+
+
 @qd.kernel(fastcache=True)
 def count_births(
     births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air, count: qd.i32, method: qd.template(),
     lanes: qd.template(),
 ):  # fmt: skip
-    """Draw how many each water particle bears in this frame.
-
-    Of the most agitated each is expected to bear `a.made`, of the others Phi_k (Phi_ta + 2 Phi_wc) of that: Eq. 8.
-    """
+    """Draw how many each water particle bears in this frame."""
     for team in range(teams(count, lanes)):
-        first = team * lanes
-        last = qd.min(first + lanes, count)
-        agitated = False
-        crested = False
-        for i in range(first, last):
-            if energy(i, births, particles, a) > 0.0:
-                agitated = True
-                crested = crested or is_crest(i, births, particles)
-        trapped = qd.Matrix.zero(qd.f32, 1, lanes)
-        crest = qd.Matrix.zero(qd.f32, 1, lanes)
-        if agitated:
-            add_neighbors(trapped, add_approach, team, particles, particles.v, grid, c, method)
-        if crested:
-            add_neighbors(crest, add_bend, team, particles, births.normal, grid, c, method)
-        for i in range(first, last):
-            expected = 0.0
-            share = energy(i, births, particles, a)
-            if share > 0.0:
-                expected = limited(trapped[0, i - first] * a.mean / a.speed, 0.12, 0.5)
-                if is_crest(i, births, particles):
-                    expected += 2.0 * limited(crest[0, i - first] * a.mean, 0.2, 0.6)
-                expected *= a.made * share
+        potentials = qd.Matrix.zero(qd.f32, 1, lanes)
+        add_potentials(potentials, team, births, particles, grid, c, a, count, method)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            expected = a.made * potentials[0, i - team * lanes]
             births.first[i] = qd.cast(expected + uniform(stream(a.seed, a.frame, particles.id[i]), 0), qd.i32)
