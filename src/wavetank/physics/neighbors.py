@@ -1,16 +1,17 @@
-"""Neighbour search: particles sorted into cells of edge h, then a list of neighbours for each particle.
+"""Neighbour search: particles sorted into cells of edge h, then a list of neighbours for every eight particles.
 
 Cells are numbered x + nx (y + ny z) modulo their count, for any whole numbers x, y, z. The numbering therefore covers
 all of space with as many cells as there is room for: in a tank every cell has its own number, in the open two far
 cells may share one, which costs a few more distance tests and changes no result. A row of three cells along x is
 always three consecutive numbers, and the rows around a particle never overlap as long as nx, ny and nz are at least 3.
 
-Inside a cell particles stand in the order of their ids, whatever the threads did: results repeat bit for bit.
+Inside a cell particles stand in the order of their x, then of their ids, whatever the threads did: results repeat bit
+for bit, and eight particles that follow each other fill a piece of a row about as long as it is wide. Such a group has
+one list, of all who are within h of any of the eight, itself included; `pairs.py` walks it. That is three times as long
+as the list of one, so that lists of all take two fifths of the room.
 
-Both loops over pairs are written for a compiler that computes eight neighbours at a time. Building a list tests the
-candidates of a row without a branch, a block of them into the bits of one word, and then walks over the bits that are
-set. A list is walked in whole groups of `lanes`, the last filled up with the particle that is nowhere, where every
-smoothing kernel is zero. Both were measured: docs/performance.md.
+Building a list tests the candidates of a row without a branch, a block of them against eight places into the bits of
+one word, and then walks over the bits that are set. Measured: docs/performance.md.
 
 Counting sort after Green 2010 ("Particle Simulation using CUDA"); Hoetzlein 2014 ("Fast Fixed-Radius Nearest
 Neighbors") for the counting by integer atomics. What there is little of is counted by one thread: waking the others

@@ -1,0 +1,50 @@
+"""Passes over pairs: what they sum is held by test_equations.py; here, what the compiler makes of them."""
+
+import os
+import platform
+import re
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import sys
+import wavetank as wt
+
+sim = wt.Simulation(wt.Scene.load(sys.argv[1]).changed(spacing=0.06, vorticity=0.01, vorticity_coherence=0.0))
+sim.step()
+"""
+#: Kernels of a step that go over pairs, and how many variants of them a step has.
+PASSES = {
+    "solve_multipliers": 2,
+    "correct_positions": 1,
+    "measure_density": 1,
+    "apply_viscosity": 1,
+    "confine_vorticity": 1,
+}
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the names of instructions are those of x86")
+@pytest.mark.parametrize(("scene", "most"), [("obstacle-tank", 16), ("obstacle-tank-2d", 50)])
+def test_eight_particles_are_computed_at_once(scene, most, tmp_path):
+    """Every pass takes roots of vectors, and so few of them that the loop over lanes has not been unrolled before.
+
+    Where there are two dimensions the first pass of an iteration is; it is computed as vectors nevertheless.
+    """
+    told = {
+        "QD_OFFLINE_CACHE_FILE_PATH": str(tmp_path / "cache"), "XDG_CACHE_HOME": str(tmp_path / "cache"),
+        "QD_PRINT_KERNEL_ASM": "1",
+    }  # fmt: skip
+    program = tmp_path / "one.py"
+    program.write_text(PROGRAM)
+    command, env = [sys.executable, str(program), scene], {**os.environ, **told}
+    subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, check=True)
+    roots: dict[str, list[int]] = {name: [] for name in PASSES}
+    for path in tmp_path.glob("*.s"):
+        text = path.read_text()
+        for name in PASSES:
+            if re.search(rf"\b{name}_c\d+_\d+_kernel", text):
+                roots[name].append(len(re.findall(r"\bv?sqrtps\b", text)))
+    assert {name: len(found) for name, found in roots.items()} == PASSES
+    assert all(0 < number <= most for found in roots.values() for number in found), roots
