@@ -83,10 +83,14 @@ class Person:
         self.look()
 
     def click(self, place: str, share: float = 0.5) -> None:
+        def moved() -> bool:  # what has just appeared may still move, on a busy machine after the pointer is there
+            before = self.desk.places[place]
+            left, top, right, bottom = before
+            self.move(left + share * (right - left), 0.5 * (top + bottom))
+            return self.desk.places.get(place) != before
+
         self.until(lambda: place in self.desk.places)
-        self.look(0.05)  # what has just appeared may still move once
-        left, top, right, bottom = self.desk.places[place]
-        self.move(left + share * (right - left), 0.5 * (top + bottom))
+        self.until(lambda: place in self.desk.places and not moved())
         self.press()
         self.lift()
 
