@@ -7,7 +7,9 @@ an error while arrays of the first are alive.
 
 import contextlib
 import functools
+import inspect
 import io
+import linecache
 import os
 import pathlib
 import sys
@@ -19,15 +21,36 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.errors import WavetankError
+
 os.environ.setdefault("QD_LOG_LEVEL", "error")
+
+
+@contextlib.contextmanager
+def _short_frames() -> Iterator[None]:
+    """Let `inspect` tell a frame's line without a walk over all modules, which the compiler asks for hundreds of times.
+
+    It wants to know whether a function that it decorates, one of its own, stands in the body of a class.
+    """
+    whole = inspect.getframeinfo
+
+    def line_only(frame: Any, context: int = 1) -> inspect.Traceback:
+        name, line = frame.f_code.co_filename, frame.f_lineno
+        return inspect.Traceback(name, line, frame.f_code.co_name, [linecache.getline(name, line)] * context, 0)
+
+    inspect.getframeinfo = line_only
+    try:
+        yield
+    finally:
+        inspect.getframeinfo = whole
+
+
 # The compiler prints a banner on import; a library should be silent.
-with contextlib.redirect_stdout(io.StringIO()):
+with contextlib.redirect_stdout(io.StringIO()), _short_frames():
     import quadrants as qd
     from quadrants.lang import _func_base, _kernel_impl_dataclass, _wrap_inspect, kernel_impl
     from quadrants.lang._fast_caching import function_hasher
     from quadrants.lang.ast import ast_transformer_utils
-
-from wavetank.errors import WavetankError
 
 __all__ = [
     "BACKENDS", "available_backends", "current_backend", "download", "qd", "start", "synchronize", "threads", "upload",
