@@ -52,7 +52,7 @@ def test_the_same_arrays_and_numbers_are_the_same_object():
     assert remembered(Coefficients(**{**numbers, "dt": 0.25})).dt == 0.25
 
 
-@qd.kernel(fastcache=True)
+@qd.kernel  # not from the cache, which does not see how the compiler reads a product
 def products(a: qd.types.vector(3, qd.f32), b: qd.types.vector(3, qd.f32), out: qd.types.ndarray()):
     out[0] = a.dot(b)
     out[1] = a.norm()
