@@ -77,24 +77,30 @@ def _is_in_class_body(level_of_class_stackframe: int) -> bool:
     return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
 
 
-class _OneLineWrapper(textwrap.TextWrapper):
-    """Python's own, with a short way for a line that needs no breaking: nearly every line of a source."""
-
-    def wrap(self, text: str) -> list[str]:
-        if len(text) <= self.width and text.isprintable():
-            return [text.rstrip()] if text.strip() else []
-        return super().wrap(text)
+def _place_in_source(context: Any, node: Any) -> str:
+    """Return what error messages show of a node: its line, and marks below it. One line needs no wrapping."""
+    line = context.src[node.lineno - 1] if node.lineno == node.end_lineno <= len(context.src) else ""
+    if not 0 < len(line) <= 120 or not line.isprintable():
+        return str(_place_in_lines(context, node))
+    first, last = context.indent + node.col_offset, context.indent + node.end_col_offset
+    where = f'File "{context.file}", line {node.lineno + context.lineno_offset}, in {context.func.func.__name__}:'
+    return f"{where}\n{line.rstrip()}\n{' ' * first}{'^' * (last - first)}\n"
 
 
 def _flatten_fields(tree: Any, struct_locals: set[str]) -> Any:
-    """Do what the compiler's function of that place does, less a walk for places that are all there."""
+    """Do what the compiler's function of that place does, less a walk for places that are all there.
+
+    Most functions have no fields to flatten.
+    """
+    if not struct_locals:
+        return tree
     return _kernel_impl_dataclass.FlattenAttributeNameTransformer(struct_locals=struct_locals).visit(tree)
 
 
-# The compiler asks Python's `inspect` for the source of a function each time it inlines it, those of its own vector
-# functions hundreds of times, and for the module of each decorated one; wraps every line of it as text, for error
-# messages; and reads the same functions again for each kernel, to see whether they have changed. A third of a cold
-# start went there, and half a second of a warm one (docs/performance.md). The answers stay the same.
+# The compiler asks Python's `inspect` for the source of a function each time it inlines it, and for the module of each
+# decorated one; wraps every line of it as text, for error messages; asks for the range of a type with each number; and
+# reads the same functions again for each kernel, to see whether they have changed. A third of a cold start went there,
+# and half a second of a warm one (docs/performance.md). The answers stay the same.
 for _name_of_lookup in ("getsourcelines", "getsourcefile"):
     if hasattr(_wrap_inspect, _name_of_lookup):
         setattr(_wrap_inspect, _name_of_lookup, functools.cache(getattr(_wrap_inspect, _name_of_lookup)))
@@ -105,8 +111,11 @@ if hasattr(function_hasher, "_hash_function"):
 if getattr(_func_base, "textwrap", None) is textwrap:
     _func_base.textwrap = types.ModuleType("textwrap")
     _func_base.textwrap.__dict__.update(vars(textwrap), fill=functools.cache(textwrap.fill))
-if getattr(ast_transformer_utils, "TextWrapper", None) is textwrap.TextWrapper:
-    ast_transformer_utils.TextWrapper = _OneLineWrapper
+if hasattr(expr, "_check_in_range"):
+    expr._check_in_range = functools.cache(expr._check_in_range)
+_place_in_lines: Any = getattr(ast_transformer_utils.ASTTransformerFuncContext, "_build_pos_info", None)
+if _place_in_lines:
+    ast_transformer_utils.ASTTransformerFuncContext._build_pos_info = _place_in_source
 if hasattr(_kernel_impl_dataclass, "FlattenAttributeNameTransformer"):
     _kernel_impl_dataclass.unpack_ast_struct_expressions = _flatten_fields
 
