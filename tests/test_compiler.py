@@ -2,6 +2,9 @@
 
 import dataclasses
 
+import numpy as np
+import pytest
+
 from wavetank import compiler
 from wavetank.compiler import qd
 from wavetank.state import Coefficients, exchanged, integers, new_particles, remembered
@@ -47,3 +50,28 @@ def test_the_same_arrays_and_numbers_are_the_same_object():
     numbers = dict.fromkeys((field.name for field in dataclasses.fields(Coefficients)), 0.5)
     assert remembered(Coefficients(**numbers)) is remembered(Coefficients(**numbers))
     assert remembered(Coefficients(**{**numbers, "dt": 0.25})).dt == 0.25
+
+
+@qd.kernel  # not from the cache, which does not see how the compiler reads a product
+def products(a: qd.types.vector(3, qd.f32), b: qd.types.vector(3, qd.f32), out: qd.types.ndarray()):
+    out[0] = a.dot(b)
+    out[1] = a.norm()
+    out[2] = a.norm(eps=7.0)
+    out[3] = a.norm_sqr()
+    out[4] = a.sum()
+    for k in qd.static(range(3)):
+        out[5 + k] = a.cross(b)[k]
+        out[8 + k] = (a + b).normalized()[k]
+    flat = qd.Vector([a[0], a[1]])
+    out[11] = flat.cross(qd.Vector([b[0], b[1]]))
+    out[12] = qd.Matrix([[a[0], a[1]], [b[0], b[1]]]).norm_sqr()
+
+
+def test_products_of_vectors_are_what_they_are_called():
+    """Kernels read none of the compiler's own sources for these; matrices and other arguments take the long way."""
+    compiler.start("cpu")
+    a, b, out = np.float32([1.0, 2.0, 4.0]), np.float32([3.0, -1.0, 0.5]), qd.ndarray(qd.f32, 13)
+    products(a, b, out)
+    along = (a + b) / np.linalg.norm(a + b)
+    expected = [3.0, 21.0**0.5, 28.0**0.5, 21.0, 7.0, *np.cross(a, b), *along, -7.0, 15.0]
+    assert compiler.download(out) == pytest.approx(expected, rel=1e-6)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from wavetank import Box, HalfSpace, Scene, Sphere, Tank
-from wavetank.compiler import qd
 from wavetank.view.buffers import SOLID
 from wavetank.view.camera import Camera
 from wavetank.view.passes import solids, spheres
@@ -115,8 +114,9 @@ def test_the_eye_inside_a_solid_sees_its_inside(make_frame):
 
 def test_the_box_of_solids_is_empty_when_they_are_out_of_sight(make_frame):
     frame = make_frame(world(Sphere(center=(0.5, 0.5, 0.5), radius=0.1)), [])
-    lens = Camera(eye=(5.0, 0.5, 3.0), target=(5.0, 0.5, 0.0), height=1.0).lens(WIDTH, HEIGHT)
-    box = qd.ndarray(qd.i32, shape=(4,))
-    solids.bound(frame.solids, lens, HEIGHT, WIDTH, box)
-    first, last, _, _ = box.to_numpy()
+    aside = buffers_of(frame, Camera(eye=(5.0, 0.5, 3.0), target=(5.0, 0.5, 0.0), height=1.0))
+    first, last, _, _ = aside.solid_box.to_numpy()
     assert first > last
+    before = buffers_of(frame, Camera(eye=(0.5, 0.5, 3.0), target=(0.5, 0.5, 0.0), height=1.0))
+    first, last, _, _ = before.solid_box.to_numpy()
+    assert 0 < first < last < WIDTH - 1

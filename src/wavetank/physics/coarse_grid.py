@@ -41,12 +41,12 @@ def in_cells(grid: CoarseGrid, p: qd.template()):
 
 
 @qd.func
-def tent(share, k: qd.template()):
-    """Weight of corner `k` of 8 of a cell for a place with the coordinates `share` in it."""
-    w = share.x if qd.static(k & 1) else 1.0 - share.x
-    w *= share.y if qd.static(k & 2) else 1.0 - share.y
-    w *= share.z if qd.static(k & 4) else 1.0 - share.z
-    return w
+def tents(share, dim: qd.template()):
+    """Weights of the corners of a cell, in the order of `corners`, for a place with the coordinates `share` in it."""
+    x = qd.Vector([1.0 - share.x, share.x])
+    y = qd.Vector([1.0 - share.y, share.y])
+    z = qd.Vector([1.0 - share.z, share.z])
+    return qd.Vector([x[k & 1] * y[k >> 1 & 1] * z[k >> 2] for k in qd.static(range(2**dim))])
 
 
 @qd.func

@@ -18,7 +18,7 @@ bit for bit. What was tried, and what it gives: docs/method.md.
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, signed_distance, vec3
 from wavetank.physics.boundary import flattened, kept_in_tank
-from wavetank.physics.coarse_grid import coordinates, corners, in_cells, tent
+from wavetank.physics.coarse_grid import coordinates, corners, in_cells, tents
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.poisson import LEAST_THETA, couple_node, solve_levels
 from wavetank.state import CoarseGrid, Coefficients, Particles, Scratch
@@ -44,9 +44,9 @@ def gather_fill(
         p = predicted(particles, i)
         s = in_cells(grid, p)
         at = corners(grid, qd.floor(s, qd.i32), p.n)
-        share = s - qd.floor(s)
+        weights = tents(s - qd.floor(s), p.n)
         for k in qd.static(range(2**p.n)):
-            w = unit * tent(share, k)
+            w = unit * weights[k]
             qd.atomic_add(grid.fill_sum[at[k]], qd.cast(qd.round(w), qd.i32))
             if qd.static(mixed):
                 qd.atomic_add(grid.mass_sum[at[k]], qd.cast(qd.round(w / scratch.weight[i]), qd.i32))
@@ -86,14 +86,14 @@ def gather_errors(
         p = predicted(particles, i)
         s = in_cells(grid, p)
         at = corners(grid, qd.floor(s, qd.i32), p.n)
-        share = s - qd.floor(s)
+        weights = tents(s - qd.floor(s), p.n)
         filled = 0.0
         for k in qd.static(range(2**p.n)):
-            filled += tent(share, k) * grid.fill[at[k]]
+            filled += weights[k] * grid.fill[at[k]]
         inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
         error = unit * inside * qd.min(qd.max(scratch.rho[i] * scratch.weight[i] - 1.0, -1.0), 1.0)
         for k in qd.static(range(2**p.n)):
-            qd.atomic_add(grid.error_sum[at[k]], qd.cast(qd.round(error * tent(share, k)), qd.i32))
+            qd.atomic_add(grid.error_sum[at[k]], qd.cast(qd.round(error * weights[k]), qd.i32))
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.rhs[n] = scale * grid.error_sum[n] / qd.max(grid.room[n], least_open)
         grid.error_sum[n] = 0
@@ -108,13 +108,13 @@ def slope_along(
     place = s
     place[axis] -= 0.5
     at = corners(grid, qd.floor(place, qd.i32), dim)
-    share = place - qd.floor(place)
-    total, weights = 0.0, 0.0
+    weights = tents(place - qd.floor(place), dim)
+    total, weight = 0.0, 0.0
     for k in qd.static(range(2**dim)):
-        w = tent(share, k) * qd.cast(coupled[at[k]] > 0.0, qd.f32)
+        w = weights[k] * qd.cast(coupled[at[k]] > 0.0, qd.f32)
         total += w * slope[at[k]]
-        weights += w
-    return total / qd.max(weights, 1e-9)
+        weight += w
+    return total / qd.max(weight, 1e-9)
 
 
 @qd.kernel(fastcache=True)

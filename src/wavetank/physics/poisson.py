@@ -16,6 +16,7 @@ import itertools
 import math
 
 from wavetank.compiler import current_backend, qd
+from wavetank.distance import vec3
 from wavetank.physics.coarse_grid import coordinates, node
 from wavetank.state import CoarseGrid
 
@@ -53,29 +54,24 @@ def coupling(grid: CoarseGrid, n, m, edge, least_theta):
 def couple_node(grid: CoarseGrid, n, least_theta):
     """Set the couplings of node `n` with the next ones along x, y and z, and what inverts its equation."""
     c = coordinates(grid, n)
-    layer = grid.nx * grid.ny
-    wx, wy, wz = 0.0, 0.0, 0.0
-    if c[0] + 1 < grid.nx:
-        wx = coupling(grid, n, n + 1, grid.dx, least_theta)
-    if c[1] + 1 < grid.ny:
-        wy = coupling(grid, n, n + grid.nx, grid.dy, least_theta)
-    if c[2] + 1 < grid.nz:
-        wz = coupling(grid, n, n + layer, grid.dz, least_theta)
-    grid.wx[n] = wx
-    grid.wy[n] = wy
-    grid.wz[n] = wz
-    inverse = 0.0
-    if grid.fill[n] > 0.5 and grid.room[n] > 0.0:
-        diagonal = wx + wy + wz
-        if c[0] > 0:
-            diagonal += coupling(grid, n, n - 1, grid.dx, least_theta)
-        if c[1] > 0:
-            diagonal += coupling(grid, n, n - grid.nx, grid.dy, least_theta)
-        if c[2] > 0:
-            diagonal += coupling(grid, n, n - layer, grid.dz, least_theta)
-        if diagonal > 0.0:
-            inverse = 1.0 / diagonal
-    grid.inverse[n] = inverse
+    nodes = qd.Vector([grid.nx, grid.ny, grid.nz])
+    steps = qd.Vector([1, grid.nx, grid.nx * grid.ny])
+    edges = vec3(grid.dx, grid.dy, grid.dz)
+    w = vec3(0.0, 0.0, 0.0)
+    diagonal = 0.0
+    is_water = grid.fill[n] > 0.5 and grid.room[n] > 0.0
+    for side in range(6):  # a loop around one copy of the code: the next nodes, then those before
+        axis = side % 3
+        sign = 1 if side < 3 else -1
+        if c[axis] + sign >= 0 and c[axis] + sign < nodes[axis] and (side < 3 or is_water):
+            coupled = coupling(grid, n, n + sign * steps[axis], edges[axis], least_theta)
+            diagonal += coupled
+            if side < 3:
+                w[axis] = coupled
+    grid.wx[n] = w.x
+    grid.wy[n] = w.y
+    grid.wz[n] = w.z
+    grid.inverse[n] = 1.0 / diagonal if is_water and diagonal > 0.0 else 0.0
 
 
 @qd.func

@@ -60,9 +60,7 @@ def new_cells(frame: Frame, extent: Extent, edge: float) -> Cells:
 
 def sort(frame: Frame, cells: Cells) -> None:
     """Sort the particles of `frame`."""
-    count_particles(cells, frame.x, frame.count)
-    scan(cells)
-    place(cells, frame.x, frame.id, frame.count)
+    sort_particles(cells, frame.x, frame.id, frame.count)
 
 
 @qd.func
@@ -73,8 +71,9 @@ def cell_number(cells: Cells, c):
 
 
 @qd.kernel(fastcache=True)
-def count_particles(cells: Cells, x: qd.types.ndarray(), count: qd.i32):
-    """Find the cell of every particle and count the particles of every cell."""
+def sort_particles(cells: Cells, x: qd.types.ndarray(), id: qd.types.ndarray(), count: qd.i32):
+    """Sort particles by cell, and those of a cell by id, and copy their positions: all in one kernel, to load fast."""
+    # Find the cell of every particle and count the particles of every cell.
     for k in range(cells.cells + 1):
         cells.start[k] = 0
     for i in range(count):
@@ -86,13 +85,8 @@ def count_particles(cells: Cells, x: qd.types.ndarray(), count: qd.i32):
         number = cell_number(cells, c)
         cells.cell[i] = qd.min(qd.max(number, 0), cells.cells - 1)
         qd.atomic_add(cells.start[cells.cell[i]], 1)
-
-
-@qd.kernel(fastcache=True)
-def scan(cells: Cells):
-    """Turn the counts into first places: an exclusive prefix sum in blocks of 1024."""
-    blocks = (cells.cells + 1023) // 1024
-    for b in range(blocks):
+    # Turn the counts into first places: an exclusive prefix sum in blocks of 1024.
+    for b in range(cells.blocks.shape[0] - 1):
         total = 0
         for k in range(b * 1024, qd.min((b + 1) * 1024, cells.cells)):
             total += cells.start[k]
@@ -100,23 +94,19 @@ def scan(cells: Cells):
     qd.loop_config(serialize=True)
     for _ in range(1):
         total = 0
-        for b in range(blocks):
+        for b in range(cells.blocks.shape[0] - 1):
             own = cells.blocks[b]
             cells.blocks[b] = total
             total += own
         cells.start[cells.cells] = total
-    for b in range(blocks):
+    for b in range(cells.blocks.shape[0] - 1):
         total = cells.blocks[b]
         for k in range(b * 1024, qd.min((b + 1) * 1024, cells.cells)):
             own = cells.start[k]
             cells.start[k] = total
             cells.fill[k] = total
             total += own
-
-
-@qd.kernel(fastcache=True)
-def place(cells: Cells, x: qd.types.ndarray(), id: qd.types.ndarray(), count: qd.i32):
-    """Give every particle a place in its cell, put each cell into the order of ids, and copy the positions."""
+    # Give every particle a place in its cell, put each cell into the order of ids, and copy the positions.
     for i in range(count):
         cells.order[qd.atomic_add(cells.fill[cells.cell[i]], 1)] = i
     for k in range(cells.cells):

@@ -44,8 +44,6 @@ def lower_depth(shot: Shot, buffers: Buffers, lens: Lens, depth: Any, is_seen: i
     """Lower `depth` to the solids that `lens` sees; with `is_seen` (1 or 0) draw them into the picture's buffers."""
     solids = shot.frame.solids
     if solids.count > solids.tank_count:
-        rows, columns = depth.shape
-        bound(solids, lens, rows, columns, buffers.solid_box)
         trace(
             strips_of(depth), solids, window(shot), lens, shot.look.solid, is_seen, buffers.solid_box,
             depth, buffers.surface, buffers.normal, buffers.color,
@@ -168,21 +166,19 @@ def in_box(box: qd.template(), row, column):
     return column >= box[0] and column <= box[1] and row >= box[2] and row <= box[3]
 
 
-@qd.kernel(fastcache=True)
-def bound(solids: SolidSet, lens: Lens, rows: qd.i32, columns: qd.i32, box: qd.types.ndarray()):
-    """Find the box of pixels (first and last column, first and last row) in which any solid can be."""
-    for _ in range(1):
-        whole = qd.Vector([columns, -1, rows, -1])
-        for k in range(solids.tank_count, solids.count):
-            c, r = to_view(lens, solids.position[k]), 1.001 * solids.reach[k] + 1e-4
-            part = qd.Vector([0, columns - 1, 0, rows - 1])
-            if r < 1e4 and (c.z > r + lens.near or lens.perspective < 0.5):
-                part = box_of_ball(lens, c, r, rows, columns)
-            if part[0] <= part[1]:
-                whole[0], whole[1] = qd.min(whole[0], part[0]), qd.max(whole[1], part[1])
-                whole[2], whole[3] = qd.min(whole[2], part[2]), qd.max(whole[3], part[3])
-        for k in qd.static(range(4)):
-            box[k] = whole[k]
+@qd.func
+def box_of_solids(solids: SolidSet, lens: Lens, rows, columns):
+    """Box of pixels (first and last column, first and last row) in which any solid can be."""
+    whole = qd.Vector([columns, -1, rows, -1])
+    for k in range(solids.tank_count, solids.count):
+        c, r = to_view(lens, solids.position[k]), 1.001 * solids.reach[k] + 1e-4
+        part = qd.Vector([0, columns - 1, 0, rows - 1])
+        if r < 1e4 and (c.z > r + lens.near or lens.perspective < 0.5):
+            part = box_of_ball(lens, c, r, rows, columns)
+        if part[0] <= part[1]:
+            whole[0], whole[1] = qd.min(whole[0], part[0]), qd.max(whole[1], part[1])
+            whole[2], whole[3] = qd.min(whole[2], part[2]), qd.max(whole[3], part[3])
+    return whole
 
 
 @qd.kernel(fastcache=True)
@@ -196,6 +192,10 @@ def trace(
     One kernel for eye and sun, because tracing takes long to compile; without `is_seen` the last three may be of any
     size.
     """
+    for _ in range(1):
+        whole = box_of_solids(solids, lens, depth.shape[0], depth.shape[1])
+        for k in qd.static(range(4)):
+            box[k] = whole[k]
     for task in range(strips.count):
         row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
         for column in range(first, last):
