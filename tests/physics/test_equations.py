@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from clouds import Cloud
 
-from wavetank.physics.density_constraint import correct_positions, schedule, solve_multipliers
+from wavetank.physics.density_constraint import correct_positions, schedule, start_multipliers
 from wavetank.physics.viscosity import apply_viscosity
 from wavetank.physics.vorticity import confine_vorticity
 
@@ -16,8 +16,8 @@ cases = pytest.mark.parametrize(("dim", "kernel"), CASES)
 
 def solve(cloud: Cloud) -> None:
     world, count = cloud.world, cloud.count
-    solve_multipliers(
-        world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, 1, cloud.method, 0,
+    start_multipliers(
+        world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, cloud.method, 0,
         world.grid.lanes,
     )  # fmt: skip
     correct_positions(

@@ -7,7 +7,7 @@ from clouds import Cloud
 import wavetank as wt
 from wavetank.compiler import upload
 from wavetank.materials import Material
-from wavetank.physics.density_constraint import correct_positions, solve_multipliers
+from wavetank.physics.density_constraint import correct_positions, start_multipliers
 from wavetank.physics.mixture import blend, pack_weights, stiffening
 from wavetank.physics.viscosity import apply_mixed_viscosity
 
@@ -22,7 +22,7 @@ def mixed_cloud(dim: int, ratio: float = 100.0, **settings) -> tuple[Cloud, np.n
 
 def solve(cloud: Cloud, mixed: int) -> np.ndarray:
     world = cloud.world
-    solve_multipliers(
+    start_multipliers(
         world.scratch,
         world.particles,
         world.grid,
@@ -30,7 +30,6 @@ def solve(cloud: Cloud, mixed: int) -> np.ndarray:
         world.walls,
         cloud.c,
         cloud.count,
-        1,
         cloud.method,
         mixed,
         world.grid.lanes,

@@ -17,7 +17,8 @@ sim.step()
 """
 #: Kernels of a step that go over pairs, and how many variants of them a step has.
 PASSES = {
-    "solve_multipliers": 2,
+    "start_multipliers": 1,
+    "solve_multipliers": 1,
     "correct_positions": 1,
     "measure_density": 1,
     "apply_viscosity": 1,

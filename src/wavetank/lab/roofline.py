@@ -56,9 +56,8 @@ COSTS: dict[str, Cost] = {
     "predict": Cost(vectors=4, words=2, operations=266),  # x, v twice, p
     "reorder": Cost(vectors=6, words=13),
     "list_neighbors": Cost(vectors=1, words=4, pair_words=0.4, test_operations=9),
-    "solve_multipliers": Cost(
-        vectors=1, words=6, pair_words=0.4, operations=25, pair_operations=17
-    ),  # 26 in the first of four
+    "start_multipliers": Cost(vectors=1, words=6, pair_words=0.4, operations=25, pair_operations=26),
+    "solve_multipliers": Cost(vectors=1, words=6, pair_words=0.4, operations=12, pair_operations=14),
     "correct_positions": Cost(vectors=2, words=3, pair_words=0.4, operations=12, pair_operations=24),
     "update_velocities": Cost(vectors=5, operations=24),
     "apply_viscosity": Cost(vectors=3, words=1, pair_words=0.4, operations=7, pair_operations=22),

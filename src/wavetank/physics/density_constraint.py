@@ -6,7 +6,6 @@ which follow the paper's from Eq. 3 on.
     code       symbol              meaning                                                   unit
     rho        rho_i / rho_0       density over rest density                                 1
     lam, dlam  lambda_i            multiplier, summed over the iterations; its last change   m^2
-    newton     Eq. 5               multiplier of one Newton step                             m^2
     squares                        its denominator, sum_k |grad_pk C_i|^2 + eps              1/m^2
     slope      |grad_pj C_i|       length of a gradient of the constraint, with its sign     1/m
     eps        eps                 constraint force mixing                                   1/m^2
@@ -99,45 +98,64 @@ DENSITIES = (add_density, add_weighted_density)
 CORRECTIONS = (add_correction, add_tensile_correction)
 
 
+@qd.func
+def wall_of(i, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients):
+    """Gradient and density that the solids add at particle `i`, kept for the correction."""
+    wall = vec4(0.0, 0.0, 0.0, 0.0)
+    if particles.near[i] != 0:
+        wall = wall_density(predicted(particles, i), particles.near[i], solids, walls, c)
+        scratch.wall[i] = wall
+    return wall
+
+
+@qd.func
+def set_multiplier(i, before, change, scratch: Scratch, c: Coefficients):
+    """Change the multiplier of particle `i` from what it was `before`; it pushes, and pulls by a share at most."""
+    lam = before + change
+    if lam > 0.0:
+        lam *= c.attraction
+    scratch.dlam[i] = lam - before
+    scratch.lam[i] = lam
+
+
+@qd.kernel(fastcache=True)
+def start_multipliers(
+    scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
+    count: qd.i32, method: qd.template(), mixed: qd.template(), lanes: qd.template(),
+):  # fmt: skip
+    """Find the denominators of all iterations of a substep, and the multipliers of the first (Eq. 1 to 5)."""
+    for team in range(teams(count, lanes)):
+        dim = qd.static(particles.x[team].n)
+        sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
+        add_neighbors(sums, qd.static(DENSITIES[mixed]), team, particles, scratch.weight, grid, c, method)
+        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            sum = column(sums, i - team * lanes)
+            wall = wall_of(i, particles, scratch, solids, walls, c)
+            constraint = c.density_scale * sum[0] + wall.w - 1.0  # Eq. 2
+            own = c.eps
+            for k in qd.static(range(dim)):
+                own += (sum[1 + k] + wall[k]) ** 2
+            if qd.static(mixed):
+                own *= scratch.weight[i]
+            squares = sum[dim + 1] + own
+            scratch.squares[i] = squares
+            set_multiplier(i, 0.0, -c.relaxation * constraint / squares, scratch, c)  # Eq. 5
+
+
 @qd.kernel(fastcache=True)
 def solve_multipliers(
     scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
-    count: qd.i32, first: qd.template(), method: qd.template(), mixed: qd.template(), lanes: qd.template(),
+    count: qd.i32, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
-    """Estimate densities (Eq. 1) and move the multipliers towards the solution (Eq. 5).
-
-    The `first` iteration of a substep starts without pressure and finds the denominators of all of them.
-    """
+    """Estimate densities (Eq. 1) and move the multipliers on towards the solution (Eq. 5)."""
     for team in range(teams(count, lanes)):
-        dim = qd.static(particles.x[team].n)
-        sums = qd.Matrix.zero(qd.f32, dim + 2 if first else 1, lanes)
-        visit = qd.static(DENSITIES[mixed] if first else add_weight)
-        add_neighbors(sums, visit, team, particles, scratch.weight, grid, c, method)
+        sums = qd.Matrix.zero(qd.f32, 1, lanes)
+        add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
         for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            sum = column(sums, i - team * lanes)
-            wall = vec4(0.0, 0.0, 0.0, 0.0)
-            if particles.near[i] != 0:
-                wall = wall_density(predicted(particles, i), particles.near[i], solids, walls, c)
-                scratch.wall[i] = wall
-            constraint = c.density_scale * sum[0] + wall.w - 1.0  # Eq. 2
-            before = 0.0
-            change = 0.0
-            if qd.static(first):
-                own = c.eps
-                for k in qd.static(range(dim)):
-                    own += (sum[1 + k] + wall[k]) ** 2
-                if qd.static(mixed):
-                    own *= scratch.weight[i]
-                scratch.squares[i] = sum[dim + 1] + own
-            else:
-                before = scratch.lam[i]
-                change = c.momentum * scratch.dlam[i]
-            newton = -constraint / scratch.squares[i]  # Eq. 5
-            lam = before + c.relaxation * newton + change
-            if lam > 0.0:
-                lam *= c.attraction
-            scratch.dlam[i] = lam - before
-            scratch.lam[i] = lam
+            wall = wall_of(i, particles, scratch, solids, walls, c)
+            constraint = c.density_scale * sums[0, i - team * lanes] + wall.w - 1.0  # Eq. 2
+            change = -c.relaxation * constraint / scratch.squares[i] + c.momentum * scratch.dlam[i]  # Eq. 5
+            set_multiplier(i, scratch.lam[i], change, scratch, c)
 
 
 @qd.kernel(fastcache=True)

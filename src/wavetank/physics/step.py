@@ -15,7 +15,13 @@ from wavetank.materials import Material
 from wavetank.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids
 from wavetank.physics.coarse_pressure import correct_pressure
-from wavetank.physics.density_constraint import correct_positions, measure_density, schedule, solve_multipliers
+from wavetank.physics.density_constraint import (
+    correct_positions,
+    measure_density,
+    schedule,
+    solve_multipliers,
+    start_multipliers,
+)
 from wavetank.physics.diffuse.pool import Pool
 from wavetank.physics.friction import apply_friction
 from wavetank.physics.implicit_viscosity import is_thick, solve_viscosity
@@ -83,8 +89,10 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     tensile, lanes = int(params.tensile_strength > 0.0), grid.lanes
     for number, (relaxation, momentum) in enumerate(relaxations(params, kinds.density_ratio)):  # 8-19
         c = remembered(dataclasses.replace(c, relaxation=relaxation, momentum=momentum))
-        first = int(number == 0)
-        solve_multipliers(scratch, now, grid, solids, walls, c, count, first, method, kinds.mixed, lanes)  # 9-11
+        if number == 0:
+            start_multipliers(scratch, now, grid, solids, walls, c, count, method, kinds.mixed, lanes)  # 9-11
+        else:
+            solve_multipliers(scratch, now, grid, solids, walls, c, count, method, lanes)
         correct_positions(
             spare, now, scratch, grid, solids, c, count, method, tensile, kinds.mixed, searched, lanes
         )  # 12-18
