@@ -100,10 +100,16 @@ class Browser:
         )  # fmt: skip
 
     def click(self, selector: str) -> None:
-        """Click on the middle of an element."""
-        x, y = self.center(selector)
-        self.mouse("mousePressed", x, y)
-        self.mouse("mouseReleased", x, y)
+        """Click on the middle of an element, once it rests: what has just appeared may still move."""
+        place: list[tuple[float, float]] = []
+
+        def rests() -> bool:
+            place.append(self.center(selector))
+            return len(place) > 1 and place[-1] == place[-2]
+
+        self._until(rests, 30.0, f"{selector} rests")
+        self.mouse("mousePressed", *place[-1])
+        self.mouse("mouseReleased", *place[-1])
 
     def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 12, pause: float = 0.03) -> None:
         """Drag with the left button, `pause` [s] between two places."""
