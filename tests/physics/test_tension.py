@@ -80,12 +80,12 @@ def test_flat_surface_sums(dim):
     assert cut == pytest.approx(1.0, rel=0.15)
 
 
-def hanging(angle: float) -> float:
-    """Largest height [m] of the water of a drop under a ceiling after a while."""
+def hanging(angle: float, radius: float) -> float:
+    """Median height [m] of the water of half a drop of that `radius` [m] under a ceiling after a while."""
     d, size = 0.0005, (0.02, 0.012)
     axis = (np.arange(-8, 8) + 0.5) * d
     x = np.stack(np.meshgrid(axis, axis, indexing="ij"), -1).reshape(-1, 2)
-    x = x[(np.sum(x**2, axis=1) < 0.0028**2) & (x[:, 1] < 0)] + [0.01, size[1]]
+    x = x[(np.sum(x**2, axis=1) < radius**2) & (x[:, 1] < 0)] + [0.01, size[1]]
     scene = wt.Scene(
         spacing=d, tank=wt.Tank(size=size), surface_tension=0.072, contact_angle=angle, dynamic_viscosity=0.005,
         frame_time=2e-3, largest_substeps=100, gravity=(0.0, -9.81), fluids=[wt.Points(positions=x)],
@@ -98,11 +98,19 @@ def hanging(angle: float) -> float:
 def test_adhesion_makes_a_drop_cling():
     """Under a ceiling a wetting drop stays, one that does not wet falls: g t^2 / 2 is 18 mm, the room 12 mm.
 
-    Its weight, rho g pi R^2 / 2, is 84 % of 2 sigma, the most that the two ends of its surface hold. With 97 % it is a
-    matter of rounding whether it stays.
+    Its weight, rho g pi R^2 / 2, is 84 % of 2 sigma, the most that the two ends of its surface hold.
     """
-    assert hanging(30.0) > 0.009
-    assert hanging(180.0) < 0.006
+    assert hanging(30.0, 0.0028) > 0.009
+    assert hanging(180.0, 0.0028) < 0.006
+
+
+@pytest.mark.xfail(
+    reason="0.0089: at 96 % of what can be held it falls since eight particles share a list, or rounding decides"
+)
+def test_adhesion_holds_a_drop_near_the_limit():
+    """The same with a weight of 96 % of 2 sigma."""
+    assert hanging(180.0, 0.003) < 0.006
+    assert hanging(30.0, 0.003) > 0.009
 
 
 def test_capillary_speed_lifts_the_speed_limit():

@@ -28,7 +28,7 @@ def add_one(sums: qd.template(), r, j, data: qd.template(), c: Coefficients):
 
 @qd.kernel(fastcache=True)
 def count_tests(tests: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32):
-    """Count the particles in the cells around each particle: one distance test each when the lists are built."""
+    """Count the particles in the cells around each particle."""
     for i in range(count):
         sums = qd.Vector([0])
         for_each_around(sums, add_one, particles.x[i], particles.x, particles.x, grid, c)
@@ -43,7 +43,10 @@ def pairs(sim: Simulation) -> int:
 
 
 def distance_tests(sim: Simulation) -> int:
-    """Return the number of distance tests that building the neighbour lists takes for the water as it stands."""
+    """Return the number of distance tests that lists take for the water as it stands, each particle for itself.
+
+    Lists of eight test each candidate against all eight, in as many cells around as these stand in: somewhat more.
+    """
     sim.frame()
     world, count = sim.world, sim.count
     tests = integers(count)
