@@ -54,7 +54,7 @@ def add_neighbors(
     end = begin + grid.number[first >> 3]
     # A short loop over lanes would be unrolled before it can be computed as vectors: its visits come in twos or fours.
     size, dim = qd.static(sums.n, particles.x[first].n)
-    pace = qd.static(1 if size > 2 else 4 if dim == 2 and size == 1 else 2)
+    pace = qd.static(1 if size > 3 else 4 if dim == 2 and size == 1 else 2)
     # Each of them has sums of its own: in which order more than two numbers are added is the compiler's choice.
     others = qd.Matrix.zero(qd.f32, size * (pace - 1 if pace > 1 else 1), lanes)
     for turn in range((end - begin + pace - 1) // pace):
