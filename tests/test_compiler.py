@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from wavetank import compiler
+from wavetank import compiler, launches
 from wavetank.compiler import qd
 from wavetank.state import Coefficients, exchanged, integers, new_particles, remembered
 
@@ -34,6 +34,56 @@ def test_a_launch_reads_the_numbers_that_it_is_given():
         read.append(int(compiler.download(x)[3]))
         del numbers
     assert read == [1001 * k for k in range(300)]
+
+
+@pytest.fixture
+def prepared(monkeypatch) -> list:
+    """How many arguments the compiler has prepared for launches, by now and from now on."""
+    from quadrants.lang.kernel import Kernel
+
+    whole, seen = Kernel._recursive_set_args, []
+    monkeypatch.setattr(Kernel, "_recursive_set_args", staticmethod(lambda *args: seen.append(args[1]) or whole(*args)))
+    return seen
+
+
+def test_a_launch_that_is_known_is_not_prepared_again(prepared):
+    """Numbers count by their value, wherever they are kept; objects by what they are."""
+    compiler.start("cpu")
+    x, y = integers(1004), integers(1004)
+    one, two = Numbers(one=1, half=0.0), Numbers(one=2, half=0.0)
+    for array, numbers, place in ((x, one, 1000), (x, one, 1001), (x, two, 1002), (y, two, 1003)):
+        write(array, numbers, place)
+    before = len(prepared)
+    for array, numbers, place in ((x, two, 2002), (y, two, 2003), (x, one, 2001)):
+        write(array, numbers, place - 1000)
+    assert len(prepared) == before == 4 * 3
+    assert compiler.download(x)[1000:].tolist() == [1, 1, 2, 0]
+    assert compiler.download(y)[1000:].tolist() == [0, 0, 0, 2]
+
+
+def test_prepared_launches_go_with_their_arrays(prepared):
+    """A new array may take the address of one that is gone."""
+    compiler.start("cpu")
+    numbers, kept, seen = Numbers(one=7, half=0.0), [], []
+    for k in range(40):
+        x = integers(4 + k % 3)
+        write(x, numbers, 3)
+        seen.append(int(compiler.download(x)[3]))
+        if k % 5 == 0:
+            kept.append(x)
+        del x
+    assert seen == [7] * 40
+    assert all(int(compiler.download(x)[3]) == 7 for x in kept)
+
+
+def test_only_so_many_prepared_launches_are_kept():
+    compiler.start("cpu")
+    x, numbers = integers(1000), Numbers(one=5, half=0.0)
+    for place in range(1000):
+        write(x, numbers, place)
+    cache = write._primal.launch_context_buffer_cache
+    assert 0 < len(cache._launch_ctx_cache) == len(cache._launch_ctx_cache_tracker) <= launches.MOST
+    assert (compiler.download(x) == 5).all()
 
 
 def test_the_same_arrays_and_numbers_are_the_same_object():

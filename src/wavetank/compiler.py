@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.errors import WavetankError
+from wavetank.launches import keep_prepared_launches
 
 os.environ.setdefault("QD_LOG_LEVEL", "error")
 
@@ -189,16 +190,10 @@ def _cross(a: Any, b: Any) -> Any:
     return matrix.make_matrix([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
-def _forget(*_: Any) -> None:
-    """Do nothing, in place of keeping the prepared arguments of a launch."""
-
-
-# Prepared arguments of a launch are kept under the addresses of frozen objects, for as long as their arrays live: an
-# object of numbers that takes the address of one that is gone would get the numbers of that one. What else the
-# compiler remembers of frozen objects it keeps in them.
-_launch_cache: Any = getattr(sys.modules["quadrants.lang.kernel"], "LaunchContextBufferCache", None)
-if hasattr(_launch_cache, "cache"):
-    _launch_cache.cache = _forget
+_kernels = sys.modules["quadrants.lang.kernel"]
+if not keep_prepared_launches(_kernels) and hasattr(_kernels, "LaunchContextBufferCache"):
+    # What the compiler itself keeps may be stale (`launches.py`): it shall keep nothing.
+    _kernels.LaunchContextBufferCache.cache = lambda *_: None
 
 
 def available_backends() -> list[str]:

@@ -202,17 +202,20 @@ def remembered(c: Coefficients) -> Coefficients:
 
 
 def exchanged(
-    known: dict[tuple[int, ...], Particles], a: Particles, b: Particles, *names: str
+    known: dict[tuple[Any, ...], Any], a: Particles, b: Particles, *names: str
 ) -> tuple[Particles, Particles]:
     """Return `a` and `b` with the arrays of those `names` exchanged; nothing is copied.
 
     What it returns stays `known`: the same arrays are the same object the next time.
     """
-    pair = []
-    for own, other in ((a, b), (b, a)):
-        arrays = {name: getattr(other if name in names else own, name) for name in own.__dataclass_fields__}
-        pair.append(known.setdefault(tuple(map(id, arrays.values())), Particles(**arrays)))
-    return pair[0], pair[1]
+    asked = (id(a), id(b), *names)
+    if asked not in known:
+        pair = []
+        for own, other in ((a, b), (b, a)):
+            arrays = {name: getattr(other if name in names else own, name) for name in own.__dataclass_fields__}
+            pair.append(known.setdefault(tuple(map(id, arrays.values())), Particles(**arrays)))
+        known[asked] = (*pair, a, b)  # the last two so that their addresses stay theirs
+    return known[asked][0], known[asked][1]
 
 
 #: What a particle is, by its number in files and on the device.

@@ -7,6 +7,7 @@ and contact is part of every correction.
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 
@@ -58,7 +59,7 @@ class World:
     has_friction: bool
     levels: list[CoarseGrid]  # of the tank, the finest first; none without a tank
     frozen: int = 0  # particles that are ice
-    known: dict[tuple[int, ...], Particles] = dataclasses.field(default_factory=dict)  # see `exchanged`
+    known: dict[tuple[Any, ...], Any] = dataclasses.field(default_factory=dict)  # see `exchanged`
     pool: Pool | None = None  # of spray, foam and bubbles; made when the first are
 
     @property
