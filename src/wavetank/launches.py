@@ -3,7 +3,8 @@
 The compiler looks at every array and number of the dataclasses that a kernel is given, 0.05 to 0.1 ms for a launch, and
 can keep what it made of them only where all arguments are objects; it keeps that under their addresses, and does not
 notice when an object of numbers is gone and another one has taken its address. Here plain numbers count by their value,
-so that every launch of a step can be known, and what is kept goes with the first of its objects (`tests/test_compiler.py`).
+so that every launch of a step can be known, and what is kept goes with the first of its objects to go
+(`tests/test_compiler.py`).
 """
 
 import weakref
