@@ -65,6 +65,7 @@ class Grid:
     list: qd.types.ndarray()  # i32 [groups * room]: who is a neighbour of any of a group's eight particles
     room: qd.i32  # places for each group, a multiple of 16
     lanes: qd.i32  # particles that are computed together: a group's, or one
+    parts: qd.i32  # in which threads share a pass over pairs
     nowhere: qd.i32  # index of a particle that is far from all others
     nx: qd.i32  # cells before the pattern moves on along y
     ny: qd.i32

@@ -8,6 +8,12 @@ import sys
 
 import pytest
 
+from wavetank import compiler
+from wavetank.compiler import qd
+from wavetank.physics.neighbors import new_grid
+from wavetank.physics.pairs import teams_of, turns
+from wavetank.state import Grid, integers
+
 PROGRAM = """
 import sys
 import wavetank as wt
@@ -24,6 +30,25 @@ PASSES = {
     "apply_viscosity": 1,
     "confine_vorticity": 1,
 }
+
+
+@qd.kernel
+def count_visits(visits: qd.types.ndarray(), grid: Grid, count: qd.i32, lanes: qd.template()):
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            qd.atomic_add(visits[team], 1)
+
+
+@pytest.mark.parametrize("lanes", [8, 1])
+@pytest.mark.parametrize("count", [0, 1, 9, 128, 1000, 4097, 70001])
+def test_every_team_has_its_turn_once(count, lanes):
+    compiler.start("cpu")
+    grid = new_grid(2, count, (1.0, 1.0), 0.5, 32)
+    visits = integers(count + 1)
+    count_visits(visits, grid, count, lanes)
+    teams = -(-count // lanes)
+    assert compiler.download(visits).tolist() == [1] * teams + [0] * (count + 1 - teams)
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the names of instructions are those of x86")

@@ -27,7 +27,7 @@ from wavetank.errors import WavetankError
 from wavetank.lab.bench import check, measured, sized, timed
 from wavetank.lab.counts import water_bytes
 from wavetank.lab.machine import load, machine
-from wavetank.physics.pairs import add_neighbors, column, count_neighbors, teams
+from wavetank.physics.pairs import add_neighbors, column, count_neighbors, teams_of, turns
 from wavetank.physics.step import coefficients
 from wavetank.scene import Scene
 from wavetank.simulation import Simulation
@@ -99,11 +99,13 @@ def walk(
     total: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()
 ):
     """Go once over all neighbour lists."""
-    for team in range(teams(count, lanes)):
-        ways = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
-        add_neighbors(ways, add_way, team, particles, particles.v, grid, c, 0)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            total[i] = column(ways, i - team * lanes).norm_sqr()
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            ways = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+            add_neighbors(ways, add_way, team, particles, particles.v, grid, c, 0)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                total[i] = column(ways, i - team * lanes).norm_sqr()
 
 
 def roofline(

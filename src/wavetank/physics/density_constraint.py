@@ -33,7 +33,7 @@ multiplier: Moreau and Jean's projected iteration, as in Tonge et al. 2012 (10.1
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, vec4
 from wavetank.physics.boundary import flattened, kept_in_tank, stopped, wall_density
-from wavetank.physics.pairs import add_neighbors, column, teams
+from wavetank.physics.pairs import add_neighbors, column, teams_of, turns
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.smoothing import inverse_length, kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch, Walls
@@ -124,22 +124,24 @@ def start_multipliers(
     count: qd.i32, method: qd.template(), mixed: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Find the denominators of all iterations of a substep, and the multipliers of the first (Eq. 1 to 5)."""
-    for team in range(teams(count, lanes)):
-        dim = qd.static(particles.x[team].n)
-        sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
-        add_neighbors(sums, qd.static(DENSITIES[mixed]), team, particles, scratch.weight, grid, c, method)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            sum = column(sums, i - team * lanes)
-            wall = wall_of(i, particles, scratch, solids, walls, c)
-            constraint = c.density_scale * sum[0] + wall.w - 1.0  # Eq. 2
-            own = c.eps
-            for k in qd.static(range(dim)):
-                own += (sum[1 + k] + wall[k]) ** 2
-            if qd.static(mixed):
-                own *= scratch.weight[i]
-            squares = sum[dim + 1] + own
-            scratch.squares[i] = squares
-            set_multiplier(i, 0.0, -c.relaxation * constraint / squares, scratch, c)  # Eq. 5
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            dim = qd.static(particles.x[team].n)
+            sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
+            add_neighbors(sums, qd.static(DENSITIES[mixed]), team, particles, scratch.weight, grid, c, method)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                sum = column(sums, i - team * lanes)
+                wall = wall_of(i, particles, scratch, solids, walls, c)
+                constraint = c.density_scale * sum[0] + wall.w - 1.0  # Eq. 2
+                own = c.eps
+                for k in qd.static(range(dim)):
+                    own += (sum[1 + k] + wall[k]) ** 2
+                if qd.static(mixed):
+                    own *= scratch.weight[i]
+                squares = sum[dim + 1] + own
+                scratch.squares[i] = squares
+                set_multiplier(i, 0.0, -c.relaxation * constraint / squares, scratch, c)  # Eq. 5
 
 
 @qd.kernel(fastcache=True)
@@ -148,14 +150,16 @@ def solve_multipliers(
     count: qd.i32, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Estimate densities (Eq. 1) and move the multipliers on towards the solution (Eq. 5)."""
-    for team in range(teams(count, lanes)):
-        sums = qd.Matrix.zero(qd.f32, 1, lanes)
-        add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            wall = wall_of(i, particles, scratch, solids, walls, c)
-            constraint = c.density_scale * sums[0, i - team * lanes] + wall.w - 1.0  # Eq. 2
-            change = -c.relaxation * constraint / scratch.squares[i] + c.momentum * scratch.dlam[i]  # Eq. 5
-            set_multiplier(i, scratch.lam[i], change, scratch, c)
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, 1, lanes)
+            add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                wall = wall_of(i, particles, scratch, solids, walls, c)
+                constraint = c.density_scale * sums[0, i - team * lanes] + wall.w - 1.0  # Eq. 2
+                change = -c.relaxation * constraint / scratch.squares[i] + c.momentum * scratch.dlam[i]  # Eq. 5
+                set_multiplier(i, scratch.lam[i], change, scratch, c)
 
 
 @qd.kernel(fastcache=True)
@@ -168,26 +172,28 @@ def correct_positions(
 
     Where solids are `searched` they stay out of those as well.
     """
-    for team in range(teams(count, lanes)):
-        sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
-        add_neighbors(sums, qd.static(CORRECTIONS[correction]), team, particles, scratch.dlam, grid, c, method)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            p = predicted(particles, i)
-            dp = column(sums, i - team * lanes)
-            near = particles.near[i]
-            if near != 0:
-                for k in qd.static(range(p.n)):
-                    dp[k] += scratch.dlam[i] * scratch.wall[i][k]
-            if qd.static(mixed):
-                dp *= scratch.weight[i]
-            # Within one substep a particle must not run past the solids that were marked for it.
-            p += dp * qd.min(1.0, c.largest_correction / qd.max(dp.norm(), 1e-12))
-            if near != 0:
-                p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
-                if qd.static(searched):
-                    if near >> solids.tank_count != 0:
-                        p = flattened(stopped(lift(particles.x[i]), lift(p), near, solids, c.wall_gap), p)
-            predict_at(corrected, i, p)
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+            add_neighbors(sums, qd.static(CORRECTIONS[correction]), team, particles, scratch.dlam, grid, c, method)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                p = predicted(particles, i)
+                dp = column(sums, i - team * lanes)
+                near = particles.near[i]
+                if near != 0:
+                    for k in qd.static(range(p.n)):
+                        dp[k] += scratch.dlam[i] * scratch.wall[i][k]
+                if qd.static(mixed):
+                    dp *= scratch.weight[i]
+                # Within one substep a particle must not run past the solids that were marked for it.
+                p += dp * qd.min(1.0, c.largest_correction / qd.max(dp.norm(), 1e-12))
+                if near != 0:
+                    p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
+                    if qd.static(searched):
+                        if near >> solids.tank_count != 0:
+                            p = flattened(stopped(lift(particles.x[i]), lift(p), near, solids, c.wall_gap), p)
+                predict_at(corrected, i, p)
 
 
 @qd.kernel(fastcache=True)
@@ -196,14 +202,16 @@ def measure_density(
     count: qd.i32, largest_density: qd.f32, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Estimate the densities [kg/m^3] at the positions p (Eq. 1), walls included."""
-    for team in range(teams(count, lanes)):
-        sums = qd.Matrix.zero(qd.f32, 1, lanes)
-        add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            rho = c.density_scale * sums[0, i - team * lanes]
-            if particles.near[i] != 0:
-                rho += wall_density(predicted(particles, i), particles.near[i], solids, walls, c).w
-            scratch.rho[i] = largest_density * rho / scratch.weight[i]
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, 1, lanes)
+            add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                rho = c.density_scale * sums[0, i - team * lanes]
+                if particles.near[i] != 0:
+                    rho += wall_density(predicted(particles, i), particles.near[i], solids, walls, c).w
+                scratch.rho[i] = largest_density * rho / scratch.weight[i]
 
 
 def schedule(iterations: int, slowest: float, stiffest: float) -> list[tuple[float, float]]:

@@ -39,7 +39,7 @@ from wavetank.physics.density_constraint import schedule
 from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend
-from wavetank.physics.pairs import add_neighbors, column, teams
+from wavetank.physics.pairs import add_neighbors, column, teams_of, turns
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars
@@ -150,20 +150,22 @@ def stiffest_particle(
     The matrix of one damper is at most twice its diagonal blocks, hence so is their sum.
     """
     most = 0
-    for team in range(teams(count, lanes)):
-        dim = qd.static(particles.x[team].n)
-        sums = qd.Matrix.zero(qd.f32, dim * dim, lanes)
-        add_neighbors(sums, add_stiffness, team, particles, packed, grid, c, 0)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            sum = column(sums, i - team * lanes)
-            largest = 0.0
-            for k in qd.static(range(dim)):
-                row = 0.0
-                for m in qd.static(range(dim)):
-                    row += qd.abs(sum[k * dim + m])
-                largest = qd.max(largest, row)
-            own = rate * scratch.weight[i] * (2.0 * largest + drag[i].w)
-            qd.atomic_max(most, qd.bit_cast(own, qd.i32))
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            dim = qd.static(particles.x[team].n)
+            sums = qd.Matrix.zero(qd.f32, dim * dim, lanes)
+            add_neighbors(sums, add_stiffness, team, particles, packed, grid, c, 0)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                sum = column(sums, i - team * lanes)
+                largest = 0.0
+                for k in qd.static(range(dim)):
+                    row = 0.0
+                    for m in qd.static(range(dim)):
+                        row += qd.abs(sum[k * dim + m])
+                    largest = qd.max(largest, row)
+                own = rate * scratch.weight[i] * (2.0 * largest + drag[i].w)
+                qd.atomic_max(most, qd.bit_cast(own, qd.i32))
     return most
 
 
@@ -174,23 +176,25 @@ def relax_velocities(
     relaxation: qd.f32, momentum: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """One Chebyshev iteration; `following` holds the iterate before `packed` and receives the next."""
-    for team in range(teams(count, lanes)):
-        sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
-        add_neighbors(sums, add_damping, team, particles, packed, grid, c, 0)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            v = particles.v[i]
-            row = packed[i]
-            before = following[i]
-            force = column(sums, i - team * lanes)
-            wall = vec3(drag[i].x, drag[i].y, drag[i].z) - vec3(row.x, row.y, row.z) * drag[i].w
-            n = vec3(normal[i].x, normal[i].y, normal[i].z)
-            wall -= n * n.dot(wall)
-            share = rate * scratch.weight[i]
-            result = row
-            for k in qd.static(range(v.n)):
-                residual = v[k] - row[k] + share * (force[k] + wall[k])
-                result[k] = row[k] + relaxation * residual + momentum * (row[k] - before[k])
-            following[i] = result
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
+            add_neighbors(sums, add_damping, team, particles, packed, grid, c, 0)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                v = particles.v[i]
+                row = packed[i]
+                before = following[i]
+                force = column(sums, i - team * lanes)
+                wall = vec3(drag[i].x, drag[i].y, drag[i].z) - vec3(row.x, row.y, row.z) * drag[i].w
+                n = vec3(normal[i].x, normal[i].y, normal[i].z)
+                wall -= n * n.dot(wall)
+                share = rate * scratch.weight[i]
+                result = row
+                for k in qd.static(range(v.n)):
+                    residual = v[k] - row[k] + share * (force[k] + wall[k])
+                    result[k] = row[k] + relaxation * residual + momentum * (row[k] - before[k])
+                following[i] = result
 
 
 @qd.kernel(fastcache=True)

@@ -24,12 +24,13 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import current_backend, qd
+from wavetank.compiler import current_backend, qd, threads
 from wavetank.errors import WavetankError
 from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles, integers
 
 SCAN_BLOCK = 1024
+PARTS = 8  # of a pass for each thread: enough to even out what takes longer
 LARGE = 50_000  # cells and particles, from where threads gain more than they cost
 MAX_ENTRIES = 2**31 - 1  # of a device array: the compiler counts them, and computes places in them, with 32 bits
 
@@ -265,6 +266,7 @@ def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, 
         cell=integers(capacity), start=integers(total + 1), fill=integers(total),
         blocks=integers(-(-total // SCAN_BLOCK)), order=integers(capacity), number=integers(_groups(capacity)),
         list=entries, room=room, lanes=8 if current_backend() == "cpu" else 1,
+        parts=PARTS * max(threads(), 1),
         nowhere=capacity,
         nx=int(cells[0]), ny=int(cells[1]), nz=int(cells[2]), cells=total,
     )  # fmt: skip

@@ -5,11 +5,13 @@ A pass over pairs runs over teams: `lanes` particles that follow each other in s
 loop over lanes becomes vector instructions: nobody is collected one by one. A team's list holds three times what one
 particle needs, and is walked in half the time (docs/performance.md). A pass looks like this:
 
-    for team in range(teams(count, lanes)):
-        sums = qd.Matrix.zero(qd.f32, 1, lanes)
-        add_neighbors(sums, visit, team, particles, data, grid, c, method)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            ... sums[0, i - team * lanes] ...
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, 1, lanes)
+            add_neighbors(sums, visit, team, particles, data, grid, c, method)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                ... sums[0, i - team * lanes] ...
 
 Cluster pair lists for vector units: Páll and Hess 2013, "A flexible algorithm for calculating pair interactions on SIMD
 architectures" (10.1016/j.cpc.2013.06.003).
@@ -25,11 +27,29 @@ from wavetank.state import Coefficients, Grid, Particles, integers
 
 
 @qd.func
-def teams(count, lanes: qd.template()):
-    """Number of teams of `lanes` particles."""
+def turns(count, grid: Grid, lanes: qd.template()):
+    """Turns of the loop of a pass over `count` particles; `teams_of` says which teams are a turn's.
+
+    The compiler gives a thread 512 turns at least, which are too many particles to share them out evenly. The first of
+    every 512 turns therefore takes a part of the teams, and the others nothing.
+    """
     if qd.static(lanes == 1):
         return count
-    return (count + lanes - 1) // lanes
+    return 512 * grid.parts
+
+
+@qd.func
+def teams_of(turn, count, grid: Grid, lanes: qd.template()):
+    """The first team of a turn, and the one behind its last."""
+    own = qd.Vector([turn, turn + 1])
+    if qd.static(lanes > 1):
+        own = qd.Vector([0, 0])
+        if turn & 511 == 0:
+            teams = (count + lanes - 1) // lanes
+            size = (teams + grid.parts - 1) // grid.parts
+            own[0] = (turn >> 9) * size
+            own[1] = qd.min(own[0] + size, teams)
+    return own
 
 
 @qd.func
@@ -109,11 +129,13 @@ def write_numbers(
     number: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()
 ):
     """Write how many neighbours every particle has."""
-    for team in range(teams(count, lanes)):
-        sums = qd.Matrix.zero(qd.f32, 1, lanes)
-        add_neighbors(sums, add_one, team, particles, particles.x, grid, c, 0)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            number[i] = qd.cast(sums[0, i - team * lanes], qd.i32) - 1  # without itself
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, 1, lanes)
+            add_neighbors(sums, add_one, team, particles, particles.x, grid, c, 0)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                number[i] = qd.cast(sums[0, i - team * lanes], qd.i32) - 1  # without itself
 
 
 def count_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> np.ndarray:

@@ -39,7 +39,7 @@ from wavetank.distance import SolidSet, lift, signed_distance, vec3, vec4
 from wavetank.physics.boundary import is_near
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend
-from wavetank.physics.pairs import add_neighbors, column, teams
+from wavetank.physics.pairs import add_neighbors, column, teams_of, turns
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.state import MARGIN, Coefficients, Fluids, Grid, Particles, Scratch, remembered, scalars
@@ -165,14 +165,16 @@ def find_surface(
     count: qd.i32, scale: qd.f32, quiet: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """Find where the surface is and which way it faces: g, without what is noise."""
-    for team in range(teams(count, lanes)):
-        sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
-        add_neighbors(sums, add_gradient, team, particles, tension, grid, c, 0)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            g = column(sums, i - team * lanes)
-            size = scale * g.norm()
-            g3 = lift(g) * (scale * qd.max(size - quiet, 0.0) / qd.max(size, 1e-12))
-            surface[i] = vec4(g3.x, g3.y, g3.z, tension[i])
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+            add_neighbors(sums, add_gradient, team, particles, tension, grid, c, 0)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                g = column(sums, i - team * lanes)
+                size = scale * g.norm()
+                g3 = lift(g) * (scale * qd.max(size - quiet, 0.0) / qd.max(size, 1e-12))
+                surface[i] = vec4(g3.x, g3.y, g3.z, tension[i])
 
 
 @qd.kernel(fastcache=True)
@@ -182,27 +184,29 @@ def attract(
     rate: qd.f32, adhesion: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """Find the velocities after the pull of neighbours and solids; `rate` is dt over the largest mass of a particle."""
-    for team in range(teams(count, lanes)):
-        sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
-        add_neighbors(sums, add_pull, team, particles, surface, grid, c, 0)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            p = predicted(particles, i)
-            force = column(sums, i - team * lanes)
-            if particles.near[i] != 0:
-                last = table.shape[0] - 1
-                wetting = adhesion * surface[i].w * rows[particles.material[i]][3]
-                for k in range(solids.count):
-                    if is_near(particles.near[i], k) == 1:
-                        value = signed_distance(solids, k, lift(p))
-                        if value.w < c.h:
-                            t = qd.min(qd.max(value.w / c.h, 0.0), 1.0) * last
-                            m = qd.min(qd.cast(t, qd.i32), last - 1)
-                            n = vec3(value.x, value.y, value.z)
-                            share = wetting * (table[m] + (table[m + 1] - table[m]) * (t - m))
-                            for axis in qd.static(range(p.n)):
-                                force[axis] -= share * n[axis]
-            v = lift(particles.v[i] + force * (rate * scratch.weight[i]))
-            pulled[i] = vec4(v.x, v.y, v.z, 0.0)
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+            add_neighbors(sums, add_pull, team, particles, surface, grid, c, 0)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                p = predicted(particles, i)
+                force = column(sums, i - team * lanes)
+                if particles.near[i] != 0:
+                    last = table.shape[0] - 1
+                    wetting = adhesion * surface[i].w * rows[particles.material[i]][3]
+                    for k in range(solids.count):
+                        if is_near(particles.near[i], k) == 1:
+                            value = signed_distance(solids, k, lift(p))
+                            if value.w < c.h:
+                                t = qd.min(qd.max(value.w / c.h, 0.0), 1.0) * last
+                                m = qd.min(qd.cast(t, qd.i32), last - 1)
+                                n = vec3(value.x, value.y, value.z)
+                                share = wetting * (table[m] + (table[m + 1] - table[m]) * (t - m))
+                                for axis in qd.static(range(p.n)):
+                                    force[axis] -= share * n[axis]
+                v = lift(particles.v[i] + force * (rate * scratch.weight[i]))
+                pulled[i] = vec4(v.x, v.y, v.z, 0.0)
 
 
 @qd.kernel(fastcache=True)

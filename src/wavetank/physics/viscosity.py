@@ -12,7 +12,7 @@ ratio of the masses: m_i dv_i is antisymmetric, no share exceeds c.
 
 from wavetank.compiler import qd
 from wavetank.distance import vec3
-from wavetank.physics.pairs import add_neighbors, column, teams
+from wavetank.physics.pairs import add_neighbors, column, teams_of, turns
 from wavetank.physics.smoothing import inverse_length, kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch
 
@@ -62,21 +62,23 @@ def apply_viscosity(
     method: qd.template(), turning: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Smooth the velocities (Eq. 11); where `turning`, estimate the vorticity (Eq. 9)."""
-    for team in range(teams(count, lanes)):
-        dim = qd.static(particles.v[team].n)
-        sums = qd.Matrix.zero(qd.f32, dim + turning * (2 * dim - 3), lanes)
-        add_neighbors(sums, qd.static(SUMS[turning]), team, particles, particles.v, grid, c, method)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            sum = column(sums, i - team * lanes)
-            v = particles.v[i]
-            for k in qd.static(range(dim)):
-                v[k] += c.viscosity * c.density_scale * sum[k]
-            smoothed.v[i] = v
-            if qd.static(turning):
-                if qd.static(dim == 3):
-                    scratch.omega[i] = vec3(sum[3], sum[4], sum[5])
-                else:
-                    scratch.omega[i] = vec3(0.0, 0.0, sum[2])
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            dim = qd.static(particles.v[team].n)
+            sums = qd.Matrix.zero(qd.f32, dim + turning * (2 * dim - 3), lanes)
+            add_neighbors(sums, qd.static(SUMS[turning]), team, particles, particles.v, grid, c, method)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                sum = column(sums, i - team * lanes)
+                v = particles.v[i]
+                for k in qd.static(range(dim)):
+                    v[k] += c.viscosity * c.density_scale * sum[k]
+                smoothed.v[i] = v
+                if qd.static(turning):
+                    if qd.static(dim == 3):
+                        scratch.omega[i] = vec3(sum[3], sum[4], sum[5])
+                    else:
+                        scratch.omega[i] = vec3(0.0, 0.0, sum[2])
 
 
 @qd.kernel(fastcache=True)
@@ -85,9 +87,11 @@ def apply_mixed_viscosity(
     method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Smooth the velocities (Eq. 11) of fluids of different density; `packed` as `mixture.pack_weights` leaves it."""
-    for team in range(teams(count, lanes)):
-        sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
-        add_neighbors(sums, add_mixed_xsph, team, particles, packed, grid, c, method)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            dv = column(sums, i - team * lanes)
-            smoothed.v[i] = particles.v[i] + c.viscosity * c.density_scale * dv
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
+            add_neighbors(sums, add_mixed_xsph, team, particles, packed, grid, c, method)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                dv = column(sums, i - team * lanes)
+                smoothed.v[i] = particles.v[i] + c.viscosity * c.density_scale * dv

@@ -16,7 +16,7 @@ Eq. 9, is summed in the sweep of XSPH (`viscosity.py`).
 
 from wavetank.compiler import qd
 from wavetank.distance import lift, vec3
-from wavetank.physics.pairs import add_neighbors, column, teams
+from wavetank.physics.pairs import add_neighbors, column, teams_of, turns
 from wavetank.physics.smoothing import inverse_length, kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch
 
@@ -40,34 +40,36 @@ def confine_vorticity(
     lanes: qd.template(),
 ):  # fmt: skip
     """Push around every vortex: dv = dt eps_w s (N x omega), N = eta / |eta| (Eq. 10)."""
-    for team in range(teams(count, lanes)):
-        first = team * lanes
-        last = qd.min(first + lanes, count)
-        fastest = 0.0
-        for i in range(first, last):
-            fastest = qd.max(fastest, scratch.omega[i].norm())
-        # Calm water, most of a tank, is not asked for its neighbours.
-        if c.coherence <= 0.0 or fastest > c.calm:
-            sums = qd.Matrix.zero(qd.f32, 7, lanes)
-            add_neighbors(sums, add_eta, team, particles, scratch.omega, grid, c, method)
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            first = team * lanes
+            last = qd.min(first + lanes, count)
+            fastest = 0.0
             for i in range(first, last):
-                sum = column(sums, i - first)
-                omega = scratch.omega[i]
-                for k in qd.static(range(3)):  # without itself
-                    sum[3 + k] -= kernel(method, 0.0)[0] * omega[k]
-                sum[6] -= kernel(method, 0.0)[0] * omega.norm()
-                eta = vec3(sum[0], sum[1], sum[2])
-                n = eta / qd.max(eta.norm(), 1e-6)
-                mean = vec3(sum[3], sum[4], sum[5])
-                agreement = mean.norm() / qd.max(sum[6], 1e-12)
-                if mean.dot(omega) < 0.0:
-                    agreement = 0.0
-                share = 1.0
-                if c.coherence > 0.0:
-                    share = qd.min(qd.max((agreement - c.coherence) / qd.max(1.0 - c.coherence, 1e-3), 0.0), 1.0)
-                    share *= qd.min(qd.max(omega.norm() / qd.max(c.calm, 1e-9) - 1.0, 0.0), 1.0)
-                force = share * n.cross(omega)
-                v = particles.v[i]
-                for k in qd.static(range(v.n)):
-                    v[k] += c.dt * c.vorticity * force[k]
-                particles.v[i] = v
+                fastest = qd.max(fastest, scratch.omega[i].norm())
+            # Calm water, most of a tank, is not asked for its neighbours.
+            if c.coherence <= 0.0 or fastest > c.calm:
+                sums = qd.Matrix.zero(qd.f32, 7, lanes)
+                add_neighbors(sums, add_eta, team, particles, scratch.omega, grid, c, method)
+                for i in range(first, last):
+                    sum = column(sums, i - first)
+                    omega = scratch.omega[i]
+                    for k in qd.static(range(3)):  # without itself
+                        sum[3 + k] -= kernel(method, 0.0)[0] * omega[k]
+                    sum[6] -= kernel(method, 0.0)[0] * omega.norm()
+                    eta = vec3(sum[0], sum[1], sum[2])
+                    n = eta / qd.max(eta.norm(), 1e-6)
+                    mean = vec3(sum[3], sum[4], sum[5])
+                    agreement = mean.norm() / qd.max(sum[6], 1e-12)
+                    if mean.dot(omega) < 0.0:
+                        agreement = 0.0
+                    share = 1.0
+                    if c.coherence > 0.0:
+                        share = qd.min(qd.max((agreement - c.coherence) / qd.max(1.0 - c.coherence, 1e-3), 0.0), 1.0)
+                        share *= qd.min(qd.max(omega.norm() / qd.max(c.calm, 1e-9) - 1.0, 0.0), 1.0)
+                    force = share * n.cross(omega)
+                    v = particles.v[i]
+                    for k in qd.static(range(v.n)):
+                        v[k] += c.dt * c.vorticity * force[k]
+                    particles.v[i] = v

@@ -26,7 +26,7 @@ from wavetank.distance import SolidSet
 from wavetank.physics.boundary import wall_density
 from wavetank.physics.density_constraint import add_density
 from wavetank.physics.diffuse.noise import stream, uniform
-from wavetank.physics.pairs import add_neighbors, column, teams
+from wavetank.physics.pairs import add_neighbors, column, teams_of, turns
 from wavetank.physics.places import predicted
 from wavetank.state import Air, Births, Coefficients, Grid, Particles, Walls
 
@@ -74,22 +74,24 @@ def find_surface(
     count: qd.i32, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Set the normals of the surface, except where the water is too slow to matter for a crest."""
-    for team in range(teams(count, lanes)):
-        first = team * lanes
-        last = qd.min(first + lanes, count)
-        dim = qd.static(particles.x[team].n)
-        slow = 0.01 * a.speed * a.speed
-        fastest = 0.0
-        for i in range(first, last):
-            fastest = qd.max(fastest, particles.v[i].norm_sqr())
-        sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
-        if fastest > slow:
-            add_neighbors(sums, add_density, team, particles, particles.v, grid, c, method)
-        for i in range(first, last):
-            n = particles.x[i] * 0.0
-            if particles.v[i].norm_sqr() > slow:
-                n = outward_normal(i, column(sums, i - first), particles, solids, walls, c)
-            births.normal[i] = n
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            first = team * lanes
+            last = qd.min(first + lanes, count)
+            dim = qd.static(particles.x[team].n)
+            slow = 0.01 * a.speed * a.speed
+            fastest = 0.0
+            for i in range(first, last):
+                fastest = qd.max(fastest, particles.v[i].norm_sqr())
+            sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
+            if fastest > slow:
+                add_neighbors(sums, add_density, team, particles, particles.v, grid, c, method)
+            for i in range(first, last):
+                n = particles.x[i] * 0.0
+                if particles.v[i].norm_sqr() > slow:
+                    n = outward_normal(i, column(sums, i - first), particles, solids, walls, c)
+                births.normal[i] = n
 
 
 @qd.func
@@ -142,9 +144,11 @@ def count_births(
     lanes: qd.template(),
 ):  # fmt: skip
     """Draw how many each water particle bears in this frame."""
-    for team in range(teams(count, lanes)):
-        potentials = qd.Matrix.zero(qd.f32, 1, lanes)
-        add_potentials(potentials, team, births, particles, grid, c, a, count, method)
-        for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-            expected = a.made * potentials[0, i - team * lanes]
-            births.first[i] = qd.cast(expected + uniform(stream(a.seed, a.frame, particles.id[i]), 0), qd.i32)
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            potentials = qd.Matrix.zero(qd.f32, 1, lanes)
+            add_potentials(potentials, team, births, particles, grid, c, a, count, method)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                expected = a.made * potentials[0, i - team * lanes]
+                births.first[i] = qd.cast(expected + uniform(stream(a.seed, a.frame, particles.id[i]), 0), qd.i32)
