@@ -191,6 +191,21 @@ def near_bodies(x, p, solids: SolidSet, h):
 
 
 @qd.func
+def bodies_in_reach(x, p, solids: SolidSet, gap):
+    """Bits of the solids, other than the tank's walls, that the way from `x` to `p` may touch: as `near_bodies`.
+
+    Here their distances are not asked for: it is for ways that are followed once.
+    """
+    near = 0
+    way = gap + (p - x).norm()
+    for k in range(solids.tank_count, solids.count):
+        away = (p - solids.position[k]).norm()
+        if away < solids.reach[k] + way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(solids.reach[k], away):
+            near |= 1 << qd.min(k, 30)
+    return near
+
+
+@qd.func
 def flattened(point, x: qd.template()):
     """The point in space `point` as one of the world of `x`, 2-D or 3-D."""
     result = x
