@@ -76,8 +76,7 @@ class Grid:
 class CoarseGrid:
     """A level of the grid of `physics/coarse_pressure.py`; nodes are the centres of its cells, x fastest."""
 
-    fill_sum: qd.types.ndarray()  # i32 [nodes]: sum of the tents of all particles, in units
-    error_sum: qd.types.ndarray()  # i32 [nodes]: sum of the tents times density errors, in units
+    sums: qd.types.ndarray()  # i32 [parts * nodes]: of the tents of particles, then of these times density errors
     mass_sum: qd.types.ndarray()  # i32 [nodes]: sum of the tents times densities, in units, where these differ
     room: qd.types.ndarray()  # f32 [nodes]: share of the cell that no solid takes, 0 where next to nothing is left
     fill: qd.types.ndarray()  # f32 [nodes]: water over room
@@ -98,6 +97,7 @@ class CoarseGrid:
     dx: qd.f32  # m: edges of a cell
     dy: qd.f32
     dz: qd.f32  # 1 in 2-D
+    parts: qd.i32  # of the particles that have sums of their own
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -29,74 +29,125 @@ INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a 
 REACH = 0.2  # of the support: the longest correction
 
 
-@qd.kernel(fastcache=True)
-def gather_fill(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, unit: qd.f32, volume: qd.f32,
-    least_open: qd.f32, count: qd.i32, searched: qd.template(), mixed: qd.template(),
-):  # fmt: skip
-    """Sum the tents of all particles at the nodes, and relate them to the room there.
+@qd.func
+def add_whole(sums: qd.template(), at, amount, alone: qd.template()):
+    """Add a whole number; `alone` where no other thread adds to these sums."""
+    if qd.static(alone):
+        sums[at] = sums[at] + amount
+    else:
+        qd.atomic_add(sums[at], amount)
 
-    The sums are 0 before. `volume` is that of a particle over that of a cell and over the `unit`. Solids take their
-    share of a cell where they are `searched`; else there are only the walls of the tank, which end where the cells do.
-    Where fluids are `mixed`, their densities are averaged.
+
+@qd.func
+def add_fill(
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, i, part, unit, mixed: qd.template(), alone: qd.template()
+):
+    """Add the tents of particle `i` to the sums of a `part`, and those over its weight where fluids are `mixed`."""
+    p = predicted(particles, i)
+    s = in_cells(grid, p)
+    at = corners(grid, qd.floor(s, qd.i32), p.n)
+    weights = tents(s - qd.floor(s), p.n)
+    for k in qd.static(range(2**p.n)):
+        w = unit * weights[k]
+        add_whole(grid.sums, part * grid.nx * grid.ny * grid.nz + at[k], qd.cast(qd.round(w), qd.i32), alone)
+        if qd.static(mixed):
+            qd.atomic_add(grid.mass_sum[at[k]], qd.cast(qd.round(w / scratch.weight[i]), qd.i32))
+
+
+@qd.func
+def add_error(
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, i, part, unit, inner_from, inner_to, alone: qd.template()
+):
+    """Add the tents of particle `i`, if it is inside of the water, times its error (Eq. 2) to the sums of a `part`."""
+    p = predicted(particles, i)
+    s = in_cells(grid, p)
+    at = corners(grid, qd.floor(s, qd.i32), p.n)
+    weights = tents(s - qd.floor(s), p.n)
+    filled = 0.0
+    for k in qd.static(range(2**p.n)):
+        filled += weights[k] * grid.fill[at[k]]
+    inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
+    error = unit * inside * qd.min(qd.max(scratch.rho[i] * scratch.weight[i] - 1.0, -1.0), 1.0)
+    for k in qd.static(range(2**p.n)):
+        amount = qd.cast(qd.round(error * weights[k]), qd.i32)
+        add_whole(grid.sums, part * grid.nx * grid.ny * grid.nz + at[k], amount, alone)
+
+
+@qd.func
+def taken(sums: qd.template(), n, nodes, parts):
+    """Sum of all `parts` at node `n`, which are 0 afterwards."""
+    total = 0
+    for part in range(parts):
+        total += sums[part * nodes + n]
+        sums[part * nodes + n] = 0
+    return total
+
+
+@qd.func
+def open_share(grid: CoarseGrid, solids: SolidSet, n):
+    """Share of the cell of node `n` that no solid takes."""
+    c = coordinates(grid, n)
+    center = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
+    edge = qd.min(grid.dx, grid.dy)
+    if grid.nz > 1:
+        edge = qd.min(edge, grid.dz)
+    else:
+        center.z = 0.0
+    room = 1.0
+    for k in range(solids.count):
+        if k < solids.tank_count or (center - solids.position[k]).norm() < solids.reach[k] + 0.5 * edge:
+            if room > 0.0:
+                room = qd.min(room, 0.5 + signed_distance(solids, k, center).w / edge)
+    return qd.max(room, 0.0)
+
+
+@qd.kernel(fastcache=True)
+def gather(
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, unit: qd.f32, volume: qd.f32,
+    scale: qd.f32, inner_from: qd.f32, inner_to: qd.f32, least_open: qd.f32, least_theta: qd.f32, count: qd.i32,
+    searched: qd.template(), mixed: qd.template(), parts: qd.template(),
+):  # fmt: skip
+    """Sum the tents of all particles at the nodes, then their density errors (Eq. 2), and set up the equation.
+
+    The sums are 0 before. `volume` is that of a particle over that of a cell and over the `unit`, `scale` the same over
+    the stiffness M. Solids take their share of a cell where they are `searched`; else there are only the walls of the
+    tank, which end where the cells do. Where fluids are `mixed`, their densities are averaged.
+
+    Each of several `parts` of the particles has sums of its own, so that threads need not wait for each other.
     """
-    for i in range(count):
-        p = predicted(particles, i)
-        s = in_cells(grid, p)
-        at = corners(grid, qd.floor(s, qd.i32), p.n)
-        weights = tents(s - qd.floor(s), p.n)
-        for k in qd.static(range(2**p.n)):
-            w = unit * weights[k]
-            qd.atomic_add(grid.fill_sum[at[k]], qd.cast(qd.round(w), qd.i32))
-            if qd.static(mixed):
-                qd.atomic_add(grid.mass_sum[at[k]], qd.cast(qd.round(w / scratch.weight[i]), qd.i32))
+    if qd.static(parts == 1):
+        for i in range(count):
+            add_fill(grid, particles, scratch, i, 0, unit, mixed, 0)
+    else:
+        # Threads take 512 turns of a loop or more at once: the first of them does the work.
+        for turn in range(512 * parts):
+            part = turn // 512
+            if turn % 512 == 0:
+                for i in range(count * part // parts, count * (part + 1) // parts):
+                    add_fill(grid, particles, scratch, i, part, unit, mixed, 1)
     for n in range(grid.nx * grid.ny * grid.nz):
         room = 1.0
         if qd.static(searched):
-            c = coordinates(grid, n)
-            center = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
-            edge = qd.min(grid.dx, grid.dy)
-            if grid.nz > 1:
-                edge = qd.min(edge, grid.dz)
-            else:
-                center.z = 0.0
-            for k in range(solids.count):
-                if room > 0.0:
-                    room = qd.min(room, 0.5 + signed_distance(solids, k, center).w / edge)
-        room = qd.max(room, 0.0)
+            room = open_share(grid, solids, n)
+        total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, parts)
         grid.room[n] = room if room >= least_open else 0.0
-        grid.fill[n] = volume * grid.fill_sum[n] / qd.max(room, least_open)
+        grid.fill[n] = volume * total / qd.max(room, least_open)
         grid.density[n] = 1.0
         if qd.static(mixed):
-            grid.density[n] = qd.max(grid.mass_sum[n], 1) / qd.cast(qd.max(grid.fill_sum[n], 1), qd.f32)
-        grid.fill_sum[n] = 0
-        grid.mass_sum[n] = 0
-
-
-@qd.kernel(fastcache=True)
-def gather_errors(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, unit: qd.f32, scale: qd.f32, inner_from: qd.f32,
-    inner_to: qd.f32, least_open: qd.f32, least_theta: qd.f32, count: qd.i32,
-):  # fmt: skip
-    """Sum the density errors (Eq. 2) of the particles inside of the water at the nodes, and set up the equation.
-
-    `scale` is the volume of a particle over that of a cell, over the unit and over the stiffness M.
-    """
-    for i in range(count):
-        p = predicted(particles, i)
-        s = in_cells(grid, p)
-        at = corners(grid, qd.floor(s, qd.i32), p.n)
-        weights = tents(s - qd.floor(s), p.n)
-        filled = 0.0
-        for k in qd.static(range(2**p.n)):
-            filled += weights[k] * grid.fill[at[k]]
-        inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
-        error = unit * inside * qd.min(qd.max(scratch.rho[i] * scratch.weight[i] - 1.0, -1.0), 1.0)
-        for k in qd.static(range(2**p.n)):
-            qd.atomic_add(grid.error_sum[at[k]], qd.cast(qd.round(error * weights[k]), qd.i32))
+            grid.density[n] = qd.max(grid.mass_sum[n], 1) / qd.cast(qd.max(total, 1), qd.f32)
+            grid.mass_sum[n] = 0
+    if qd.static(parts == 1):
+        for i in range(count):
+            add_error(grid, particles, scratch, i, 0, unit, inner_from, inner_to, 0)
+    else:
+        for turn in range(512 * parts):
+            part = turn // 512
+            if turn % 512 == 0:
+                for i in range(count * part // parts, count * (part + 1) // parts):
+                    add_error(grid, particles, scratch, i, part, unit, inner_from, inner_to, 1)
     for n in range(grid.nx * grid.ny * grid.nz):
-        grid.rhs[n] = scale * grid.error_sum[n] / qd.max(grid.room[n], least_open)
-        grid.error_sum[n] = 0
+        total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, parts)
+        grid.rhs[n] = scale * total / qd.max(grid.room[n], least_open)
         couple_node(grid, n, least_theta)
 
 
@@ -154,7 +205,9 @@ def correct_pressure(
     """
     finest = levels[0]
     scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
-    gather_fill(finest, particles, scratch, solids, UNIT, scale, LEAST_OPEN, count, int(searched), int(mixed))
-    gather_errors(finest, particles, scratch, UNIT, share * scale / stiffness, *INNER, LEAST_OPEN, LEAST_THETA, count)
+    gather(
+        finest, particles, scratch, solids, UNIT, scale, share * scale / stiffness, *INNER, LEAST_OPEN, LEAST_THETA,
+        count, int(searched), int(mixed), finest.parts,
+    )  # fmt: skip
     solve_levels(levels)
     move_particles(finest, particles, solids, c, stiffness, REACH * c.h, count)
