@@ -77,9 +77,8 @@ class Grid:
 class CoarseGrid:
     """A level of the grid of `physics/coarse_pressure.py`; nodes are the centres of its cells, x fastest."""
 
-    fill_sum: qd.types.ndarray()  # i32 [nodes]: sum of the tents of all particles, in units
-    error_sum: qd.types.ndarray()  # i32 [nodes]: sum of the tents times density errors, in units
-    mass_sum: qd.types.ndarray()  # i32 [nodes]: sum of the tents times densities, in units, where these differ
+    sums: qd.types.ndarray()  # i32 [parts * nodes]: of the tents of particles, then of these times density errors
+    mass_sums: qd.types.ndarray()  # i32 [parts * nodes]: of the tents times densities, where these differ
     room: qd.types.ndarray()  # f32 [nodes]: share of the cell that no solid takes, 0 where next to nothing is left
     fill: qd.types.ndarray()  # f32 [nodes]: water over room
     density: qd.types.ndarray()  # f32 [nodes]: mean density over that of the heaviest fluid
@@ -99,6 +98,8 @@ class CoarseGrid:
     dx: qd.f32  # m: edges of a cell
     dy: qd.f32
     dz: qd.f32  # 1 in 2-D
+    parts: qd.i32  # of the particles that have sums of their own
+    lanes: qd.i32  # particles that are computed together
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ import numpy as np
 
 from wavetank import compiler
 from wavetank.compiler import qd
-from wavetank.physics.neighbors import for_each_around
+from wavetank.physics.neighbors import for_each_row_around
 from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.step import coefficients
 from wavetank.simulation import Simulation
@@ -21,9 +21,9 @@ from wavetank.state import Coefficients, Grid, Particles, integers
 
 
 @qd.func
-def add_one(sums: qd.template(), r, j, data: qd.template(), c: Coefficients):
-    """Count the visit."""
-    sums[0] += 1
+def add_length(sums: qd.template(), point, begin, end, particles: Particles, h):
+    """Count the particles of a row."""
+    sums[0] += end - begin
 
 
 @qd.kernel(fastcache=True)
@@ -31,7 +31,7 @@ def count_tests(tests: qd.types.ndarray(), particles: Particles, grid: Grid, c: 
     """Count the particles in the cells around each particle."""
     for i in range(count):
         sums = qd.Vector([0])
-        for_each_around(sums, add_one, particles.x[i], particles.x, particles.x, grid, c)
+        for_each_row_around(sums, add_length, particles.x[i], particles, grid, c.h)
         tests[i] = sums[0]
 
 

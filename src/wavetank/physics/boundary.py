@@ -164,21 +164,29 @@ def stopped(origin, target, near, solids: SolidSet, gap):
 
 
 @qd.func
-def near_walls(x, p, solids: SolidSet, h):
-    """Bits of the tank's walls that a particle on its way from `x` to `p` may touch or feel, and a little beyond."""
-    near = 0
-    way = 1.2 * h + (p - x).norm()
-    for k in range(solids.tank_count):
-        margin = way + solids.sweep[k][0]
-        if solids.sweep[k][1] > 0.0:
-            margin += solids.sweep[k][1] * (p - solids.position[k]).norm()
-        near |= qd.cast(plane_distance(solids, k, p).w < margin, qd.i32) << k
-    return near
+def walls_near(
+    near: qd.template(), nearest: qd.template(), origins: qd.template(), targets: qd.template(), solids: SolidSet, h
+):
+    """Set bits of the tank's walls that particles on their ways may touch or feel, and a little beyond.
+
+    All have a column for each particle, places three numbers in it; `nearest` is the distance [m] to the nearest wall.
+    """
+    for turn in range((solids.tank_count + 1) // 2):
+        for lane in range(origins.m):
+            p = vec3(targets[0, lane], targets[1, lane], targets[2, lane])
+            way = 1.2 * h + (p - vec3(origins[0, lane], origins[1, lane], origins[2, lane])).norm()
+            # Two walls a turn: a shorter loop over lanes would be unrolled before it can be computed as vectors.
+            for side in qd.static(range(2)):
+                k = qd.min(2 * turn + side, solids.tank_count - 1)
+                margin = way + solids.sweep[k][0] + solids.sweep[k][1] * (p - solids.position[k]).norm()
+                distance = plane_distance(solids, k, p).w
+                near[0, lane] |= qd.cast(distance < margin, qd.i32) << k
+                nearest[0, lane] = qd.min(nearest[0, lane], distance)
 
 
 @qd.func
 def near_bodies(x, p, solids: SolidSet, h):
-    """Bits, as `near_walls`, of the solids that are no walls of the tank."""
+    """Bits of the solids, other than the tank's walls, that a particle on its way from `x` to `p` may touch or feel."""
     near = 0
     way = 1.2 * h + (p - x).norm()
     for k in range(solids.tank_count, solids.count):
@@ -187,6 +195,21 @@ def near_bodies(x, p, solids: SolidSet, h):
         if away < solids.reach[k] + margin:
             if signed_distance(solids, k, p).w < margin:
                 near |= 1 << qd.min(k, 30)
+    return near
+
+
+@qd.func
+def bodies_in_reach(x, p, solids: SolidSet, gap):
+    """Bits of the solids, other than the tank's walls, that the way from `x` to `p` may touch: as `near_bodies`.
+
+    Here their distances are not asked for: it is for ways that are followed once.
+    """
+    near = 0
+    way = gap + (p - x).norm()
+    for k in range(solids.tank_count, solids.count):
+        away = (p - solids.position[k]).norm()
+        if away < solids.reach[k] + way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(solids.reach[k], away):
+            near |= 1 << qd.min(k, 30)
     return near
 
 
@@ -205,7 +228,14 @@ def keep_out_of_solids(particles: Particles, solids: SolidSet, c: Coefficients, 
     for i in range(count):
         x = particles.x[i]
         p = predicted(particles, i)
-        near = near_walls(lift(x), lift(p), solids, c.h) | near_bodies(lift(x), lift(p), solids, c.h)
+        origin, target = qd.Matrix.zero(qd.f32, 3, 1), qd.Matrix.zero(qd.f32, 3, 1)
+        for k in qd.static(range(x.n)):
+            origin[k, 0] = x[k]
+            target[k, 0] = p[k]
+        near_tank = qd.Matrix.zero(qd.i32, 1, 1)
+        nearest = qd.Matrix.zero(qd.f32, 1, 1)
+        walls_near(near_tank, nearest, origin, target, solids, c.h)
+        near = near_tank[0, 0] | near_bodies(lift(x), lift(p), solids, c.h)
         particles.near[i] = near
         if near >> solids.tank_count != 0:
             predict_at(particles, i, flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap), x))

@@ -8,11 +8,13 @@ node alone: that is what particle-in-cell methods do (Harlow 1964).
 import dataclasses
 import math
 
-from wavetank.compiler import qd
+from wavetank.compiler import current_backend, qd
 from wavetank.distance import lift, vec3
 from wavetank.state import CoarseGrid, integers, scalars
 
 EDGE = 1.0  # of a cell, over the support
+LARGE = 50_000  # nodes, from where threads gain more than they cost
+PARTS = 4  # of the particles that have sums of their own on a processor, where nodes are fewer than that
 SMALLEST = 8  # cells along an axis that is not halved any more
 
 
@@ -85,6 +87,11 @@ def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
     nodes = nx * ny * nz
     rim = nodes + nx * ny  # the next node of those on the rim is read, and counts nothing
     kinds = {field.name: field.type for field in dataclasses.fields(CoarseGrid)}
-    sums = {name: integers(nodes) for name in kinds if name.endswith("_sum")}
+    on_processor = current_backend() == "cpu"
+    parts = PARTS if on_processor and nodes <= LARGE else 1
+    sums = {"sums": integers(parts * nodes), "mass_sums": integers(parts * nodes)}
     fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in (qd.i32, qd.f32) and name not in sums}
-    return CoarseGrid(**sums, **fields, nx=nx, ny=ny, nz=nz, pairs=(nx + 1) // 2, dx=dx, dy=dy, dz=dz)
+    return CoarseGrid(
+        **sums, **fields, nx=nx, ny=ny, nz=nz, pairs=(nx + 1) // 2, dx=dx, dy=dy, dz=dz, parts=parts,
+        lanes=8 if on_processor else 1,
+    )  # fmt: skip

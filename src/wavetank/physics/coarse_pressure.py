@@ -19,6 +19,7 @@ from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, signed_distance, vec3
 from wavetank.physics.boundary import flattened, kept_in_tank
 from wavetank.physics.coarse_grid import coordinates, corners, in_cells, tents
+from wavetank.physics.pairs import column, teams
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.poisson import LEAST_THETA, couple_node, solve_levels
 from wavetank.state import CoarseGrid, Coefficients, Particles, Scratch
@@ -29,119 +30,202 @@ INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a 
 REACH = 0.2  # of the support: the longest correction
 
 
-@qd.kernel(fastcache=True)
-def gather_fill(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, unit: qd.f32, volume: qd.f32,
-    least_open: qd.f32, count: qd.i32, searched: qd.template(), mixed: qd.template(),
-):  # fmt: skip
-    """Sum the tents of all particles at the nodes, and relate them to the room there.
+@qd.func
+def add_whole(sums: qd.template(), at, amount, alone: qd.template()):
+    """Add a whole number; `alone` where no other thread adds to these sums."""
+    if qd.static(alone):
+        sums[at] = sums[at] + amount
+    else:
+        qd.atomic_add(sums[at], amount)
 
-    The sums are 0 before. `volume` is that of a particle over that of a cell and over the `unit`. Solids take their
-    share of a cell where they are `searched`; else there are only the walls of the tank, which end where the cells do.
-    Where fluids are `mixed`, their densities are averaged.
-    """
-    for i in range(count):
-        p = predicted(particles, i)
-        s = in_cells(grid, p)
-        at = corners(grid, qd.floor(s, qd.i32), p.n)
-        weights = tents(s - qd.floor(s), p.n)
-        for k in qd.static(range(2**p.n)):
+
+@qd.func
+def add_fill(
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, team, part, unit, count, mixed: qd.template(),
+    lanes: qd.template(), alone: qd.template(),
+):  # fmt: skip
+    """Add the tents of a team's particles to the sums of a `part`, and those over their weights where `mixed`."""
+    first = team * lanes
+    dim = qd.static(particles.x[first].n)
+    at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
+    amounts = qd.Matrix.zero(qd.i32, 2**dim, lanes)
+    masses = qd.Matrix.zero(qd.i32, 2**dim if mixed else 1, lanes)
+    for lane in range(lanes):
+        s = in_cells(grid, predicted(particles, first + lane))
+        nodes = corners(grid, qd.floor(s, qd.i32), dim)
+        weights = tents(s - qd.floor(s), dim)
+        for k in qd.static(range(2**dim)):
             w = unit * weights[k]
-            qd.atomic_add(grid.fill_sum[at[k]], qd.cast(qd.round(w), qd.i32))
+            at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
+            amounts[k, lane] = qd.cast(qd.round(w), qd.i32)
             if qd.static(mixed):
-                qd.atomic_add(grid.mass_sum[at[k]], qd.cast(qd.round(w / scratch.weight[i]), qd.i32))
+                masses[k, lane] = qd.cast(qd.round(w / scratch.weight[first + lane]), qd.i32)
+    for lane in range(qd.min(lanes, count - first)):
+        for k in qd.static(range(2**dim)):
+            add_whole(grid.sums, at[k, lane], amounts[k, lane], alone)
+            if qd.static(mixed):
+                add_whole(grid.mass_sums, at[k, lane], masses[k, lane], alone)
+
+
+@qd.func
+def add_errors(
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, team, part, unit, inner_from, inner_to, count,
+    lanes: qd.template(), alone: qd.template(),
+):  # fmt: skip
+    """Add the tents of a team's particles, if inside of the water, times their errors (Eq. 2) to a `part`'s sums."""
+    first = team * lanes
+    dim = qd.static(particles.x[first].n)
+    at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
+    amounts = qd.Matrix.zero(qd.i32, 2**dim, lanes)
+    for lane in range(lanes):
+        s = in_cells(grid, predicted(particles, first + lane))
+        nodes = corners(grid, qd.floor(s, qd.i32), dim)
+        weights = tents(s - qd.floor(s), dim)
+        filled = 0.0
+        for k in qd.static(range(2**dim)):
+            filled += weights[k] * grid.fill[nodes[k]]
+        inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
+        density = scratch.rho[first + lane] * scratch.weight[first + lane]
+        error = unit * inside * qd.min(qd.max(density - 1.0, -1.0), 1.0)
+        for k in qd.static(range(2**dim)):
+            at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
+            amounts[k, lane] = qd.cast(qd.round(error * weights[k]), qd.i32)
+    for lane in range(qd.min(lanes, count - first)):
+        for k in qd.static(range(2**dim)):
+            add_whole(grid.sums, at[k, lane], amounts[k, lane], alone)
+
+
+@qd.func
+def taken(sums: qd.template(), n, nodes, parts):
+    """Sum of all `parts` at node `n`, which are 0 afterwards."""
+    total = 0
+    for part in range(parts):
+        total += sums[part * nodes + n]
+        sums[part * nodes + n] = 0
+    return total
+
+
+@qd.func
+def open_share(grid: CoarseGrid, solids: SolidSet, n):
+    """Share of the cell of node `n` that no solid takes."""
+    c = coordinates(grid, n)
+    center = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
+    edge = qd.min(grid.dx, grid.dy)
+    if grid.nz > 1:
+        edge = qd.min(edge, grid.dz)
+    else:
+        center.z = 0.0
+    room = 1.0
+    for k in range(solids.count):
+        if k < solids.tank_count or (center - solids.position[k]).norm() < solids.reach[k] + 0.5 * edge:
+            if room > 0.0:
+                room = qd.min(room, 0.5 + signed_distance(solids, k, center).w / edge)
+    return qd.max(room, 0.0)
+
+
+@qd.kernel(fastcache=True)
+def gather(
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, unit: qd.f32, volume: qd.f32,
+    scale: qd.f32, inner_from: qd.f32, inner_to: qd.f32, least_open: qd.f32, least_theta: qd.f32, count: qd.i32,
+    searched: qd.template(), mixed: qd.template(), parts: qd.template(), lanes: qd.template(),
+):  # fmt: skip
+    """Sum the tents of all particles at the nodes, then their density errors (Eq. 2), and set up the equation.
+
+    The sums are 0 before. `volume` is that of a particle over that of a cell and over the `unit`, `scale` the same over
+    the stiffness M. Solids take their share of a cell where they are `searched`; else there are only the walls of the
+    tank, which end where the cells do. Where fluids are `mixed`, their densities are averaged.
+
+    Each of several `parts` of the particles has sums of its own, so that threads need not wait for each other.
+    """
+    if qd.static(parts == 1):
+        for team in range(teams(count, lanes)):
+            add_fill(grid, particles, scratch, team, 0, unit, count, mixed, lanes, 0)
+    else:
+        # Threads take 512 turns of a loop or more at once: the first of them does the work.
+        for turn in range(512 * parts):
+            part, all_teams = turn // 512, teams(count, lanes)
+            if turn % 512 == 0:
+                for team in range(all_teams * part // parts, all_teams * (part + 1) // parts):
+                    add_fill(grid, particles, scratch, team, part, unit, count, mixed, lanes, 1)
     for n in range(grid.nx * grid.ny * grid.nz):
         room = 1.0
         if qd.static(searched):
-            c = coordinates(grid, n)
-            center = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
-            edge = qd.min(grid.dx, grid.dy)
-            if grid.nz > 1:
-                edge = qd.min(edge, grid.dz)
-            else:
-                center.z = 0.0
-            for k in range(solids.count):
-                if room > 0.0:
-                    room = qd.min(room, 0.5 + signed_distance(solids, k, center).w / edge)
-        room = qd.max(room, 0.0)
+            room = open_share(grid, solids, n)
+        total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, parts)
         grid.room[n] = room if room >= least_open else 0.0
-        grid.fill[n] = volume * grid.fill_sum[n] / qd.max(room, least_open)
+        grid.fill[n] = volume * total / qd.max(room, least_open)
         grid.density[n] = 1.0
         if qd.static(mixed):
-            grid.density[n] = qd.max(grid.mass_sum[n], 1) / qd.cast(qd.max(grid.fill_sum[n], 1), qd.f32)
-        grid.fill_sum[n] = 0
-        grid.mass_sum[n] = 0
-
-
-@qd.kernel(fastcache=True)
-def gather_errors(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, unit: qd.f32, scale: qd.f32, inner_from: qd.f32,
-    inner_to: qd.f32, least_open: qd.f32, least_theta: qd.f32, count: qd.i32,
-):  # fmt: skip
-    """Sum the density errors (Eq. 2) of the particles inside of the water at the nodes, and set up the equation.
-
-    `scale` is the volume of a particle over that of a cell, over the unit and over the stiffness M.
-    """
-    for i in range(count):
-        p = predicted(particles, i)
-        s = in_cells(grid, p)
-        at = corners(grid, qd.floor(s, qd.i32), p.n)
-        weights = tents(s - qd.floor(s), p.n)
-        filled = 0.0
-        for k in qd.static(range(2**p.n)):
-            filled += weights[k] * grid.fill[at[k]]
-        inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
-        error = unit * inside * qd.min(qd.max(scratch.rho[i] * scratch.weight[i] - 1.0, -1.0), 1.0)
-        for k in qd.static(range(2**p.n)):
-            qd.atomic_add(grid.error_sum[at[k]], qd.cast(qd.round(error * weights[k]), qd.i32))
+            mass = taken(grid.mass_sums, n, grid.nx * grid.ny * grid.nz, parts)
+            grid.density[n] = qd.max(mass, 1) / qd.cast(qd.max(total, 1), qd.f32)
+    if qd.static(parts == 1):
+        for team in range(teams(count, lanes)):
+            add_errors(grid, particles, scratch, team, 0, unit, inner_from, inner_to, count, lanes, 0)
+    else:
+        for turn in range(512 * parts):
+            part, all_teams = turn // 512, teams(count, lanes)
+            if turn % 512 == 0:
+                for team in range(all_teams * part // parts, all_teams * (part + 1) // parts):
+                    add_errors(grid, particles, scratch, team, part, unit, inner_from, inner_to, count, lanes, 1)
     for n in range(grid.nx * grid.ny * grid.nz):
-        grid.rhs[n] = scale * grid.error_sum[n] / qd.max(grid.room[n], least_open)
-        grid.error_sum[n] = 0
+        total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, parts)
+        grid.rhs[n] = scale * total / qd.max(grid.room[n], least_open)
         couple_node(grid, n, least_theta)
 
 
 @qd.func
-def slope_along(
-    grid: CoarseGrid, slope: qd.template(), coupled: qd.template(), s, axis: qd.template(), dim: qd.template()
-):
-    """Derivative of lambda [m] along `axis` at the place `s` [cells], from the faces around that lead into water."""
+def slope_across(coupled, edge, difference):
+    """Derivative of lambda [m] across a face, told from 0 where the face leads into water."""
+    return coupled * edge * difference + (1e-30 if coupled > 0.0 else 0.0)
+
+
+@qd.func
+def slope_along(grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), dim: qd.template()):
+    """Derivative of lambda [m] along `axis` at the place `s` [cells], from the faces around that lead into water.
+
+    The `slope` of the others is 0.
+    """
     place = s
     place[axis] -= 0.5
     at = corners(grid, qd.floor(place, qd.i32), dim)
     weights = tents(place - qd.floor(place), dim)
     total, weight = 0.0, 0.0
     for k in qd.static(range(2**dim)):
-        w = weights[k] * qd.cast(coupled[at[k]] > 0.0, qd.f32)
-        total += w * slope[at[k]]
-        weight += w
+        own = slope[at[k]]
+        total += weights[k] * own
+        weight += weights[k] if own != 0.0 else 0.0
     return total / qd.max(weight, 1e-9)
 
 
 @qd.kernel(fastcache=True)
 def move_particles(
     grid: CoarseGrid, particles: Particles, solids: SolidSet, c: Coefficients, stiffness: qd.f32, reach: qd.f32,
-    count: qd.i32,
+    count: qd.i32, lanes: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank."""
     for n in range(grid.nx * grid.ny * grid.nz):
         lam = grid.lam[n]
-        grid.slope_x[n] = grid.wx[n] * grid.dx * (grid.lam[n + 1] - lam)
-        grid.slope_y[n] = grid.wy[n] * grid.dy * (grid.lam[n + grid.nx] - lam)
-        grid.slope_z[n] = grid.wz[n] * grid.dz * (grid.lam[n + grid.nx * grid.ny] - lam)
-    for i in range(count):
-        p = predicted(particles, i)
-        s = in_cells(grid, p)
-        dp = p * 0.0
-        dp[0] = slope_along(grid, grid.slope_x, grid.wx, s, 0, p.n)
-        dp[1] = slope_along(grid, grid.slope_y, grid.wy, s, 1, p.n)
-        if qd.static(p.n == 3):
-            dp[2] = slope_along(grid, grid.slope_z, grid.wz, s, 2, p.n)
-        dp *= stiffness
-        p += dp * qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
-        near = particles.near[i]
-        if near != 0:
-            p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
-        predict_at(particles, i, p)
+        grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
+        grid.slope_y[n] = slope_across(grid.wy[n], grid.dy, grid.lam[n + grid.nx] - lam)
+        grid.slope_z[n] = slope_across(grid.wz[n], grid.dz, grid.lam[n + grid.nx * grid.ny] - lam)
+    for team in range(teams(count, lanes)):
+        first = team * lanes
+        dim = qd.static(particles.x[first].n)
+        slopes = qd.Matrix.zero(qd.f32, dim, lanes)
+        for lane in range(lanes):
+            s = in_cells(grid, predicted(particles, first + lane))
+            slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, dim)
+            slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, dim)
+            if qd.static(dim == 3):
+                slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, dim)
+        for i in range(first, qd.min(first + lanes, count)):
+            p = predicted(particles, i)
+            dp = column(slopes, i - first) * stiffness
+            p += dp * qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
+            near = particles.near[i]
+            if near != 0:
+                p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
+            predict_at(particles, i, p)
 
 
 def correct_pressure(
@@ -154,7 +238,9 @@ def correct_pressure(
     """
     finest = levels[0]
     scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
-    gather_fill(finest, particles, scratch, solids, UNIT, scale, LEAST_OPEN, count, int(searched), int(mixed))
-    gather_errors(finest, particles, scratch, UNIT, share * scale / stiffness, *INNER, LEAST_OPEN, LEAST_THETA, count)
+    gather(
+        finest, particles, scratch, solids, UNIT, scale, share * scale / stiffness, *INNER, LEAST_OPEN, LEAST_THETA,
+        count, int(searched), int(mixed), finest.parts, finest.lanes,
+    )  # fmt: skip
     solve_levels(levels)
-    move_particles(finest, particles, solids, c, stiffness, REACH * c.h, count)
+    move_particles(finest, particles, solids, c, stiffness, REACH * c.h, count, finest.lanes)

@@ -2,8 +2,9 @@
 
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift
-from wavetank.physics.boundary import flattened, kept_in_tank, near_bodies, near_walls, stopped
+from wavetank.physics.boundary import flattened, kept_in_tank, near_bodies, stopped, walls_near
 from wavetank.physics.neighbors import cell_of
+from wavetank.physics.pairs import teams_of, turns
 from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles
 
@@ -30,30 +31,46 @@ def accelerate(particles: Particles, i, v, c: Coefficients):
 @qd.kernel(fastcache=True)
 def predict(
     particles: Particles, grid: Grid, solids: SolidSet, c: Coefficients, count: qd.i32,
-    gravity: qd.types.vector(3, qd.f32), searched: qd.template(),
+    gravity: qd.types.vector(3, qd.f32), searched: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Accelerate, move freely (Algorithm 1, lines 2-3), mark what is near, stay out of it, and find the cell.
 
     Where solids are not `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they
     are, wherever that is.
     """
-    for i in range(count):
-        x = particles.x[i]
-        v = particles.v[i]
-        for k in qd.static(range(x.n)):
-            v[k] += c.dt * gravity[k]
-        particles.v[i] = v
-        p = free_motion(x, v, c)
-        near = near_walls(lift(x), lift(p), solids, c.h)
-        if near != 0 and c.dt > 0.0:
-            p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), x)
-        if qd.static(searched):
-            near |= near_bodies(lift(x), lift(p), solids, c.h)
-            if near >> solids.tank_count != 0 and c.dt > 0.0:
-                p = flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap), x)
-        particles.near[i] = near
-        predict_at(particles, i, p)
-        grid.cell[i] = cell_of(grid, p, c.h)
+    for turn in range(turns(count, grid, lanes)):
+        part = teams_of(turn, count, grid, lanes)
+        for team in range(part[0], part[1]):
+            first = team * lanes
+            origins = qd.Matrix.zero(qd.f32, 3, lanes)
+            targets = qd.Matrix.zero(qd.f32, 3, lanes)
+            # What walls are near is computed for a team at once; few particles are so near that they are moved.
+            for lane in range(lanes):
+                x = particles.x[first + lane]
+                v = particles.v[first + lane]
+                for k in qd.static(range(x.n)):
+                    origins[k, lane] = x[k]
+                    targets[k, lane] = x[k] + c.dt * (v[k] + c.dt * gravity[k])
+            walls = qd.Matrix.zero(qd.i32, 1, lanes)
+            nearest = qd.Matrix.zero(qd.f32, 1, lanes) + 1e9
+            walls_near(walls, nearest, origins, targets, solids, c.h)
+            for i in range(first, qd.min(first + lanes, count)):
+                x = particles.x[i]
+                v = particles.v[i]
+                for k in qd.static(range(x.n)):
+                    v[k] += c.dt * gravity[k]
+                particles.v[i] = v
+                p = free_motion(x, v, c)
+                near = walls[0, i - first]
+                if nearest[0, i - first] < 1.1 * c.wall_gap and c.dt > 0.0:
+                    p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), x)
+                if qd.static(searched):
+                    near |= near_bodies(lift(x), lift(p), solids, c.h)
+                    if near >> solids.tank_count != 0 and c.dt > 0.0:
+                        p = flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap), x)
+                particles.near[i] = near
+                predict_at(particles, i, p)
+                grid.cell[i] = cell_of(grid, p, c.h)
 
 
 @qd.kernel(fastcache=True)

@@ -210,7 +210,7 @@ def near_bits(particles: Particles, places: qd.template(), begin, length, h2):
     for k in range(qd.static(32 if places.n == 3 else 16)):
         p = predicted(particles, begin + k)
         nearest = 2.0 * h2
-        for column in qd.static(range(8)):
+        for column in qd.static(range(places.m)):
             square = 0.0
             for axis in qd.static(range(places.n)):
                 square += (p[axis] - places[axis, column]) ** 2
@@ -220,19 +220,21 @@ def near_bits(particles: Particles, places: qd.template(), begin, length, h2):
 
 
 @qd.func
-def for_each_around(
-    sums: qd.template(), visit: qd.template(), point, p: qd.template(), data: qd.template(), grid: Grid, c: Coefficients
-):
-    """Call ``visit(sums, r, j, data, c)`` for every particle j in the cells around any `point`, r = point - p_j [m].
+def for_each_row_around(sums: qd.template(), visit: qd.template(), point, particles: Particles, grid: Grid, h):
+    """Call ``visit(sums, point, begin, end, particles, h)`` for every row of particles in the cells around `point`.
 
-    The visitor weighs with the distance itself: particles beyond h come as well.
+    The particles of a row are those from `begin` to `end` - 1; some of them are farther away than h.
     """
-    cell = cell_of(grid, point, c.h)
+    cell = cell_of(grid, point, h)
     for row in range(qd.static(9 if point.n == 3 else 3)):
         layer = grid.nx * (row % 3 - 1)
         if qd.static(point.n == 3):
             layer += grid.nx * grid.ny * (row // 3 - 1)
-        low = (cell + layer - 1) % grid.cells
+        low = cell + layer - 1
+        if low < 0:
+            low += grid.cells
+        if low >= grid.cells:
+            low -= grid.cells
         # A row that runs over the last cell goes on at the first.
         over = qd.max(low + 3 - grid.cells, 0)
         for part in range(1 + qd.min(over, 1)):
@@ -241,8 +243,7 @@ def for_each_around(
             if part == 1:
                 begin = 0
                 end = grid.start[over]
-            for j in range(begin, end):
-                visit(sums, point - p[j], j, data, c)
+            visit(sums, point, begin, end, particles, h)
 
 
 def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, room: int) -> Grid:

@@ -27,6 +27,14 @@ from wavetank.state import Coefficients, Grid, Particles, integers
 
 
 @qd.func
+def teams(count, lanes: qd.template()):
+    """Number of teams of `lanes` particles."""
+    if qd.static(lanes == 1):
+        return count
+    return (count + lanes - 1) // lanes
+
+
+@qd.func
 def turns(count, grid: Grid, lanes: qd.template()):
     """Turns of the loop of a pass over `count` particles; `teams_of` says which teams are a turn's.
 
@@ -45,10 +53,10 @@ def teams_of(turn, count, grid: Grid, lanes: qd.template()):
     if qd.static(lanes > 1):
         own = qd.Vector([0, 0])
         if turn & 511 == 0:
-            teams = (count + lanes - 1) // lanes
-            size = (teams + grid.parts - 1) // grid.parts
+            all_teams = teams(count, lanes)
+            size = (all_teams + grid.parts - 1) // grid.parts
             own[0] = (turn >> 9) * size
-            own[1] = qd.min(own[0] + size, teams)
+            own[1] = qd.min(own[0] + size, all_teams)
     return own
 
 

@@ -17,14 +17,13 @@ import math
 
 from wavetank.compiler import current_backend, qd
 from wavetank.distance import vec3
-from wavetank.physics.coarse_grid import coordinates, node
+from wavetank.physics.coarse_grid import LARGE, coordinates, node
 from wavetank.state import CoarseGrid
 
 SWEEPS, MOST_SWEEPS = 8, 200  # of a level, and of the coarsest
 OVER_RELAXATION = 1.5
 LEAST_THETA = 0.1
 ZERO, FROM_COARSER, GO_ON = 0, 1, 2  # where a level starts
-LARGE = 50_000  # nodes, from where threads gain more than they cost
 
 
 @qd.func

@@ -76,7 +76,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     )  # fmt: skip
 
     searched = int(world.has_solids)
-    predict(now, grid, solids, c, count, np.array([*params.gravity, 0.0][:3], np.float32), searched)  # 1-4
+    predict(now, grid, solids, c, count, np.array([*params.gravity, 0.0][:3], np.float32), searched, grid.lanes)  # 1-4
 
     sort_particles(now, spare, grid, count)  # 5-7
     now, spare = spare, now
@@ -162,7 +162,10 @@ def has_grid_pressure(world: World, params: Parameters) -> bool:
 def update_densities(world: World, params: Parameters) -> None:
     """Measure the densities [kg/m^3] of `world` as it stands. The order of particles changes, the motion does not."""
     c, method, count = coefficients(params, 0.0), method_number(params), world.count
-    predict(world.particles, world.grid, world.solids, c, count, np.zeros(3, np.float32), int(world.has_solids))
+    predict(
+        world.particles, world.grid, world.solids, c, count, np.zeros(3, np.float32), int(world.has_solids),
+        world.grid.lanes,
+    )  # fmt: skip
     sort_particles(world.particles, world.spare, world.grid, count)
     world.particles, world.spare = world.spare, world.particles
     world.grid = find_neighbors(world.particles, world.grid, c, count)

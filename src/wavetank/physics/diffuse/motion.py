@@ -23,19 +23,31 @@ Where we differ, and why:
 
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, signed_distance, vec2
-from wavetank.physics.boundary import flattened, stopped
-from wavetank.physics.neighbors import for_each_around
+from wavetank.physics.boundary import bodies_in_reach, flattened, stopped
+from wavetank.physics.neighbors import for_each_row_around, near_bits
+from wavetank.physics.places import predicted
 from wavetank.state import Air, Births, Coefficients, Diffuse, Grid, Particles
 
 
 @qd.func
-def add_water(sums: qd.template(), r, j, v: qd.template(), c: Coefficients):
-    """Add water particle j to (sum W, sum v W) with Poly6."""
-    t = qd.max(1.0 - r.norm_sqr() / (c.h * c.h), 0.0)
-    w = t * t * t
-    sums[0] += w
-    for k in qd.static(range(r.n)):
-        sums[1 + k] += w * v[j][k]
+def add_water(sums: qd.template(), point, begin, end, water: Particles, h):
+    """Add the water particles of a row to (sum W, sum v W) with Poly6."""
+    block = qd.static(32 if point.n == 3 else 16)
+    place = qd.Matrix.zero(qd.f32, point.n, 1)
+    for k in qd.static(range(point.n)):
+        place[k, 0] = point[k]
+    first = begin
+    while first < end:
+        hits = near_bits(water, place, first, qd.min(end - first, block), h * h)
+        while hits != qd.u32(0):
+            j = first + qd.math.ffs(hits) - 1
+            hits &= hits - qd.u32(1)
+            t = qd.max(1.0 - (point - predicted(water, j)).norm_sqr() / (h * h), 0.0)
+            w = t * t * t
+            sums[0] += w
+            for k in qd.static(range(point.n)):
+                sums[1 + k] += w * water.v[j][k]
+        first += block
 
 
 @qd.func
@@ -43,15 +55,17 @@ def surroundings(point, solids: SolidSet, h):
     """(distance to the nearest solid [m], share of the support around `point` that is not inside of one).
 
     The share is that of Poly6 over a half-space for each solid. The polynomial is the integral in space; in the plane
-    it is off by 0.02 at most.
+    it is off by 0.02 at most. Solids beyond the support are not asked: without any the distance is h.
     """
-    nearest, free = 1e9, 1.0
+    nearest, free = h, 1.0
     for k in range(solids.count):
-        distance = signed_distance(solids, k, point).w
-        nearest = qd.min(nearest, distance)
-        t = qd.min(qd.max(distance / h, -1.0), 1.0)
-        s = t * t
-        free *= 0.5 + 1.2304688 * t * (1.0 - s * (1.3333333 - s * (1.2 - s * (0.57142857 - s / 9.0))))
+        if k < solids.tank_count or (point - solids.position[k]).norm() < solids.reach[k] + h:
+            distance = signed_distance(solids, k, point).w
+            if distance < h:
+                nearest = qd.min(nearest, distance)
+                t = qd.max(distance / h, -1.0)
+                s = t * t
+                free *= 0.5 + 1.2304688 * t * (1.0 - s * (1.3333333 - s * (1.2 - s * (0.57142857 - s / 9.0))))
     return vec2(nearest, free)
 
 
@@ -59,7 +73,7 @@ def surroundings(point, solids: SolidSet, h):
 def water_at(point: qd.template(), free, water: Particles, grid: Grid, c: Coefficients, a: Air):
     """(share of water, its mean velocity [m/s]) around `point`, of whose support the share `free` is outside solids."""
     sums = qd.Vector([0.0] * (point.n + 1))
-    for_each_around(sums, add_water, point, water.x, water.v, grid, c)
+    for_each_row_around(sums, add_water, point, water, grid, c.h)
     for k in qd.static(range(point.n)):
         sums[1 + k] /= qd.max(sums[0], 1e-12)
     sums[0] *= a.share / qd.max(free, 0.1)
@@ -105,7 +119,8 @@ def move(
             slip = v - medium
             later = medium + slip * a.bubble_keep - 2.0 * pull * a.bubble_path
             target = x + a.dt * medium + slip * a.bubble_path - 2.0 * pull * a.bubble_bend
-        out = stopped(lift(x), lift(target), -1, solids, c.wall_gap)  # -1: all solids, marked or not
+        near = bodies_in_reach(lift(x), lift(target), solids, c.wall_gap) | ((1 << solids.tank_count) - 1)
+        out = stopped(lift(x), lift(target), near, solids, c.wall_gap)
         if (out - lift(target)).norm_sqr() > 0.0:
             target = flattened(out, x)
             later = (target - x) / a.dt
