@@ -9,7 +9,7 @@ from wavetank.physics.diffuse.noise import stream, uniform
 from wavetank.physics.diffuse.pool import new_pool, scan
 from wavetank.physics.diffuse.potentials import add_potentials, find_surface, limited
 from wavetank.physics.diffuse.update import air
-from wavetank.physics.pairs import teams_of, turns
+from wavetank.physics.pairs import part_of, teams, turns
 from wavetank.state import Air, Births, Coefficients, Grid, Particles, integers, scalars
 
 
@@ -18,8 +18,8 @@ def fill_potentials(
     out: qd.types.ndarray(), births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air,
     count: qd.i32, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
-    for turn in range(turns(count, grid, lanes)):
-        part = teams_of(turn, count, grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid, lanes)):
+        part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, 1, lanes)
             add_potentials(sums, team, births, particles, grid, c, a, count, method)

@@ -11,7 +11,7 @@ import pytest
 from wavetank import compiler
 from wavetank.compiler import qd
 from wavetank.physics.neighbors import new_grid
-from wavetank.physics.pairs import teams_of, turns
+from wavetank.physics.pairs import part_of, teams, turns
 from wavetank.state import Grid, integers
 
 PROGRAM = """
@@ -34,8 +34,8 @@ PASSES = {
 
 @qd.kernel
 def count_visits(visits: qd.types.ndarray(), grid: Grid, count: qd.i32, lanes: qd.template()):
-    for turn in range(turns(count, grid, lanes)):
-        part = teams_of(turn, count, grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid, lanes)):
+        part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
             qd.atomic_add(visits[team], 1)
 

@@ -27,7 +27,7 @@ from wavetank.errors import WavetankError
 from wavetank.lab.bench import check, measured, sized, timed
 from wavetank.lab.counts import water_bytes
 from wavetank.lab.machine import load, machine
-from wavetank.physics.pairs import add_neighbors, column, count_neighbors, teams_of, turns
+from wavetank.physics.pairs import add_neighbors, column, count_neighbors, part_of, teams, turns
 from wavetank.physics.step import coefficients
 from wavetank.scene import Scene
 from wavetank.simulation import Simulation
@@ -99,8 +99,8 @@ def walk(
     total: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()
 ):
     """Go once over all neighbour lists."""
-    for turn in range(turns(count, grid, lanes)):
-        part = teams_of(turn, count, grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid, lanes)):
+        part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
             ways = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
             add_neighbors(ways, add_way, team, particles, particles.v, grid, c, 0)

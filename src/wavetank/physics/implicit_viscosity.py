@@ -39,7 +39,7 @@ from wavetank.physics.density_constraint import schedule
 from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend
-from wavetank.physics.pairs import add_neighbors, column, teams_of, turns
+from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars
@@ -150,8 +150,8 @@ def stiffest_particle(
     The matrix of one damper is at most twice its diagonal blocks, hence so is their sum.
     """
     most = 0
-    for turn in range(turns(count, grid, lanes)):
-        part = teams_of(turn, count, grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid, lanes)):
+        part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
             dim = qd.static(particles.x[team].n)
             sums = qd.Matrix.zero(qd.f32, dim * dim, lanes)
@@ -176,8 +176,8 @@ def relax_velocities(
     relaxation: qd.f32, momentum: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """One Chebyshev iteration; `following` holds the iterate before `packed` and receives the next."""
-    for turn in range(turns(count, grid, lanes)):
-        part = teams_of(turn, count, grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid, lanes)):
+        part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
             add_neighbors(sums, add_damping, team, particles, packed, grid, c, 0)

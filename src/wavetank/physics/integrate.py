@@ -4,7 +4,7 @@ from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift
 from wavetank.physics.boundary import flattened, kept_in_tank, near_bodies, stopped, walls_near
 from wavetank.physics.neighbors import cell_of
-from wavetank.physics.pairs import teams_of, turns
+from wavetank.physics.pairs import part_of, teams, turns
 from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles
 
@@ -38,8 +38,8 @@ def predict(
     Where solids are not `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they
     are, wherever that is.
     """
-    for turn in range(turns(count, grid, lanes)):
-        part = teams_of(turn, count, grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid, lanes)):
+        part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
             first = team * lanes
             origins = qd.Matrix.zero(qd.f32, 3, lanes)

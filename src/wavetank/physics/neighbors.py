@@ -26,6 +26,7 @@ import numpy as np
 
 from wavetank.compiler import current_backend, qd, threads
 from wavetank.errors import WavetankError
+from wavetank.physics.pairs import part_of, turns
 from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles, integers
 
@@ -132,61 +133,68 @@ def copy_particle(target: Particles, to, source: Particles, i):
     target.frozen[to] = source.frozen[i]
 
 
+@qd.func
+def list_group(group, particles: Particles, grid: Grid, h2, count):
+    """Write the neighbours of a group and return their number, even if it had no room."""
+    room = grid.room
+    dim = qd.static(particles.x[group].n)
+    block = qd.static(32 if dim == 3 else 16)  # what a full row has, and some more
+    first = 8 * group
+    last = qd.min(first + 8, count)
+    n = 0
+    begin_run = first
+    while begin_run < last:
+        # A run: particles in cells that follow each other, so that the rows around them are one as well.
+        low_cell = grid.cell[grid.order[begin_run]]
+        cells = 3
+        end_run = begin_run + 1
+        while end_run < last and grid.cell[grid.order[end_run]] - low_cell <= qd.min(cells, grid.nx - 3):
+            cells = grid.cell[grid.order[end_run]] - low_cell + 3
+            end_run += 1
+        run = places_of(particles, first, begin_run, end_run)
+        earlier = places_of(particles, first, first, begin_run)
+        for row in range(qd.static(9 if dim == 3 else 3)):
+            layer = grid.nx * (row % 3 - 1)
+            if qd.static(dim == 3):
+                layer += grid.nx * grid.ny * (row // 3 - 1)
+            low = low_cell + layer - 1
+            if low < 0:
+                low += grid.cells
+            if low >= grid.cells:
+                low -= grid.cells
+            # A row that runs over the last cell goes on at the first.
+            over = qd.max(low + cells - grid.cells, 0)
+            for piece in range(1 + qd.min(over, 1)):
+                begin = grid.start[low]
+                end = grid.start[low + cells - over]
+                if piece == 1:
+                    begin = 0
+                    end = grid.start[over]
+                while begin < end:
+                    length = qd.min(end - begin, block)
+                    hits = near_bits(particles, run, begin, length, h2)
+                    if begin_run > first:
+                        hits &= ~near_bits(particles, earlier, begin, length, h2)
+                    while hits != qd.u32(0):
+                        grid.list[group * room + qd.min(n, room - 1)] = begin + qd.math.ffs(hits) - 1
+                        hits &= hits - qd.u32(1)
+                        n += 1
+                    begin += block
+        begin_run = end_run
+    grid.number[group] = n
+    for k in range(n, qd.min(n + 3, room)):
+        grid.list[group * room + k] = grid.nowhere
+    return n
+
+
 @qd.kernel(fastcache=True)
-def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.i32) -> qd.i32:
+def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()) -> qd.i32:
     """Write the neighbours of every group and return the largest number found, even if it had no room."""
     most = 0
-    h2 = c.h * c.h
-    room = grid.room
-    for group in range((count + 7) >> 3):
-        dim = qd.static(particles.x[group].n)
-        block = qd.static(32 if dim == 3 else 16)  # what a full row has, and some more
-        first = 8 * group
-        last = qd.min(first + 8, count)
-        n = 0
-        begin_run = first
-        while begin_run < last:
-            # A run: particles in cells that follow each other, so that the rows around them are one as well.
-            low_cell = grid.cell[grid.order[begin_run]]
-            cells = 3
-            end_run = begin_run + 1
-            while end_run < last and grid.cell[grid.order[end_run]] - low_cell <= qd.min(cells, grid.nx - 3):
-                cells = grid.cell[grid.order[end_run]] - low_cell + 3
-                end_run += 1
-            run = places_of(particles, first, begin_run, end_run)
-            earlier = places_of(particles, first, first, begin_run)
-            for row in range(qd.static(9 if dim == 3 else 3)):
-                layer = grid.nx * (row % 3 - 1)
-                if qd.static(dim == 3):
-                    layer += grid.nx * grid.ny * (row // 3 - 1)
-                low = low_cell + layer - 1
-                if low < 0:
-                    low += grid.cells
-                if low >= grid.cells:
-                    low -= grid.cells
-                # A row that runs over the last cell goes on at the first.
-                over = qd.max(low + cells - grid.cells, 0)
-                for part in range(1 + qd.min(over, 1)):
-                    begin = grid.start[low]
-                    end = grid.start[low + cells - over]
-                    if part == 1:
-                        begin = 0
-                        end = grid.start[over]
-                    while begin < end:
-                        length = qd.min(end - begin, block)
-                        hits = near_bits(particles, run, begin, length, h2)
-                        if begin_run > first:
-                            hits &= ~near_bits(particles, earlier, begin, length, h2)
-                        while hits != qd.u32(0):
-                            grid.list[group * room + qd.min(n, room - 1)] = begin + qd.math.ffs(hits) - 1
-                            hits &= hits - qd.u32(1)
-                            n += 1
-                        begin += block
-            begin_run = end_run
-        grid.number[group] = n
-        for k in range(n, qd.min(n + 3, room)):
-            grid.list[group * room + k] = grid.nowhere
-        qd.atomic_max(most, n)
+    for turn in range(turns((count + 7) >> 3, grid, lanes)):
+        part = part_of(turn, (count + 7) >> 3, grid, lanes)
+        for group in range(part[0], part[1]):
+            qd.atomic_max(most, list_group(group, particles, grid, c.h * c.h, count))
     return most
 
 
@@ -289,11 +297,11 @@ def sort_particles(particles: Particles, spare: Particles, grid: Grid, count: in
 
 def find_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> Grid:
     """List the neighbours of sorted particles; return the grid, with larger lists where there was too little room."""
-    most = int(list_neighbors(particles, grid, c, count))
+    most = int(list_neighbors(particles, grid, c, count, grid.lanes))
     if most >= grid.room:
         room = _rounded(most)
         grid = dataclasses.replace(grid, room=room, list=_new_list(grid.order.shape[0], room))
-        list_neighbors(particles, grid, c, count)
+        list_neighbors(particles, grid, c, count, grid.lanes)
     return grid
 
 

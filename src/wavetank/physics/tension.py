@@ -39,7 +39,7 @@ from wavetank.distance import SolidSet, lift, signed_distance, vec3, vec4
 from wavetank.physics.boundary import is_near
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend
-from wavetank.physics.pairs import add_neighbors, column, teams_of, turns
+from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.state import MARGIN, Coefficients, Fluids, Grid, Particles, Scratch, remembered, scalars
@@ -165,8 +165,8 @@ def find_surface(
     count: qd.i32, scale: qd.f32, quiet: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """Find where the surface is and which way it faces: g, without what is noise."""
-    for turn in range(turns(count, grid, lanes)):
-        part = teams_of(turn, count, grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid, lanes)):
+        part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
             add_neighbors(sums, add_gradient, team, particles, tension, grid, c, 0)
@@ -184,8 +184,8 @@ def attract(
     rate: qd.f32, adhesion: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """Find the velocities after the pull of neighbours and solids; `rate` is dt over the largest mass of a particle."""
-    for turn in range(turns(count, grid, lanes)):
-        part = teams_of(turn, count, grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid, lanes)):
+        part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
             add_neighbors(sums, add_pull, team, particles, surface, grid, c, 0)

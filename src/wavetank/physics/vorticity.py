@@ -16,7 +16,7 @@ Eq. 9, is summed in the sweep of XSPH (`viscosity.py`).
 
 from wavetank.compiler import qd
 from wavetank.distance import lift, vec3
-from wavetank.physics.pairs import add_neighbors, column, teams_of, turns
+from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
 from wavetank.physics.smoothing import inverse_length, kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch
 
@@ -40,8 +40,8 @@ def confine_vorticity(
     lanes: qd.template(),
 ):  # fmt: skip
     """Push around every vortex: dv = dt eps_w s (N x omega), N = eta / |eta| (Eq. 10)."""
-    for turn in range(turns(count, grid, lanes)):
-        part = teams_of(turn, count, grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid, lanes)):
+        part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
             first = team * lanes
             last = qd.min(first + lanes, count)

@@ -26,7 +26,7 @@ from wavetank.distance import SolidSet
 from wavetank.physics.boundary import wall_density
 from wavetank.physics.density_constraint import add_density
 from wavetank.physics.diffuse.noise import stream, uniform
-from wavetank.physics.pairs import add_neighbors, column, teams_of, turns
+from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
 from wavetank.physics.places import predicted
 from wavetank.state import Air, Births, Coefficients, Grid, Particles, Walls
 
@@ -74,8 +74,8 @@ def find_surface(
     count: qd.i32, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Set the normals of the surface, except where the water is too slow to matter for a crest."""
-    for turn in range(turns(count, grid, lanes)):
-        part = teams_of(turn, count, grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid, lanes)):
+        part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
             first = team * lanes
             last = qd.min(first + lanes, count)
@@ -144,8 +144,8 @@ def count_births(
     lanes: qd.template(),
 ):  # fmt: skip
     """Draw how many each water particle bears in this frame."""
-    for turn in range(turns(count, grid, lanes)):
-        part = teams_of(turn, count, grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid, lanes)):
+        part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
             potentials = qd.Matrix.zero(qd.f32, 1, lanes)
             add_potentials(potentials, team, births, particles, grid, c, a, count, method)
