@@ -5,12 +5,28 @@ import pytest
 from clouds import Cloud
 
 from wavetank.compiler import qd, upload
+from wavetank.distance import SolidSet
 from wavetank.physics.diffuse.noise import stream, uniform
-from wavetank.physics.diffuse.pool import new_pool, scan
-from wavetank.physics.diffuse.potentials import add_potentials, find_surface, limited
+from wavetank.physics.diffuse.pool import new_pool
+from wavetank.physics.diffuse.potentials import add_potentials, find_normals, limited
+from wavetank.physics.diffuse.sums import sum_up
 from wavetank.physics.diffuse.update import air
 from wavetank.physics.pairs import part_of, teams, turns
-from wavetank.state import Air, Births, Coefficients, Grid, Particles, integers, scalars
+from wavetank.state import Air, Births, Coefficients, Grid, Particles, Walls, integers, scalars
+
+
+@qd.kernel
+def find_surface(
+    births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
+    count: qd.i32, method: qd.template(), lanes: qd.template(),
+):  # fmt: skip
+    for team in range(teams(count, lanes)):
+        find_normals(births, team, particles, grid, solids, walls, c, a, count, method, lanes)
+
+
+@qd.kernel
+def scan(values: qd.types.ndarray(), blocks: qd.types.ndarray(), count: qd.i32, shared: qd.template()):
+    sum_up(values, blocks, count, shared)
 
 
 @qd.kernel
@@ -105,10 +121,11 @@ def test_random_numbers_are_even_and_independent():
     assert np.abs(correlation - np.eye(5)).max() < 0.015
 
 
+@pytest.mark.parametrize("shared", [0, 1])
 @pytest.mark.parametrize("count", [0, 1, 1023, 1024, 1025, 70_000])
-def test_the_scan_is_a_prefix_sum(count):
+def test_the_scan_is_a_prefix_sum(count, shared):
     values = np.random.default_rng(count).integers(0, 5, count)
     device, blocks = integers(count + 1), integers(-(-count // 1024))
     upload(device, values)
-    scan(device, blocks, count)
+    scan(device, blocks, count, shared)
     np.testing.assert_array_equal(device.to_numpy()[: count + 1], np.concatenate([[0], np.cumsum(values)]))

@@ -24,6 +24,7 @@ Where we differ, and why:
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, signed_distance, vec2
 from wavetank.physics.boundary import bodies_in_reach, flattened, stopped
+from wavetank.physics.diffuse.sums import sum_up
 from wavetank.physics.neighbors import for_each_row_around, near_bits
 from wavetank.physics.places import predicted
 from wavetank.state import Air, Births, Coefficients, Diffuse, Grid, Particles
@@ -93,10 +94,13 @@ def kind_in(share):
 
 @qd.kernel(fastcache=True)
 def move(
-    diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients, a: Air,
-    count: qd.i32, gravity: qd.types.vector(3, qd.f32),
+    packed: Diffuse, diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients,
+    a: Air, count: qd.i32, gravity: qd.types.vector(3, qd.f32), shared: qd.template(),
 ):  # fmt: skip
-    """Move everything by one frame, tell anew what is what, and mark who lives on."""
+    """Move everything by one frame, tell anew what is what, and copy those who live on to the front, in their order.
+
+    `births.kept` then ends with their number. Threads share the sums where `shared`.
+    """
     for i in range(count):
         x = diffuse.x[i]
         v = diffuse.v[i]
@@ -131,3 +135,13 @@ def move(
         diffuse.age[i] = age
         # Written so that what is no number ends as well.
         births.kept[i] = qd.cast(age < diffuse.life[i] and target.norm_sqr() < 1e30, qd.i32)
+    sum_up(births.kept, births.blocks, count, shared)
+    for i in range(count):
+        place = births.kept[i]
+        if births.kept[i + 1] > place:
+            packed.x[place] = diffuse.x[i]
+            packed.v[place] = diffuse.v[i]
+            packed.kind[place] = diffuse.kind[i]
+            packed.age[place] = diffuse.age[i]
+            packed.life[place] = diffuse.life[i]
+            packed.id[place] = diffuse.id[i]

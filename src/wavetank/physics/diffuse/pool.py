@@ -12,6 +12,7 @@ from wavetank.compiler import qd, upload
 from wavetank.distance import SolidSet, lift
 from wavetank.physics.diffuse.motion import kind_in, surroundings, water_at
 from wavetank.physics.diffuse.noise import stream, uniform
+from wavetank.physics.diffuse.sums import SCAN_BLOCK
 from wavetank.state import (
     MARGIN,
     Air,
@@ -26,7 +27,6 @@ from wavetank.state import (
     vectors,
 )  # fmt: skip
 
-SCAN_BLOCK = 1024
 #: What a saved state holds of spray, foam and bubbles, and the array of it.
 ROWS = {
     "foam_positions": "x", "foam_velocities": "v", "foam_kinds": "kind", "foam_ages": "age", "foam_lives": "life",
@@ -81,44 +81,6 @@ def pool_from(rows: dict[str, np.ndarray], born: int, capacity: int, dim: int, w
         upload(getattr(pool.now, array), rows[name])
     pool.count, pool.born = len(rows["foam_kinds"]), born
     return pool
-
-
-@qd.kernel(fastcache=True)
-def scan(values: qd.types.ndarray(), blocks: qd.types.ndarray(), count: qd.i32):
-    """Replace the first `count` values by the sums of those before them, and write the total behind."""
-    for b in range((count + 1023) // 1024):
-        total = 0
-        for k in range(b * 1024, qd.min((b + 1) * 1024, count)):
-            total += values[k]
-        blocks[b] = total
-    qd.loop_config(serialize=True)
-    for _ in range(1):
-        total = 0
-        for b in range((count + 1023) // 1024):
-            own = blocks[b]
-            blocks[b] = total
-            total += own
-        values[count] = total
-    for b in range((count + 1023) // 1024):
-        total = blocks[b]
-        for k in range(b * 1024, qd.min((b + 1) * 1024, count)):
-            own = values[k]
-            values[k] = total
-            total += own
-
-
-@qd.kernel(fastcache=True)
-def compact(packed: Diffuse, diffuse: Diffuse, births: Births, count: qd.i32):
-    """Copy those who live on to the front, in their order."""
-    for i in range(count):
-        place = births.kept[i]
-        if births.kept[i + 1] > place:
-            packed.x[place] = diffuse.x[i]
-            packed.v[place] = diffuse.v[i]
-            packed.kind[place] = diffuse.kind[i]
-            packed.age[place] = diffuse.age[i]
-            packed.life[place] = diffuse.life[i]
-            packed.id[place] = diffuse.id[i]
 
 
 @qd.kernel(fastcache=True)

@@ -26,6 +26,7 @@ from wavetank.distance import SolidSet
 from wavetank.physics.boundary import wall_density
 from wavetank.physics.density_constraint import add_density
 from wavetank.physics.diffuse.noise import stream, uniform
+from wavetank.physics.diffuse.sums import sum_up
 from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
 from wavetank.physics.places import predicted
 from wavetank.state import Air, Births, Coefficients, Grid, Particles, Walls
@@ -68,30 +69,27 @@ def outward_normal(i, sum, particles: Particles, solids: SolidSet, walls: Walls,
     return n / steepness if c.h * steepness > 0.5 else p * 0.0
 
 
-@qd.kernel(fastcache=True)
-def find_surface(
-    births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
-    count: qd.i32, method: qd.template(), lanes: qd.template(),
+@qd.func
+def find_normals(
+    births: Births, team, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
+    count, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
-    """Set the normals of the surface, except where the water is too slow to matter for a crest."""
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
-        for team in range(part[0], part[1]):
-            first = team * lanes
-            last = qd.min(first + lanes, count)
-            dim = qd.static(particles.x[team].n)
-            slow = 0.01 * a.speed * a.speed
-            fastest = 0.0
-            for i in range(first, last):
-                fastest = qd.max(fastest, particles.v[i].norm_sqr())
-            sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
-            if fastest > slow:
-                add_neighbors(sums, add_density, team, particles, particles.v, grid, c, method)
-            for i in range(first, last):
-                n = particles.x[i] * 0.0
-                if particles.v[i].norm_sqr() > slow:
-                    n = outward_normal(i, column(sums, i - first), particles, solids, walls, c)
-                births.normal[i] = n
+    """Set the normals of the surface at a team, except where the water is too slow to matter for a crest."""
+    first = team * lanes
+    last = qd.min(first + lanes, count)
+    dim = qd.static(particles.x[team].n)
+    slow = 0.01 * a.speed * a.speed
+    fastest = 0.0
+    for i in range(first, last):
+        fastest = qd.max(fastest, particles.v[i].norm_sqr())
+    sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
+    if fastest > slow:
+        add_neighbors(sums, add_density, team, particles, particles.v, grid, c, method)
+    for i in range(first, last):
+        n = particles.x[i] * 0.0
+        if particles.v[i].norm_sqr() > slow:
+            n = outward_normal(i, column(sums, i - first), particles, solids, walls, c)
+        births.normal[i] = n
 
 
 @qd.func
@@ -140,10 +138,14 @@ def add_potentials(
 
 @qd.kernel(fastcache=True)
 def count_births(
-    births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air, count: qd.i32, method: qd.template(),
-    lanes: qd.template(),
+    births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
+    count: qd.i32, method: qd.template(), lanes: qd.template(), shared: qd.template(),
 ):  # fmt: skip
-    """Draw how many each water particle bears in this frame."""
+    """Draw how many each water particle bears in this frame, and sum them up; threads share the sums where `shared`."""
+    for turn in range(turns(teams(count, lanes), grid, lanes)):
+        part = part_of(turn, teams(count, lanes), grid, lanes)
+        for team in range(part[0], part[1]):
+            find_normals(births, team, particles, grid, solids, walls, c, a, count, method, lanes)
     for turn in range(turns(teams(count, lanes), grid, lanes)):
         part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
@@ -152,3 +154,4 @@ def count_births(
             for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
                 expected = a.made * potentials[0, i - team * lanes]
                 births.first[i] = qd.cast(expected + uniform(stream(a.seed, a.frame, particles.id[i]), 0), qd.i32)
+    sum_up(births.first, births.blocks, count, shared)

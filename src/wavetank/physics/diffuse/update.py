@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 
+from wavetank.compiler import current_backend
 from wavetank.materials import Material
 from wavetank.params import SURFACE_TENSION, Parameters
 from wavetank.physics.diffuse.motion import move
-from wavetank.physics.diffuse.pool import bear, compact, new_pool, scan
-from wavetank.physics.diffuse.potentials import count_births, find_surface
+from wavetank.physics.diffuse.pool import bear, new_pool
+from wavetank.physics.diffuse.potentials import count_births
 from wavetank.physics.smoothing import sigma
 from wavetank.physics.step import World, coefficients, method_number
 from wavetank.physics.time_step import largest_speed
@@ -32,21 +33,16 @@ def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> N
     pool, water, grid, solids, count = world.pool, world.particles, world.grid, world.solids, world.count
     c, method = coefficients(params, dt), method_number(params)
     a = air(params, count, pool.count / pool.capacity, dt, frame)
-    gravity = np.array([*params.gravity, 0.0][:3], np.float32)
+    gravity, shared = np.array([*params.gravity, 0.0][:3], np.float32), int(current_backend() != "cpu")
 
     if pool.count:
-        move(pool.now, pool.births, water, grid, solids, c, a, pool.count, gravity)
-    scan(pool.births.kept, pool.births.blocks, pool.count)
-    if pool.count:
-        compact(pool.spare, pool.now, pool.births, pool.count)
+        move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, pool.count, gravity, shared)
         pool.now, pool.spare = pool.spare, pool.now
 
     makes = count if a.made > 0.0 else 0
     if makes:
         pool.set_reluctance(reluctance(world.materials, params))
-        find_surface(pool.births, water, grid, solids, world.walls, c, a, count, method, grid.lanes)
-        count_births(pool.births, water, grid, c, a, count, method, grid.lanes)
-    scan(pool.births.first, pool.births.blocks, makes)
+        count_births(pool.births, water, grid, solids, world.walls, c, a, count, method, grid.lanes, shared)
     total, births = bear(pool.now, pool.births, water, grid, solids, c, a, makes, pool.count, pool.born)
     pool.count, pool.born = int(total), (pool.born + int(births)) % 2**31
 
