@@ -175,6 +175,9 @@ class Coefficients:
     """Scalars of a substep, from the scene's parameters."""
 
     dt: qd.f32  # s
+    gravity_x: qd.f32  # m/s^2
+    gravity_y: qd.f32
+    gravity_z: qd.f32  # 0 in 2-D
     h: qd.f32  # m, support radius
     inverse_h: qd.f32  # 1/m
     density_scale: qd.f32  # see RestLattice

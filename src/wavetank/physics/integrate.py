@@ -1,7 +1,7 @@
 """The two ends of a position-based step: predict positions, and read velocities off the corrected ones."""
 
 from wavetank.compiler import qd
-from wavetank.distance import SolidSet, lift
+from wavetank.distance import SolidSet, lift, vec3
 from wavetank.physics.boundary import flattened, kept_in_tank, near_bodies, stopped, walls_near
 from wavetank.physics.neighbors import cell_of
 from wavetank.physics.pairs import part_of, teams, turns
@@ -30,8 +30,8 @@ def accelerate(particles: Particles, i, v, c: Coefficients):
 
 @qd.kernel(fastcache=True)
 def predict(
-    particles: Particles, grid: Grid, solids: SolidSet, c: Coefficients, count: qd.i32,
-    gravity: qd.types.vector(3, qd.f32), searched: qd.template(), lanes: qd.template(),
+    particles: Particles, grid: Grid, solids: SolidSet, c: Coefficients, count: qd.i32, searched: qd.template(),
+    lanes: qd.template(),
 ):  # fmt: skip
     """Accelerate, move freely (Algorithm 1, lines 2-3), mark what is near, stay out of it, and find the cell.
 
@@ -39,6 +39,7 @@ def predict(
     are, wherever that is.
     """
     for turn in range(turns(teams(count, lanes), grid, lanes)):
+        gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
         part = part_of(turn, teams(count, lanes), grid, lanes)
         for team in range(part[0], part[1]):
             first = team * lanes

@@ -76,7 +76,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     )  # fmt: skip
 
     searched = int(world.has_solids)
-    predict(now, grid, solids, c, count, np.array([*params.gravity, 0.0][:3], np.float32), searched, grid.lanes)  # 1-4
+    predict(now, grid, solids, c, count, searched, grid.lanes)  # 1-4
 
     sort_particles(now, spare, grid, count)  # 5-7
     now, spare = spare, now
@@ -162,10 +162,7 @@ def has_grid_pressure(world: World, params: Parameters) -> bool:
 def update_densities(world: World, params: Parameters) -> None:
     """Measure the densities [kg/m^3] of `world` as it stands. The order of particles changes, the motion does not."""
     c, method, count = coefficients(params, 0.0), method_number(params), world.count
-    predict(
-        world.particles, world.grid, world.solids, c, count, np.zeros(3, np.float32), int(world.has_solids),
-        world.grid.lanes,
-    )  # fmt: skip
+    predict(world.particles, world.grid, world.solids, c, count, int(world.has_solids), world.grid.lanes)
     sort_particles(world.particles, world.spare, world.grid, count)
     world.particles, world.spare = world.spare, world.particles
     world.grid = find_neighbors(world.particles, world.grid, c, count)
@@ -235,13 +232,16 @@ def method_number(params: Parameters) -> int:
 
 def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf) -> Coefficients:
     """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here."""
-    h = params.support * params.spacing
+    h, gravity = params.support * params.spacing, (*params.gravity, 0.0)
     rest = rest_lattice(params.kernel, params.dim, params.support)
     s_0 = rest.squared_gradients / h**2
     w_dq = float(kernel_shape(NAMES[params.kernel][0], np.array(params.tensile_distance))[0])
     return remembered(
         Coefficients(
             dt=dt,
+            gravity_x=gravity[0],
+            gravity_y=gravity[1],
+            gravity_z=gravity[2],
             h=h,
             inverse_h=1.0 / h,
             density_scale=rest.density_scale,

@@ -22,7 +22,7 @@ Where we differ, and why:
 """
 
 from wavetank.compiler import qd
-from wavetank.distance import SolidSet, lift, signed_distance, vec2
+from wavetank.distance import SolidSet, lift, signed_distance, vec2, vec3
 from wavetank.physics.boundary import bodies_in_reach, flattened, stopped
 from wavetank.physics.diffuse.sums import sum_up
 from wavetank.physics.neighbors import for_each_row_around, near_bits
@@ -95,13 +95,14 @@ def kind_in(share):
 @qd.kernel(fastcache=True)
 def move(
     packed: Diffuse, diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients,
-    a: Air, count: qd.i32, gravity: qd.types.vector(3, qd.f32), shared: qd.template(),
+    a: Air, count: qd.i32, shared: qd.template(),
 ):  # fmt: skip
     """Move everything by one frame, tell anew what is what, and copy those who live on to the front, in their order.
 
     `births.kept` then ends with their number. Threads share the sums where `shared`.
     """
     for i in range(count):
+        gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
         x = diffuse.x[i]
         v = diffuse.v[i]
         # The water has moved already: what is around is asked where the particle gets to.

@@ -33,10 +33,10 @@ def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> N
     pool, water, grid, solids, count = world.pool, world.particles, world.grid, world.solids, world.count
     c, method = coefficients(params, dt), method_number(params)
     a = air(params, count, pool.count / pool.capacity, dt, frame)
-    gravity, shared = np.array([*params.gravity, 0.0][:3], np.float32), int(current_backend() != "cpu")
+    shared = int(current_backend() != "cpu")
 
     if pool.count:
-        move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, pool.count, gravity, shared)
+        move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, pool.count, shared)
         pool.now, pool.spare = pool.spare, pool.now
 
     makes = count if a.made > 0.0 else 0
