@@ -60,7 +60,7 @@ class Parameters(Model):
     support: float = parameter(1.9, 1.2, 3.0, "d", "h/d", "Support radius of the smoothing kernel.", live=False)
     kernel: KernelName = parameter("spiky", None, None, "", "W", "Smoothing kernel; poly6-spiky takes one for the density and the other for its gradient.", live=False)
     frame_time: float = parameter(1 / 60, 1e-5, 1.0, "s", "T", "Time of water in one frame.", live=False)
-    substeps: int = parameter(2, 1, 100, "", "n", "Time steps in a frame, at least.")
+    substeps: int = parameter(1, 1, 100, "", "n", "Time steps in a frame, at least.")
     courant: float = parameter(0.8, 0.05, 100.0, "d", "CFL", "Way that the fastest particle may go in a time step; more time steps are taken to keep it.")
     wave_courant: float = parameter(0.35, 0.05, 100.0, "d", "", "Way that the fastest gravity wave, sqrt(g depth), may go in a time step where no grid carries the pressure: how much deep water may compress.")
     largest_substeps: int = parameter(32, 1, 1000, "", "", "Time steps in a frame, at most: what keeps fast scenes affordable.")

@@ -13,20 +13,37 @@ Pressure from a grid, details from the particles: Zhu and Bridson 2005 (10.1145/
 al. 2014 (10.1111/cgf.12324) for SPH. Where we differ: the right side is the error of the particles' own densities, so
 that volume does not drift, and it is the positions that are moved. The sums are of whole numbers, so that runs repeat
 bit for bit. What was tried, and what it gives: docs/method.md.
+
+In time. A correction at the end of a step is implicit Euler, which damps waves by half of omega^2 dt. Each particle
+therefore carries what the grid accelerated it by, `a`, and the share w = `CARRIED` of it acts in the next prediction;
+the grid corrects what that leaves. What acts is then the sum of (1 - w) w^n times the acceleration that was found n
+steps ago, w / (1 - w) steps late on average. With w = 1/2 that is one step, and just what takes a velocity from half a
+step before a place to half a step behind it, as v = (p - x) / dt is: leapfrog, of second order, and waves keep their
+height. Below, the share (1 - 2 w) / (1 - w) of the damping stays. It is stable for every omega dt, and modes that are
+much stiffer than a step are stopped at once, as without it. No more than `LARGEST_CARRIED` times gravity is carried, so
+that water that hits a wall does not bounce.
+
+At walls. Layers of a wall that move with a particle by the share s of its way (`WALL_STIFFENING`) answer it with
+(1 + s) / 2 of the density that water would (`half_space`). The grid is told the rest, which is `MISSING` times what the
+way of this step has added. As it is the way and not the place that counts, water at rest feels nothing of it.
 """
 
 from wavetank.compiler import qd
-from wavetank.distance import SolidSet, lift, signed_distance, vec3
-from wavetank.physics.boundary import flattened, kept_in_tank
+from wavetank.distance import SolidSet, lift, plane_distance, rotate, signed_distance, to_local, vec3, vec4
+from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
 from wavetank.physics.coarse_grid import coordinates, corners, in_cells, tents
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.poisson import LEAST_THETA, couple_node, solve_levels
-from wavetank.state import CoarseGrid, Coefficients, Particles, Scratch
+from wavetank.physics.smoothing import WALL_STIFFENING
+from wavetank.state import CoarseGrid, Coefficients, Particles, Scratch, Walls
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 LEAST_OPEN = 0.1  # a cell that is less open is solid
-INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
+INNER = (0.55, 0.75)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 REACH = 0.2  # of the support: the longest correction
+CARRIED = 0.36  # of the pressure of the last step, w above
+LARGEST_CARRIED = 1.5  # of gravity
+MISSING = (1.0 - WALL_STIFFENING) / (1.0 + WALL_STIFFENING)  # of a wall's answer, over what it gives
 
 
 @qd.kernel(fastcache=True)
@@ -73,14 +90,41 @@ def gather_fill(
         grid.mass_sum[n] = 0
 
 
+@qd.func
+def approached(x, p, near, solids: SolidSet, walls: Walls, c: Coefficients, searched: qd.template()):
+    """Relative density that the marked solids have added on the way from `x` to `p`, in their motion."""
+    added, free = 0.0, 1.0
+    k = next_near(near, -1, solids.count)
+    while k < (solids.count if qd.static(searched) else solids.tank_count):
+        value = vec4(0.0, 0.0, 0.0, 0.0)
+        way = p - x
+        if qd.static(searched):
+            value = signed_distance(solids, k, p)
+            if k >= solids.tank_count:
+                own = to_local(solids.old_position[k], solids.old_rotation[k], x)
+                way = p - solids.position[k] - rotate(solids.rotation[k], own)
+        else:
+            value = plane_distance(solids, k, p)
+        if value.w < c.h:
+            share = wall_share(walls, value.w, c.h) * c.wall_density
+            inward = -way.dot(vec3(value.x, value.y, value.z))
+            added = added * (1.0 - share[0]) + inward * free * share[1] / c.h
+            free *= 1.0 - share[0]
+        k = next_near(near, k, solids.count)
+    return added
+
+
 @qd.kernel(fastcache=True)
 def gather_errors(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, unit: qd.f32, scale: qd.f32, inner_from: qd.f32,
-    inner_to: qd.f32, least_open: qd.f32, least_theta: qd.f32, count: qd.i32,
+    inner_to: qd.f32, least_open: qd.f32, least_theta: qd.f32, solids: SolidSet, walls: Walls, c: Coefficients,
+    missing: qd.f32, count: qd.i32, searched: qd.template(),
 ):  # fmt: skip
     """Sum the density errors (Eq. 2) of the particles inside of the water at the nodes, and set up the equation.
 
-    `scale` is the volume of a particle over that of a cell, over the unit and over the stiffness M.
+    What solids answer to the way of a particle is increased by the share `missing`; there are others than the walls of
+    the tank where they are `searched`. `scale` is the volume of a particle over that of a cell, over the unit and over
+    the stiffness M.
     """
     for i in range(count):
         p = predicted(particles, i)
@@ -91,7 +135,11 @@ def gather_errors(
         for k in qd.static(range(2**p.n)):
             filled += weights[k] * grid.fill[at[k]]
         inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
-        error = unit * inside * qd.min(qd.max(scratch.rho[i] * scratch.weight[i] - 1.0, -1.0), 1.0)
+        error = scratch.rho[i] * scratch.weight[i] - 1.0
+        near = particles.near[i]
+        if near != 0:
+            error += missing * approached(lift(particles.x[i]), lift(p), near, solids, walls, c, searched)
+        error = unit * inside * qd.min(qd.max(error, -1.0), 1.0)
         for k in qd.static(range(2**p.n)):
             qd.atomic_add(grid.error_sum[at[k]], qd.cast(qd.round(error * weights[k]), qd.i32))
     for n in range(grid.nx * grid.ny * grid.nz):
@@ -122,7 +170,7 @@ def move_particles(
     grid: CoarseGrid, particles: Particles, solids: SolidSet, c: Coefficients, stiffness: qd.f32, reach: qd.f32,
     count: qd.i32,
 ):  # fmt: skip
-    """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank."""
+    """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank, and carry it on."""
     for n in range(grid.nx * grid.ny * grid.nz):
         lam = grid.lam[n]
         grid.slope_x[n] = grid.wx[n] * grid.dx * (grid.lam[n + 1] - lam)
@@ -137,7 +185,10 @@ def move_particles(
         if qd.static(p.n == 3):
             dp[2] = slope_along(grid, grid.slope_z, grid.wz, s, 2, p.n)
         dp *= stiffness
-        p += dp * qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
+        dp *= qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
+        p += dp
+        a = particles.a[i] + dp / (c.dt * c.dt)
+        particles.a[i] = a * qd.min(1.0, c.largest_carried / qd.max(a.norm(), 1e-12))
         near = particles.near[i]
         if near != 0:
             p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
@@ -145,7 +196,7 @@ def move_particles(
 
 
 def correct_pressure(
-    levels: list[CoarseGrid], particles: Particles, scratch: Scratch, solids: SolidSet, c: Coefficients,
+    levels: list[CoarseGrid], particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     stiffness: float, volume: float, count: int, share: float, *, searched: bool, mixed: bool,
 ) -> None:  # fmt: skip
     """Move the predicted positions of `particles` so that the `share` of the mean errors of their densities vanishes.
@@ -155,6 +206,9 @@ def correct_pressure(
     finest = levels[0]
     scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
     gather_fill(finest, particles, scratch, solids, UNIT, scale, LEAST_OPEN, count, int(searched), int(mixed))
-    gather_errors(finest, particles, scratch, UNIT, share * scale / stiffness, *INNER, LEAST_OPEN, LEAST_THETA, count)
+    gather_errors(
+        finest, particles, scratch, UNIT, share * scale / stiffness, *INNER, LEAST_OPEN, LEAST_THETA, solids, walls, c,
+        MISSING, count, int(searched),
+    )  # fmt: skip
     solve_levels(levels)
     move_particles(finest, particles, solids, c, stiffness, REACH * c.h, count)

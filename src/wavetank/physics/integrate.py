@@ -34,14 +34,19 @@ def predict(
 ):  # fmt: skip
     """Accelerate, move freely (Algorithm 1, lines 2-3), mark what is near, stay out of it, and find the cell.
 
-    Where solids are not `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they
-    are, wherever that is.
+    With gravity acts the share of the grid's pressure that is carried on (`coarse_pressure.py`). Where solids are not
+    `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they are, wherever that
+    is.
     """
     for i in range(count):
         x = particles.x[i]
         v = particles.v[i]
         for k in qd.static(range(x.n)):
             v[k] += c.dt * gravity[k]
+        if c.dt > 0.0:
+            a = c.carried * particles.a[i]
+            v += c.dt * a
+            particles.a[i] = a
         particles.v[i] = v
         p = free_motion(x, v, c)
         near = near_walls(lift(x), lift(p), solids, c.h)
