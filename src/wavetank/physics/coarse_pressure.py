@@ -23,9 +23,10 @@ height. Below, the share (1 - 2 w) / (1 - w) of the damping stays. It is stable 
 much stiffer than a step are stopped at once, as without it. No more than `LARGEST_CARRIED` times gravity is carried, so
 that water that hits a wall does not bounce.
 
-At walls. Layers of a wall that move with a particle by the share s of its way (`WALL_STIFFENING`) answer it with
-(1 + s) / 2 of the density that water would (`half_space`). The grid is told the rest, which is `MISSING` times what the
-way of this step has added. As it is the way and not the place that counts, water at rest feels nothing of it.
+At walls. Layers of a wall that move with a particle by half of its way (`smoothing.WALL_STIFFENING`) answer it with 3/4
+of the density that water would, so that the grid removed only 3/4 of what runs into a wall in a step, and water at rest
+made up for it by standing too close. The grid is told most of the rest: `MISSING` times what the way of this step has
+added. As it is the way that counts and not the place, it does not shift where water rests.
 """
 
 from wavetank.compiler import qd
@@ -34,16 +35,15 @@ from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_s
 from wavetank.physics.coarse_grid import coordinates, corners, in_cells, tents
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.poisson import LEAST_THETA, couple_node, solve_levels
-from wavetank.physics.smoothing import WALL_STIFFENING
 from wavetank.state import CoarseGrid, Coefficients, Particles, Scratch, Walls
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 LEAST_OPEN = 0.1  # a cell that is less open is solid
-INNER = (0.55, 0.75)  # from where to where `fill` lets a particle count: near a surface its density says nothing
+INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 REACH = 0.2  # of the support: the longest correction
 CARRIED = 0.36  # of the pressure of the last step, w above
-LARGEST_CARRIED = 1.5  # of gravity
-MISSING = (1.0 - WALL_STIFFENING) / (1.0 + WALL_STIFFENING)  # of a wall's answer, over what it gives
+LARGEST_CARRIED = 1.2  # of gravity
+MISSING = 0.2  # of a wall's answer, over what it gives; 1/3 would be all, see docs/method.md
 
 
 @qd.kernel(fastcache=True)
