@@ -43,7 +43,7 @@ INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a 
 REACH = 0.2  # of the support: the longest correction
 CARRIED = 0.36  # of the pressure of the last step, w above
 LARGEST_CARRIED = 1.2  # of gravity
-MISSING = 0.2  # of a wall's answer, over what it gives; 1/3 would be all, see docs/method.md
+MISSING = 0.18  # of a wall's answer, over what it gives; 1/3 would be all, see docs/method.md
 
 
 @qd.kernel(fastcache=True)
