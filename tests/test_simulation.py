@@ -53,7 +53,7 @@ def test_free_fall_is_exact(dim):
     world = wt.Scene(spacing=0.1, courant=100, gravity=g, fluids=[wt.Points(positions=[(0.0,) * dim])])
     sim = Simulation(world)
     sim.advance(1.0)
-    n = 60 * sim.substeps
+    n = 60 * sim.time_steps
     dt = 1 / n
     np.testing.assert_allclose(sim.velocities[0], np.array(g) * n * dt, rtol=2e-6)
     np.testing.assert_allclose(sim.positions[0], np.array(g) * dt**2 * n * (n + 1) / 2, rtol=2e-5)

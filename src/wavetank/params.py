@@ -60,11 +60,11 @@ class Parameters(Model):
     support: float = parameter(1.9, 1.2, 3.0, "d", "h/d", "Support radius of the smoothing kernel.", live=False)
     kernel: KernelName = parameter("spiky", None, None, "", "W", "Smoothing kernel; poly6-spiky takes one for the density and the other for its gradient.", live=False)
     frame_time: float = parameter(1 / 60, 1e-5, 1.0, "s", "T", "Time of water in one frame.", live=False)
-    substeps: int = parameter(2, 1, 100, "", "n", "Time steps in a frame, at least.")
+    substeps: int = parameter(1, 1, 100, "", "n", "Time steps in a frame, at least.")
     courant: float = parameter(0.8, 0.05, 100.0, "d", "CFL", "Way that the fastest particle may go in a time step; more time steps are taken to keep it.")
     wave_courant: float = parameter(0.35, 0.05, 100.0, "d", "", "Way that the fastest gravity wave, sqrt(g depth), may go in a time step where no grid carries the pressure: how much deep water may compress.")
     largest_substeps: int = parameter(32, 1, 1000, "", "", "Time steps in a frame, at most: what keeps fast scenes affordable.")
-    iterations: int = parameter(4, 1, 100, "", "", "Solver iterations in a time step.")
+    iterations: int = parameter(5, 1, 100, "", "", "Solver iterations in a time step.")
     relaxation: float = parameter(1.0, 0.1, 3.0, "", "omega", "First relaxation of a time step, in units of the largest that damps every mode.")
     slowest_mode: float = parameter(0.15, 0.0, 0.5, "", "a", "Lower end of the eigenvalues that four iterations damp evenly (Chebyshev); 0 is plain Jacobi.")
     force_mixing: float = parameter(0.01, 0.0, 1e4, "S_0", "eps", "Constraint force mixing (Eq. 5), relative to the sum of squared gradients in the rest lattice.")
@@ -157,5 +157,5 @@ PRESETS: dict[str, dict[str, Any]] = {
 QUALITIES: dict[str, dict[str, Any]] = {
     "draft": {"substeps": 1, "iterations": 3, "wave_courant": 0.6, "courant": 0.9},
     "standard": {},
-    "high": {"substeps": 4, "wave_courant": 0.2, "courant": 0.4},
+    "high": {"substeps": 4, "iterations": 4, "wave_courant": 0.2, "courant": 0.4},
 }

@@ -17,7 +17,7 @@ from wavetank.solid import Solid
 if TYPE_CHECKING:
     from wavetank.simulation import Simulation
 
-ARRAYS = ("x", "v", "id", "dye", "frozen", "material")  # of the particles, in device order
+ARRAYS = ("x", "v", "a", "id", "dye", "frozen", "material")  # of the particles, in device order
 NUMBERS = (
     "time", "frame_number", "owed", "next_id", "frozen_count", "fastest_start", "fastest_solid", "fastest_force",
     "capacity", "start_box", "foam_born", "foam_capacity",

@@ -32,6 +32,7 @@ class Particles:
     py: qd.types.ndarray()  # likewise
     pz: qd.types.ndarray()  # likewise; unused in 2-D
     v: qd.types.ndarray()  # vec [capacity], m/s
+    a: qd.types.ndarray()  # vec [capacity], m/s^2: by the pressure of the grid, see `physics/coarse_pressure.py`
     id: qd.types.ndarray()  # i32 [capacity]: name of the particle for life; those of removed ones are not used again
     material: qd.types.ndarray()  # i32 [capacity]: number of its material
     near: qd.types.ndarray()  # i32 [capacity]: bit k is set where solid k is near, bit 30 for all solids from 30 on
@@ -194,6 +195,8 @@ class Coefficients:
     coherence: qd.f32
     calm: qd.f32  # 1/s, vorticity of water at rest
     speed_limit: qd.f32  # m/s
+    carried: qd.f32  # share of the grid's pressure that is carried on
+    largest_carried: qd.f32  # m/s^2, of what is carried on
     wall_density: qd.f32
     wall_gap: qd.f32  # m
     skin: qd.f32 = 0.0  # m^(dim - 2), see physics/tension.py
@@ -250,7 +253,8 @@ def new_particles(dim: int, capacity: int) -> Particles:
     places[capacity] = NOWHERE
     for component in (px, py, pz)[:dim]:
         upload(component, places)
-    return Particles(vectors(dim, rows), px, py, pz, vectors(dim, rows), *(integers(rows) for _ in range(5)))
+    x, v, a = (vectors(dim, rows) for _ in range(3))
+    return Particles(x, px, py, pz, v, a, *(integers(rows) for _ in range(5)))
 
 
 def new_scratch(capacity: int) -> Scratch:

@@ -150,7 +150,7 @@ def test_layers_of_different_density_rest():
     sim = Simulation(scene)
     assert has_grid_pressure(sim.world, sim.scene)
     assert rms_speed(sim, 1.0) < 0.02
-    assert sim.time_steps == 2
+    assert sim.time_steps == 1
 
 
 def test_the_grid_is_for_gravity():

@@ -13,21 +13,38 @@ Pressure from a grid, details from the particles: Zhu and Bridson 2005 (10.1145/
 al. 2014 (10.1111/cgf.12324) for SPH. Where we differ: the right side is the error of the particles' own densities, so
 that volume does not drift, and it is the positions that are moved. The sums are of whole numbers, so that runs repeat
 bit for bit. What was tried, and what it gives: docs/method.md.
+
+In time. A correction at the end of a step is implicit Euler, which damps waves by half of omega^2 dt. Each particle
+therefore carries what the grid accelerated it by, `a`, and the share w = `CARRIED` of it acts in the next prediction;
+the grid corrects what that leaves. What acts is then the sum of (1 - w) w^n times the acceleration that was found n
+steps ago, w / (1 - w) steps late on average. With w = 1/2 that is one step, and just what takes a velocity from half a
+step before a place to half a step behind it, as v = (p - x) / dt is: leapfrog, of second order, and waves keep their
+height. Below, the share (1 - 2 w) / (1 - w) of the damping stays. It is stable for every omega dt, and modes that are
+much stiffer than a step are stopped at once, as without it. No more than `LARGEST_CARRIED` times gravity is carried, so
+that water that hits a wall does not bounce.
+
+At walls. Layers of a wall that move with a particle by half of its way (`smoothing.WALL_STIFFENING`) answer it with 3/4
+of the density that water would, so that the grid removed only 3/4 of what runs into a wall in a step, and water at rest
+made up for it by standing too close. The grid is told most of the rest: `MISSING` times what the way of this step has
+added. As it is the way that counts and not the place, it does not shift where water rests.
 """
 
 from wavetank.compiler import qd
-from wavetank.distance import SolidSet, lift, signed_distance, vec3
-from wavetank.physics.boundary import flattened, kept_in_tank
+from wavetank.distance import SolidSet, lift, plane_distance, rotate, signed_distance, to_local, vec3, vec4
+from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
 from wavetank.physics.coarse_grid import coordinates, corners, in_cells, tents
 from wavetank.physics.pairs import column, teams
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.poisson import LEAST_THETA, couple_node, solve_levels
-from wavetank.state import CoarseGrid, Coefficients, Particles, Scratch
+from wavetank.state import CoarseGrid, Coefficients, Particles, Scratch, Walls
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 LEAST_OPEN = 0.1  # a cell that is less open is solid
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 REACH = 0.2  # of the support: the longest correction
+CARRIED = 0.36  # of the pressure of the last step, w above
+LARGEST_CARRIED = 1.2  # of gravity
+MISSING = 0.18  # of a wall's answer, over what it gives; 1/3 would be all, see docs/method.md
 
 
 @qd.func
@@ -68,15 +85,48 @@ def add_fill(
 
 
 @qd.func
+def approached(x, p, near, solids: SolidSet, walls: Walls, c: Coefficients, searched: qd.template()):
+    """Relative density that the marked solids have added on the way from `x` to `p`, in their motion."""
+    added, free = 0.0, 1.0
+    k = next_near(near, -1, solids.count)
+    while k < (solids.count if qd.static(searched) else solids.tank_count):
+        value = vec4(0.0, 0.0, 0.0, 0.0)
+        way = p - x
+        if qd.static(searched):
+            value = signed_distance(solids, k, p)
+            if k >= solids.tank_count:
+                own = to_local(solids.old_position[k], solids.old_rotation[k], x)
+                way = p - solids.position[k] - rotate(solids.rotation[k], own)
+        else:
+            value = plane_distance(solids, k, p)
+        if value.w < c.h:
+            share = wall_share(walls, value.w, c.h) * c.wall_density
+            inward = -way.dot(vec3(value.x, value.y, value.z))
+            added = added * (1.0 - share[0]) + inward * free * share[1] / c.h
+            free *= 1.0 - share[0]
+        k = next_near(near, k, solids.count)
+    return added
+
+
+@qd.func
 def add_errors(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, team, part, unit, inner_from, inner_to, count,
-    lanes: qd.template(), alone: qd.template(),
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, team,
+    part, unit, inner_from, inner_to, missing, count, searched: qd.template(), lanes: qd.template(),
+    alone: qd.template(),
 ):  # fmt: skip
     """Add the tents of a team's particles, if inside of the water, times their errors (Eq. 2) to a `part`'s sums."""
     first = team * lanes
     dim = qd.static(particles.x[first].n)
     at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
     amounts = qd.Matrix.zero(qd.i32, 2**dim, lanes)
+    added = qd.Matrix.zero(qd.f32, 1, lanes)
+    for i in range(first, qd.min(first + lanes, count)):
+        near = particles.near[i]
+        if near != 0:
+            x = lift(particles.x[i])
+            added[0, i - first] = missing * approached(
+                x, lift(predicted(particles, i)), near, solids, walls, c, searched
+            )
     for lane in range(lanes):
         s = in_cells(grid, predicted(particles, first + lane))
         nodes = corners(grid, qd.floor(s, qd.i32), dim)
@@ -86,7 +136,7 @@ def add_errors(
             filled += weights[k] * grid.fill[nodes[k]]
         inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
         density = scratch.rho[first + lane] * scratch.weight[first + lane]
-        error = unit * inside * qd.min(qd.max(density - 1.0, -1.0), 1.0)
+        error = unit * inside * qd.min(qd.max(density - 1.0 + added[0, lane], -1.0), 1.0)
         for k in qd.static(range(2**dim)):
             at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
             amounts[k, lane] = qd.cast(qd.round(error * weights[k]), qd.i32)
@@ -125,14 +175,16 @@ def open_share(grid: CoarseGrid, solids: SolidSet, n):
 
 @qd.kernel(fastcache=True)
 def gather(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, unit: qd.f32, volume: qd.f32,
-    scale: qd.f32, inner_from: qd.f32, inner_to: qd.f32, least_open: qd.f32, least_theta: qd.f32, count: qd.i32,
-    searched: qd.template(), mixed: qd.template(), parts: qd.template(), lanes: qd.template(),
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
+    unit: qd.f32, volume: qd.f32, scale: qd.f32, inner_from: qd.f32, inner_to: qd.f32, missing: qd.f32,
+    least_open: qd.f32, least_theta: qd.f32, count: qd.i32, searched: qd.template(), mixed: qd.template(),
+    parts: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Sum the tents of all particles at the nodes, then their density errors (Eq. 2), and set up the equation.
 
     The sums are 0 before. `volume` is that of a particle over that of a cell and over the `unit`, `scale` the same over
-    the stiffness M. Solids take their share of a cell where they are `searched`; else there are only the walls of the
+    the stiffness M. What solids answer to the way of a particle is increased by the share `missing`. Solids take their
+    share of a cell where they are `searched`; else there are only the walls of the
     tank, which end where the cells do. Where fluids are `mixed`, their densities are averaged.
 
     Each of several `parts` of the particles has sums of its own, so that threads need not wait for each other.
@@ -160,13 +212,19 @@ def gather(
             grid.density[n] = qd.max(mass, 1) / qd.cast(qd.max(total, 1), qd.f32)
     if qd.static(parts == 1):
         for team in range(teams(count, lanes)):
-            add_errors(grid, particles, scratch, team, 0, unit, inner_from, inner_to, count, lanes, 0)
+            add_errors(
+                grid, particles, scratch, solids, walls, c, team, 0, unit, inner_from, inner_to, missing, count,
+                searched, lanes, 0,
+            )  # fmt: skip
     else:
         for turn in range(512 * parts):
             part, all_teams = turn // 512, teams(count, lanes)
             if turn % 512 == 0:
                 for team in range(all_teams * part // parts, all_teams * (part + 1) // parts):
-                    add_errors(grid, particles, scratch, team, part, unit, inner_from, inner_to, count, lanes, 1)
+                    add_errors(
+                        grid, particles, scratch, solids, walls, c, team, part, unit, inner_from, inner_to, missing,
+                        count, searched, lanes, 1,
+                    )  # fmt: skip
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, parts)
         grid.rhs[n] = scale * total / qd.max(grid.room[n], least_open)
@@ -202,7 +260,7 @@ def move_particles(
     grid: CoarseGrid, particles: Particles, solids: SolidSet, c: Coefficients, stiffness: qd.f32, reach: qd.f32,
     count: qd.i32, lanes: qd.template(),
 ):  # fmt: skip
-    """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank."""
+    """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank, and carry it on."""
     for n in range(grid.nx * grid.ny * grid.nz):
         lam = grid.lam[n]
         grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
@@ -221,7 +279,10 @@ def move_particles(
         for i in range(first, qd.min(first + lanes, count)):
             p = predicted(particles, i)
             dp = column(slopes, i - first) * stiffness
-            p += dp * qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
+            dp *= qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
+            p += dp
+            a = particles.a[i] + dp / (c.dt * c.dt)
+            particles.a[i] = a * qd.min(1.0, c.largest_carried / qd.max(a.norm(), 1e-12))
             near = particles.near[i]
             if near != 0:
                 p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
@@ -229,7 +290,7 @@ def move_particles(
 
 
 def correct_pressure(
-    levels: list[CoarseGrid], particles: Particles, scratch: Scratch, solids: SolidSet, c: Coefficients,
+    levels: list[CoarseGrid], particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     stiffness: float, volume: float, count: int, share: float, *, searched: bool, mixed: bool,
 ) -> None:  # fmt: skip
     """Move the predicted positions of `particles` so that the `share` of the mean errors of their densities vanishes.
@@ -239,8 +300,8 @@ def correct_pressure(
     finest = levels[0]
     scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
     gather(
-        finest, particles, scratch, solids, UNIT, scale, share * scale / stiffness, *INNER, LEAST_OPEN, LEAST_THETA,
-        count, int(searched), int(mixed), finest.parts, finest.lanes,
+        finest, particles, scratch, solids, walls, c, UNIT, scale, share * scale / stiffness, *INNER, MISSING,
+        LEAST_OPEN, LEAST_THETA, count, int(searched), int(mixed), finest.parts, finest.lanes,
     )  # fmt: skip
     solve_levels(levels)
     move_particles(finest, particles, solids, c, stiffness, REACH * c.h, count, finest.lanes)

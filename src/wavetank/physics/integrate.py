@@ -35,8 +35,9 @@ def predict(
 ):  # fmt: skip
     """Accelerate, move freely (Algorithm 1, lines 2-3), mark what is near, stay out of it, and find the cell.
 
-    Where solids are not `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they
-    are, wherever that is.
+    With gravity acts the share of the grid's pressure that is carried on (`coarse_pressure.py`). Where solids are not
+    `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they are, wherever that
+    is.
     """
     for turn in range(turns(teams(count, lanes), grid, lanes)):
         gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
@@ -49,9 +50,10 @@ def predict(
             for lane in range(lanes):
                 x = particles.x[first + lane]
                 v = particles.v[first + lane]
+                a = particles.a[first + lane]
                 for k in qd.static(range(x.n)):
                     origins[k, lane] = x[k]
-                    targets[k, lane] = x[k] + c.dt * (v[k] + c.dt * gravity[k])
+                    targets[k, lane] = x[k] + c.dt * (v[k] + c.dt * (gravity[k] + c.carried * a[k]))
             walls = qd.Matrix.zero(qd.i32, 1, lanes)
             nearest = qd.Matrix.zero(qd.f32, 1, lanes) + 1e9
             walls_near(walls, nearest, origins, targets, solids, c.h)
@@ -60,6 +62,10 @@ def predict(
                 v = particles.v[i]
                 for k in qd.static(range(x.n)):
                     v[k] += c.dt * gravity[k]
+                if c.dt > 0.0:
+                    a = c.carried * particles.a[i]
+                    v += c.dt * a
+                    particles.a[i] = a
                 particles.v[i] = v
                 p = free_motion(x, v, c)
                 near = walls[0, i - first]

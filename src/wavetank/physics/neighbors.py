@@ -126,6 +126,7 @@ def copy_particle(target: Particles, to, source: Particles, i):
     target.x[to] = source.x[i]
     predict_at(target, to, predicted(source, i))
     target.v[to] = source.v[i]
+    target.a[to] = source.a[i]
     target.id[to] = source.id[i]
     target.material[to] = source.material[i]
     target.near[to] = source.near[i]

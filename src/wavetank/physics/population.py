@@ -18,7 +18,7 @@ from wavetank.physics.neighbors import copy_particle
 from wavetank.physics.places import predict_at
 from wavetank.state import Grid, Particles, integers, new_particles, vectors
 
-_FIELDS = ("x", "v", "id", "material", "near", "dye", "frozen")
+_FIELDS = ("x", "v", "a", "id", "material", "near", "dye", "frozen")
 
 
 @qd.func
@@ -85,6 +85,7 @@ def append_rows(
     for i in range(count):
         particles.x[first + i] = x[i]
         particles.v[first + i] = v[i]
+        particles.a[first + i] = 0.0 * v[i]
         particles.id[first + i] = first_id + i
         particles.near[first + i] = 0
         particles.dye[first + i] = dye[i]

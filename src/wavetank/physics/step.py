@@ -15,7 +15,7 @@ from wavetank.distance import SolidSet
 from wavetank.materials import Material
 from wavetank.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids
-from wavetank.physics.coarse_pressure import correct_pressure
+from wavetank.physics.coarse_pressure import CARRIED, LARGEST_CARRIED, correct_pressure
 from wavetank.physics.density_constraint import (
     correct_positions,
     measure_density,
@@ -70,7 +70,8 @@ class World:
 
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
     """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
-    c, method, count = coefficients(params, dt, speed_limit), method_number(params), world.count
+    on_grid, method, count = has_grid_pressure(world, params), method_number(params), world.count
+    c = coefficients(params, dt, speed_limit, carried=CARRIED if on_grid else 0.0)
     now, spare, scratch, grid, solids, walls = (
         world.particles, world.spare, world.scratch, world.grid, world.solids, world.walls,
     )  # fmt: skip
@@ -84,7 +85,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     kinds = prepare_fluids(world, now, params, dt)
     if act_on_fluids(world, now, kinds, params, c):
         keep_out_of_solids(now, solids, c, count)
-    if has_grid_pressure(world, params):
+    if on_grid:
         correct_on_grid(world, now, kinds, params, c)
 
     tensile, lanes = int(params.tensile_strength > 0.0), grid.lanes
@@ -120,8 +121,8 @@ def correct_on_grid(world: World, particles: Particles, kinds: Blend, params: Pa
     )
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     correct_pressure(
-        world.levels, particles, world.scratch, world.solids, c, stiffness, params.spacing**params.dim, count,
-        params.grid_pressure, searched=world.has_solids, mixed=bool(kinds.mixed),
+        world.levels, particles, world.scratch, world.solids, world.walls, c, stiffness, params.spacing**params.dim,
+        count, params.grid_pressure, searched=world.has_solids, mixed=bool(kinds.mixed),
     )  # fmt: skip
 
 
@@ -230,7 +231,7 @@ def method_number(params: Parameters) -> int:
     return number
 
 
-def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf) -> Coefficients:
+def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf, *, carried: float = 0.0) -> Coefficients:
     """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here."""
     h, gravity = params.support * params.spacing, (*params.gravity, 0.0)
     rest = rest_lattice(params.kernel, params.dim, params.support)
@@ -258,6 +259,8 @@ def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf) -
             coherence=params.vorticity_coherence,
             calm=CALM * math.sqrt(math.hypot(*params.gravity) / h),
             speed_limit=speed_limit,
+            carried=carried,
+            largest_carried=LARGEST_CARRIED * math.hypot(*params.gravity),
             wall_density=params.wall_density,
             wall_gap=params.wall_gap * params.spacing,
         )

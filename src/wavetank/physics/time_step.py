@@ -23,16 +23,21 @@ from wavetank.compiler import qd
 from wavetank.params import Parameters
 from wavetank.state import Particles
 
+SHALLOWEST = 0.6  # d: way in a frame of the wave that water without a grid is taken to have, however shallow
 LEVELS = 64  # whole steps of height that are summed; their rounding cancels
 
 
 def substeps(params: Parameters, duration: float, speed: float, depth: float, *, on_grid: bool) -> int:
-    """Return the number of time steps for `duration` [s]. Pressure that is solved `on_grid` reaches any depth."""
+    """Return the number of time steps for `duration` [s]. Pressure that is solved `on_grid` reaches any depth.
+
+    Where iterations alone carry it, the shallowest water needs two a frame by default.
+    """
     gravity = math.hypot(*params.gravity)
     usual = params.substeps * duration / params.frame_time
     for_speed = (speed + duration * gravity) * duration / (params.courant * params.spacing)
     for_waves = 0.0 if on_grid else math.sqrt(gravity * depth) * duration / (params.wave_courant * params.spacing)
-    steps = (usual, min(for_speed, params.largest_substeps), for_waves)
+    alone = 0.0 if on_grid else SHALLOWEST / params.wave_courant * duration / params.frame_time
+    steps = (usual, min(max(for_speed, alone), params.largest_substeps), for_waves)
     return max(1, *(math.ceil(n - 1e-6) for n in steps))
 
 
