@@ -33,10 +33,10 @@ from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, plane_distance, rotate, signed_distance, to_local, vec3, vec4
 from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
 from wavetank.physics.coarse_grid import coordinates, corners, in_cells, tents
-from wavetank.physics.pairs import column, teams
+from wavetank.physics.pairs import column, part_of, teams, turns
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.poisson import LEAST_THETA, couple_node, solve_levels
-from wavetank.state import CoarseGrid, Coefficients, Particles, Scratch, Walls
+from wavetank.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 LEAST_OPEN = 0.1  # a cell that is less open is solid
@@ -257,8 +257,8 @@ def slope_along(grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), 
 
 @qd.kernel(fastcache=True)
 def move_particles(
-    grid: CoarseGrid, particles: Particles, solids: SolidSet, c: Coefficients, stiffness: qd.f32, reach: qd.f32,
-    count: qd.i32, lanes: qd.template(),
+    grid: CoarseGrid, particles: Particles, cells: Grid, solids: SolidSet, c: Coefficients, stiffness: qd.f32,
+    reach: qd.f32, count: qd.i32, lanes: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank, and carry it on."""
     for n in range(grid.nx * grid.ny * grid.nz):
@@ -266,32 +266,34 @@ def move_particles(
         grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
         grid.slope_y[n] = slope_across(grid.wy[n], grid.dy, grid.lam[n + grid.nx] - lam)
         grid.slope_z[n] = slope_across(grid.wz[n], grid.dz, grid.lam[n + grid.nx * grid.ny] - lam)
-    for team in range(teams(count, lanes)):
-        first = team * lanes
-        dim = qd.static(particles.x[first].n)
-        slopes = qd.Matrix.zero(qd.f32, dim, lanes)
-        for lane in range(lanes):
-            s = in_cells(grid, predicted(particles, first + lane))
-            slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, dim)
-            slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, dim)
-            if qd.static(dim == 3):
-                slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, dim)
-        for i in range(first, qd.min(first + lanes, count)):
-            p = predicted(particles, i)
-            dp = column(slopes, i - first) * stiffness
-            dp *= qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
-            p += dp
-            a = particles.a[i] + dp / (c.dt * c.dt)
-            particles.a[i] = a * qd.min(1.0, c.largest_carried / qd.max(a.norm(), 1e-12))
-            near = particles.near[i]
-            if near != 0:
-                p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
-            predict_at(particles, i, p)
+    for turn in range(turns(teams(count, lanes), cells, lanes)):
+        part = part_of(turn, teams(count, lanes), cells, lanes)
+        for team in range(part[0], part[1]):
+            first = team * lanes
+            dim = qd.static(particles.x[first].n)
+            slopes = qd.Matrix.zero(qd.f32, dim, lanes)
+            for lane in range(lanes):
+                s = in_cells(grid, predicted(particles, first + lane))
+                slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, dim)
+                slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, dim)
+                if qd.static(dim == 3):
+                    slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, dim)
+            for i in range(first, qd.min(first + lanes, count)):
+                p = predicted(particles, i)
+                dp = column(slopes, i - first) * stiffness
+                dp *= qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
+                p += dp
+                a = particles.a[i] + dp / (c.dt * c.dt)
+                particles.a[i] = a * qd.min(1.0, c.largest_carried / qd.max(a.norm(), 1e-12))
+                near = particles.near[i]
+                if near != 0:
+                    p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
+                predict_at(particles, i, p)
 
 
 def correct_pressure(
-    levels: list[CoarseGrid], particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
-    stiffness: float, volume: float, count: int, share: float, *, searched: bool, mixed: bool,
+    levels: list[CoarseGrid], particles: Particles, cells: Grid, scratch: Scratch, solids: SolidSet, walls: Walls,
+    c: Coefficients, stiffness: float, volume: float, count: int, share: float, *, searched: bool, mixed: bool,
 ) -> None:  # fmt: skip
     """Move the predicted positions of `particles` so that the `share` of the mean errors of their densities vanishes.
 
@@ -304,4 +306,4 @@ def correct_pressure(
         LEAST_OPEN, LEAST_THETA, count, int(searched), int(mixed), finest.parts, finest.lanes,
     )  # fmt: skip
     solve_levels(levels)
-    move_particles(finest, particles, solids, c, stiffness, REACH * c.h, count, finest.lanes)
+    move_particles(finest, particles, cells, solids, c, stiffness, REACH * c.h, count, finest.lanes)

@@ -121,8 +121,8 @@ def correct_on_grid(world: World, particles: Particles, kinds: Blend, params: Pa
     )
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     correct_pressure(
-        world.levels, particles, world.scratch, world.solids, world.walls, c, stiffness, params.spacing**params.dim,
-        count, params.grid_pressure, searched=world.has_solids, mixed=bool(kinds.mixed),
+        world.levels, particles, world.grid, world.scratch, world.solids, world.walls, c, stiffness,
+        params.spacing**params.dim, count, params.grid_pressure, searched=world.has_solids, mixed=bool(kinds.mixed),
     )  # fmt: skip
 
 
