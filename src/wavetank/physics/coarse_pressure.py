@@ -42,7 +42,7 @@ UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 LEAST_OPEN = 0.1  # a cell that is less open is solid
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 REACH = 0.2  # of the support: the longest correction
-CARRIED = 0.36  # of the pressure of the last step, w above
+CARRIED = 0.36  # of the pressure of the last step, w above; docs/method.md
 LARGEST_CARRIED = 1.2  # of gravity
 MISSING = 0.18  # of a wall's answer, over what it gives; 1/3 would be all, see docs/method.md
 
