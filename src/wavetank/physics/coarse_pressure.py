@@ -15,12 +15,13 @@ that volume does not drift, and it is the positions that are moved. The sums are
 bit for bit. What was tried, and what it gives: docs/method.md.
 
 In time. A correction at the end of a step is implicit Euler, which damps waves by half of omega^2 dt. Each particle
-therefore carries what the grid accelerated it by, `a`, and the share w = `CARRIED` of it acts in the next prediction;
+therefore carries what the grid accelerated it by, `a`, and a share w of it acts in the next prediction;
 the grid corrects what that leaves. What acts is then the sum of (1 - w) w^n times the acceleration that was found n
 steps ago, w / (1 - w) steps late on average. With w = 1/2 that is one step, and just what takes a velocity from half a
 step before a place to half a step behind it, as v = (p - x) / dt is: leapfrog, of second order, and waves keep their
-height. Below, the share (1 - 2 w) / (1 - w) of the damping stays. It is stable for every omega dt, and modes that are
-much stiffer than a step are stopped at once, as without it. No more than `LARGEST_CARRIED` times gravity is carried, so
+height. Below, the share (1 - 2 w) / (1 - w) of the damping stays: w is such that a step of any length damps as one of
+the share `DAMPING` of a frame would, and steps shorter than that carry nothing. It is stable for every omega dt, and
+modes that are much stiffer than a step are stopped at once, as without it. No more than `LARGEST_CARRIED` times gravity is carried, so
 that water that hits a wall does not bounce.
 
 At walls. Layers of a wall that move with a particle by half of its way (`smoothing.WALL_STIFFENING`) answer it with 3/4
@@ -42,9 +43,15 @@ UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 LEAST_OPEN = 0.1  # a cell that is less open is solid
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 REACH = 0.2  # of the support: the longest correction
-CARRIED = 0.36  # of the pressure of the last step, w above; docs/method.md
+DAMPING = 0.44  # of a frame: the length of a step that damps as much, docs/method.md
 LARGEST_CARRIED = 1.2  # of gravity
 MISSING = 0.18  # of a wall's answer, over what it gives; 1/3 would be all, see docs/method.md
+
+
+def carried(dt: float, frame_time: float) -> float:
+    """Return the share w of the grid's pressure that a step of `dt` [s] carries on."""
+    share = min(1.0, DAMPING * frame_time / dt)
+    return (1.0 - share) / (2.0 - share)
 
 
 @qd.func

@@ -15,7 +15,7 @@ from wavetank.distance import SolidSet
 from wavetank.materials import Material
 from wavetank.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids
-from wavetank.physics.coarse_pressure import CARRIED, LARGEST_CARRIED, correct_pressure
+from wavetank.physics.coarse_pressure import LARGEST_CARRIED, carried, correct_pressure
 from wavetank.physics.density_constraint import (
     correct_positions,
     measure_density,
@@ -71,7 +71,7 @@ class World:
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
     """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
     on_grid, method, count = has_grid_pressure(world, params), method_number(params), world.count
-    c = coefficients(params, dt, speed_limit, carried=CARRIED if on_grid else 0.0)
+    c = coefficients(params, dt, speed_limit, carries=carried(dt, params.frame_time) if on_grid else 0.0)
     now, spare, scratch, grid, solids, walls = (
         world.particles, world.spare, world.scratch, world.grid, world.solids, world.walls,
     )  # fmt: skip
@@ -231,7 +231,7 @@ def method_number(params: Parameters) -> int:
     return number
 
 
-def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf, *, carried: float = 0.0) -> Coefficients:
+def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf, *, carries: float = 0.0) -> Coefficients:
     """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here."""
     h, gravity = params.support * params.spacing, (*params.gravity, 0.0)
     rest = rest_lattice(params.kernel, params.dim, params.support)
@@ -259,7 +259,7 @@ def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf, *
             coherence=params.vorticity_coherence,
             calm=CALM * math.sqrt(math.hypot(*params.gravity) / h),
             speed_limit=speed_limit,
-            carried=carried,
+            carried=carries,
             largest_carried=LARGEST_CARRIED * math.hypot(*params.gravity),
             wall_density=params.wall_density,
             wall_gap=params.wall_gap * params.spacing,
