@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank.physics.time_step import largest_speed, pool_depth, substeps
+from wavetank.physics.time_step import ALONE, largest_speed, pool_depth, substeps
 from wavetank.simulation import Simulation
 
 
@@ -34,9 +34,12 @@ def test_every_bound_holds():
     for speed, depth in [(0.0, 0.0), (0.0, 2.0), (3.0, 0.1), (5.0, 5.0)]:
         n = substeps(scene, scene.frame_time, speed, depth, on_grid=False)
         dt = scene.frame_time / n
-        assert speed * dt <= scene.courant * scene.spacing
+        assert speed * dt <= ALONE * scene.courant * scene.spacing
         assert math.sqrt(9.81 * depth) * dt <= scene.wave_courant * scene.spacing * 1.0001
         assert n >= scene.substeps
+    for speed in (3.0, 5.0):
+        dt = scene.frame_time / substeps(scene, scene.frame_time, speed, 0.1, on_grid=True)
+        assert 0.6 * scene.courant * scene.spacing <= speed * dt <= scene.courant * scene.spacing
     assert substeps(scene, scene.frame_time, 1e6, 0.0, on_grid=True) == scene.largest_substeps
     assert substeps(scene, scene.frame_time, 0.0, 5.0, on_grid=True) == scene.substeps
 

@@ -11,7 +11,7 @@ scenes only, because a jet that is followed in too long steps is merely crude.
     code     symbol    meaning                                                   unit
     speed    v         speed of the fastest particle or solid                    m/s
     depth    H         depth of a level pool that has the water's energy         m
-    courant  CFL       v dt / d, at most                                         1
+    courant  CFL       v dt / d, at most, on a grid                              1
     wave     w         sqrt(g H) dt / d, at most                                 1
 """
 
@@ -23,6 +23,7 @@ from wavetank.compiler import qd
 from wavetank.params import Parameters
 from wavetank.state import Particles
 
+ALONE = 2.0 / 3.0  # of `courant` where iterations alone carry the pressure
 SHALLOWEST = 0.6  # d: way in a frame of the wave that water without a grid is taken to have, however shallow
 LEVELS = 64  # whole steps of height that are summed; their rounding cancels
 
@@ -34,7 +35,8 @@ def substeps(params: Parameters, duration: float, speed: float, depth: float, *,
     """
     gravity = math.hypot(*params.gravity)
     usual = params.substeps * duration / params.frame_time
-    for_speed = (speed + duration * gravity) * duration / (params.courant * params.spacing)
+    courant = params.courant if on_grid else ALONE * params.courant
+    for_speed = (speed + duration * gravity) * duration / (courant * params.spacing)
     for_waves = 0.0 if on_grid else math.sqrt(gravity * depth) * duration / (params.wave_courant * params.spacing)
     alone = 0.0 if on_grid else SHALLOWEST / params.wave_courant * duration / params.frame_time
     steps = (usual, min(max(for_speed, alone), params.largest_substeps), for_waves)

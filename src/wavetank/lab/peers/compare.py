@@ -109,7 +109,7 @@ def fastest_of_ours(dam: Dam, target: float, seconds: float, say: Say) -> Settin
                 # A fast particle is followed as a fast wave is; waves are no matter where a grid carries the pressure.
                 return {
                     "iterations": iterations, "substeps": 1, "wave_courant": wave, "grid_pressure": grid,
-                    "courant": min(3.0 if grid else 1.5, max(0.2, 0.6 / 0.35 * wave)), "largest_substeps": 1000,
+                    "courant": min(3.0 if grid else 2.25, max(0.3, 0.9 / 0.35 * wave)), "largest_substeps": 1000,
                 }  # fmt: skip
 
             wave = _meet(target, wave, (0.02, 3.0), setting, lambda s: ours(dam.scene(**s), seconds), found, say)
