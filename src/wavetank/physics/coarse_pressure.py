@@ -21,8 +21,8 @@ steps ago, w / (1 - w) steps late on average. With w = 1/2 that is one step, and
 step before a place to half a step behind it, as v = (p - x) / dt is: leapfrog, of second order, and waves keep their
 height. Below, the share (1 - 2 w) / (1 - w) of the damping stays: w is such that a step of any length damps as one of
 the share `DAMPING` of a frame would, and steps shorter than that carry nothing. It is stable for every omega dt, and
-modes that are much stiffer than a step are stopped at once, as without it. No more than `LARGEST_CARRIED` times gravity is carried, so
-that water that hits a wall does not bounce.
+modes that are much stiffer than a step are stopped at once, as without it. No more than `LARGEST_CARRIED` times gravity
+is carried, so that water that hits a wall does not bounce.
 
 At walls. Layers of a wall that move with a particle by half of its way (`smoothing.WALL_STIFFENING`) answer it with 3/4
 of the density that water would, so that the grid removed only 3/4 of what runs into a wall in a step, and water at rest
