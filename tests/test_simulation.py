@@ -115,6 +115,18 @@ def test_a_saved_state_continues_exactly(dim, tmp_path):
     np.testing.assert_array_equal(again.velocities, sim.velocities)
 
 
+def test_a_state_from_before_pressure_was_carried_on_is_read(tmp_path):
+    sim = Simulation(small(2))
+    sim.step()
+    sim.save(tmp_path / "now.npz")
+    with np.load(tmp_path / "now.npz") as file:
+        np.savez(tmp_path / "then.npz", **{name: file[name] for name in file.files if name != "a"})
+    again = Simulation.restore(tmp_path / "then.npz")
+    np.testing.assert_array_equal(again.positions, sim.positions)
+    again.step()
+    assert np.isfinite(again.positions).all()
+
+
 def test_a_file_that_is_no_state(tmp_path):
     (tmp_path / "x.npz").write_bytes(b"nothing")
     with pytest.raises(wt.WavetankError, match=r"x\.npz: this is not a state"):

@@ -139,6 +139,7 @@ def read_snapshot(path: str | Path, solids: Any) -> tuple[Snapshot, str]:
     try:
         with np.load(path, allow_pickle=False) as file:
             data = {name: file[name] for name in file.files}
+        data.setdefault("a", np.zeros_like(data["v"]))  # earlier states carry no pressure on
         scene = str(data["scene"])
         about = json.loads(str(data["about"]))
         members = solids(scene)
