@@ -105,7 +105,7 @@ def test_adhesion_makes_a_drop_cling():
 
 
 @pytest.mark.xfail(
-    reason="0.0089: at 96 % of what can be held it falls since eight particles share a list, or rounding decides"
+    reason="at 96 % of what can be held rounding decides whether it falls"
 )
 def test_adhesion_holds_a_drop_near_the_limit():
     """The same with a weight of 96 % of 2 sigma."""
