@@ -104,9 +104,7 @@ def test_adhesion_makes_a_drop_cling():
     assert hanging(180.0, 0.0028) < 0.006
 
 
-@pytest.mark.xfail(
-    reason="at 96 % of what can be held rounding decides whether it falls"
-)
+@pytest.mark.xfail(reason="at 96 % of what can be held rounding decides whether it falls")
 def test_adhesion_holds_a_drop_near_the_limit():
     """The same with a weight of 96 % of 2 sigma."""
     assert hanging(180.0, 0.003) < 0.006
