@@ -151,9 +151,9 @@ class Simulation:
         speed = max(self._solid_speed(duration), largest_speed(particles, count))
         speed += duration * sum(force.largest_acceleration() for force in (*self.forces, *self.pushed))
         capillary = min(capillary_substeps(self.world, scene, duration), scene.largest_substeps)
-        on_grid = has_grid_pressure(self.world, scene)
+        on_grid, forced = has_grid_pressure(self.world, scene), bool(self.forces or self.pushed)
         depth = 0.0 if on_grid else pool_depth(particles, count, scene.gravity, *box)
-        return max(capillary, substeps(scene, duration, speed, depth, on_grid=on_grid))
+        return max(capillary, substeps(scene, duration, speed, depth, on_grid=on_grid, forced=forced))
 
     def _solid_speed(self, duration: float) -> float:
         """Return the largest speed [m/s] at which any solid moves through the tank in this frame."""

@@ -42,6 +42,8 @@ def test_every_bound_holds():
         assert 0.6 * scene.courant * scene.spacing <= speed * dt <= scene.courant * scene.spacing
     assert substeps(scene, scene.frame_time, 1e6, 0.0, on_grid=True) == scene.largest_substeps
     assert substeps(scene, scene.frame_time, 0.0, 5.0, on_grid=True) == scene.substeps
+    assert substeps(scene, scene.frame_time, 0.0, 0.0, on_grid=True, forced=True) == 2
+    assert substeps(scene, scene.frame_time, 0.0, 0.0, on_grid=False) == 2
 
 
 def test_nothing_has_neither_speed_nor_depth():

@@ -65,16 +65,8 @@ def test_every_tool_tells_about_itself():
 
 
 def test_push_takes_the_water_along(session):
-    """The hand goes 2.4 m/s; the fastest particle comes to nearly half of that on the way."""
-    fastest = []
-    session.apply(c.ToolBegin(tool="push", options={}, **at(session, 0.4, 0.25)))
-    for k in range(8):
-        session.apply(c.ToolMove(**at(session, 0.4 + 0.04 * k, 0.25)))
-        session.tick()
-        fastest.append(session.sim.velocities[:, 0].max())
-    session.apply(c.ToolEnd())
-    assert max(fastest) > 1.05
-    assert fastest[-1] > 0.9
+    use(session, "push", *[(0.4 + 0.04 * k, 0.25) for k in range(8)], frames=1)
+    assert session.sim.velocities[:, 0].max() > 1.0
     momentum = session.sim.velocities.mean(axis=0)
     assert momentum[0] > 4.0 * abs(momentum[1])
 

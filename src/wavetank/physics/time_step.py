@@ -28,17 +28,20 @@ SHALLOWEST = 0.6  # d: way in a frame of the wave that water without a grid is t
 LEVELS = 64  # whole steps of height that are summed; their rounding cancels
 
 
-def substeps(params: Parameters, duration: float, speed: float, depth: float, *, on_grid: bool) -> int:
+def substeps(
+    params: Parameters, duration: float, speed: float, depth: float, *, on_grid: bool, forced: bool = False
+) -> int:
     """Return the number of time steps for `duration` [s]. Pressure that is solved `on_grid` reaches any depth.
 
-    Where iterations alone carry it, the shallowest water needs two a frame by default.
+    Where iterations alone carry it, the shallowest water needs two a frame by default; and so does water on which more
+    than gravity acts (`forced`), because a force acts before the pressure answers: in one step it would be weaker.
     """
     gravity = math.hypot(*params.gravity)
     usual = params.substeps * duration / params.frame_time
     courant = params.courant if on_grid else ALONE * params.courant
     for_speed = (speed + duration * gravity) * duration / (courant * params.spacing)
     for_waves = 0.0 if on_grid else math.sqrt(gravity * depth) * duration / (params.wave_courant * params.spacing)
-    alone = 0.0 if on_grid else SHALLOWEST / params.wave_courant * duration / params.frame_time
+    alone = 0.0 if on_grid and not forced else SHALLOWEST / params.wave_courant * duration / params.frame_time
     steps = (usual, min(max(for_speed, alone), params.largest_substeps), for_waves)
     return max(1, *(math.ceil(n - 1e-6) for n in steps))
 
