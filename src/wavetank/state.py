@@ -100,7 +100,6 @@ class CoarseGrid:
     dy: qd.f32
     dz: qd.f32  # 1 in 2-D
     parts: qd.i32  # of the particles that have sums of their own
-    lanes: qd.i32  # particles that are computed together
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

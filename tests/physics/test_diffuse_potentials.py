@@ -34,8 +34,8 @@ def fill_potentials(
     out: qd.types.ndarray(), births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air,
     count: qd.i32, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, 1, lanes)
             add_potentials(sums, team, births, particles, grid, c, a, count, method)

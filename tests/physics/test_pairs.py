@@ -34,8 +34,8 @@ PASSES = {
 
 @qd.kernel
 def count_visits(visits: qd.types.ndarray(), grid: Grid, count: qd.i32, lanes: qd.template()):
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             qd.atomic_add(visits[team], 1)
 

@@ -99,8 +99,8 @@ def walk(
     total: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()
 ):
     """Go once over all neighbour lists."""
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             ways = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
             add_neighbors(ways, add_way, team, particles, particles.v, grid, c, 0)

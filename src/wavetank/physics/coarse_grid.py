@@ -87,11 +87,7 @@ def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
     nodes = nx * ny * nz
     rim = nodes + nx * ny  # the next node of those on the rim is read, and counts nothing
     kinds = {field.name: field.type for field in dataclasses.fields(CoarseGrid)}
-    on_processor = current_backend() == "cpu"
-    parts = PARTS if on_processor and nodes <= LARGE else 1
+    parts = PARTS if current_backend() == "cpu" and nodes <= LARGE else 1
     sums = {"sums": integers(parts * nodes), "mass_sums": integers(parts * nodes)}
     fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in (qd.i32, qd.f32) and name not in sums}
-    return CoarseGrid(
-        **sums, **fields, nx=nx, ny=ny, nz=nz, pairs=(nx + 1) // 2, dx=dx, dy=dy, dz=dz, parts=parts,
-        lanes=8 if on_processor else 1,
-    )  # fmt: skip
+    return CoarseGrid(**sums, **fields, nx=nx, ny=ny, nz=nz, pairs=(nx + 1) // 2, dx=dx, dy=dy, dz=dz, parts=parts)

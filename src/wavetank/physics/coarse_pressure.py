@@ -184,56 +184,42 @@ def open_share(grid: CoarseGrid, solids: SolidSet, n):
 def gather(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     unit: qd.f32, volume: qd.f32, scale: qd.f32, inner_from: qd.f32, inner_to: qd.f32, missing: qd.f32,
-    least_open: qd.f32, least_theta: qd.f32, count: qd.i32, searched: qd.template(), mixed: qd.template(),
-    parts: qd.template(), lanes: qd.template(),
+    least_open: qd.f32, least_theta: qd.f32, count: qd.i32, parts: qd.i32, searched: qd.template(),
+    mixed: qd.template(), alone: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Sum the tents of all particles at the nodes, then their density errors (Eq. 2), and set up the equation.
 
     The sums are 0 before. `volume` is that of a particle over that of a cell and over the `unit`, `scale` the same over
     the stiffness M. What solids answer to the way of a particle is increased by the share `missing`. Solids take their
-    share of a cell where they are `searched`; else there are only the walls of the
-    tank, which end where the cells do. Where fluids are `mixed`, their densities are averaged.
+    share of a cell where they are `searched`; else there are only the walls of the tank, which end where the cells do.
+    Where fluids are `mixed`, their densities are averaged.
 
-    Each of several `parts` of the particles has sums of its own, so that threads need not wait for each other.
+    Threads share the particles in `parts`. Where these are `alone`, each has sums of its own and waits for no other.
     """
-    if qd.static(parts == 1):
-        for team in range(teams(count, lanes)):
-            add_fill(grid, particles, scratch, team, 0, unit, count, mixed, lanes, 0)
-    else:
-        # Threads take 512 turns of a loop or more at once: the first of them does the work.
-        for turn in range(512 * parts):
-            part, all_teams = turn // 512, teams(count, lanes)
-            if turn % 512 == 0:
-                for team in range(all_teams * part // parts, all_teams * (part + 1) // parts):
-                    add_fill(grid, particles, scratch, team, part, unit, count, mixed, lanes, 1)
+    for turn in range(turns(teams(count, lanes), parts, lanes)):
+        part = part_of(turn, teams(count, lanes), parts, lanes)
+        for team in range(part[0], part[1]):
+            add_fill(grid, particles, scratch, team, alone * (turn >> 9), unit, count, mixed, lanes, alone)
     for n in range(grid.nx * grid.ny * grid.nz):
         room = 1.0
         if qd.static(searched):
             room = open_share(grid, solids, n)
-        total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, parts)
+        total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
         grid.room[n] = room if room >= least_open else 0.0
         grid.fill[n] = volume * total / qd.max(room, least_open)
         grid.density[n] = 1.0
         if qd.static(mixed):
-            mass = taken(grid.mass_sums, n, grid.nx * grid.ny * grid.nz, parts)
+            mass = taken(grid.mass_sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
             grid.density[n] = qd.max(mass, 1) / qd.cast(qd.max(total, 1), qd.f32)
-    if qd.static(parts == 1):
-        for team in range(teams(count, lanes)):
+    for turn in range(turns(teams(count, lanes), parts, lanes)):
+        part = part_of(turn, teams(count, lanes), parts, lanes)
+        for team in range(part[0], part[1]):
             add_errors(
-                grid, particles, scratch, solids, walls, c, team, 0, unit, inner_from, inner_to, missing, count,
-                searched, lanes, 0,
+                grid, particles, scratch, solids, walls, c, team, alone * (turn >> 9), unit, inner_from, inner_to,
+                missing, count, searched, lanes, alone,
             )  # fmt: skip
-    else:
-        for turn in range(512 * parts):
-            part, all_teams = turn // 512, teams(count, lanes)
-            if turn % 512 == 0:
-                for team in range(all_teams * part // parts, all_teams * (part + 1) // parts):
-                    add_errors(
-                        grid, particles, scratch, solids, walls, c, team, part, unit, inner_from, inner_to, missing,
-                        count, searched, lanes, 1,
-                    )  # fmt: skip
     for n in range(grid.nx * grid.ny * grid.nz):
-        total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, parts)
+        total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
         grid.rhs[n] = scale * total / qd.max(grid.room[n], least_open)
         couple_node(grid, n, least_theta)
 
@@ -273,8 +259,8 @@ def move_particles(
         grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
         grid.slope_y[n] = slope_across(grid.wy[n], grid.dy, grid.lam[n + grid.nx] - lam)
         grid.slope_z[n] = slope_across(grid.wz[n], grid.dz, grid.lam[n + grid.nx * grid.ny] - lam)
-    for turn in range(turns(teams(count, lanes), cells, lanes)):
-        part = part_of(turn, teams(count, lanes), cells, lanes)
+    for turn in range(turns(teams(count, lanes), cells.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), cells.parts, lanes)
         for team in range(part[0], part[1]):
             first = team * lanes
             dim = qd.static(particles.x[first].n)
@@ -307,10 +293,12 @@ def correct_pressure(
     `scratch.rho` holds the densities over that of the heaviest fluid there, `volume` [m^dim] is that of a particle.
     """
     finest = levels[0]
+    alone = finest.parts > 1
     scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
     gather(
         finest, particles, scratch, solids, walls, c, UNIT, scale, share * scale / stiffness, *INNER, MISSING,
-        LEAST_OPEN, LEAST_THETA, count, int(searched), int(mixed), finest.parts, finest.lanes,
+        LEAST_OPEN, LEAST_THETA, count, finest.parts if alone else cells.parts, int(searched), int(mixed), int(alone),
+        cells.lanes,
     )  # fmt: skip
     solve_levels(levels)
-    move_particles(finest, particles, cells, solids, c, stiffness, REACH * c.h, count, finest.lanes)
+    move_particles(finest, particles, cells, solids, c, stiffness, REACH * c.h, count, cells.lanes)

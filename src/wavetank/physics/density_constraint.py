@@ -124,8 +124,8 @@ def start_multipliers(
     count: qd.i32, method: qd.template(), mixed: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Find the denominators of all iterations of a substep, and the multipliers of the first (Eq. 1 to 5)."""
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             dim = qd.static(particles.x[team].n)
             sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
@@ -150,8 +150,8 @@ def solve_multipliers(
     count: qd.i32, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Estimate densities (Eq. 1) and move the multipliers on towards the solution (Eq. 5)."""
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, 1, lanes)
             add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
@@ -172,8 +172,8 @@ def correct_positions(
 
     Where solids are `searched` they stay out of those as well.
     """
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
             add_neighbors(sums, qd.static(CORRECTIONS[correction]), team, particles, scratch.dlam, grid, c, method)
@@ -202,8 +202,8 @@ def measure_density(
     count: qd.i32, largest_density: qd.f32, method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Estimate the densities [kg/m^3] at the positions p (Eq. 1), walls included."""
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, 1, lanes)
             add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)

@@ -150,8 +150,8 @@ def stiffest_particle(
     The matrix of one damper is at most twice its diagonal blocks, hence so is their sum.
     """
     most = 0
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             dim = qd.static(particles.x[team].n)
             sums = qd.Matrix.zero(qd.f32, dim * dim, lanes)
@@ -176,8 +176,8 @@ def relax_velocities(
     relaxation: qd.f32, momentum: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """One Chebyshev iteration; `following` holds the iterate before `packed` and receives the next."""
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
             add_neighbors(sums, add_damping, team, particles, packed, grid, c, 0)

@@ -39,9 +39,9 @@ def predict(
     `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they are, wherever that
     is.
     """
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
         gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             first = team * lanes
             origins = qd.Matrix.zero(qd.f32, 3, lanes)

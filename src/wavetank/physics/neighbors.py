@@ -135,6 +135,16 @@ def copy_particle(target: Particles, to, source: Particles, i):
 
 
 @qd.func
+def wrapped(cell, grid: Grid):
+    """The number of a cell that is less than all cells beyond either end, without a division."""
+    if cell < 0:
+        cell += grid.cells
+    if cell >= grid.cells:
+        cell -= grid.cells
+    return cell
+
+
+@qd.func
 def list_group(group, particles: Particles, grid: Grid, h2, count):
     """Write the neighbours of a group and return their number, even if it had no room."""
     room = grid.room
@@ -158,11 +168,7 @@ def list_group(group, particles: Particles, grid: Grid, h2, count):
             layer = grid.nx * (row % 3 - 1)
             if qd.static(dim == 3):
                 layer += grid.nx * grid.ny * (row // 3 - 1)
-            low = low_cell + layer - 1
-            if low < 0:
-                low += grid.cells
-            if low >= grid.cells:
-                low -= grid.cells
+            low = wrapped(low_cell + layer - 1, grid)
             # A row that runs over the last cell goes on at the first.
             over = qd.max(low + cells - grid.cells, 0)
             for piece in range(1 + qd.min(over, 1)):
@@ -192,8 +198,8 @@ def list_group(group, particles: Particles, grid: Grid, h2, count):
 def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()) -> qd.i32:
     """Write the neighbours of every group and return the largest number found, even if it had no room."""
     most = 0
-    for turn in range(turns((count + 7) >> 3, grid, lanes)):
-        part = part_of(turn, (count + 7) >> 3, grid, lanes)
+    for turn in range(turns((count + 7) >> 3, grid.parts, lanes)):
+        part = part_of(turn, (count + 7) >> 3, grid.parts, lanes)
         for group in range(part[0], part[1]):
             qd.atomic_max(most, list_group(group, particles, grid, c.h * c.h, count))
     return most
@@ -239,11 +245,7 @@ def for_each_row_around(sums: qd.template(), visit: qd.template(), point, partic
         layer = grid.nx * (row % 3 - 1)
         if qd.static(point.n == 3):
             layer += grid.nx * grid.ny * (row // 3 - 1)
-        low = cell + layer - 1
-        if low < 0:
-            low += grid.cells
-        if low >= grid.cells:
-            low -= grid.cells
+        low = wrapped(cell + layer - 1, grid)
         # A row that runs over the last cell goes on at the first.
         over = qd.max(low + 3 - grid.cells, 0)
         for part in range(1 + qd.min(over, 1)):

@@ -5,8 +5,8 @@ A pass over pairs runs over teams: `lanes` particles that follow each other in s
 loop over lanes becomes vector instructions: nobody is collected one by one. A team's list holds three times what one
 particle needs, and is walked in half the time (docs/performance.md). A pass looks like this:
 
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, 1, lanes)
             add_neighbors(sums, visit, team, particles, data, grid, c, method)
@@ -35,25 +35,25 @@ def teams(count, lanes: qd.template()):
 
 
 @qd.func
-def turns(number, grid: Grid, lanes: qd.template()):
-    """Turns of a loop over so many teams; `part_of` says which of them are a turn's.
+def turns(number, parts, lanes: qd.template()):
+    """Turns of a loop over so many teams in equal `parts`; `part_of` says which of them are a turn's.
 
     The compiler gives a thread 512 turns at least, which are too many teams to share them out evenly. The first of
     every 512 turns therefore takes a part of them, and the others nothing.
     """
     if qd.static(lanes == 1):
         return number
-    return 512 * grid.parts
+    return 512 * parts
 
 
 @qd.func
-def part_of(turn, number, grid: Grid, lanes: qd.template()):
+def part_of(turn, number, parts, lanes: qd.template()):
     """The first team of a turn, and the one behind its last, of that `number` of teams."""
     own = qd.Vector([turn, turn + 1])
     if qd.static(lanes > 1):
         own = qd.Vector([0, 0])
         if turn & 511 == 0:
-            size = (number + grid.parts - 1) // grid.parts
+            size = (number + parts - 1) // parts
             own[0] = (turn >> 9) * size
             own[1] = qd.min(own[0] + size, number)
     return own
@@ -136,8 +136,8 @@ def write_numbers(
     number: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()
 ):
     """Write how many neighbours every particle has."""
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, 1, lanes)
             add_neighbors(sums, add_one, team, particles, particles.x, grid, c, 0)

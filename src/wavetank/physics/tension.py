@@ -165,8 +165,8 @@ def find_surface(
     count: qd.i32, scale: qd.f32, quiet: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """Find where the surface is and which way it faces: g, without what is noise."""
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
             add_neighbors(sums, add_gradient, team, particles, tension, grid, c, 0)
@@ -184,8 +184,8 @@ def attract(
     rate: qd.f32, adhesion: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """Find the velocities after the pull of neighbours and solids; `rate` is dt over the largest mass of a particle."""
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
             add_neighbors(sums, add_pull, team, particles, surface, grid, c, 0)

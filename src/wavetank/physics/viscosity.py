@@ -62,8 +62,8 @@ def apply_viscosity(
     method: qd.template(), turning: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Smooth the velocities (Eq. 11); where `turning`, estimate the vorticity (Eq. 9)."""
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             dim = qd.static(particles.v[team].n)
             sums = qd.Matrix.zero(qd.f32, dim + turning * (2 * dim - 3), lanes)
@@ -87,8 +87,8 @@ def apply_mixed_viscosity(
     method: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Smooth the velocities (Eq. 11) of fluids of different density; `packed` as `mixture.pack_weights` leaves it."""
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
             add_neighbors(sums, add_mixed_xsph, team, particles, packed, grid, c, method)

@@ -142,12 +142,12 @@ def count_births(
     count: qd.i32, method: qd.template(), lanes: qd.template(), shared: qd.template(),
 ):  # fmt: skip
     """Draw how many each water particle bears in this frame, and sum them up; threads share the sums where `shared`."""
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             find_normals(births, team, particles, grid, solids, walls, c, a, count, method, lanes)
-    for turn in range(turns(teams(count, lanes), grid, lanes)):
-        part = part_of(turn, teams(count, lanes), grid, lanes)
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             potentials = qd.Matrix.zero(qd.f32, 1, lanes)
             add_potentials(potentials, team, births, particles, grid, c, a, count, method)
