@@ -107,6 +107,25 @@ def test_a_setting_that_meets_the_error_is_found():
         compare._fastest([], 0.001, "ours")
 
 
+def test_a_run_slower_than_the_fastest_is_given_up_and_not_chosen():
+    orders = []
+
+    def their(**order):
+        orders.append(order)
+        steps = round(order["seconds"] / (0.004 * order["cfl_factor"]))
+        wall = 0.02 * steps * (1.0 if order["max_error"] == 1.0 else 5.0)  # the others take five times as long
+        share = min(1.0, order.get("patience", np.inf) / wall)
+        return {"steps": steps, "wall": share * wall, "seconds_of_water": share * order["seconds"],
+                "given_up": share < 1.0, "density_error_mean": 0.0099}  # fmt: skip
+
+    chosen = compare.fastest_of_theirs(their, 0.01, 1.0, lambda text: None)
+    assert chosen["max_error"] == 1.0 and "patience" not in chosen
+    assert [order["max_error"] for order in orders] == pytest.approx([1.0, 0.3, 3.0])  # each once
+    best = 0.02 * round(1.0 / (0.004 * chosen["cfl_factor"]))
+    assert "patience" not in orders[0]
+    assert [order["patience"] for order in orders[1:]] == pytest.approx([compare.PATIENCE * best] * 2)
+
+
 def test_a_peer_that_stops_is_one_sentence(fake):
     runs.SCRIPT.write_text("import sys; sys.exit('no graphics')")
     with pytest.raises(WavetankError, match="exit code 1: no graphics"):

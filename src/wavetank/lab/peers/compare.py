@@ -26,6 +26,7 @@ OUR_ITERATIONS = (2, 3, 4, 6)
 THEIR_BOUNDS = (1.0, 0.3, 3.0)  # of the error that is allowed
 WELL_MET = 0.85  # of the error that is allowed: a setting that leaves more unused is loosened
 TRIES = 5  # for a time step that meets the error
+PATIENCE = 1.1  # of the time that its fastest setting takes: a run of theirs that takes longer is given up
 
 Say = Callable[[str], None]
 Setting = dict[str, Any]
@@ -128,7 +129,12 @@ def fastest_of_theirs(their: Callable[..., Run], target: float, seconds: float, 
                 "max_error": bound, "max_error_v": max(0.1, 10.0 * bound),
             }  # fmt: skip
 
-        courant = _meet(target, courant, (0.02, 4.0), setting, lambda s: their(**s), found, say)
+        def run(order: Setting) -> Run:
+            if not found:
+                return their(**order)
+            return their(**order, patience=PATIENCE * seconds / max(speed for speed, _ in found))
+
+        courant = _meet(target, courant, (0.02, 4.0), setting, run, found, say)
     return _fastest(found, target, "DFSPH's")
 
 
@@ -141,12 +147,15 @@ def _meet(
     for _ in range(TRIES):
         chosen = setting(step)
         taken = run(chosen)
-        error = taken["density_error_mean"]
+        error, given_up = taken["density_error_mean"], taken.get("given_up", False)
         kept = error <= target
-        if kept:
+        if kept and not given_up:
             found.append((pace(taken), chosen))
-        say(f"  {_short(chosen)}: {taken['steps']} steps, {100 * error:.3f} %, {pace(taken):.4f} s/s")
-        if (kept and error >= WELL_MET * target) or taken["steps"] == before or (kept and step >= limits[1]):
+        end = ", given up" if given_up else ""
+        say(f"  {_short(chosen)}: {taken['steps']} steps, {100 * error:.3f} %, {pace(taken):.4f} s/s{end}")
+        if error >= WELL_MET * target and (kept or given_up):  # a shorter step would only be slower
+            break
+        if taken["steps"] == before or (kept and step >= limits[1]):
             break
         before = taken["steps"]
         # Compression goes about with the square of the time step.
