@@ -131,7 +131,8 @@ class Air:
 
     dt: qd.f32  # s, of the frame
     speed: qd.f32  # m/s: U
-    made: qd.f32  # births of a water particle in this frame where all potentials are one
+    interval: qd.f32  # s, between two births of a water particle, and two looks of a particle at the water around it
+    made: qd.f32  # births of a water particle in that time where all potentials are one
     lifetime: qd.f32  # s
     spread: qd.f32  # m: how far from the way of its water particle one is born
     share: qd.f32  # makes the sum of Poly6 around a point one in the bulk
@@ -139,10 +140,12 @@ class Air:
     spray_keep: qd.f32  # share of the velocity relative to the air that is left after dt
     spray_path: qd.f32  # s: way per relative velocity in dt
     spray_bend: qd.f32  # s^2: way per acceleration in dt
-    bubble_keep: qd.f32
     bubble_path: qd.f32
     bubble_bend: qd.f32
+    bubble_keep: qd.f32  # likewise relative to the water, after an interval
+    bubble_gain: qd.f32  # s: velocity per acceleration in an interval
     frame: qd.i32  # number of the frame
+    every: qd.i32  # frames in an interval
     seed: qd.i32
 
 

@@ -5,7 +5,7 @@ import pytest
 from diffuse_worlds import with_diffuse
 
 import wavetank as wt
-from wavetank.physics.diffuse.update import BUBBLE_RISE, SPRAY_DRAG
+from wavetank.physics.diffuse.update import BUBBLE_RISE, MOST_FRAMES, SPRAY_DRAG, air
 
 
 def pool_of_water(dim: int, **keys) -> wt.Scene:
@@ -69,12 +69,27 @@ def test_a_bubble_rises_at_its_terminal_speed_and_becomes_foam(dim):
     assert sim.foam_positions[0][1] == pytest.approx(0.5, abs=1.2 * scene.spacing)
 
 
+def test_each_looks_around_once_in_an_interval():
+    """Much water changes little in a frame: particles take turns, and a glass of water is looked at in every frame."""
+    for edge, every in ((0.5, 2), (0.1, 1)):
+        water = wt.Block(lower=(0, 0, 0), upper=(edge,) * 3, velocity=(3.0, 0.0, 0.0))
+        scene = wt.Scene(spacing=edge / 10, gravity=(0, 0, 0), attraction=0.0, fluids=[water])
+        falling = scene.changed(gravity=(0.0, -9.81, 0.0))
+        assert air(falling, 1000, 0.0, 1 / 60, 0).every == every
+        assert air(falling, 1000, 0.0, 1 / 240, 0).every == MOST_FRAMES
+    sim = with_diffuse(scene.changed(frame_time=1e-4), np.full((4, 3), 0.5 * edge))  # ids 0 to 3, in the middle
+    sim.step()
+    assert sim.foam_kinds.tolist() == [3, 1, 3, 1]
+    sim.step()
+    assert sim.foam_kinds.tolist() == [3, 3, 3, 3]
+
+
 def test_foam_drifts_with_the_water():
     """A block of water moves through free space; what floats at its surface stays there."""
     block = wt.Block(lower=(0, 0, 0), upper=(0.5, 0.5, 0.5), velocity=(2.0, 0.0, 0.0))
     scene = wt.Scene(spacing=0.05, gravity=(0, 0, 0), attraction=0.0, fluids=[block])
     sim = with_diffuse(scene, [(0.25, 0.5, 0.25), (0.5, 0.25, 0.25), (0.0, 0.25, 0.25)], [(2.0, 0.0, 0.0)] * 3)
-    sim.step()
+    sim.advance(MOST_FRAMES / 60)  # until each has looked around
     before = sim.foam_positions
     assert (sim.foam_kinds == 2).all()
     sim.advance(0.5)
@@ -89,7 +104,7 @@ def test_what_a_particle_is_follows_from_the_water_around_it(dim):
     places = [(x, y) for x in (0.25, 0.3 * d) for y in (0.3 * d, 0.25, 0.5, 0.5 + 1.5 * d)]
     expected = [3, 3, 2, 1] * 2
     sim = with_diffuse(scene, [(x, y, 0.25)[:dim] for x, y in places])
-    sim.step()
+    sim.advance(MOST_FRAMES / 60)  # until each has looked around
     assert sim.foam_kinds.tolist() == expected
 
 

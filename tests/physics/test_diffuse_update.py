@@ -59,7 +59,7 @@ def test_foam_does_not_act_on_the_water():
 
 
 def test_the_amount_is_one_live_control():
-    counts = [born(dam(foam=foam), 1.2) for foam in (0.0, 0.5, 1.0, 2.0)]
+    counts = [born(dam(foam=foam, spacing=0.045), 1.2) for foam in (0.0, 0.5, 1.0, 2.0)]
     assert counts[0] == 0
     np.testing.assert_allclose(np.array(counts[1:]) / counts[2], (0.5, 1.0, 2.0), rtol=0.05)
     sim = Simulation(dam(foam=0.0))

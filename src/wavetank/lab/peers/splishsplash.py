@@ -26,7 +26,7 @@ CORNERS = [(x, y, z) for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0
 FACES = ((1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (3, 7, 8, 4), (1, 5, 7, 3), (2, 4, 8, 6))
 
 
-class Done(Exception):
+class Done(Exception):  # noqa: N818
     """Ends a run from within."""
 
 

@@ -19,6 +19,8 @@ Where we differ, and why:
 - The share of water is a smooth sum instead of a number of neighbours, and what solids take of the support is left
   out of it, so that water at a wall is not taken for a surface.
 - All kinds age.
+- Looking around is most of the work, and a frame is a short time for much water: each looks once in an interval
+  (`update.INTERVAL`, two frames of a tank of half a metre and more) and keeps its velocity between; spray falls on.
 """
 
 from wavetank.compiler import qd
@@ -97,32 +99,37 @@ def move(
     packed: Diffuse, diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients,
     a: Air, count: qd.i32, shared: qd.template(),
 ):  # fmt: skip
-    """Move everything by one frame, tell anew what is what, and copy those who live on to the front, in their order.
+    """Move everything by one frame, and copy those who live on to the front, in their order.
 
-    `births.kept` then ends with their number. Threads share the sums where `shared`.
+    Each looks around every so many frames, tells anew what it is and takes the velocity that it keeps until it looks
+    again. `births.kept` ends with the number of those who live on. Threads share the sums where `shared`.
     """
     for i in range(count):
-        gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
         x = diffuse.x[i]
         v = diffuse.v[i]
-        # The water has moved already: what is around is asked where the particle gets to.
-        ahead = x + a.dt * v
-        room = surroundings(lift(ahead), solids, c.h)
-        here = water_at(ahead, room[1], water, grid, c, a)
-        kind = kind_in(here[0])
+        kind = diffuse.kind[i]
+        target, later = x + a.dt * v, v
         medium, pull = x * 0.0, x * 0.0
+        gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
         for k in qd.static(range(x.n)):
-            medium[k] = here[1 + k]
             pull[k] = gravity[k]
-        target, later = ahead, medium
+        looks = (diffuse.id[i] + a.frame) % a.every == 0
+        if looks:
+            # The water has moved already: what is around is asked where the particle gets to.
+            room = surroundings(lift(target), solids, c.h)
+            here = water_at(target, room[1], water, grid, c, a)
+            kind = kind_in(here[0])
+            for k in qd.static(range(x.n)):
+                medium[k] = here[1 + k]
         if kind == 1:
             later = v * a.spray_keep + pull * a.spray_path
             target = x + v * a.spray_path + pull * a.spray_bend
-        elif kind == 2:
+        elif looks and kind == 2:
+            later = medium
             target = x + 0.5 * a.dt * (v + medium)
-        else:
+        elif looks:
             slip = v - medium
-            later = medium + slip * a.bubble_keep - 2.0 * pull * a.bubble_path
+            later = medium + slip * a.bubble_keep - 2.0 * pull * a.bubble_gain
             target = x + a.dt * medium + slip * a.bubble_path - 2.0 * pull * a.bubble_bend
         near = bodies_in_reach(lift(x), lift(target), solids, c.wall_gap) | ((1 << solids.tank_count) - 1)
         out = stopped(lift(x), lift(target), near, solids, c.wall_gap)

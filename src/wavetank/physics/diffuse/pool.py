@@ -106,7 +106,7 @@ def bear(
                 for axis in qd.static(range(v.n)):
                     aside[axis] = 2.0 * uniform(state, k + axis) - 1.0
                 aside -= ahead * aside.dot(ahead)
-                x = water.x[i] - (a.dt * uniform(state, k + 3)) * v + a.spread * aside
+                x = water.x[i] - (a.interval * uniform(state, k + 3)) * v + a.spread * aside
                 around = surroundings(lift(x), solids, c.h)
                 if around[0] < c.wall_gap:  # inside of a solid: born where the water is
                     x = water.x[i]

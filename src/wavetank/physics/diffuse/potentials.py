@@ -141,7 +141,7 @@ def count_births(
     births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
     count: qd.i32, method: qd.template(), lanes: qd.template(), shared: qd.template(),
 ):  # fmt: skip
-    """Draw how many each water particle bears in this frame, and sum them up; threads share the sums where `shared`."""
+    """Draw how many each water particle bears in an interval, and sum up; threads share the sums where `shared`."""
     for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
         part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):

@@ -20,6 +20,8 @@ SPRAY_DRAG = 0.25  # U / L: the terminal speed of spray is U / 0.25
 BUBBLE_RISE = 0.1  # U
 BUBBLE_PULL = 2.0  # g
 SPREAD = 1.0  # d
+INTERVAL = 0.15  # L / U: the longest between two births, and between two looks of a particle at the water around it
+MOST_FRAMES = 2  # in an interval: births come in beats, which nobody shall see
 #: Energy in U^2 up to which no water foams; a little below what `potentials.potential` spells out.
 LEAST_ENERGY = 0.0499
 
@@ -39,7 +41,7 @@ def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> N
         move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, pool.count, shared)
         pool.now, pool.spare = pool.spare, pool.now
 
-    makes = count if a.made > 0.0 else 0
+    makes = count if a.made > 0.0 and frame % a.every == 0 else 0
     if makes:
         pool.set_reluctance(reluctance(world.materials, params))
         count_births(pool.births, water, grid, solids, world.walls, c, a, count, method, grid.lanes, shared)
@@ -52,7 +54,9 @@ def _can_foam(world: World, params: Parameters, dt: float, frame: int) -> bool:
     if params.foam == 0.0 or not world.count:
         return False
     a = air(params, world.count, 0.0, dt, frame)
-    return a.made > 0.0 and largest_speed(world.particles, world.count) ** 2 > LEAST_ENERGY * a.speed**2
+    if a.made == 0.0 or frame % a.every:
+        return False
+    return largest_speed(world.particles, world.count) ** 2 > LEAST_ENERGY * a.speed**2
 
 
 def air(params: Parameters, water: int, filled: float, dt: float, frame: int) -> Air:
@@ -68,19 +72,23 @@ def air(params: Parameters, water: int, filled: float, dt: float, frame: int) ->
     rate = speed / length
     # A fuller pool takes less, evenly everywhere, rather than all of what comes first.
     room = min(1.0, 2.0 * (1.0 - filled))
+    every = max(1, math.floor(min(INTERVAL / max(rate * dt, 1e-12), MOST_FRAMES)))
+    interval = every * dt
     drag = _decay(SPRAY_DRAG * rate, dt)
-    follow = _decay(BUBBLE_PULL * gravity / (BUBBLE_RISE * speed) if speed > 0.0 else math.inf, dt)
+    pull = BUBBLE_PULL * gravity / (BUBBLE_RISE * speed) if speed > 0.0 else math.inf
+    follow, gained = _decay(pull, dt), _decay(pull, interval)
     return Air(
         dt=dt,
+        interval=interval,
         speed=speed,
-        made=params.foam * room * RATE * rate * dt,
+        made=params.foam * room * RATE * rate * interval,
         lifetime=params.foam_lifetime,
         spread=SPREAD * params.spacing,
         share=sigma("poly6", dim) / ratio**dim,
         mean=1.0 / (math.pi / 3.0 * ratio**dim),
         spray_keep=drag[0], spray_path=drag[1], spray_bend=drag[2],
-        bubble_keep=follow[0], bubble_path=follow[1], bubble_bend=follow[2],
-        frame=frame, seed=params.foam_seed,
+        bubble_path=follow[1], bubble_bend=follow[2], bubble_keep=gained[0], bubble_gain=gained[1],
+        frame=frame, every=every, seed=params.foam_seed,
     )  # fmt: skip
 
 
