@@ -25,6 +25,7 @@ from wavetank.errors import WavetankError
 from wavetank.launches import keep_prepared_launches
 
 os.environ.setdefault("QD_LOG_LEVEL", "error")
+os.environ.setdefault("QD_ENABLE_PYBUF", "0")  # no kernel prints, and none needs to be asked whether it has
 
 
 @contextlib.contextmanager
@@ -191,7 +192,7 @@ def _cross(a: Any, b: Any) -> Any:
 
 
 _kernels = sys.modules["quadrants.lang.kernel"]
-if not keep_prepared_launches(_kernels) and hasattr(_kernels, "LaunchContextBufferCache"):
+if not keep_prepared_launches(_kernels, impl.get_runtime) and hasattr(_kernels, "LaunchContextBufferCache"):
     # What the compiler itself keeps may be stale (`launches.py`): it shall keep nothing.
     _kernels.LaunchContextBufferCache.cache = lambda *_: None
 

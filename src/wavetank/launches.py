@@ -2,61 +2,133 @@
 
 The compiler looks at every array and number of the dataclasses that a kernel is given, 0.05 to 0.1 ms for a launch, and
 can keep what it made of them only where all arguments are objects; it keeps that under their addresses, and does not
-notice when an object of numbers is gone and another one has taken its address. Here plain numbers count by their value,
-so that every launch of a step can be known, and what is kept goes with the first of its objects to go
-(`tests/test_compiler.py`).
+notice when an object of numbers is gone and another one has taken its address. Here plain numbers are written over
+those of the kept launch, so that every launch of a step can be known, and what is kept goes with the first of its
+objects to go. What is known is launched at once: what the compiler asks before it looks at arguments takes longer than
+to copy the prepared ones (`tests/test_compiler.py`).
 """
 
+import dataclasses
 import weakref
+from operator import index
 from typing import Any
 
 NUMBERS = (int, float, bool)
 MOST = 64  # launches of a kernel that are kept; when there are more, all are forgotten
+NEEDED = {
+    "Kernel": ("__call__", "_recursive_set_args", "construct_kernel_ret"),
+    "LaunchContextBufferCache": ("cache", "populate_launch_ctx_from_cache"),
+    "primitive_types": ("integer_type_ids", "real_type_ids"),
+    "runtime_ops": ("sync",),
+}
 
 
-def keep_prepared_launches(kernels: Any) -> bool:
-    """Let the compiler's module `kernels` keep prepared launches this way; say whether it has what that takes."""
-    kernel: Any = getattr(kernels, "Kernel", None)
-    cache: Any = getattr(kernels, "LaunchContextBufferCache", None)
-    needed = ("launch_kernel", "_recursive_set_args"), ("cache", "populate_launch_ctx_from_cache")
-    if not all(hasattr(owner, name) for owner, names in zip((kernel, cache), needed, strict=True) for name in names):
-        return False
-    launch, prepare = kernel.launch_kernel, kernel._recursive_set_args
-    keep, find = cache.cache, cache.populate_launch_ctx_from_cache
+@dataclasses.dataclass
+class Known:
+    """A launch that has been prepared."""
 
-    def launch_with(self: Any, key: Any, compiled_for: Any, compiled: Any, *args: Any, **options: Any) -> Any:
-        self.launch_context_buffer_cache.args = args
-        try:
-            return launch(self, key, compiled_for, compiled, *args, **options)
-        finally:
-            self.launch_context_buffer_cache.args = ()
+    program: Any
+    read: Any  # the kernel, as the compiler has read it
+    compiled: Any
+    context: Any  # its arguments
+    watchers: list[weakref.ref[Any]]  # of its objects
 
-    def prepare_one(*args: Any) -> tuple[int, bool]:
-        slots, known = prepare(*args)
-        return slots, known or type(args[6]) in NUMBERS
 
-    def find_known(self: Any, addresses: tuple[int, ...], launch_context: Any) -> bool:
-        values = (arg if type(arg) in NUMBERS else id(arg) for arg in self.args)
-        self.name = (addresses[0], *values, *addresses[1 + len(self.args) :])
-        return bool(find(self, self.name, launch_context))
+@dataclasses.dataclass
+class Launches:
+    """Those of a kernel that are known, by their objects and by the numbers that it is compiled for."""
 
-    def keep_known(self: Any, compiled_for: Any, addresses: Any, launch_context: Any, arguments: Any) -> None:
-        entries, watchers, name = self._launch_ctx_cache, self._launch_ctx_cache_tracker, self.name
+    fixed: tuple[int, ...]  # places of these among the arguments
+    integers: tuple[int, ...]  # places of other numbers
+    reals: tuple[int, ...]
+    slots: dict[int, int] = dataclasses.field(default_factory=dict)  # where the device has such a number
+    known: dict[tuple[Any, ...], Known] = dataclasses.field(default_factory=dict)
+    prepared: tuple[Any, Any] | None = None  # the last launch that was not known
+
+    def asked(self, args: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Return what a launch is known by."""
+        return tuple([args[k] if type(args[k]) in NUMBERS else id(args[k]) for k in self.fixed])
+
+    def context(self, known: Known, args: tuple[Any, ...]) -> Any:
+        """Return the arguments of a known launch with these numbers."""
+        context = known.read.make_launch_context()
+        context.copy(known.context)
+        if self.integers:
+            context.set_args_int(
+                tuple(self.slots[k] for k in self.integers), tuple(index(args[k]) for k in self.integers)
+            )
+        if self.reals:
+            context.set_args_float(tuple(self.slots[k] for k in self.reals), tuple(float(args[k]) for k in self.reals))
+        return context
+
+    def remember(self, args: tuple[Any, ...], program: Any, compiled: Any) -> None:
+        """Keep the launch that has been prepared until one of its objects goes."""
+        if self.prepared is None or not self.slots.keys() >= {*self.integers, *self.reals}:
+            return
+        asked, launches = self.asked(args), self.known
 
         def forget(_: Any) -> None:
-            entries.pop(name, None)
-            watchers.pop(name, None)
+            launches.pop(asked, None)
 
         try:
-            watched = [weakref.ref(arg, forget) for arg in self.args if type(arg) not in NUMBERS]
+            watchers = [weakref.ref(args[k], forget) for k in self.fixed if type(args[k]) not in NUMBERS]
         except TypeError:
             return  # an object that cannot tell when it goes
-        if len(entries) >= MOST:
-            entries.clear()
-            watchers.clear()
-        keep(self, compiled_for, name, launch_context, arguments)
-        watchers[name].extend(watched)
+        if len(launches) >= MOST:
+            launches.clear()
+        launches[asked] = Known(program, self.prepared[0], compiled, self.prepared[1], watchers)
 
-    kernel.launch_kernel, kernel._recursive_set_args = launch_with, staticmethod(prepare_one)
-    cache.cache, cache.populate_launch_ctx_from_cache = keep_known, find_known
+
+def keep_prepared_launches(kernels: Any, runtime: Any) -> bool:
+    """Let the compiler's module `kernels` keep prepared launches; say whether it has what that takes.
+
+    ``runtime()`` is what holds the compiler's program.
+    """
+    if not all(hasattr(getattr(kernels, owner, None), name) for owner, names in NEEDED.items() for name in names):
+        return False
+    kernel, cache, types = kernels.Kernel, kernels.LaunchContextBufferCache, kernels.primitive_types
+    call, prepare = kernel.__call__, kernel._recursive_set_args
+    numbers: dict[str, int] = {}  # slots of the launch that is prepared, by the names of the arguments
+
+    def launches_of(self: Any) -> Launches:
+        kinds = [id(meta.annotation) for meta in self.arg_metas]
+        integers = tuple(k for k, kind in enumerate(kinds) if kind in types.integer_type_ids)
+        reals = tuple(k for k, kind in enumerate(kinds) if kind in types.real_type_ids)
+        return Launches(tuple(k for k in range(len(kinds)) if k not in (*integers, *reals)), integers, reals)
+
+    def launch(self: Any, *args: Any, **options: Any) -> Any:
+        buffers = self.launch_context_buffer_cache
+        launches = buffers.__dict__.get("launches")
+        if launches is None:
+            launches = buffers.launches = launches_of(self)
+        known = launches.known.get(launches.asked(args)) if len(args) == len(self.arg_metas) else None
+        if known is None or options or known.program is not runtime().prog:
+            numbers.clear()
+            launches.prepared = None
+            result = call(self, *args, **options)
+            launches.slots = {k: numbers[meta.name] for k, meta in enumerate(self.arg_metas) if meta.name in numbers}
+            if not getattr(self, "_mutable_nd_cached_val", None):  # arrays that may be exchanged within an object
+                launches.remember(args, runtime().prog, self._last_compiled_kernel_data)
+            return result
+        context = launches.context(known, args)
+        known.program.launch_kernel(known.compiled, context)
+        if not self.return_type:
+            return None
+        kernels.runtime_ops.sync()
+        values = [self.construct_kernel_ret(context, kind, (k,)) for k, kind in enumerate(self.return_type)]
+        return values[0] if len(values) == 1 else tuple(values)
+
+    def prepare_one(*args: Any) -> tuple[int, bool]:
+        if type(args[6]) not in NUMBERS:
+            return prepare(*args)
+        numbers[args[1]] = args[7]
+        return prepare(*args)[0], True
+
+    def keep(self: Any, read: Any, _: Any, context: Any, __: Any) -> None:
+        copied = read.make_launch_context()
+        copied.copy(context)
+        self.launches.prepared = read, copied
+
+    kernel.__call__, kernel._recursive_set_args = launch, staticmethod(prepare_one)
+    cache.cache, cache.populate_launch_ctx_from_cache = keep, lambda *_: False
     return True

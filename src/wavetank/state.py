@@ -13,12 +13,13 @@ the compiler then knows the arguments of a launch, which else cost more than a s
 
 import dataclasses
 import functools
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from wavetank.compiler import qd, upload
 
+Numbers = TypeVar("Numbers")
 NOWHERE = 1e6  # m, in every direction
 MARGIN = 32  # rows behind the last particle that loops over whole blocks and groups may read
 
@@ -125,9 +126,9 @@ class Births:
     reluctance: qd.types.ndarray()  # f32 [materials]: energy at which a fluid foams, in that of one without viscosity
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True)
 class Air:
-    """Scalars of a frame of spray, foam and bubbles, from the scene's parameters; see `physics/diffuse/`."""
+    """Scalars of spray, foam and bubbles, from the scene's parameters; see `physics/diffuse/`."""
 
     dt: qd.f32  # s, of the frame
     speed: qd.f32  # m/s: U
@@ -144,7 +145,6 @@ class Air:
     bubble_bend: qd.f32
     bubble_keep: qd.f32  # likewise relative to the water, after an interval
     bubble_gain: qd.f32  # s: velocity per acceleration in an interval
-    frame: qd.i32  # number of the frame
     every: qd.i32  # frames in an interval
     seed: qd.i32
 
@@ -206,9 +206,14 @@ class Coefficients:
 
 
 @functools.lru_cache(maxsize=256)
-def remembered(c: Coefficients) -> Coefficients:
-    """Return the first object that equals `c`, which the compiler then knows."""
-    return c
+def _first_equal(numbers: Any) -> Any:
+    return numbers
+
+
+def remembered(numbers: Numbers) -> Numbers:
+    """Return the first object that equals `numbers`, which the compiler then knows."""
+    first: Numbers = _first_equal(numbers)
+    return first
 
 
 def exchanged(

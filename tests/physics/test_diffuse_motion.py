@@ -75,8 +75,8 @@ def test_each_looks_around_once_in_an_interval():
         water = wt.Block(lower=(0, 0, 0), upper=(edge,) * 3, velocity=(3.0, 0.0, 0.0))
         scene = wt.Scene(spacing=edge / 10, gravity=(0, 0, 0), attraction=0.0, fluids=[water])
         falling = scene.changed(gravity=(0.0, -9.81, 0.0))
-        assert air(falling, 1000, 0.0, 1 / 60, 0).every == every
-        assert air(falling, 1000, 0.0, 1 / 240, 0).every == MOST_FRAMES
+        assert air(falling, 1000, 1 / 60).every == every
+        assert air(falling, 1000, 1 / 240).every == MOST_FRAMES
     sim = with_diffuse(scene.changed(frame_time=1e-4), np.full((4, 3), 0.5 * edge))  # ids 0 to 3, in the middle
     sim.step()
     assert sim.foam_kinds.tolist() == [3, 1, 3, 1]

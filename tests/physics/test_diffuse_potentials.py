@@ -58,7 +58,7 @@ def fill_uniform(out: qd.types.ndarray(), seed: qd.i32, frame: qd.i32, k: qd.i32
 def potentials(cloud: Cloud, speed: float) -> tuple[np.ndarray, np.ndarray]:
     """Normals and potentials of a cloud whose U is `speed`, in device order."""
     world, births = cloud.world, new_pool(cloud.dim, 1, cloud.count).births
-    a = dataclasses.replace(air(cloud.scene, cloud.count, 0.0, 1 / 60, 0), speed=speed)
+    a = dataclasses.replace(air(cloud.scene, cloud.count, 1 / 60), speed=speed)
     particles, grid, lanes = world.particles, world.grid, world.grid.lanes
     find_surface(births, particles, grid, world.solids, world.walls, cloud.c, a, cloud.count, cloud.method, lanes)
     out = scalars(cloud.count)

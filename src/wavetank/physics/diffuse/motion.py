@@ -97,7 +97,7 @@ def kind_in(share):
 @qd.kernel(fastcache=True)
 def move(
     packed: Diffuse, diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients,
-    a: Air, count: qd.i32, shared: qd.template(),
+    a: Air, count: qd.i32, frame: qd.i32, shared: qd.template(),
 ):  # fmt: skip
     """Move everything by one frame, and copy those who live on to the front, in their order.
 
@@ -113,7 +113,7 @@ def move(
         gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
         for k in qd.static(range(x.n)):
             pull[k] = gravity[k]
-        looks = (diffuse.id[i] + a.frame) % a.every == 0
+        looks = (diffuse.id[i] + frame) % a.every == 0
         if looks:
             # The water has moved already: what is around is asked where the particle gets to.
             room = surroundings(lift(target), solids, c.h)

@@ -86,7 +86,7 @@ def pool_from(rows: dict[str, np.ndarray], born: int, capacity: int, dim: int, w
 @qd.kernel(fastcache=True)
 def bear(
     diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients, a: Air,
-    count: qd.i32, old: qd.i32, born: qd.i32,
+    count: qd.i32, old: qd.i32, born: qd.i32, frame: qd.i32,
 ) -> qd.types.vector(2, qd.i32):  # fmt: skip
     """Append the newborn, each around the way that its water particle came; return the number of all and of births.
 
@@ -98,7 +98,7 @@ def bear(
         for place in range(births.first[i], births.first[i + 1]):
             slot = births.kept[old] + place
             if slot < room:
-                state = stream(a.seed, a.frame, water.id[i])
+                state = stream(a.seed, frame, water.id[i])
                 k = 1 + 8 * (place - births.first[i])
                 v = water.v[i]
                 ahead = v / qd.max(v.norm(), 1e-12)

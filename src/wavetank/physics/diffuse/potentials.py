@@ -139,9 +139,12 @@ def add_potentials(
 @qd.kernel(fastcache=True)
 def count_births(
     births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
-    count: qd.i32, method: qd.template(), lanes: qd.template(), shared: qd.template(),
+    count: qd.i32, room: qd.f32, frame: qd.i32, method: qd.template(), lanes: qd.template(), shared: qd.template(),
 ):  # fmt: skip
-    """Draw how many each water particle bears in an interval, and sum up; threads share the sums where `shared`."""
+    """Draw how many each water particle bears in an interval, of which the share `room` is wanted, and sum them up.
+
+    Threads share the sums where `shared`.
+    """
     for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
         part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
@@ -152,6 +155,6 @@ def count_births(
             potentials = qd.Matrix.zero(qd.f32, 1, lanes)
             add_potentials(potentials, team, births, particles, grid, c, a, count, method)
             for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                expected = a.made * potentials[0, i - team * lanes]
-                births.first[i] = qd.cast(expected + uniform(stream(a.seed, a.frame, particles.id[i]), 0), qd.i32)
+                expected = room * a.made * potentials[0, i - team * lanes]
+                births.first[i] = qd.cast(expected + uniform(stream(a.seed, frame, particles.id[i]), 0), qd.i32)
     sum_up(births.first, births.blocks, count, shared)

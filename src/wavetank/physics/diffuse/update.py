@@ -13,7 +13,7 @@ from wavetank.physics.diffuse.potentials import count_births
 from wavetank.physics.smoothing import sigma
 from wavetank.physics.step import World, coefficients, method_number
 from wavetank.physics.time_step import largest_speed
-from wavetank.state import Air
+from wavetank.state import Air, remembered
 
 RATE = 24.0  # births of a most agitated water particle in the time L / U, at foam = 1
 SPRAY_DRAG = 0.25  # U / L: the terminal speed of spray is U / 0.25
@@ -28,39 +28,38 @@ LEAST_ENERGY = 0.0499
 
 def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> None:
     """Move what there is by `dt` [s] and add what the water makes in this frame."""
-    if (world.pool is None or not world.pool.count) and not _can_foam(world, params, dt, frame):
+    a = air(params, world.count, dt)
+    makes = world.count if a.made > 0.0 and frame % a.every == 0 else 0
+    if (world.pool is None or not world.pool.count) and not (makes and _can_foam(world, a)):
         return
     if world.pool is None:
         world.pool = new_pool(params.dim, params.foam_capacity, world.particles.id.shape[0])
     pool, water, grid, solids, count = world.pool, world.particles, world.grid, world.solids, world.count
     c, method = coefficients(params, dt), method_number(params)
-    a = air(params, count, pool.count / pool.capacity, dt, frame)
     shared = int(current_backend() != "cpu")
 
     if pool.count:
-        move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, pool.count, shared)
+        move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, pool.count, frame, shared)
         pool.now, pool.spare = pool.spare, pool.now
 
-    makes = count if a.made > 0.0 and frame % a.every == 0 else 0
     if makes:
+        # A fuller pool takes less, evenly everywhere, rather than all of what comes first.
+        room = min(1.0, 2.0 * (1.0 - pool.count / pool.capacity))
         pool.set_reluctance(reluctance(world.materials, params))
-        count_births(pool.births, water, grid, solids, world.walls, c, a, count, method, grid.lanes, shared)
-    total, births = bear(pool.now, pool.births, water, grid, solids, c, a, makes, pool.count, pool.born)
+        count_births(
+            pool.births, water, grid, solids, world.walls, c, a, count, room, frame, method, grid.lanes, shared
+        )
+    total, births = bear(pool.now, pool.births, water, grid, solids, c, a, makes, pool.count, pool.born, frame)
     pool.count, pool.born = int(total), (pool.born + int(births)) % 2**31
 
 
-def _can_foam(world: World, params: Parameters, dt: float, frame: int) -> bool:
+def _can_foam(world: World, a: Air) -> bool:
     """Say whether any of the water is fast enough to make foam: where none is, not even the kernels are compiled."""
-    if params.foam == 0.0 or not world.count:
-        return False
-    a = air(params, world.count, 0.0, dt, frame)
-    if a.made == 0.0 or frame % a.every:
-        return False
-    return largest_speed(world.particles, world.count) ** 2 > LEAST_ENERGY * a.speed**2
+    return bool(largest_speed(world.particles, world.count) ** 2 > LEAST_ENERGY * a.speed**2)
 
 
-def air(params: Parameters, water: int, filled: float, dt: float, frame: int) -> Air:
-    """Return the scalars of a frame of `dt` [s] for `water` particles and a pool of which the share `filled` is full.
+def air(params: Parameters, water: int, dt: float) -> Air:
+    """Return the scalars of a frame of `dt` [s] for `water` particles.
 
     L is the edge of a cube (2-D: a square) of all the water and U = sqrt(g L) its speed; in a world without gravity
     U = 0: nothing is made there, spray keeps its velocity and bubbles take that of the water.
@@ -70,26 +69,24 @@ def air(params: Parameters, water: int, filled: float, dt: float, frame: int) ->
     length = params.spacing * max(water, 1) ** (1.0 / dim)
     speed = math.sqrt(gravity * length)
     rate = speed / length
-    # A fuller pool takes less, evenly everywhere, rather than all of what comes first.
-    room = min(1.0, 2.0 * (1.0 - filled))
     every = max(1, math.floor(min(INTERVAL / max(rate * dt, 1e-12), MOST_FRAMES)))
     interval = every * dt
     drag = _decay(SPRAY_DRAG * rate, dt)
     pull = BUBBLE_PULL * gravity / (BUBBLE_RISE * speed) if speed > 0.0 else math.inf
     follow, gained = _decay(pull, dt), _decay(pull, interval)
-    return Air(
+    return remembered(Air(
         dt=dt,
         interval=interval,
         speed=speed,
-        made=params.foam * room * RATE * rate * interval,
+        made=params.foam * RATE * rate * interval,
         lifetime=params.foam_lifetime,
         spread=SPREAD * params.spacing,
         share=sigma("poly6", dim) / ratio**dim,
         mean=1.0 / (math.pi / 3.0 * ratio**dim),
         spray_keep=drag[0], spray_path=drag[1], spray_bend=drag[2],
         bubble_path=follow[1], bubble_bend=follow[2], bubble_keep=gained[0], bubble_gain=gained[1],
-        frame=frame, every=every, seed=params.foam_seed,
-    )  # fmt: skip
+        every=every, seed=params.foam_seed,
+    ))  # fmt: skip
 
 
 def reluctance(materials: dict[int, Material], params: Parameters) -> np.ndarray:
