@@ -64,13 +64,14 @@ with contextlib.redirect_stdout(io.StringIO()), _short_frames():
     from quadrants.lang.ast import ast_transformer_utils
 
 __all__ = [
-    "BACKENDS", "available_backends", "current_backend", "download", "qd", "start", "synchronize", "threads", "upload",
-    "watched",
+    "BACKENDS", "LANES", "available_backends", "current_backend", "download", "lanes", "qd", "start", "synchronize",
+    "threads", "upload", "watched",
 ]  # fmt: skip
 
 #: Names a user may pass as ``arch``; ``gpu`` means the best one present.
 BACKENDS = ("cpu", "gpu", "cuda", "vulkan", "metal", "amdgpu")
 _GPU_ORDER = ("cuda", "metal", "amdgpu", "vulkan")
+LANES = 8
 _current: str | None = None
 
 
@@ -254,6 +255,14 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
 def threads() -> int:
     """Return how many threads of the processor compute, 0 where a graphics processor does."""
     return int(qd.lang.impl.current_cfg().cpu_max_num_threads) if _current == "cpu" else 0
+
+
+def lanes() -> int:
+    """Return how many particles or nodes are computed together: as vectors on a processor, each by a thread on others.
+
+    More than eight are no faster, where vectors are twice as long (docs/performance.md).
+    """
+    return LANES if _current == "cpu" else 1
 
 
 def _thread_ids() -> set[int]:

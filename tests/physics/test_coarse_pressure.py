@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank.compiler import qd
+from wavetank.compiler import lanes, qd
 from wavetank.materials import Material
 from wavetank.physics import coarse_grid, poisson
 from wavetank.physics.coarse_grid import new_levels
@@ -17,10 +17,10 @@ from wavetank.state import CoarseGrid
 
 
 @qd.kernel(fastcache=True)
-def couple(level: CoarseGrid, least_theta: qd.f32):
+def couple(level: CoarseGrid, least_theta: qd.f32, lanes: qd.template()):
     """Set the couplings of a finest level, as `gather` does."""
-    for n in range(level.nx * level.ny * level.nz):
-        poisson.couple_node(level, n, least_theta)
+    for piece in range(level.pieces * level.ny * level.nz):
+        poisson.couple_nodes(level, piece, least_theta, lanes)
 
 
 def filled(level, heights) -> None:
@@ -31,7 +31,7 @@ def filled(level, heights) -> None:
         whole = array.to_numpy()
         whole[: values.size] = values.ravel()
         array.from_numpy(whole)
-    couple(level, poisson.LEAST_THETA)
+    couple(level, poisson.LEAST_THETA, lanes())
 
 
 def test_weight_at_the_bottom_becomes_hydrostatic_pressure():

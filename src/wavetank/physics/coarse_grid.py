@@ -8,7 +8,7 @@ node alone: that is what particle-in-cell methods do (Harlow 1964).
 import dataclasses
 import math
 
-from wavetank.compiler import current_backend, qd
+from wavetank.compiler import LANES, current_backend, lanes, qd
 from wavetank.distance import lift, vec3
 from wavetank.state import CoarseGrid, integers, scalars
 
@@ -85,9 +85,12 @@ def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
     edges = [edge / n for edge, n in zip(size, shape, strict=True)]
     dx, dy, dz = [*edges, 1.0][:3]
     nodes = nx * ny * nz
-    rim = nodes + nx * ny  # the next node of those on the rim is read, and counts nothing
+    rim = nodes + nx * ny + LANES  # what is beyond the last node is read, and counts nothing
     kinds = {field.name: field.type for field in dataclasses.fields(CoarseGrid)}
     parts = PARTS if current_backend() == "cpu" and nodes <= LARGE else 1
     sums = {"sums": integers(parts * nodes), "mass_sums": integers(parts * nodes)}
     fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in (qd.i32, qd.f32) and name not in sums}
-    return CoarseGrid(**sums, **fields, nx=nx, ny=ny, nz=nz, pairs=(nx + 1) // 2, dx=dx, dy=dy, dz=dz, parts=parts)
+    return CoarseGrid(
+        **sums, **fields, nx=nx, ny=ny, nz=nz, pairs=(nx + 1) // 2, pieces=-(-nx // lanes()), dx=dx, dy=dy, dz=dz,
+        parts=parts,
+    )  # fmt: skip

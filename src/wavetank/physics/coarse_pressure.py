@@ -36,7 +36,7 @@ from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_s
 from wavetank.physics.coarse_grid import coordinates, corners, in_cells, tents
 from wavetank.physics.pairs import column, part_of, teams, turns
 from wavetank.physics.places import predict_at, predicted
-from wavetank.physics.poisson import LEAST_THETA, couple_node, solve_levels
+from wavetank.physics.poisson import LEAST_THETA, couple_nodes, solve_levels
 from wavetank.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
@@ -221,7 +221,8 @@ def gather(
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
         grid.rhs[n] = scale * total / qd.max(grid.room[n], least_open)
-        couple_node(grid, n, least_theta)
+    for piece in range(grid.pieces * grid.ny * grid.nz):
+        couple_nodes(grid, piece, least_theta, lanes)
 
 
 @qd.func

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import current_backend, qd, threads
+from wavetank.compiler import current_backend, lanes, qd, threads
 from wavetank.errors import WavetankError
 from wavetank.physics.pairs import part_of, turns
 from wavetank.physics.places import predict_at, predicted
@@ -277,7 +277,7 @@ def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, 
     return Grid(
         cell=integers(capacity), start=integers(total + 1), fill=integers(total),
         blocks=integers(-(-total // SCAN_BLOCK)), order=integers(capacity), number=integers(_groups(capacity)),
-        list=entries, room=room, lanes=8 if current_backend() == "cpu" else 1,
+        list=entries, room=room, lanes=lanes(),
         parts=PARTS * max(threads(), 1),
         nowhere=capacity,
         nx=int(cells[0]), ny=int(cells[1]), nz=int(cells[2]), cells=total,

@@ -15,9 +15,8 @@ time step before: pressures that are carried over make water pulse (docs/method.
 import itertools
 import math
 
-from wavetank.compiler import current_backend, qd
-from wavetank.distance import vec3
-from wavetank.physics.coarse_grid import LARGE, coordinates, node
+from wavetank.compiler import current_backend, lanes, qd
+from wavetank.physics.coarse_grid import LARGE, coordinates
 from wavetank.state import CoarseGrid
 
 SWEEPS, MOST_SWEEPS = 8, 200  # of a level, and of the coarsest
@@ -34,80 +33,92 @@ def coupling(grid: CoarseGrid, n, m, edge, least_theta):
     """
     a = qd.min(grid.fill[n], 1.0) - 0.5
     b = qd.min(grid.fill[m], 1.0) - 0.5
-    theta = 1.0
-    if a * b < 0.0:
-        theta = qd.max(qd.max(a, b) / qd.abs(a - b), least_theta)
+    crossed = qd.max(qd.max(a, b) / qd.max(qd.abs(a - b), 1e-6), least_theta)
+    theta = qd.select(a * b < 0.0, crossed, 1.0)
     # Light fluid gives way more: the inverse of the mean density, and of that of the water where there is air.
-    density = 0.5 * (grid.density[n] + grid.density[m])
-    if a <= 0.0:
-        density = grid.density[m]
-    if b <= 0.0:
-        density = grid.density[n]
-    result = 1.0 / (theta * edge * edge * density)
-    if (a <= 0.0 and b <= 0.0) or grid.room[n] == 0.0 or grid.room[m] == 0.0:
-        result = 0.0
-    return result
+    mean = 0.5 * (grid.density[n] + grid.density[m])
+    density = qd.select(a <= 0.0, grid.density[m], qd.select(b <= 0.0, grid.density[n], mean))
+    is_open = qd.min(qd.max(a, b), qd.min(grid.room[n], grid.room[m])) > 0.0
+    return qd.select(is_open, 1.0 / qd.max(theta * edge * edge * density, 1e-12), 0.0)
 
 
 @qd.func
-def couple_node(grid: CoarseGrid, n, least_theta):
-    """Set the couplings of node `n` with the next ones along x, y and z, and what inverts its equation."""
-    c = coordinates(grid, n)
-    nodes = qd.Vector([grid.nx, grid.ny, grid.nz])
-    steps = qd.Vector([1, grid.nx, grid.nx * grid.ny])
-    edges = vec3(grid.dx, grid.dy, grid.dz)
-    w = vec3(0.0, 0.0, 0.0)
-    diagonal = 0.0
-    is_water = grid.fill[n] > 0.5 and grid.room[n] > 0.0
-    for side in range(6):  # a loop around one copy of the code: the next nodes, then those before
-        axis = side % 3
-        sign = 1 if side < 3 else -1
-        if c[axis] + sign >= 0 and c[axis] + sign < nodes[axis] and (side < 3 or is_water):
-            coupled = coupling(grid, n, n + sign * steps[axis], edges[axis], least_theta)
-            diagonal += coupled
-            if side < 3:
-                w[axis] = coupled
-    grid.wx[n] = w.x
-    grid.wy[n] = w.y
-    grid.wz[n] = w.z
-    grid.inverse[n] = 1.0 / diagonal if is_water and diagonal > 0.0 else 0.0
+def couple_nodes(grid: CoarseGrid, piece, least_theta, lanes: qd.template()):
+    """Set the couplings of `lanes` nodes of a row with the next ones along x, y and z, and what inverts their equation.
 
-
-@qd.func
-def start_node(grid: CoarseGrid, coarser: CoarseGrid, n, start):
-    """Set lambda of node `n` to what `start` says; it stays 0 outside of the water."""
-    lam = 0.0
-    if grid.inverse[n] > 0.0:
-        if start == 2:  # GO_ON
-            lam = grid.lam[n]
-        if start == 1:  # FROM_COARSER
-            c = coordinates(grid, n)
-            fx = grid.nx // coarser.nx
-            fy = grid.ny // coarser.ny
-            fz = grid.nz // coarser.nz
-            lam = coarser.lam[node(coarser, qd.Vector([c[0] // fx, c[1] // fy, c[2] // fz]))]
-    grid.lam[n] = lam
-
-
-@qd.func
-def relax_node(grid: CoarseGrid, pair, row, colour, over_relaxation):
-    """One step of projected over-relaxation, lambda <= 0, at the node of that `colour` in a `pair` of a `row`."""
+    The rim of the arrays, where there is no room, stands for what is beyond the tank.
+    """
+    first = piece % grid.pieces * lanes
+    row = piece // grid.pieces
     y = row % grid.ny
     z = row // grid.ny
-    x = 2 * pair + (y + z + colour) % 2
-    n = x + grid.nx * row
-    if x < grid.nx and grid.inverse[n] > 0.0:
-        layer = grid.nx * grid.ny
-        total = -grid.rhs[n] + grid.wx[n] * grid.lam[n + 1] + grid.wy[n] * grid.lam[n + grid.nx]
-        total += grid.wz[n] * grid.lam[n + layer]
-        if x > 0:
-            total += grid.wx[n - 1] * grid.lam[n - 1]
-        if y > 0:
-            total += grid.wy[n - grid.nx] * grid.lam[n - grid.nx]
-        if z > 0:
-            total += grid.wz[n - layer] * grid.lam[n - layer]
-        lam = grid.lam[n]
-        grid.lam[n] = qd.min(lam + over_relaxation * (total * grid.inverse[n] - lam), 0.0)
+    begin, layer, rim = grid.nx * row, grid.nx * grid.ny, grid.nx * grid.ny * grid.nz
+    after_y = begin + grid.nx if y + 1 < grid.ny else rim
+    before_y = begin - grid.nx if y > 0 else rim
+    after_z = begin + layer if z + 1 < grid.nz else rim
+    before_z = begin - layer if z > 0 else rim
+    found = qd.Matrix.zero(qd.f32, 4, lanes)
+    for lane in range(lanes):
+        x = first + lane
+        n = begin + x
+        wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, rim), grid.dx, least_theta)
+        wy = coupling(grid, n, after_y + x, grid.dy, least_theta)
+        wz = coupling(grid, n, after_z + x, grid.dz, least_theta)
+        diagonal = wx + wy + wz
+        diagonal += coupling(grid, n, qd.select(x > 0, n - 1, rim), grid.dx, least_theta)
+        diagonal += coupling(grid, n, before_y + x, grid.dy, least_theta)
+        diagonal += coupling(grid, n, before_z + x, grid.dz, least_theta)
+        is_water = qd.min(grid.fill[n] - 0.5, qd.min(grid.room[n], diagonal)) > 0.0
+        found[0, lane] = wx
+        found[1, lane] = wy
+        found[2, lane] = wz
+        found[3, lane] = qd.select(is_water, 1.0 / qd.max(diagonal, 1e-12), 0.0)
+    for lane in range(qd.min(lanes, grid.nx - first)):
+        n = begin + first + lane
+        grid.wx[n] = found[0, lane]
+        grid.wy[n] = found[1, lane]
+        grid.wz[n] = found[2, lane]
+        grid.inverse[n] = found[3, lane]
+
+
+@qd.func
+def start_nodes(grid: CoarseGrid, coarser: CoarseGrid, row, first, last, start):
+    """Set lambda of the nodes of a `row` from x = `first` to `last` to what `start` says; 0 outside of the water."""
+    halved = grid.nx // coarser.nx - 1  # 1, or 0 where the levels have as many nodes along x
+    y = row % grid.ny // (grid.ny // coarser.ny)
+    z = row // grid.ny // (grid.nz // coarser.nz)
+    below = coarser.nx * (y + coarser.ny * z)
+    for x in range(first, last):
+        n = grid.nx * row + x
+        lam = 0.0
+        if grid.inverse[n] > 0.0:
+            if start == 2:  # GO_ON
+                lam = grid.lam[n]
+            if start == 1:  # FROM_COARSER
+                lam = coarser.lam[below + (x >> halved)]
+        grid.lam[n] = lam
+
+
+@qd.func
+def relax_nodes(grid: CoarseGrid, row, first, last, over_relaxation):
+    """One step of projected over-relaxation, lambda <= 0, at every other node of a `row` from x = `first` to `last`.
+
+    What a node is coupled with beyond the tank stands in the rim of the arrays, and is 0.
+    """
+    begin, layer, rim = grid.nx * row, grid.nx * grid.ny, grid.nx * grid.ny * grid.nz
+    before_y = begin - grid.nx if row % grid.ny > 0 else rim
+    before_z = begin - layer if row >= grid.ny else rim
+    for k in range((last - first + 1) // 2):
+        x = first + 2 * k
+        n = begin + x
+        if grid.inverse[n] > 0.0:
+            total = grid.wx[n] * grid.lam[n + 1] - grid.rhs[n]
+            total += grid.wy[n] * grid.lam[n + grid.nx] + grid.wy[before_y + x] * grid.lam[before_y + x]
+            total += grid.wz[n] * grid.lam[n + layer] + grid.wz[before_z + x] * grid.lam[before_z + x]
+            if x > 0:
+                total += grid.wx[n - 1] * grid.lam[n - 1]
+            lam = grid.lam[n]
+            grid.lam[n] = qd.min(lam + over_relaxation * (total * grid.inverse[n] - lam), 0.0)
 
 
 @qd.kernel(fastcache=True)
@@ -121,20 +132,21 @@ def solve(
     """
     if qd.static(shared):
         for n in range(grid.nx * grid.ny * grid.nz):
-            start_node(grid, coarser, n, start)
+            start_nodes(grid, coarser, n // grid.nx, n % grid.nx, n % grid.nx + 1, start)
         for colour in qd.static(range(2 * shared)):
             for half in range(grid.pairs * grid.ny * grid.nz):
-                relax_node(grid, half % grid.pairs, half // grid.pairs, colour, over_relaxation)
+                row = half // grid.pairs
+                x = 2 * (half % grid.pairs) + (row % grid.ny + row // grid.ny + colour) % 2
+                relax_nodes(grid, row, x, qd.min(x + 1, grid.nx), over_relaxation)
     else:
         # A grid of some thousand nodes is done before other threads have started.
         qd.loop_config(serialize=True)
         for _ in range(1):
-            for n in range(grid.nx * grid.ny * grid.nz):
-                start_node(grid, coarser, n, start)
-            for turn in range(2 * sweeps):
+            for row in range(grid.ny * grid.nz):
+                start_nodes(grid, coarser, row, 0, grid.nx, start)
+            for colour in range(2 * sweeps):
                 for row in range(grid.ny * grid.nz):
-                    for pair in range(grid.pairs):
-                        relax_node(grid, pair, row, turn, over_relaxation)
+                    relax_nodes(grid, row, (row % grid.ny + row // grid.ny + colour) % 2, grid.nx, over_relaxation)
 
 
 @qd.func
@@ -145,12 +157,14 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
     fy = fine.ny // coarse.ny
     fz = fine.nz // coarse.nz
     room, fill, rhs, density = 0.0, 0.0, 0.0, 0.0
-    for k in range(fx * fy * fz):
-        m = node(fine, qd.Vector([c[0] * fx + k % fx, c[1] * fy + k // fx % fy, c[2] * fz + k // (fx * fy)]))
-        room += fine.room[m]
-        fill += fine.fill[m] * fine.room[m]
-        rhs += fine.rhs[m] * fine.room[m]
-        density += fine.density[m] * fine.fill[m] * fine.room[m]
+    for z in range(c[2] * fz, c[2] * fz + fz):
+        for y in range(c[1] * fy, c[1] * fy + fy):
+            row = fine.nx * (y + fine.ny * z)
+            for m in range(row + c[0] * fx, row + c[0] * fx + fx):
+                room += fine.room[m]
+                fill += fine.fill[m] * fine.room[m]
+                rhs += fine.rhs[m] * fine.room[m]
+                density += fine.density[m] * fine.fill[m] * fine.room[m]
     coarse.room[n] = room / (fx * fy * fz)
     coarse.density[n] = density / fill if fill > 0.0 else 1.0
     coarse.fill[n] = fill / qd.max(room, 1e-6)
@@ -158,20 +172,20 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
 
 
 @qd.kernel(fastcache=True)
-def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: qd.template()):
+def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: qd.template(), lanes: qd.template()):
     """Set up the equation of a coarser level; `shared` by all threads, or done by one."""
     if qd.static(shared):
         for n in range(coarse.nx * coarse.ny * coarse.nz):
             average_node(coarse, fine, n)
-        for n in range(coarse.nx * coarse.ny * coarse.nz):
-            couple_node(coarse, n, least_theta)
+        for piece in range(coarse.pieces * coarse.ny * coarse.nz):
+            couple_nodes(coarse, piece, least_theta, lanes)
     else:
         qd.loop_config(serialize=True)
         for _ in range(1):
             for n in range(coarse.nx * coarse.ny * coarse.nz):
                 average_node(coarse, fine, n)
-            for n in range(coarse.nx * coarse.ny * coarse.nz):
-                couple_node(coarse, n, least_theta)
+            for piece in range(coarse.pieces * coarse.ny * coarse.nz):
+                couple_nodes(coarse, piece, least_theta, lanes)
 
 
 def is_shared(level: CoarseGrid) -> bool:
@@ -200,7 +214,7 @@ def coarsest_relaxation(level: CoarseGrid) -> tuple[int, float]:
 def solve_levels(levels: list[CoarseGrid]) -> None:
     """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set."""
     for fine, coarse in itertools.pairwise(levels):
-        restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)))
+        restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)), lanes())
     coarsest = coarser = levels[-1]
     for level in reversed(levels):
         start, sweeps, over_relaxation = FROM_COARSER, SWEEPS, OVER_RELAXATION
