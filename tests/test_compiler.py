@@ -61,6 +61,33 @@ def test_a_launch_that_is_known_is_not_prepared_again(prepared):
     assert compiler.download(y)[1000:].tolist() == [0, 0, 0, 2]
 
 
+@dataclasses.dataclass(frozen=True)
+class More:
+    """Fields that only some variants of a kernel read: plain numbers come after those that are."""
+
+    first: qd.i32
+    second: qd.i32
+    third: qd.f32
+
+
+@qd.kernel(fastcache=True)
+def write_some(x: qd.types.ndarray(), more: More, place: qd.i32, share: qd.f32, whole: qd.template()):
+    if qd.static(whole):
+        x[place] = more.first + more.second + qd.cast(more.third + share, qd.i32)
+    else:
+        x[place] = more.second + qd.cast(share, qd.i32)
+
+
+def test_variants_of_a_kernel_have_their_numbers_in_places_of_their_own(prepared):
+    compiler.start("cpu")
+    x, more = integers(1000), More(first=100, second=10, third=1000.0)
+    for place in range(4):
+        for whole in (1, 0):
+            write_some(x, more, 500 + 2 * place + whole, 1.0 + place, whole)
+    assert len(prepared) == 2 * len(("x", "more", "place", "share"))  # once for each variant
+    assert compiler.download(x)[500:508].tolist() == [11, 1111, 12, 1112, 13, 1113, 14, 1114]
+
+
 def test_prepared_launches_go_with_their_arrays(prepared):
     """A new array may take the address of one that is gone."""
     compiler.start("cpu")

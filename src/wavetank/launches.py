@@ -31,6 +31,8 @@ class Known:
     read: Any  # the kernel, as the compiler has read it
     compiled: Any
     context: Any  # its arguments
+    integers: tuple[int, ...]  # slots of plain numbers among these, which depend on what the kernel is compiled for
+    reals: tuple[int, ...]
     watchers: list[weakref.ref[Any]]  # of its objects
 
 
@@ -41,7 +43,6 @@ class Launches:
     fixed: tuple[int, ...]  # places of these among the arguments
     integers: tuple[int, ...]  # places of other numbers
     reals: tuple[int, ...]
-    slots: dict[int, int] = dataclasses.field(default_factory=dict)  # where the device has such a number
     known: dict[tuple[Any, ...], Known] = dataclasses.field(default_factory=dict)
     prepared: tuple[Any, Any] | None = None  # the last launch that was not known
 
@@ -54,16 +55,14 @@ class Launches:
         context = known.read.make_launch_context()
         context.copy(known.context)
         if self.integers:
-            context.set_args_int(
-                tuple(self.slots[k] for k in self.integers), tuple(index(args[k]) for k in self.integers)
-            )
+            context.set_args_int(known.integers, tuple([index(args[k]) for k in self.integers]))
         if self.reals:
-            context.set_args_float(tuple(self.slots[k] for k in self.reals), tuple(float(args[k]) for k in self.reals))
+            context.set_args_float(known.reals, tuple([float(args[k]) for k in self.reals]))
         return context
 
-    def remember(self, args: tuple[Any, ...], program: Any, compiled: Any) -> None:
-        """Keep the launch that has been prepared until one of its objects goes."""
-        if self.prepared is None or not self.slots.keys() >= {*self.integers, *self.reals}:
+    def remember(self, args: tuple[Any, ...], program: Any, compiled: Any, slots: dict[int, int]) -> None:
+        """Keep the launch that has been prepared until one of its objects goes; numbers have the `slots`."""
+        if self.prepared is None or not slots.keys() >= {*self.integers, *self.reals}:
             return
         asked, launches = self.asked(args), self.known
 
@@ -76,7 +75,8 @@ class Launches:
             return  # an object that cannot tell when it goes
         if len(launches) >= MOST:
             launches.clear()
-        launches[asked] = Known(program, self.prepared[0], compiled, self.prepared[1], watchers)
+        integers, reals = (tuple(slots[k] for k in places) for places in (self.integers, self.reals))
+        launches[asked] = Known(program, self.prepared[0], compiled, self.prepared[1], integers, reals, watchers)
 
 
 def keep_prepared_launches(kernels: Any, runtime: Any) -> bool:
@@ -106,9 +106,9 @@ def keep_prepared_launches(kernels: Any, runtime: Any) -> bool:
             numbers.clear()
             launches.prepared = None
             result = call(self, *args, **options)
-            launches.slots = {k: numbers[meta.name] for k, meta in enumerate(self.arg_metas) if meta.name in numbers}
+            slots = {k: numbers[meta.name] for k, meta in enumerate(self.arg_metas) if meta.name in numbers}
             if not getattr(self, "_mutable_nd_cached_val", None):  # arrays that may be exchanged within an object
-                launches.remember(args, runtime().prog, self._last_compiled_kernel_data)
+                launches.remember(args, runtime().prog, self._last_compiled_kernel_data, slots)
             return result
         context = launches.context(known, args)
         known.program.launch_kernel(known.compiled, context)

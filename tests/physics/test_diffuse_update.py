@@ -89,10 +89,15 @@ def test_amount_follows_the_surface_and_not_the_resolution(dim):
     """Births times d^(dim - 1), the share of a surface that each one covers, is the same at twice the resolution.
 
     With as many time steps, and to a third: coarse water is damped more itself. Without the share it would be 2 or 4.
+    How often a jet in the plane breaks is a matter of chance (single pairs: 1.03 to 1.34), hence a mean.
     """
     coarse, fine = (0.064, 0.032) if dim == 3 else (0.04, 0.02)
     same = {"substeps": 8, "courant": 100.0, "wave_courant": 100.0}
-    shares = [born(dam(dim, spacing=d, **same), 1.2) * d ** (dim - 1) for d in (coarse, fine)]
+    near = (0.98, 1.0, 1.02) if dim == 2 else (1.0,)
+    shares = [
+        np.mean([born(dam(dim, spacing=f * d, **same), 1.2) * (f * d) ** (dim - 1) for f in near])
+        for d in (coarse, fine)
+    ]
     assert shares[0] == pytest.approx(shares[1], rel=0.33)
 
 
