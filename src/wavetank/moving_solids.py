@@ -28,6 +28,7 @@ class MovingSolids:
         self.poses: list[Pose] = [(solid.origin, solid.quaternion) for solid in self.members]
         self.targets: dict[int, Pose] = {}  # at the end of the next frame
         self.growing: dict[int, tuple[float, float]] = {}  # age and time to grow [s]
+        self.changes = 0  # of what is on the device
         self.rebuild()
 
     def rebuild(self) -> None:
@@ -91,10 +92,10 @@ class MovingSolids:
             fastest = max(fastest, min(self.reaches[number], 1e3) / time)
         return fastest
 
-    def move_to(self, begin: float, end: float) -> None:
-        """Put the poses at the shares `begin` and `end` of the frame on the device."""
+    def move_to(self, begin: float, end: float) -> int:
+        """Put the poses at the shares `begin` and `end` of the frame on the device; return how often those changed."""
         if not self.targets:
-            return
+            return self.changes
         self._upload(begin, end)
         resting = all(
             np.array_equal(a, b)
@@ -103,6 +104,7 @@ class MovingSolids:
         )
         if begin == 0.0 and resting:
             self.targets = {}
+        return self.changes
 
     def arrive(self) -> None:
         """End a frame: what was aimed at is where the solids are."""
@@ -117,6 +119,7 @@ class MovingSolids:
             self.growing = {k: (age, time) for k, (age, time) in self.growing.items() if age < time}
 
     def _resize(self) -> None:
+        self.changes += 1
         if self.growing:
             scales = [1.0] * len(self.members)
             for number, (age, time) in self.growing.items():
@@ -124,6 +127,7 @@ class MovingSolids:
             solids.resize(self.device, self.members, scales)
 
     def _upload(self, begin: float, end: float) -> None:
+        self.changes += 1
         if not self.poses:
             return
         where = [self.targets.get(number, pose) for number, pose in enumerate(self.poses)]

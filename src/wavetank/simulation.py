@@ -129,7 +129,7 @@ class Simulation:
         parts = self.time_steps = self._substeps(duration)
         self.solids.grow(duration)
         for part in range(parts):
-            self.solids.move_to(part / parts, (part + 1) / parts)
+            self.world.solids_version = self.solids.move_to(part / parts, (part + 1) / parts)
             if self.count:
                 for force in (*self.forces, *self.pushed):
                     force.apply(self.world.particles, self.count, duration / parts, self.time + duration * part / parts)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import wavetank as wt
+from wavetank import compiler
 from wavetank.compiler import lanes, qd
 from wavetank.materials import Material
-from wavetank.physics import coarse_grid, poisson
+from wavetank.physics import coarse_grid, coarse_pressure, poisson
 from wavetank.physics.coarse_grid import new_levels
 from wavetank.physics.smoothing import NAMES, kernel_shape, rest_lattice
 from wavetank.physics.step import has_grid_pressure
@@ -184,3 +185,38 @@ def test_threads_together_solve_what_one_does(monkeypatch):
             sim.step()
         found.append(sim.positions)
     np.testing.assert_array_equal(*found)
+
+
+def test_the_room_that_solids_leave_follows_them():
+    """It is found anew when solids move, swell, come and go, and not while they rest."""
+    water = wt.Block(lower=(0, 0, 0), upper=(1.0, 0.3, 0.6))
+    tank = wt.Tank(size=(1.0, 0.6, 0.6))
+    box = wt.Box(name="box", center=(0.3, 0.2, 0.3), size=(0.2, 0.2, 0.2))
+    sim = Simulation(wt.Scene(spacing=0.05, tank=tank, fluids=[water], solids=[box]))
+    assert has_grid_pressure(sim.world, sim.scene)
+
+    def room() -> np.ndarray:
+        with compiler.watched(lambda module, name, launch: (names.append(name), launch())[1]):
+            sim.step()
+        level = sim.world.levels[0]
+        kept = level.room.to_numpy()
+        coarse_pressure.find_room(level, sim.world.solids, coarse_pressure.LEAST_OPEN, int(sim.world.has_solids))
+        np.testing.assert_array_equal(level.room.to_numpy(), kept)
+        return kept
+
+    names: list[str] = []
+    first = room()
+    names.clear()
+    np.testing.assert_array_equal(room(), first)
+    assert "gather" in names and "find_room" not in names
+    sim.move("box", (0.5, 0.2, 0.3))
+    assert (room() != first).any()
+    sim.move("box", (0.3, 0.2, 0.3))
+    np.testing.assert_array_equal(room(), first)
+    ball = sim.add_solid(wt.Sphere(center=(0.75, 0.2, 0.3), radius=0.15), grow=0.1)
+    small = room()
+    for _ in range(12):
+        grown = room()
+    assert grown.sum() < small.sum() < first.sum()
+    sim.remove_solid(ball)
+    np.testing.assert_array_equal(room(), first)

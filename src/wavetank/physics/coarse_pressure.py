@@ -181,6 +181,16 @@ def open_share(grid: CoarseGrid, solids: SolidSet, n):
 
 
 @qd.kernel(fastcache=True)
+def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: qd.template()):
+    """Find which share of each cell is open where solids are `searched`; else the tank ends where the cells do."""
+    for n in range(grid.nx * grid.ny * grid.nz):
+        room = 1.0
+        if qd.static(searched):
+            room = open_share(grid, solids, n)
+        grid.room[n] = room if room >= least_open else 0.0
+
+
+@qd.kernel(fastcache=True)
 def gather(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     unit: qd.f32, volume: qd.f32, scale: qd.f32, inner_from: qd.f32, inner_to: qd.f32, missing: qd.f32,
@@ -190,23 +200,20 @@ def gather(
     """Sum the tents of all particles at the nodes, then their density errors (Eq. 2), and set up the equation.
 
     The sums are 0 before. `volume` is that of a particle over that of a cell and over the `unit`, `scale` the same over
-    the stiffness M. What solids answer to the way of a particle is increased by the share `missing`. Solids take their
-    share of a cell where they are `searched`; else there are only the walls of the tank, which end where the cells do.
-    Where fluids are `mixed`, their densities are averaged.
+    the stiffness M. What solids answer to the way of a particle is increased by the share `missing`; there are only the
+    walls of the tank unless they are `searched`. Where fluids are `mixed`, their densities are averaged.
 
-    Threads share the particles in `parts`. Where these are `alone`, each has sums of its own and waits for no other.
+    Threads share the particles in `parts`. Where these are `alone`, each has sums of its own and waits for no other,
+    and there are so few nodes that one thread is done with them before others have started.
     """
     for turn in range(turns(teams(count, lanes), parts, lanes)):
         part = part_of(turn, teams(count, lanes), parts, lanes)
         for team in range(part[0], part[1]):
             add_fill(grid, particles, scratch, team, alone * (turn >> 9), unit, count, mixed, lanes, alone)
+    qd.loop_config(serialize=bool(alone))
     for n in range(grid.nx * grid.ny * grid.nz):
-        room = 1.0
-        if qd.static(searched):
-            room = open_share(grid, solids, n)
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.room[n] = room if room >= least_open else 0.0
-        grid.fill[n] = volume * total / qd.max(room, least_open)
+        grid.fill[n] = volume * total / qd.max(grid.room[n], least_open)
         grid.density[n] = 1.0
         if qd.static(mixed):
             mass = taken(grid.mass_sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
@@ -218,9 +225,11 @@ def gather(
                 grid, particles, scratch, solids, walls, c, team, alone * (turn >> 9), unit, inner_from, inner_to,
                 missing, count, searched, lanes, alone,
             )  # fmt: skip
+    qd.loop_config(serialize=bool(alone))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
         grid.rhs[n] = scale * total / qd.max(grid.room[n], least_open)
+    qd.loop_config(serialize=bool(alone))
     for piece in range(grid.pieces * grid.ny * grid.nz):
         couple_nodes(grid, piece, least_theta, lanes)
 
@@ -252,9 +261,13 @@ def slope_along(grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), 
 @qd.kernel(fastcache=True)
 def move_particles(
     grid: CoarseGrid, particles: Particles, cells: Grid, solids: SolidSet, c: Coefficients, stiffness: qd.f32,
-    reach: qd.f32, count: qd.i32, lanes: qd.template(),
+    reach: qd.f32, count: qd.i32, alone: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
-    """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank, and carry it on."""
+    """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank, and carry it on.
+
+    One thread `alone` sees to the nodes where they are few.
+    """
+    qd.loop_config(serialize=bool(alone))
     for n in range(grid.nx * grid.ny * grid.nz):
         lam = grid.lam[n]
         grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
@@ -288,12 +301,16 @@ def move_particles(
 def correct_pressure(
     levels: list[CoarseGrid], particles: Particles, cells: Grid, scratch: Scratch, solids: SolidSet, walls: Walls,
     c: Coefficients, stiffness: float, volume: float, count: int, share: float, *, searched: bool, mixed: bool,
+    moved: bool,
 ) -> None:  # fmt: skip
     """Move the predicted positions of `particles` so that the `share` of the mean errors of their densities vanishes.
 
     `scratch.rho` holds the densities over that of the heaviest fluid there, `volume` [m^dim] is that of a particle.
+    Unless solids have `moved`, the room that they leave is what it was.
     """
     finest = levels[0]
+    if moved:
+        find_room(finest, solids, LEAST_OPEN, int(searched))
     alone = finest.parts > 1
     scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
     gather(
@@ -302,4 +319,4 @@ def correct_pressure(
         cells.lanes,
     )  # fmt: skip
     solve_levels(levels)
-    move_particles(finest, particles, cells, solids, c, stiffness, REACH * c.h, count, cells.lanes)
+    move_particles(finest, particles, cells, solids, c, stiffness, REACH * c.h, count, int(alone), cells.lanes)

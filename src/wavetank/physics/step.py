@@ -59,6 +59,8 @@ class World:
     has_friction: bool
     levels: list[CoarseGrid]  # of the tank, the finest first; none without a tank
     frozen: int = 0  # particles that are ice
+    solids_version: int = 0  # changes with each motion of the solids
+    room_version: int = -1  # of the solids when the grid was last told which room they leave
     known: dict[tuple[Any, ...], Any] = dataclasses.field(default_factory=dict)  # see `exchanged`
     pool: Pool | None = None  # of spray, foam and bubbles; made when the first are
 
@@ -123,7 +125,9 @@ def correct_on_grid(world: World, particles: Particles, kinds: Blend, params: Pa
     correct_pressure(
         world.levels, particles, world.grid, world.scratch, world.solids, world.walls, c, stiffness,
         params.spacing**params.dim, count, params.grid_pressure, searched=world.has_solids, mixed=bool(kinds.mixed),
+        moved=world.room_version != world.solids_version,
     )  # fmt: skip
+    world.room_version = world.solids_version
 
 
 def smooth_and_confine(
