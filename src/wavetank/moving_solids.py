@@ -1,5 +1,6 @@
 """The solids of a running world: their names, where they are, where they are going, and their way to the device."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -14,6 +15,7 @@ from wavetank.solid import Solid
 
 Pose = tuple[np.ndarray, np.ndarray]  # position [m], shape [3], and rotation (w, x, y, z)
 SMALLEST = 0.02  # size at which a growing solid starts, of its full size
+_versions = itertools.count(1)
 
 
 class MovingSolids:
@@ -28,7 +30,7 @@ class MovingSolids:
         self.poses: list[Pose] = [(solid.origin, solid.quaternion) for solid in self.members]
         self.targets: dict[int, Pose] = {}  # at the end of the next frame
         self.growing: dict[int, tuple[float, float]] = {}  # age and time to grow [s]
-        self.changes = 0  # of what is on the device
+        self.version = 0  # of what is on the device
         self.rebuild()
 
     def rebuild(self) -> None:
@@ -93,9 +95,12 @@ class MovingSolids:
         return fastest
 
     def move_to(self, begin: float, end: float) -> int:
-        """Put the poses at the shares `begin` and `end` of the frame on the device; return how often those changed."""
+        """Put the poses at the shares `begin` and `end` of the frame on the device, and return the version of those.
+
+        No two versions of any world's solids have the same number.
+        """
         if not self.targets:
-            return self.changes
+            return self.version
         self._upload(begin, end)
         resting = all(
             np.array_equal(a, b)
@@ -104,7 +109,7 @@ class MovingSolids:
         )
         if begin == 0.0 and resting:
             self.targets = {}
-        return self.changes
+        return self.version
 
     def arrive(self) -> None:
         """End a frame: what was aimed at is where the solids are."""
@@ -119,7 +124,7 @@ class MovingSolids:
             self.growing = {k: (age, time) for k, (age, time) in self.growing.items() if age < time}
 
     def _resize(self) -> None:
-        self.changes += 1
+        self.version = next(_versions)
         if self.growing:
             scales = [1.0] * len(self.members)
             for number, (age, time) in self.growing.items():
@@ -127,7 +132,7 @@ class MovingSolids:
             solids.resize(self.device, self.members, scales)
 
     def _upload(self, begin: float, end: float) -> None:
-        self.changes += 1
+        self.version = next(_versions)
         if not self.poses:
             return
         where = [self.targets.get(number, pose) for number, pose in enumerate(self.poses)]

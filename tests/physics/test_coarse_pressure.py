@@ -220,3 +220,9 @@ def test_the_room_that_solids_leave_follows_them():
     assert grown.sum() < small.sum() < first.sum()
     sim.remove_solid(ball)
     np.testing.assert_array_equal(room(), first)
+    before = sim.snapshot()
+    for x in (0.4, 0.5, 0.6):
+        sim.move("box", (x, 0.2, 0.3))
+        room()
+        sim.resume(before)
+        np.testing.assert_array_equal(room(), first)

@@ -87,8 +87,12 @@ def sized(scene: Scene, count: int) -> Scene:
 
 
 def measured(scene: Scene, arch: str, seconds: float) -> Figures:
-    """Run once without a clock: density error, substeps and pairs of each frame, and what the device holds."""
+    """Run once without a clock: density error, substeps and pairs of each frame, and what the device holds.
+
+    The first frame does not count, as in `timed`.
+    """
     sim = Simulation(scene, arch)
+    sim.step()
     frames = max(2, math.ceil(seconds / scene.frame_time - 1e-6))
     launches, parts, lists, means, tails = [], [], [], [], []
     for _ in range(frames):
@@ -120,8 +124,12 @@ def measured(scene: Scene, arch: str, seconds: float) -> Figures:
 
 
 def timed(scene: Scene, arch: str, frames: int, turn: int) -> Figures:
-    """Run once more: every other frame as a whole, the others kernel by kernel; then a few pictures. Seconds."""
+    """Run once more: every other frame as a whole, the others kernel by kernel; then a few pictures. Seconds.
+
+    The first frame does not count: what is new to the compiler then is start-up, which has its own figures.
+    """
     sim = Simulation(scene, arch)
+    sim.step()
     clock, whole, watched = Clock(), [], 0
     for frame in range(frames):
         if (frame + turn) % 2:

@@ -6,6 +6,7 @@ and contact is part of every correction.
 """
 
 import dataclasses
+import functools
 import math
 from typing import Any
 
@@ -92,7 +93,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
 
     tensile, lanes = int(params.tensile_strength > 0.0), grid.lanes
     for number, (relaxation, momentum) in enumerate(relaxations(params, kinds.density_ratio)):  # 8-19
-        c = remembered(dataclasses.replace(c, relaxation=relaxation, momentum=momentum))
+        c = in_iteration(c, relaxation, momentum)
         if number == 0:
             start_multipliers(scratch, now, grid, solids, walls, c, count, method, kinds.mixed, lanes)  # 9-11
         else:
@@ -113,6 +114,12 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         stop_frozen(now, count)
 
     world.particles, world.spare = now, spare
+
+
+@functools.lru_cache(maxsize=256)
+def in_iteration(c: Coefficients, relaxation: float, momentum: float) -> Coefficients:
+    """Return `c` with the numbers of one iteration, the same object for the same numbers."""
+    return remembered(dataclasses.replace(c, relaxation=relaxation, momentum=momentum))
 
 
 def correct_on_grid(world: World, particles: Particles, kinds: Blend, params: Parameters, c: Coefficients) -> None:
