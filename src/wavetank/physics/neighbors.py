@@ -46,10 +46,19 @@ def cell_of(grid: Grid, x: qd.template(), h):
 
 
 @qd.func
+def remainder(number, size):
+    """Python's modulo, never negative; most numbers are less than `size`, and are not divided."""
+    rest = number
+    if number < 0 or number >= size:
+        rest = number % size
+    return rest
+
+
+@qd.func
 def cell_number(grid: Grid, c):
-    """Number of the cell with the whole coordinates `c`; Python's modulo, never negative."""
-    layer = (c[1] + grid.ny * (c[2] % grid.nz)) % (grid.ny * grid.nz)
-    return (c[0] + grid.nx * layer) % grid.cells
+    """Number of the cell with the whole coordinates `c`."""
+    layer = remainder(c[1] + grid.ny * remainder(c[2], grid.nz), grid.ny * grid.nz)
+    return remainder(c[0] + grid.nx * layer, grid.cells)
 
 
 @qd.kernel(fastcache=True)

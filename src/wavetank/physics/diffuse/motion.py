@@ -98,11 +98,11 @@ def kind_in(share):
 def move(
     packed: Diffuse, diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients,
     a: Air, count: qd.i32, frame: qd.i32, shared: qd.template(),
-):  # fmt: skip
+) -> qd.i32:  # fmt: skip
     """Move everything by one frame, and copy those who live on to the front, in their order.
 
-    Each looks around every so many frames, tells anew what it is and takes the velocity that it keeps until it looks
-    again. `births.kept` ends with the number of those who live on. Threads share the sums where `shared`.
+    Return the number of those. Each looks around every so many frames, tells anew what it is and takes the velocity
+    that it keeps until it looks again. Threads share the sums where `shared`.
     """
     for i in range(count):
         x = diffuse.x[i]
@@ -153,3 +153,4 @@ def move(
             packed.age[place] = diffuse.age[i]
             packed.life[place] = diffuse.life[i]
             packed.id[place] = diffuse.id[i]
+    return births.kept[count]

@@ -87,8 +87,8 @@ def pool_from(rows: dict[str, np.ndarray], born: int, capacity: int, dim: int, w
 def bear(
     diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients, a: Air,
     count: qd.i32, old: qd.i32, born: qd.i32, frame: qd.i32,
-) -> qd.types.vector(2, qd.i32):  # fmt: skip
-    """Append the newborn, each around the way that its water particle came; return the number of all and of births.
+):  # fmt: skip
+    """Append the newborn behind the `old` ones, each around the way that its water particle came.
 
     Ihmsen et al. 2012, Sec. 3.2: a cylinder along the velocity. Here it lies behind the water particle rather than
     ahead, because the water has been moved already; velocities fan out with the distance from its axis.
@@ -96,7 +96,7 @@ def bear(
     room = diffuse.age.shape[0]
     for i in range(count):
         for place in range(births.first[i], births.first[i + 1]):
-            slot = births.kept[old] + place
+            slot = old + place
             if slot < room:
                 state = stream(a.seed, frame, water.id[i])
                 k = 1 + 8 * (place - births.first[i])
@@ -116,4 +116,3 @@ def bear(
                 diffuse.age[slot] = 0.0
                 diffuse.life[slot] = a.lifetime * (0.5 + uniform(state, k + 4))
                 diffuse.id[slot] = born + place
-    return qd.Vector([qd.min(births.kept[old] + births.first[count], room), births.first[count]])

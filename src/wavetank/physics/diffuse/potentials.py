@@ -140,8 +140,8 @@ def add_potentials(
 def count_births(
     births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
     count: qd.i32, room: qd.f32, frame: qd.i32, method: qd.template(), lanes: qd.template(), shared: qd.template(),
-):  # fmt: skip
-    """Draw how many each water particle bears in an interval, of which the share `room` is wanted, and sum them up.
+) -> qd.i32:  # fmt: skip
+    """Draw how many each water particle bears in an interval, of which the share `room` is wanted; return their sum.
 
     Threads share the sums where `shared`.
     """
@@ -158,3 +158,4 @@ def count_births(
                 expected = room * a.made * potentials[0, i - team * lanes]
                 births.first[i] = qd.cast(expected + uniform(stream(a.seed, frame, particles.id[i]), 0), qd.i32)
     sum_up(births.first, births.blocks, count, shared)
+    return births.first[count]

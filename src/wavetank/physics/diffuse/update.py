@@ -29,7 +29,7 @@ LEAST_ENERGY = 0.0499
 def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> None:
     """Move what there is by `dt` [s] and add what the water makes in this frame."""
     a = air(params, world.count, dt)
-    makes = world.count if a.made > 0.0 and frame % a.every == 0 else 0
+    makes = a.made > 0.0 and world.count > 0 and frame % a.every == 0
     if (world.pool is None or not world.pool.count) and not (makes and _can_foam(world, a)):
         return
     if world.pool is None:
@@ -39,18 +39,18 @@ def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> N
     shared = int(current_backend() != "cpu")
 
     if pool.count:
-        move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, pool.count, frame, shared)
-        pool.now, pool.spare = pool.spare, pool.now
-
+        kept = move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, pool.count, frame, shared)
+        pool.now, pool.spare, pool.count = pool.spare, pool.now, int(kept)
     if makes:
         # A fuller pool takes less, evenly everywhere, rather than all of what comes first.
         room = min(1.0, 2.0 * (1.0 - pool.count / pool.capacity))
         pool.set_reluctance(reluctance(world.materials, params))
-        count_births(
+        number = count_births(
             pool.births, water, grid, solids, world.walls, c, a, count, room, frame, method, grid.lanes, shared
         )
-    total, births = bear(pool.now, pool.births, water, grid, solids, c, a, makes, pool.count, pool.born, frame)
-    pool.count, pool.born = int(total), (pool.born + int(births)) % 2**31
+        if number:
+            bear(pool.now, pool.births, water, grid, solids, c, a, count, pool.count, pool.born, frame)
+        pool.count, pool.born = min(pool.count + int(number), pool.capacity), (pool.born + int(number)) % 2**31
 
 
 def _can_foam(world: World, a: Air) -> bool:
