@@ -35,15 +35,13 @@ from wavetank.distance import SolidSet, lift, vec4
 from wavetank.physics.boundary import flattened, kept_in_tank, stopped, wall_density
 from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
 from wavetank.physics.places import predict_at, predicted
-from wavetank.physics.smoothing import inverse_length, kernel
+from wavetank.physics.smoothing import kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch, Walls
 
 
 @qd.func
-def add_density(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+def add_density(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to (sum w, grad_i C, sum_j |grad_j C|^2): Eq. 1 and the denominator of Eq. 4."""
-    inverse = inverse_length(r)
-    length = r.norm_sqr() * inverse
     w = kernel(method, length * c.inverse_h)
     share = c.gradient_scale * w[1] * inverse
     sums[0] += w[0]
@@ -55,33 +53,29 @@ def add_density(sums: qd.template(), r, a, b, c: Coefficients, method: qd.templa
 
 
 @qd.func
-def add_weight(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+def add_weight(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum w: Eq. 1."""
-    sums[0] += kernel(method, r.norm() * c.inverse_h)[0]
+    sums[0] += kernel(method, length * c.inverse_h)[0]
 
 
 @qd.func
-def add_correction(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+def add_correction(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to the correction of particle i: Eq. 6."""
-    inverse = inverse_length(r)
-    slope = c.gradient_scale * kernel(method, r.norm_sqr() * inverse * c.inverse_h)[1]
+    slope = c.gradient_scale * kernel(method, length * c.inverse_h)[1]
     sums += r * ((a[0] + b[0]) * slope * inverse)
 
 
 @qd.func
-def add_tensile_correction(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+def add_tensile_correction(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to the correction of particle i: Eq. 8, Eq. 6 with the artificial pressure of Eq. 7."""
-    inverse = inverse_length(r)
-    w = kernel(method, r.norm_sqr() * inverse * c.inverse_h)
+    w = kernel(method, length * c.inverse_h)
     s_corr = -c.tensile * w[0] ** c.tensile_exponent  # Eq. 7
     sums += r * ((a[0] + b[0] + s_corr) * c.gradient_scale * w[1] * inverse)
 
 
 @qd.func
-def add_weighted_density(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+def add_weighted_density(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
     """`add_density` for fluids of different density: squared gradients count with the inverse masses."""
-    inverse = inverse_length(r)
-    length = r.norm_sqr() * inverse
     w = kernel(method, length * c.inverse_h)
     share = c.gradient_scale * w[1] * inverse
     sums[0] += w[0]

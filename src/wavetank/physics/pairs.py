@@ -64,11 +64,11 @@ def add_neighbors(
     sums: qd.template(), visit: qd.template(), team, particles: Particles, data: qd.template(), grid: Grid,
     c: Coefficients, method: qd.template(),
 ):  # fmt: skip
-    """Add up what ``visit(sum, r, a, b, c, method)`` adds for each neighbour j of each particle i of a team.
+    """Add up what ``visit(sum, r, length, inverse, a, b, c, method)`` adds for each neighbour j of each i of a team.
 
-    `sums` has a column for each of the team's particles, r = p_i - p_j [m], a and b are what `data` holds of i and j,
-    as vectors. `visit` is called for others than neighbours as well and adds nothing where |r| >= h; it is called for
-    the particle itself, with r = 0 and a = b.
+    `sums` has a column for each of the team's particles, r = p_i - p_j [m] has the `length` [m] and its `inverse`
+    [1/m], a and b are what `data` holds of i and j, as vectors. `visit` is called for others than neighbours as well
+    and adds nothing where |r| >= h; it is called for the particle itself, with r = 0, an inverse of 1e15 and a = b.
     """
     lanes, width = qd.static(sums.m, _width(data))
     first = team * lanes
@@ -89,8 +89,10 @@ def add_neighbors(
             for k in qd.static(range(pace)):
                 j = grid.list[begin + pace * turn + k]
                 r = predicted(particles, first + lane) - predicted(particles, j)
+                length = r.norm()
+                inverse = 1.0 / qd.max(length, 1e-15)
                 part = qd.Vector([0.0] * size)
-                visit(part, r, column(own, lane), _row(data, j), c, method)
+                visit(part, r, length, inverse, column(own, lane), _row(data, j), c, method)
                 for n in qd.static(range(size)):
                     if qd.static(k == 0):
                         sums[n, lane] += part[n]
@@ -125,9 +127,9 @@ def column(sums: qd.template(), lane):
 
 
 @qd.func
-def add_one(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+def add_one(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
     """Count neighbour j."""
-    if r.norm_sqr() < c.h * c.h:
+    if length < c.h:
         sums[0] += 1.0
 
 

@@ -85,12 +85,6 @@ _SIGMA = {
 
 
 @qd.func
-def inverse_length(r: qd.template()):
-    """1 / |r|, finite for r = 0; |r| is r^2 times that. One root and one division serve both."""
-    return qd.rsqrt(r.norm_sqr() + 1e-30)
-
-
-@qd.func
 def kernel(method: qd.template(), q):
     """Pair (w, dw/dq) of the kernel with that number in KERNELS, chosen when the caller is compiled."""
     return qd.static(KERNELS[method])(q)

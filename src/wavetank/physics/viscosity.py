@@ -13,24 +13,22 @@ ratio of the masses: m_i dv_i is antisymmetric, no share exceeds c.
 from wavetank.compiler import qd
 from wavetank.distance import vec3
 from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
-from wavetank.physics.smoothing import inverse_length, kernel
+from wavetank.physics.smoothing import kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch
 
 
 @qd.func
-def add_xsph(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+def add_xsph(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j (v_j - v_i) w_ij."""
-    inverse = inverse_length(r)
-    dv = (b - a) * kernel(method, r.norm_sqr() * inverse * c.inverse_h)[0]
+    dv = (b - a) * kernel(method, length * c.inverse_h)[0]
     for k in qd.static(range(r.n)):
         sums[k] += dv[k]
 
 
 @qd.func
-def add_vorticity(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+def add_vorticity(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j (v_j - v_i) w_ij and to omega_i = sum_j (v_j - v_i) x grad_j W (Eq. 9)."""
-    inverse = inverse_length(r)
-    w = kernel(method, r.norm_sqr() * inverse * c.inverse_h)
+    w = kernel(method, length * c.inverse_h)
     dv = b - a
     for k in qd.static(range(r.n)):
         sums[k] += dv[k] * w[0]
@@ -48,10 +46,9 @@ SUMS = (add_xsph, add_vorticity)
 
 
 @qd.func
-def add_mixed_xsph(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+def add_mixed_xsph(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j (v_j - v_i) w_ij min(1, m_j / m_i); the inverse masses w are in `data`, behind v."""
-    inverse = inverse_length(r)
-    share = kernel(method, r.norm_sqr() * inverse * c.inverse_h)[0] * qd.min(1.0, a[3] / b[3])
+    share = kernel(method, length * c.inverse_h)[0] * qd.min(1.0, a[3] / b[3])
     for k in qd.static(range(r.n)):
         sums[k] += (b[k] - a[k]) * share
 

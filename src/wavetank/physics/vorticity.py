@@ -17,15 +17,14 @@ Eq. 9, is summed in the sweep of XSPH (`viscosity.py`).
 from wavetank.compiler import qd
 from wavetank.distance import lift, vec3
 from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
-from wavetank.physics.smoothing import inverse_length, kernel
+from wavetank.physics.smoothing import kernel
 from wavetank.state import Coefficients, Grid, Particles, Scratch
 
 
 @qd.func
-def add_eta(sums: qd.template(), r, a, b, c: Coefficients, method: qd.template()):
+def add_eta(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to (grad |omega|, sum_j w omega_j, sum_j w |omega_j|)."""
-    inverse = inverse_length(r)
-    w = kernel(method, r.norm_sqr() * inverse * c.inverse_h)
+    w = kernel(method, length * c.inverse_h)
     size = b.norm()
     slope = lift(r) * ((size - a.norm()) * c.gradient_scale * w[1] * inverse)
     for k in qd.static(range(3)):
