@@ -65,13 +65,14 @@ with contextlib.redirect_stdout(io.StringIO()), _short_frames():
 
 __all__ = [
     "BACKENDS", "LANES", "available_backends", "current_backend", "download", "lanes", "qd", "start", "synchronize",
-    "threads", "upload", "watched",
+    "threads", "upload", "watched", "worth_sharing",
 ]  # fmt: skip
 
 #: Names a user may pass as ``arch``; ``gpu`` means the best one present.
 BACKENDS = ("cpu", "gpu", "cuda", "vulkan", "metal", "amdgpu")
 _GPU_ORDER = ("cuda", "metal", "amdgpu", "vulkan")
 LANES = 8
+FEW = 50_000
 _current: str | None = None
 
 
@@ -263,6 +264,11 @@ def lanes() -> int:
     More than eight are no faster, where vectors are twice as long (docs/performance.md).
     """
     return LANES if _current == "cpu" else 1
+
+
+def worth_sharing(number: int) -> bool:
+    """Whether threads gain more on so many things, none of them much work, than it costs to wake them."""
+    return _current != "cpu" or number > FEW
 
 
 def _thread_ids() -> set[int]:

@@ -9,10 +9,10 @@ from wavetank.distance import SolidSet
 from wavetank.physics.diffuse.noise import stream, uniform
 from wavetank.physics.diffuse.pool import new_pool
 from wavetank.physics.diffuse.potentials import add_potentials, find_normals, limited
-from wavetank.physics.diffuse.sums import sum_up
 from wavetank.physics.diffuse.update import air
 from wavetank.physics.pairs import part_of, teams, turns
 from wavetank.state import Air, Births, Coefficients, Grid, Particles, Walls, integers, scalars
+from wavetank.sums import sum_up
 
 
 @qd.kernel

@@ -8,13 +8,12 @@ node alone: that is what particle-in-cell methods do (Harlow 1964).
 import dataclasses
 import math
 
-from wavetank.compiler import LANES, current_backend, lanes, qd
+from wavetank.compiler import LANES, lanes, qd, worth_sharing
 from wavetank.distance import lift, vec3
 from wavetank.state import CoarseGrid, integers, scalars
 
 EDGE = 1.0  # of a cell, over the support
-LARGE = 50_000  # nodes, from where threads gain more than they cost
-PARTS = 4  # of the particles that have sums of their own on a processor, where nodes are fewer than that
+PARTS = 4  # of the particles that have sums of their own, where nodes are few
 SMALLEST = 8  # cells along an axis that is not halved any more
 
 
@@ -87,7 +86,7 @@ def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
     nodes = nx * ny * nz
     rim = nodes + nx * ny + LANES  # what is beyond the last node is read, and counts nothing
     kinds = {field.name: field.type for field in dataclasses.fields(CoarseGrid)}
-    parts = PARTS if current_backend() == "cpu" and nodes <= LARGE else 1
+    parts = 1 if worth_sharing(nodes) else PARTS
     sums = {"sums": integers(parts * nodes), "mass_sums": integers(parts * nodes)}
     fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in (qd.i32, qd.f32) and name not in sums}
     return CoarseGrid(

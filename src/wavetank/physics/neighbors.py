@@ -24,15 +24,14 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import current_backend, lanes, qd, threads
+from wavetank.compiler import lanes, qd, threads, worth_sharing
 from wavetank.errors import WavetankError
 from wavetank.physics.pairs import part_of, turns
 from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles, integers
+from wavetank.sums import SCAN_BLOCK, count_one, sum_up
 
-SCAN_BLOCK = 1024
 PARTS = 8  # of a pass for each thread: enough to even out what takes longer
-LARGE = 50_000  # cells and particles, from where threads gain more than they cost
 MAX_ENTRIES = 2**31 - 1  # of a device array: the compiler counts them, and computes places in them, with 32 bits
 
 
@@ -67,56 +66,20 @@ def reorder(sorted_: Particles, particles: Particles, grid: Grid, count: qd.i32,
 
     One thread does all but copying, or all threads share it where `shared`.
     """
-    if qd.static(shared):
-        for k in range(grid.cells):
-            grid.fill[k] = 0
-        for i in range(count):
-            qd.atomic_add(grid.fill[grid.cell[i]], 1)
-        # An exclusive prefix sum in blocks of 1024.
-        blocks = (grid.cells + 1023) // 1024
-        for b in range(blocks):
-            total = 0
-            for k in range(b * 1024, qd.min((b + 1) * 1024, grid.cells)):
-                total += grid.fill[k]
-            grid.blocks[b] = total
-        qd.loop_config(serialize=True)
-        for _ in range(1):
-            total = 0
-            for b in range(blocks):
-                own = grid.blocks[b]
-                grid.blocks[b] = total
-                total += own
-            grid.start[grid.cells] = total
-        for b in range(blocks):
-            total = grid.blocks[b]
-            for k in range(b * 1024, qd.min((b + 1) * 1024, grid.cells)):
-                own = grid.fill[k]
-                grid.start[k] = total
-                grid.fill[k] = total
-                total += own
-        for i in range(count):
-            grid.order[qd.atomic_add(grid.fill[grid.cell[i]], 1)] = i
-    else:
-        # Some ten thousand particles are done before other threads have started.
-        qd.loop_config(serialize=True)
-        for _ in range(1):
-            for k in range(grid.cells):
-                grid.fill[k] = 0
-            for i in range(count):
-                cell = grid.cell[i]
-                grid.fill[cell] = grid.fill[cell] + 1
-            total = 0
-            for k in range(grid.cells):
-                own = grid.fill[k]
-                grid.start[k] = total
-                grid.fill[k] = total
-                total += own
-            grid.start[grid.cells] = total
-            for i in range(count):
-                cell = grid.cell[i]
-                place = grid.fill[cell]
-                grid.order[place] = i
-                grid.fill[cell] = place + 1
+    # Some ten thousand particles are done before other threads have started.
+    qd.loop_config(serialize=not shared)
+    for k in range(grid.cells):
+        grid.start[k] = 0
+    qd.loop_config(serialize=not shared)
+    for i in range(count):
+        count_one(grid.start, grid.cell[i], shared)
+    sum_up(grid.start, grid.blocks, grid.cells, shared)
+    qd.loop_config(serialize=not shared)
+    for k in range(grid.cells):
+        grid.fill[k] = grid.start[k]
+    qd.loop_config(serialize=not shared)
+    for i in range(count):
+        grid.order[count_one(grid.fill, grid.cell[i], shared)] = i
     for n in range(count):
         i = grid.order[n]
         own = particles.px[i]
@@ -304,7 +267,7 @@ def list_room(dim: int, support: float) -> int:
 
 def sort_particles(particles: Particles, spare: Particles, grid: Grid, count: int) -> None:
     """Sort `particles` by cell into `spare`; `grid.cell` holds the cell of each."""
-    reorder(spare, particles, grid, count, int(current_backend() != "cpu" or grid.cells + count > LARGE))
+    reorder(spare, particles, grid, count, int(worth_sharing(grid.cells + count)))
 
 
 def find_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> Grid:

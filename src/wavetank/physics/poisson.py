@@ -15,8 +15,8 @@ time step before: pressures that are carried over make water pulse (docs/method.
 import itertools
 import math
 
-from wavetank.compiler import current_backend, lanes, qd
-from wavetank.physics.coarse_grid import LARGE, coordinates
+from wavetank.compiler import lanes, qd, worth_sharing
+from wavetank.physics.coarse_grid import coordinates
 from wavetank.state import CoarseGrid
 
 SWEEPS, MOST_SWEEPS = 8, 200  # of a level, and of the coarsest
@@ -189,8 +189,8 @@ def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: 
 
 
 def is_shared(level: CoarseGrid) -> bool:
-    """Whether threads gain more on a `level` than they cost; always on a graphics processor."""
-    return current_backend() != "cpu" or level.nx * level.ny * level.nz > LARGE
+    """Whether all threads see to a `level`."""
+    return worth_sharing(level.nx * level.ny * level.nz)
 
 
 def coarsest_relaxation(level: CoarseGrid) -> tuple[int, float]:

@@ -26,10 +26,10 @@ Where we differ, and why:
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, signed_distance, vec2, vec3
 from wavetank.physics.boundary import bodies_in_reach, flattened, stopped
-from wavetank.physics.diffuse.sums import sum_up
 from wavetank.physics.neighbors import for_each_row_around, near_bits
 from wavetank.physics.places import predicted
 from wavetank.state import Air, Births, Coefficients, Diffuse, Grid, Particles
+from wavetank.sums import sum_up
 
 
 @qd.func

@@ -12,7 +12,6 @@ from wavetank.compiler import qd, upload
 from wavetank.distance import SolidSet, lift
 from wavetank.physics.diffuse.motion import kind_in, surroundings, water_at
 from wavetank.physics.diffuse.noise import stream, uniform
-from wavetank.physics.diffuse.sums import SCAN_BLOCK
 from wavetank.state import (
     MARGIN,
     Air,
@@ -26,6 +25,7 @@ from wavetank.state import (
     scalars,
     vectors,
 )  # fmt: skip
+from wavetank.sums import SCAN_BLOCK
 
 #: What a saved state holds of spray, foam and bubbles, and the array of it.
 ROWS = {

@@ -26,10 +26,10 @@ from wavetank.distance import SolidSet
 from wavetank.physics.boundary import wall_density
 from wavetank.physics.density_constraint import add_density
 from wavetank.physics.diffuse.noise import stream, uniform
-from wavetank.physics.diffuse.sums import sum_up
 from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
 from wavetank.physics.places import predicted
 from wavetank.state import Air, Births, Coefficients, Grid, Particles, Walls
+from wavetank.sums import sum_up
 
 
 @qd.func

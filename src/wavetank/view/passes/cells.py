@@ -9,13 +9,12 @@ Inside a cell particles stand in the order of their ids, so that sums over them 
 import dataclasses
 import math
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, worth_sharing
 from wavetank.distance import lift
 from wavetank.frame import Frame
+from wavetank.sums import SCAN_BLOCK, count_one, sum_up
 from wavetank.view.extent import Extent
 from wavetank.view.lens import vec3
-
-SCAN_BLOCK = 1024
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -60,7 +59,7 @@ def new_cells(frame: Frame, extent: Extent, edge: float) -> Cells:
 
 def sort(frame: Frame, cells: Cells) -> None:
     """Sort the particles of `frame`."""
-    sort_particles(cells, frame.x, frame.id, frame.count)
+    sort_particles(cells, frame.x, frame.id, frame.count, int(worth_sharing(cells.cells + frame.count)))
 
 
 @qd.func
@@ -71,10 +70,13 @@ def cell_number(cells: Cells, c):
 
 
 @qd.kernel(fastcache=True)
-def sort_particles(cells: Cells, x: qd.types.ndarray(), id: qd.types.ndarray(), count: qd.i32):
-    """Sort particles by cell, and those of a cell by id, and copy their positions: all in one kernel, to load fast."""
-    # Find the cell of every particle and count the particles of every cell.
-    for k in range(cells.cells + 1):
+def sort_particles(cells: Cells, x: qd.types.ndarray(), id: qd.types.ndarray(), count: qd.i32, shared: qd.template()):
+    """Sort particles by cell, and those of a cell by id, and copy their positions: all in one kernel, to load fast.
+
+    All threads count and place where the work is `shared`.
+    """
+    qd.loop_config(serialize=not shared)
+    for k in range(cells.cells):
         cells.start[k] = 0
     for i in range(count):
         p = lift(x[i])
@@ -82,33 +84,18 @@ def sort_particles(cells: Cells, x: qd.types.ndarray(), id: qd.types.ndarray(), 
         for k in qd.static(range(x[0].n)):
             # Bounded, because a particle that is no number must still have a cell.
             c[k] = qd.cast(qd.min(qd.max(qd.floor(p[k] / cells.edge), -1e6), 1e6), qd.i32)
-        number = cell_number(cells, c)
-        cells.cell[i] = qd.min(qd.max(number, 0), cells.cells - 1)
-        qd.atomic_add(cells.start[cells.cell[i]], 1)
-    # Turn the counts into first places: an exclusive prefix sum in blocks of 1024.
-    for b in range(cells.blocks.shape[0] - 1):
-        total = 0
-        for k in range(b * 1024, qd.min((b + 1) * 1024, cells.cells)):
-            total += cells.start[k]
-        cells.blocks[b] = total
-    qd.loop_config(serialize=True)
-    for _ in range(1):
-        total = 0
-        for b in range(cells.blocks.shape[0] - 1):
-            own = cells.blocks[b]
-            cells.blocks[b] = total
-            total += own
-        cells.start[cells.cells] = total
-    for b in range(cells.blocks.shape[0] - 1):
-        total = cells.blocks[b]
-        for k in range(b * 1024, qd.min((b + 1) * 1024, cells.cells)):
-            own = cells.start[k]
-            cells.start[k] = total
-            cells.fill[k] = total
-            total += own
-    # Give every particle a place in its cell, put each cell into the order of ids, and copy the positions.
+        cells.cell[i] = qd.min(qd.max(cell_number(cells, c), 0), cells.cells - 1)
+    qd.loop_config(serialize=not shared)
     for i in range(count):
-        cells.order[qd.atomic_add(cells.fill[cells.cell[i]], 1)] = i
+        count_one(cells.start, cells.cell[i], shared)
+    sum_up(cells.start, cells.blocks, cells.cells, shared)
+    qd.loop_config(serialize=not shared)
+    for k in range(cells.cells):
+        cells.fill[k] = cells.start[k]
+    # Give every particle a place in its cell, put each cell into the order of ids, and copy the positions.
+    qd.loop_config(serialize=not shared)
+    for i in range(count):
+        cells.order[count_one(cells.fill, cells.cell[i], shared)] = i
     for k in range(cells.cells):
         for a in range(cells.start[k] + 1, cells.start[k + 1]):
             moved = cells.order[a]

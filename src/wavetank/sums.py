@@ -1,8 +1,20 @@
-"""Prefix sums: the places of what is many times there, in an order that does not depend on threads."""
+"""Counting and prefix sums: the places of what is many times there, in an order that does not depend on threads."""
 
 from wavetank.compiler import qd
 
 SCAN_BLOCK = 1024  # values that one thread sums up; the kernel spells it out
+
+
+@qd.func
+def count_one(values: qd.template(), at, shared: qd.template()):
+    """Add one to a value and return what it was; no other thread may do so unless it is `shared`."""
+    before = 0
+    if qd.static(shared):
+        before = qd.atomic_add(values[at], 1)
+    else:
+        before = values[at]
+        values[at] = before + 1
+    return before
 
 
 @qd.func
