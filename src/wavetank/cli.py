@@ -243,7 +243,7 @@ def bench(
         list[str], typer.Argument(metavar="[SCENE]... [SIZE]...", help="Scenes, and further sizes.")
     ] = [],  # noqa: B006
     sizes: Annotated[str, typer.Option(help="Numbers of particles, as 10000,100000.")] = "",
-    seconds: Annotated[float | None, typer.Option(help="Seconds of water of each run [0.5; with --peers 1].")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Seconds of water of each run [0.5].")] = None,
     repeats: Annotated[int, typer.Option(help="Passes that the medians are taken over.")] = 3,
     threads: Annotated[int | None, typer.Option(min=1, max=1024, help="Threads on the CPU; all without it.")] = None,
     peers: Annotated[bool, typer.Option("--peers", help="Compare with SPlisHSPlasH on the same dam break.")] = False,

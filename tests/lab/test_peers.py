@@ -79,7 +79,8 @@ def test_ratios_are_ours_over_theirs_at_equal_error(fake, monkeypatch):
                 "density_error_mean": error, "density_error_p99": error}  # fmt: skip
 
     monkeypatch.setattr(compare, "ours", mine)
-    result = compare.compare_peers(1000, seconds=1.0, repeats=2)
+    result = compare.compare_peers(1000, 2000, seconds=1.0, repeats=2)
+    assert result["settings"]["particles"] == [1000, 2000]
     pbf, dfsph = result["peers"]["splishsplash_pbf"], result["peers"]["splishsplash_dfsph"]
     assert pbf["ratio"] == pytest.approx(rate(pbf["ours"]) / rate(pbf["theirs"]))
     assert pbf["theirs"]["order"]["iterations"] == compare.ITERATIONS

@@ -14,7 +14,7 @@ from wavetank.lab.startup import start_up
 
 __all__ = ["Order", "perform", "save_result"]
 
-PEER_SIZE, PEER_SECONDS, SECONDS = 60_000, 1.0, 0.5
+SECONDS = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,11 +111,13 @@ def _peers(
 ) -> tuple[dict[str, Any], list[Table]]:
     from wavetank.lab.peers.compare import compare_peers
 
-    if names or len(sizes) > 1 or order.arch != "cpu":
-        raise WavetankError("--peers compares one dam break on the CPU; give at most one of --sizes, and no scene.")
+    if names or len(sizes) > 2 or order.arch != "cpu":
+        raise WavetankError(
+            "--peers compares one dam break on the CPU; give no scene, and at most two --sizes, for PBF and for DFSPH."
+        )
     result = compare_peers(
-        sizes[0] if sizes else PEER_SIZE, seconds=PEER_SECONDS if order.seconds is None else order.seconds,
-        repeats=order.repeats, threads=order.threads, say=say,
+        *(sizes * 2)[:2], seconds=SECONDS if order.seconds is None else order.seconds, repeats=order.repeats,
+        threads=order.threads, say=say,
     )  # fmt: skip
     found = result["peers"]
     table = Table(
