@@ -70,7 +70,8 @@ def compare_peers(
     return {
         "machine": machine("cpu", threads),
         "settings": {
-            "peer": PACKAGE, "particles": [pbf_count, dfsph_count], "seconds": seconds, "repeats": repeats, "load_before": busy,
+            "peer": PACKAGE, "particles": [pbf_count, dfsph_count], "seconds": seconds, "repeats": repeats,
+            "load_before": busy,
         },
         "peers": {"splishsplash_pbf": pbf, "splishsplash_dfsph": dfsph},
     }  # fmt: skip
