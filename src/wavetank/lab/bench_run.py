@@ -119,14 +119,14 @@ def _peers(
         *(sizes * 2)[:2], seconds=SECONDS if order.seconds is None else order.seconds, repeats=order.repeats,
         threads=order.threads, say=say,
     )  # fmt: skip
-    found = result["peers"]
+    found, (pbf, dfsph) = result["peers"], result["settings"]["particles"]
     table = Table(
         "against SPlisHSPlasH", "ours / theirs", "[low, high]", "ours", "theirs", "density error, ours; theirs"
     )
     for title, one, name in (
-        ("PBF, M particle-iterations/s", found["splishsplash_pbf"], "particle_iterations_per_second"),
-        ("DFSPH at 1 %, s of water per s", found["splishsplash_dfsph"]["at_1pct"], "water_per_second"),
-        ("DFSPH at 0.1 %, s of water per s", found["splishsplash_dfsph"]["at_0.1pct"], "water_per_second"),
+        (f"PBF, {pbf:,}: M particle-iterations/s", found["splishsplash_pbf"], "particle_iterations_per_second"),
+        (f"DFSPH at 1 %, {dfsph:,}: s of water per s", found["splishsplash_dfsph"]["at_1pct"], "water_per_second"),
+        (f"DFSPH at 0.1 %, {dfsph:,}: s of water per s", found["splishsplash_dfsph"]["at_0.1pct"], "water_per_second"),
     ):
         factor = 1e-6 if name.startswith("particle") else 1.0
         table.add_row(
