@@ -8,12 +8,15 @@ node alone: that is what particle-in-cell methods do (Harlow 1964).
 import dataclasses
 import math
 
-from wavetank.compiler import LANES, lanes, qd, worth_sharing
+from wavetank.compiler import LANES, lanes, qd, threads, worth_sharing
 from wavetank.distance import lift, vec3
 from wavetank.state import CoarseGrid, integers, scalars
 
 EDGE = 1.0  # of a cell, over the support
-PARTS = 4  # of the particles that have sums of their own, where nodes are few
+PARTS, MOST_PARTS = (
+    4,
+    16,
+)  # of the particles that have sums of their own, where nodes are few and where threads are many
 SMALLEST = 8  # cells along an axis that is not halved any more
 
 
@@ -69,6 +72,13 @@ def new_levels(size: tuple[float, ...], h: float) -> list[CoarseGrid]:
     return levels
 
 
+def sums_of(nodes: int) -> int:
+    """Return how many sums each of so many nodes has: on a processor some, so that no thread waits for another."""
+    if lanes() == 1:
+        return 1
+    return max(PARTS, min(threads(), MOST_PARTS)) if worth_sharing(nodes) else PARTS
+
+
 def _can_halve(n: int) -> bool:
     return n % 2 == 0 and n > SMALLEST
 
@@ -86,7 +96,7 @@ def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
     nodes = nx * ny * nz
     rim = nodes + nx * ny + LANES  # what is beyond the last node is read, and counts nothing
     kinds = {field.name: field.type for field in dataclasses.fields(CoarseGrid)}
-    parts = 1 if worth_sharing(nodes) else PARTS
+    parts = sums_of(nodes)
     sums = {"sums": integers(parts * nodes), "mass_sums": integers(parts * nodes)}
     fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in (qd.i32, qd.f32) and name not in sums}
     return CoarseGrid(

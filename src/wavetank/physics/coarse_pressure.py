@@ -36,7 +36,7 @@ from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_s
 from wavetank.physics.coarse_grid import coordinates, corners, in_cells, tents
 from wavetank.physics.pairs import column, part_of, teams, turns
 from wavetank.physics.places import predict_at, predicted
-from wavetank.physics.poisson import LEAST_THETA, couple_nodes, solve_levels
+from wavetank.physics.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
 from wavetank.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
@@ -195,7 +195,7 @@ def gather(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     unit: qd.f32, volume: qd.f32, scale: qd.f32, inner_from: qd.f32, inner_to: qd.f32, missing: qd.f32,
     least_open: qd.f32, least_theta: qd.f32, count: qd.i32, parts: qd.i32, searched: qd.template(),
-    mixed: qd.template(), alone: qd.template(), lanes: qd.template(),
+    mixed: qd.template(), alone: qd.template(), few: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Sum the tents of all particles at the nodes, then their density errors (Eq. 2), and set up the equation.
 
@@ -203,14 +203,14 @@ def gather(
     the stiffness M. What solids answer to the way of a particle is increased by the share `missing`; there are only the
     walls of the tank unless they are `searched`. Where fluids are `mixed`, their densities are averaged.
 
-    Threads share the particles in `parts`. Where these are `alone`, each has sums of its own and waits for no other,
-    and there are so few nodes that one thread is done with them before others have started.
+    Threads share the particles in `parts`. Where these are `alone`, each has sums of its own and waits for no other.
+    Where nodes are `few`, one thread is done with them before others have started.
     """
     for turn in range(turns(teams(count, lanes), parts, lanes)):
         part = part_of(turn, teams(count, lanes), parts, lanes)
         for team in range(part[0], part[1]):
             add_fill(grid, particles, scratch, team, alone * (turn >> 9), unit, count, mixed, lanes, alone)
-    qd.loop_config(serialize=bool(alone))
+    qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
         grid.fill[n] = volume * total / qd.max(grid.room[n], least_open)
@@ -225,11 +225,11 @@ def gather(
                 grid, particles, scratch, solids, walls, c, team, alone * (turn >> 9), unit, inner_from, inner_to,
                 missing, count, searched, lanes, alone,
             )  # fmt: skip
-    qd.loop_config(serialize=bool(alone))
+    qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
         grid.rhs[n] = scale * total / qd.max(grid.room[n], least_open)
-    qd.loop_config(serialize=bool(alone))
+    qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
         couple_nodes(grid, piece, least_theta, lanes)
 
@@ -261,13 +261,13 @@ def slope_along(grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), 
 @qd.kernel(fastcache=True)
 def move_particles(
     grid: CoarseGrid, particles: Particles, cells: Grid, solids: SolidSet, c: Coefficients, stiffness: qd.f32,
-    reach: qd.f32, count: qd.i32, alone: qd.template(), lanes: qd.template(),
+    reach: qd.f32, count: qd.i32, few: qd.template(), lanes: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank, and carry it on.
 
-    One thread `alone` sees to the nodes where they are few.
+    One thread sees to the nodes where they are `few`.
     """
-    qd.loop_config(serialize=bool(alone))
+    qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         lam = grid.lam[n]
         grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
@@ -311,12 +311,12 @@ def correct_pressure(
     finest = levels[0]
     if moved:
         find_room(finest, solids, LEAST_OPEN, int(searched))
-    alone = finest.parts > 1
+    alone, few = finest.parts > 1, int(not is_shared(finest))
     scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
     gather(
         finest, particles, scratch, solids, walls, c, UNIT, scale, share * scale / stiffness, *INNER, MISSING,
         LEAST_OPEN, LEAST_THETA, count, finest.parts if alone else cells.parts, int(searched), int(mixed), int(alone),
-        cells.lanes,
+        few, cells.lanes,
     )  # fmt: skip
     solve_levels(levels)
-    move_particles(finest, particles, cells, solids, c, stiffness, REACH * c.h, count, int(alone), cells.lanes)
+    move_particles(finest, particles, cells, solids, c, stiffness, REACH * c.h, count, few, cells.lanes)
