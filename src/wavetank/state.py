@@ -96,8 +96,7 @@ class CoarseGrid:
     nx: qd.i32
     ny: qd.i32
     nz: qd.i32  # 1 in 2-D
-    pairs: qd.i32  # along x: half of nx, rounded up
-    pieces: qd.i32  # along x, of as many nodes as a processor computes at once
+    pieces: qd.i32  # along x, of so many nodes as a thread takes at once
     dx: qd.f32  # m: edges of a cell
     dy: qd.f32
     dz: qd.f32  # 1 in 2-D

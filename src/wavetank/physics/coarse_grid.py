@@ -72,6 +72,11 @@ def new_levels(size: tuple[float, ...], h: float) -> list[CoarseGrid]:
     return levels
 
 
+def piece_width() -> int:
+    """Return how many nodes of a row a thread takes at once: one of each colour at least (`poisson.py`)."""
+    return max(2, lanes())
+
+
 def sums_of(nodes: int) -> int:
     """Return how many sums each of so many nodes has: on a processor some, so that no thread waits for another."""
     if lanes() == 1:
@@ -100,6 +105,6 @@ def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
     sums = {"sums": integers(parts * nodes), "mass_sums": integers(parts * nodes)}
     fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in (qd.i32, qd.f32) and name not in sums}
     return CoarseGrid(
-        **sums, **fields, nx=nx, ny=ny, nz=nz, pairs=(nx + 1) // 2, pieces=-(-nx // lanes()), dx=dx, dy=dy, dz=dz,
+        **sums, **fields, nx=nx, ny=ny, nz=nz, pieces=-(-nx // piece_width()), dx=dx, dy=dy, dz=dz,
         parts=parts,
     )  # fmt: skip

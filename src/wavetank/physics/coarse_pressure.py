@@ -33,7 +33,7 @@ added. As it is the way that counts and not the place, it does not shift where w
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, plane_distance, rotate, signed_distance, to_local, vec3, vec4
 from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
-from wavetank.physics.coarse_grid import coordinates, corners, in_cells, tents
+from wavetank.physics.coarse_grid import coordinates, corners, in_cells, piece_width, tents
 from wavetank.physics.pairs import column, part_of, teams, turns
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
@@ -196,6 +196,7 @@ def gather(
     unit: qd.f32, volume: qd.f32, scale: qd.f32, inner_from: qd.f32, inner_to: qd.f32, missing: qd.f32,
     least_open: qd.f32, least_theta: qd.f32, count: qd.i32, parts: qd.i32, searched: qd.template(),
     mixed: qd.template(), alone: qd.template(), few: qd.template(), lanes: qd.template(),
+    width: qd.template(),
 ):  # fmt: skip
     """Sum the tents of all particles at the nodes, then their density errors (Eq. 2), and set up the equation.
 
@@ -231,7 +232,7 @@ def gather(
         grid.rhs[n] = scale * total / qd.max(grid.room[n], least_open)
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
-        couple_nodes(grid, piece, least_theta, lanes)
+        couple_nodes(grid, piece, least_theta, width)
 
 
 @qd.func
@@ -316,7 +317,7 @@ def correct_pressure(
     gather(
         finest, particles, scratch, solids, walls, c, UNIT, scale, share * scale / stiffness, *INNER, MISSING,
         LEAST_OPEN, LEAST_THETA, count, finest.parts if alone else cells.parts, int(searched), int(mixed), int(alone),
-        few, cells.lanes,
+        few, cells.lanes, piece_width(),
     )  # fmt: skip
     solve_levels(levels)
     move_particles(finest, particles, cells, solids, c, stiffness, REACH * c.h, count, few, cells.lanes)

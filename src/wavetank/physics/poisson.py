@@ -15,8 +15,8 @@ time step before: pressures that are carried over make water pulse (docs/method.
 import itertools
 import math
 
-from wavetank.compiler import lanes, qd, worth_sharing
-from wavetank.physics.coarse_grid import coordinates
+from wavetank.compiler import qd, worth_sharing
+from wavetank.physics.coarse_grid import coordinates, piece_width
 from wavetank.state import CoarseGrid
 
 SWEEPS, MOST_SWEEPS = 8, 200  # of a level, and of the coarsest
@@ -43,12 +43,12 @@ def coupling(grid: CoarseGrid, n, m, edge, least_theta):
 
 
 @qd.func
-def couple_nodes(grid: CoarseGrid, piece, least_theta, lanes: qd.template()):
-    """Set the couplings of `lanes` nodes of a row with the next ones along x, y and z, and what inverts their equation.
+def couple_nodes(grid: CoarseGrid, piece, least_theta, width: qd.template()):
+    """Set the couplings of `width` nodes of a row with the next ones along x, y and z, and what inverts their equation.
 
     The rim of the arrays, where there is no room, stands for what is beyond the tank.
     """
-    first = piece % grid.pieces * lanes
+    first = piece % grid.pieces * width
     row = piece // grid.pieces
     y = row % grid.ny
     z = row // grid.ny
@@ -57,8 +57,8 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta, lanes: qd.template()):
     before_y = begin - grid.nx if y > 0 else rim
     after_z = begin + layer if z + 1 < grid.nz else rim
     before_z = begin - layer if z > 0 else rim
-    found = qd.Matrix.zero(qd.f32, 4, lanes)
-    for lane in range(lanes):
+    found = qd.Matrix.zero(qd.f32, 4, width)
+    for lane in range(width):
         x = first + lane
         n = begin + x
         wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, rim), grid.dx, least_theta)
@@ -73,7 +73,7 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta, lanes: qd.template()):
         found[1, lane] = wy
         found[2, lane] = wz
         found[3, lane] = qd.select(is_water, 1.0 / qd.max(diagonal, 1e-12), 0.0)
-    for lane in range(qd.min(lanes, grid.nx - first)):
+    for lane in range(qd.min(width, grid.nx - first)):
         n = begin + first + lane
         grid.wx[n] = found[0, lane]
         grid.wy[n] = found[1, lane]
@@ -124,20 +124,22 @@ def relax_nodes(grid: CoarseGrid, row, first, last, over_relaxation):
 @qd.kernel(fastcache=True)
 def solve(
     grid: CoarseGrid, coarser: CoarseGrid, start: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32,
-    shared: qd.template(),
+    shared: qd.template(), width: qd.template(),
 ):  # fmt: skip
     """Relax the equation of a level, whose couplings are set, in sweeps of two colours, starting as `start` says.
 
-    One thread does the `sweeps`, or all threads share as many as `shared` says.
+    One thread does the `sweeps`, or all threads share as many as `shared` says, `width` nodes of a row at once.
     """
     if qd.static(shared):
-        for n in range(grid.nx * grid.ny * grid.nz):
-            start_nodes(grid, coarser, n // grid.nx, n % grid.nx, n % grid.nx + 1, start)
+        for piece in range(grid.pieces * grid.ny * grid.nz):
+            first = piece % grid.pieces * width
+            start_nodes(grid, coarser, piece // grid.pieces, first, qd.min(first + width, grid.nx), start)
         for colour in qd.static(range(2 * shared)):
-            for half in range(grid.pairs * grid.ny * grid.nz):
-                row = half // grid.pairs
-                x = 2 * (half % grid.pairs) + (row % grid.ny + row // grid.ny + colour) % 2
-                relax_nodes(grid, row, x, qd.min(x + 1, grid.nx), over_relaxation)
+            for piece in range(grid.pieces * grid.ny * grid.nz):
+                row = piece // grid.pieces
+                first = piece % grid.pieces * width
+                x = first + (row % grid.ny + row // grid.ny + colour) % 2
+                relax_nodes(grid, row, x, qd.min(first + width, grid.nx), over_relaxation)
     else:
         # A grid of some thousand nodes is done before other threads have started.
         qd.loop_config(serialize=True)
@@ -172,20 +174,20 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
 
 
 @qd.kernel(fastcache=True)
-def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: qd.template(), lanes: qd.template()):
+def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: qd.template(), width: qd.template()):
     """Set up the equation of a coarser level; `shared` by all threads, or done by one."""
     if qd.static(shared):
         for n in range(coarse.nx * coarse.ny * coarse.nz):
             average_node(coarse, fine, n)
         for piece in range(coarse.pieces * coarse.ny * coarse.nz):
-            couple_nodes(coarse, piece, least_theta, lanes)
+            couple_nodes(coarse, piece, least_theta, width)
     else:
         qd.loop_config(serialize=True)
         for _ in range(1):
             for n in range(coarse.nx * coarse.ny * coarse.nz):
                 average_node(coarse, fine, n)
             for piece in range(coarse.pieces * coarse.ny * coarse.nz):
-                couple_nodes(coarse, piece, least_theta, lanes)
+                couple_nodes(coarse, piece, least_theta, width)
 
 
 def is_shared(level: CoarseGrid) -> bool:
@@ -214,7 +216,7 @@ def coarsest_relaxation(level: CoarseGrid) -> tuple[int, float]:
 def solve_levels(levels: list[CoarseGrid]) -> None:
     """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set."""
     for fine, coarse in itertools.pairwise(levels):
-        restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)), lanes())
+        restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)), piece_width())
     coarsest = coarser = levels[-1]
     for level in reversed(levels):
         start, sweeps, over_relaxation = FROM_COARSER, SWEEPS, OVER_RELAXATION
@@ -223,8 +225,8 @@ def solve_levels(levels: list[CoarseGrid]) -> None:
             sweeps, over_relaxation = coarsest_relaxation(level)
         if is_shared(level):
             for _ in range(sweeps // SWEEPS):
-                solve(level, coarser, start, sweeps, over_relaxation, SWEEPS)
+                solve(level, coarser, start, sweeps, over_relaxation, SWEEPS, piece_width())
                 start = GO_ON
         else:
-            solve(level, coarser, start, sweeps, over_relaxation, 0)
+            solve(level, coarser, start, sweeps, over_relaxation, 0, piece_width())
         coarser = level
