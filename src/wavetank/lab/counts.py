@@ -78,6 +78,6 @@ def device_bytes(value: Any) -> int:
 
 
 def water_bytes(sim: Simulation) -> int:
-    """Return the bytes on the device of all that the water needs: particles twice, scratch, grid and lists."""
+    """Return the bytes on the device of all that the water needs: particles twice, scratch, cells, lists, pressure."""
     world = sim.world
-    return sum(device_bytes(part) for part in (world.particles, world.spare, world.scratch, world.grid))
+    return sum(map(device_bytes, (world.particles, world.spare, world.scratch, world.grid, *world.levels)))
