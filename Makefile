@@ -33,7 +33,7 @@ figures: .venv/test-ready
 gallery: .venv/test-ready
 	$(BIN)/python docs/figures.py gallery
 
-# All cases of `wavetank validate` in full, with a picture of each: validation/README.md. Some twenty minutes.
+# All cases of `wavetank validate` in full, with a picture of each: validation/README.md. Some minutes.
 validation: .venv/test-ready
 	$(BIN)/python docs/figures.py validation
 
