@@ -61,6 +61,14 @@ def test_a_launch_that_is_known_is_not_prepared_again(prepared):
     assert compiler.download(y)[1000:].tolist() == [0, 0, 0, 2]
 
 
+def test_a_launch_may_name_its_arguments():
+    compiler.start("cpu")
+    x, numbers = integers(2004), Numbers(one=5, half=1.0)
+    for place in range(2000, 2003):
+        write(x, place=place, numbers=numbers)
+    assert compiler.download(x)[2000:].tolist() == [7, 7, 7, 0]
+
+
 @dataclasses.dataclass(frozen=True)
 class More:
     """Fields that only some variants of a kernel read: plain numbers come after those that are."""

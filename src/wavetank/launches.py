@@ -101,13 +101,15 @@ def keep_prepared_launches(kernels: Any, runtime: Any) -> bool:
         launches = buffers.__dict__.get("launches")
         if launches is None:
             launches = buffers.launches = launches_of(self)
-        known = launches.known.get(launches.asked(args)) if len(args) == len(self.arg_metas) else None
-        if known is None or options or known.program is not runtime().prog:
+        complete = len(args) == len(self.arg_metas) and not options
+        known = launches.known.get(launches.asked(args)) if complete else None
+        if known is None or known.program is not runtime().prog:
             numbers.clear()
             launches.prepared = None
             result = call(self, *args, **options)
             slots = {k: numbers[meta.name] for k, meta in enumerate(self.arg_metas) if meta.name in numbers}
-            if not getattr(self, "_mutable_nd_cached_val", None):  # arrays that may be exchanged within an object
+            exchangeable = getattr(self, "_mutable_nd_cached_val", None)  # arrays within an object
+            if complete and not exchangeable:
                 launches.remember(args, runtime().prog, self._last_compiled_kernel_data, slots)
             return result
         context = launches.context(known, args)

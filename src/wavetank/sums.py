@@ -1,4 +1,4 @@
-"""Counting and prefix sums: the places of what is many times there, in an order that does not depend on threads."""
+"""Counting, prefix sums, and a sort by them; the sums do not depend on threads."""
 
 from wavetank.compiler import qd
 
@@ -15,6 +15,31 @@ def count_one(values: qd.template(), at, shared: qd.template()):
         before = values[at]
         values[at] = before + 1
     return before
+
+
+@qd.func
+def sort_by(
+    key: qd.template(), order: qd.template(), start: qd.template(), fill: qd.template(), blocks: qd.template(), keys,
+    count, shared: qd.template(),
+):  # fmt: skip
+    """Write the numbers below `count` into `order` so that their `key` rises, and where each of so many `keys` starts.
+
+    One thread does it, or all threads share it where `shared`, and then the order within a key is chance. `fill` and
+    `blocks` are scratch. To be called at the top level of a kernel.
+    """
+    qd.loop_config(serialize=not shared)
+    for k in range(keys):
+        start[k] = 0
+    qd.loop_config(serialize=not shared)
+    for i in range(count):
+        count_one(start, key[i], shared)
+    sum_up(start, blocks, keys, shared)
+    qd.loop_config(serialize=not shared)
+    for k in range(keys):
+        fill[k] = start[k]
+    qd.loop_config(serialize=not shared)
+    for i in range(count):
+        order[count_one(fill, key[i], shared)] = i
 
 
 @qd.func

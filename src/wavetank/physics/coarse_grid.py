@@ -13,20 +13,9 @@ from wavetank.distance import lift, vec3
 from wavetank.state import CoarseGrid, integers, scalars
 
 EDGE = 1.0  # of a cell, over the support
-PARTS, MOST_PARTS = (
-    4,
-    16,
-)  # of the particles that have sums of their own, where nodes are few and where threads are many
+PARTS = 4  # of the particles that have sums of their own, where nodes are few
+MOST_PARTS = 16  # where they are many: one for each thread, but not more
 SMALLEST = 8  # cells along an axis that is not halved any more
-
-
-@qd.func
-def node(grid: CoarseGrid, c):
-    """Number of the node with the whole coordinates `c`, or of the nearest that there is."""
-    x = qd.min(qd.max(c[0], 0), grid.nx - 1)
-    y = qd.min(qd.max(c[1], 0), grid.ny - 1)
-    z = qd.min(qd.max(c[2], 0), grid.nz - 1)
-    return x + grid.nx * (y + grid.ny * z)
 
 
 @qd.func
@@ -105,6 +94,5 @@ def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
     sums = {"sums": integers(parts * nodes), "mass_sums": integers(parts * nodes)}
     fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in (qd.i32, qd.f32) and name not in sums}
     return CoarseGrid(
-        **sums, **fields, nx=nx, ny=ny, nz=nz, pieces=-(-nx // piece_width()), dx=dx, dy=dy, dz=dz,
-        parts=parts,
+        **sums, **fields, nx=nx, ny=ny, nz=nz, pieces=-(-nx // piece_width()), dx=dx, dy=dy, dz=dz, parts=parts,
     )  # fmt: skip

@@ -29,7 +29,7 @@ from wavetank.errors import WavetankError
 from wavetank.physics.pairs import part_of, turns
 from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles, integers
-from wavetank.sums import SCAN_BLOCK, count_one, sum_up
+from wavetank.sums import SCAN_BLOCK, sort_by
 
 PARTS = 8  # of a pass for each thread: enough to even out what takes longer
 MAX_ENTRIES = 2**31 - 1  # of a device array: the compiler counts them, and computes places in them, with 32 bits
@@ -67,19 +67,7 @@ def reorder(sorted_: Particles, particles: Particles, grid: Grid, count: qd.i32,
     One thread does all but copying, or all threads share it where `shared`.
     """
     # Some ten thousand particles are done before other threads have started.
-    qd.loop_config(serialize=not shared)
-    for k in range(grid.cells):
-        grid.start[k] = 0
-    qd.loop_config(serialize=not shared)
-    for i in range(count):
-        count_one(grid.start, grid.cell[i], shared)
-    sum_up(grid.start, grid.blocks, grid.cells, shared)
-    qd.loop_config(serialize=not shared)
-    for k in range(grid.cells):
-        grid.fill[k] = grid.start[k]
-    qd.loop_config(serialize=not shared)
-    for i in range(count):
-        grid.order[count_one(grid.fill, grid.cell[i], shared)] = i
+    sort_by(grid.cell, grid.order, grid.start, grid.fill, grid.blocks, grid.cells, count, shared)
     for n in range(count):
         i = grid.order[n]
         own = particles.px[i]
@@ -107,16 +95,6 @@ def copy_particle(target: Particles, to, source: Particles, i):
 
 
 @qd.func
-def wrapped(cell, grid: Grid):
-    """The number of a cell that is less than all cells beyond either end, without a division."""
-    if cell < 0:
-        cell += grid.cells
-    if cell >= grid.cells:
-        cell -= grid.cells
-    return cell
-
-
-@qd.func
 def list_group(group, particles: Particles, grid: Grid, h2, count):
     """Write the neighbours of a group and return their number, even if it had no room."""
     room = grid.room
@@ -140,7 +118,7 @@ def list_group(group, particles: Particles, grid: Grid, h2, count):
             layer = grid.nx * (row % 3 - 1)
             if qd.static(dim == 3):
                 layer += grid.nx * grid.ny * (row // 3 - 1)
-            low = wrapped(low_cell + layer - 1, grid)
+            low = remainder(low_cell + layer - 1, grid.cells)
             # A row that runs over the last cell goes on at the first.
             over = qd.max(low + cells - grid.cells, 0)
             for piece in range(1 + qd.min(over, 1)):
@@ -217,7 +195,7 @@ def for_each_row_around(sums: qd.template(), visit: qd.template(), point, partic
         layer = grid.nx * (row % 3 - 1)
         if qd.static(point.n == 3):
             layer += grid.nx * grid.ny * (row // 3 - 1)
-        low = wrapped(cell + layer - 1, grid)
+        low = remainder(cell + layer - 1, grid.cells)
         # A row that runs over the last cell goes on at the first.
         over = qd.max(low + 3 - grid.cells, 0)
         for part in range(1 + qd.min(over, 1)):

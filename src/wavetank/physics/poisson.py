@@ -176,18 +176,12 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
 @qd.kernel(fastcache=True)
 def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: qd.template(), width: qd.template()):
     """Set up the equation of a coarser level; `shared` by all threads, or done by one."""
-    if qd.static(shared):
-        for n in range(coarse.nx * coarse.ny * coarse.nz):
-            average_node(coarse, fine, n)
-        for piece in range(coarse.pieces * coarse.ny * coarse.nz):
-            couple_nodes(coarse, piece, least_theta, width)
-    else:
-        qd.loop_config(serialize=True)
-        for _ in range(1):
-            for n in range(coarse.nx * coarse.ny * coarse.nz):
-                average_node(coarse, fine, n)
-            for piece in range(coarse.pieces * coarse.ny * coarse.nz):
-                couple_nodes(coarse, piece, least_theta, width)
+    qd.loop_config(serialize=not shared)
+    for n in range(coarse.nx * coarse.ny * coarse.nz):
+        average_node(coarse, fine, n)
+    qd.loop_config(serialize=not shared)
+    for piece in range(coarse.pieces * coarse.ny * coarse.nz):
+        couple_nodes(coarse, piece, least_theta, width)
 
 
 def is_shared(level: CoarseGrid) -> bool:

@@ -119,7 +119,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
 @functools.lru_cache(maxsize=256)
 def in_iteration(c: Coefficients, relaxation: float, momentum: float) -> Coefficients:
     """Return `c` with the numbers of one iteration, the same object for the same numbers."""
-    return remembered(dataclasses.replace(c, relaxation=relaxation, momentum=momentum))
+    return dataclasses.replace(c, relaxation=relaxation, momentum=momentum)
 
 
 def correct_on_grid(world: World, particles: Particles, kinds: Blend, params: Parameters, c: Coefficients) -> None:

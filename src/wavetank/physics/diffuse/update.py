@@ -28,9 +28,12 @@ LEAST_ENERGY = 0.0499
 
 def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> None:
     """Move what there is by `dt` [s] and add what the water makes in this frame."""
+    is_empty = world.pool is None or not world.pool.count
+    if is_empty and not (params.foam and world.count):
+        return
     a = air(params, world.count, dt)
     makes = a.made > 0.0 and world.count > 0 and frame % a.every == 0
-    if (world.pool is None or not world.pool.count) and not (makes and _can_foam(world, a)):
+    if is_empty and not (makes and _can_foam(world, a)):
         return
     if world.pool is None:
         world.pool = new_pool(params.dim, params.foam_capacity, world.particles.id.shape[0])

@@ -12,7 +12,7 @@ import math
 from wavetank.compiler import qd, worth_sharing
 from wavetank.distance import lift
 from wavetank.frame import Frame
-from wavetank.sums import SCAN_BLOCK, count_one, sum_up
+from wavetank.sums import SCAN_BLOCK, sort_by
 from wavetank.view.extent import Extent
 from wavetank.view.lens import vec3
 
@@ -75,9 +75,6 @@ def sort_particles(cells: Cells, x: qd.types.ndarray(), id: qd.types.ndarray(), 
 
     All threads count and place where the work is `shared`.
     """
-    qd.loop_config(serialize=not shared)
-    for k in range(cells.cells):
-        cells.start[k] = 0
     for i in range(count):
         p = lift(x[i])
         c = qd.Vector([0, 0, 0])
@@ -85,17 +82,8 @@ def sort_particles(cells: Cells, x: qd.types.ndarray(), id: qd.types.ndarray(), 
             # Bounded, because a particle that is no number must still have a cell.
             c[k] = qd.cast(qd.min(qd.max(qd.floor(p[k] / cells.edge), -1e6), 1e6), qd.i32)
         cells.cell[i] = qd.min(qd.max(cell_number(cells, c), 0), cells.cells - 1)
-    qd.loop_config(serialize=not shared)
-    for i in range(count):
-        count_one(cells.start, cells.cell[i], shared)
-    sum_up(cells.start, cells.blocks, cells.cells, shared)
-    qd.loop_config(serialize=not shared)
-    for k in range(cells.cells):
-        cells.fill[k] = cells.start[k]
-    # Give every particle a place in its cell, put each cell into the order of ids, and copy the positions.
-    qd.loop_config(serialize=not shared)
-    for i in range(count):
-        cells.order[count_one(cells.fill, cells.cell[i], shared)] = i
+    sort_by(cells.cell, cells.order, cells.start, cells.fill, cells.blocks, cells.cells, count, shared)
+    # Put each cell into the order of ids, and copy the positions.
     for k in range(cells.cells):
         for a in range(cells.start[k] + 1, cells.start[k + 1]):
             moved = cells.order[a]
