@@ -183,8 +183,9 @@ class Coefficients:
     gravity_z: qd.f32  # 0 in 2-D
     h: qd.f32  # m, support radius
     inverse_h: qd.f32  # 1/m
+    inverse_h2: qd.f32  # 1/m^2
     density_scale: qd.f32  # see RestLattice
-    gradient_scale: qd.f32  # 1/m
+    gradient_scale: qd.f32  # 1/m^2
     eps: qd.f32  # 1/m^2, constraint force mixing
     relaxation: qd.f32
     momentum: qd.f32

@@ -14,10 +14,12 @@ SINGLE = [name for name, (a, b) in NAMES.items() if a == b]
 @qd.kernel
 def evaluate(q: qd.types.ndarray(), out: qd.types.ndarray(), method: qd.template()):
     for i in range(q.shape[0]):
-        out[i] = smoothing.kernel(method, q[i])
+        pair = smoothing.kernel(method, q[i] * q[i])
+        out[i] = qd.Vector([pair[0], pair[1] * q[i]])
 
 
 def on_device(name: str, q: np.ndarray) -> np.ndarray:
+    """(w, w') at `q`; a kernel gives w' over q."""
     points, pairs = qd.ndarray(qd.f32, shape=(len(q),)), qd.ndarray(qd.types.vector(2, qd.f32), shape=(len(q),))
     points.from_numpy(q.astype(np.float32))
     evaluate(points, pairs, list(NAMES).index(name))

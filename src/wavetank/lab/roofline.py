@@ -89,7 +89,7 @@ def spin(values: qd.types.ndarray(), count: qd.i32, a: qd.f32, b: qd.f32):
 
 
 @qd.func
-def add_way(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_way(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add up the ways to the neighbours: the least that a pass over the lists can do."""
     sums += r
 

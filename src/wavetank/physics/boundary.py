@@ -62,21 +62,60 @@ def wall_share(walls: Walls, s, h):
 
 
 @qd.func
+def add_wall(sums: qd.template(), lane, value, walls: Walls, c: Coefficients):
+    """Add a solid, (gradient, distance) as `value`, to a lane's (gradient [1/m], share of the support that is free).
+
+    Where it is out of reach the table is zero to the last digit.
+    """
+    share = wall_share(walls, value.w, c.h) * c.wall_density
+    push = sums[3, lane] * share[1] * c.inverse_h
+    for k in qd.static(range(3)):
+        sums[k, lane] = sums[k, lane] * (1.0 - share[0]) - value[k] * push
+    sums[3, lane] *= 1.0 - share[0]
+
+
+@qd.func
+def add_bodies(sums: qd.template(), lane, p: qd.template(), near, solids: SolidSet, walls: Walls, c: Coefficients):
+    """Add the marked solids, other than the walls of the tank, as `add_wall` does, at the place `p` of a lane."""
+    k = next_near(near, solids.tank_count - 1, solids.count)
+    while k < solids.count:
+        add_wall(sums, lane, signed_distance(solids, k, lift(p)), walls, c)
+        k = next_near(near, k, solids.count)
+
+
+@qd.func
+def find_walls(sums: qd.template(), team, particles: Particles, solids: SolidSet, walls: Walls, c: Coefficients):
+    """Find, in a column for each particle of a team, (gradient [1/m], free share) by the marked solids.
+
+    Returns the bits of the solids that one of them is near. The walls of the tank are computed in all lanes at once.
+    """
+    first = team * sums.m
+    near = 0
+    for lane in range(sums.m):
+        near |= particles.near[first + lane]
+    for lane in range(sums.m):
+        sums[3, lane] = 1.0
+    k = next_near(near, -1, solids.tank_count)
+    while k < solids.tank_count:
+        for lane in range(sums.m):
+            add_wall(sums, lane, plane_distance(solids, k, lift(predicted(particles, first + lane))), walls, c)
+        k = next_near(near, k, solids.tank_count)
+    if near >> solids.tank_count != 0:
+        for lane in range(sums.m):
+            add_bodies(sums, lane, predicted(particles, first + lane), particles.near[first + lane], solids, walls, c)
+    return near
+
+
+@qd.func
 def wall_density(x: qd.template(), near, solids: SolidSet, walls: Walls, c: Coefficients):
     """(gradient [1/m], relative density) that the marked solids add at `x`."""
-    point = lift(x)
-    free = 1.0
-    gradient = vec3(0.0, 0.0, 0.0)
-    k = next_near(near, -1, solids.count)
-    while k < solids.count:
-        value = signed_distance(solids, k, point)
-        if value.w < c.h:
-            share = wall_share(walls, value.w, c.h) * c.wall_density
-            n = vec3(value.x, value.y, value.z)
-            gradient = gradient * (1.0 - share[0]) - n * (free * share[1] / c.h)
-            free *= 1.0 - share[0]
-        k = next_near(near, k, solids.count)
-    return vec4(gradient.x, gradient.y, gradient.z, 1.0 - free)
+    sums = qd.Matrix([[0.0], [0.0], [0.0], [1.0]])
+    k = next_near(near, -1, solids.tank_count)
+    while k < solids.tank_count:
+        add_wall(sums, 0, plane_distance(solids, k, lift(x)), walls, c)
+        k = next_near(near, k, solids.tank_count)
+    add_bodies(sums, 0, x, near, solids, walls, c)
+    return vec4(sums[0, 0], sums[1, 0], sums[2, 0], 1.0 - sums[3, 0])
 
 
 @qd.func

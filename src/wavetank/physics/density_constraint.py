@@ -32,7 +32,7 @@ multiplier: Moreau and Jean's projected iteration, as in Tonge et al. 2012 (10.1
 
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, vec4
-from wavetank.physics.boundary import flattened, kept_in_tank, stopped, wall_density
+from wavetank.physics.boundary import find_walls, flattened, kept_in_tank, stopped
 from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.smoothing import kernel
@@ -40,50 +40,47 @@ from wavetank.state import Coefficients, Grid, Particles, Scratch, Walls
 
 
 @qd.func
-def add_density(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_density(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to (sum w, grad_i C, sum_j |grad_j C|^2): Eq. 1 and the denominator of Eq. 4."""
-    w = kernel(method, length * c.inverse_h)
-    share = c.gradient_scale * w[1] * inverse
+    w = kernel(method, square * c.inverse_h2)
+    share = c.gradient_scale * w[1]
     sums[0] += w[0]
     direction = r * share
     for k in qd.static(range(r.n)):
         sums[1 + k] += direction[k]
-    slope = share * length  # none for the particle itself
-    sums[1 + r.n] += slope * slope
+    sums[1 + r.n] += share * share * square  # none for the particle itself
 
 
 @qd.func
-def add_weight(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_weight(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum w: Eq. 1."""
-    sums[0] += kernel(method, length * c.inverse_h)[0]
+    sums[0] += kernel(method, square * c.inverse_h2)[0]
 
 
 @qd.func
-def add_correction(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_correction(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to the correction of particle i: Eq. 6."""
-    slope = c.gradient_scale * kernel(method, length * c.inverse_h)[1]
-    sums += r * ((a[0] + b[0]) * slope * inverse)
+    sums += r * ((a[0] + b[0]) * c.gradient_scale * kernel(method, square * c.inverse_h2)[1])
 
 
 @qd.func
-def add_tensile_correction(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_tensile_correction(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to the correction of particle i: Eq. 8, Eq. 6 with the artificial pressure of Eq. 7."""
-    w = kernel(method, length * c.inverse_h)
+    w = kernel(method, square * c.inverse_h2)
     s_corr = -c.tensile * w[0] ** c.tensile_exponent  # Eq. 7
-    sums += r * ((a[0] + b[0] + s_corr) * c.gradient_scale * w[1] * inverse)
+    sums += r * ((a[0] + b[0] + s_corr) * c.gradient_scale * w[1])
 
 
 @qd.func
-def add_weighted_density(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_weighted_density(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """`add_density` for fluids of different density: squared gradients count with the inverse masses."""
-    w = kernel(method, length * c.inverse_h)
-    share = c.gradient_scale * w[1] * inverse
+    w = kernel(method, square * c.inverse_h2)
+    share = c.gradient_scale * w[1]
     sums[0] += w[0]
     direction = r * share
     for k in qd.static(range(r.n)):
         sums[1 + k] += direction[k]
-    slope = share * length
-    sums[1 + r.n] += b[0] * slope * slope
+    sums[1 + r.n] += b[0] * share * share * square
 
 
 #: By `mixed`; append only, as `smoothing.KERNELS`.
@@ -93,11 +90,10 @@ CORRECTIONS = (add_correction, add_tensile_correction)
 
 
 @qd.func
-def wall_of(i, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients):
-    """Gradient and density that the solids add at particle `i`, kept for the correction."""
-    wall = vec4(0.0, 0.0, 0.0, 0.0)
-    if particles.near[i] != 0:
-        wall = wall_density(predicted(particles, i), particles.near[i], solids, walls, c)
+def kept_wall(found: qd.template(), lane, i, near, scratch: Scratch):
+    """Gradient and density that the solids add at particle `i`, from its lane of `found`; kept if `near` any."""
+    wall = vec4(found[0, lane], found[1, lane], found[2, lane], 1.0 - found[3, lane])
+    if near != 0:
         scratch.wall[i] = wall
     return wall
 
@@ -124,9 +120,11 @@ def start_multipliers(
             dim = qd.static(particles.x[team].n)
             sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
             add_neighbors(sums, qd.static(DENSITIES[mixed]), team, particles, scratch.weight, grid, c, method)
+            found = qd.Matrix.zero(qd.f32, 4, lanes)
+            near = find_walls(found, team, particles, solids, walls, c)
             for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
                 sum = column(sums, i - team * lanes)
-                wall = wall_of(i, particles, scratch, solids, walls, c)
+                wall = kept_wall(found, i - team * lanes, i, near, scratch)
                 constraint = c.density_scale * sum[0] + wall.w - 1.0  # Eq. 2
                 own = c.eps
                 for k in qd.static(range(dim)):
@@ -149,8 +147,10 @@ def solve_multipliers(
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, 1, lanes)
             add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
+            found = qd.Matrix.zero(qd.f32, 4, lanes)
+            near = find_walls(found, team, particles, solids, walls, c)
             for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                wall = wall_of(i, particles, scratch, solids, walls, c)
+                wall = kept_wall(found, i - team * lanes, i, near, scratch)
                 constraint = c.density_scale * sums[0, i - team * lanes] + wall.w - 1.0  # Eq. 2
                 change = -c.relaxation * constraint / scratch.squares[i] + c.momentum * scratch.dlam[i]  # Eq. 5
                 set_multiplier(i, scratch.lam[i], change, scratch, c)
@@ -201,10 +201,10 @@ def measure_density(
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, 1, lanes)
             add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
+            found = qd.Matrix.zero(qd.f32, 4, lanes)
+            find_walls(found, team, particles, solids, walls, c)
             for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                rho = c.density_scale * sums[0, i - team * lanes]
-                if particles.near[i] != 0:
-                    rho += wall_density(predicted(particles, i), particles.near[i], solids, walls, c).w
+                rho = c.density_scale * sums[0, i - team * lanes] + (1.0 - found[3, i - team * lanes])
                 scratch.rho[i] = largest_density * rho / scratch.weight[i]
 
 

@@ -74,24 +74,24 @@ def drag_table(dim: int, ratio: float) -> np.ndarray:
 
 
 @qd.func
-def add_damping(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_damping(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j mu_ij f(q) ((v_j - v_i) . n) n."""
     approach = 0.0
     for k in qd.static(range(r.n)):
         approach += (b[k] - a[k]) * r[k]
-    f = qd.max(1.0 - length * c.inverse_h, 0.0)
+    f = qd.max(1.0 - qd.sqrt(square) * c.inverse_h, 0.0)
     mu = 2.0 * a[3] * b[3] / qd.max(a[3] + b[3], 1e-20)
-    sums += r * (mu * f * approach * inverse * inverse)
+    sums += r * (mu * f * approach / qd.max(square, 1e-30))
 
 
 @qd.func
-def add_stiffness(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_stiffness(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to the rows' sums of |sum_j mu_ij f(q) n n^T|, element by element from above."""
-    f = qd.max(1.0 - length * c.inverse_h, 0.0)
+    f = qd.max(1.0 - qd.sqrt(square) * c.inverse_h, 0.0)
     mu = 2.0 * a[3] * b[3] / qd.max(a[3] + b[3], 1e-20)
     for k in qd.static(range(r.n)):
         for m in qd.static(range(r.n)):
-            sums[k * r.n + m] += mu * f * (r[k] * inverse) * (r[m] * inverse)
+            sums[k * r.n + m] += mu * f * r[k] * r[m] / qd.max(square, 1e-30)
 
 
 @qd.kernel(fastcache=True)

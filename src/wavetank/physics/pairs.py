@@ -64,11 +64,11 @@ def add_neighbors(
     sums: qd.template(), visit: qd.template(), team, particles: Particles, data: qd.template(), grid: Grid,
     c: Coefficients, method: qd.template(),
 ):  # fmt: skip
-    """Add up what ``visit(sum, r, length, inverse, a, b, c, method)`` adds for each neighbour j of each i of a team.
+    """Add up what ``visit(sum, r, square, a, b, c, method)`` adds for each neighbour j of each i of a team.
 
-    `sums` has a column for each of the team's particles, r = p_i - p_j [m] has the `length` [m] and its `inverse`
-    [1/m], a and b are what `data` holds of i and j, as vectors. `visit` is called for others than neighbours as well
-    and adds nothing where |r| >= h; it is called for the particle itself, with r = 0, an inverse of 1e15 and a = b.
+    `sums` has a column for each of the team's particles, r = p_i - p_j [m] has the `square` |r|^2 [m^2], a and b are
+    what `data` holds of i and j, as vectors. `visit` is called for others than neighbours as well and adds nothing
+    where |r| >= h; it is called for the particle itself, with r = 0 and a = b.
     """
     lanes, width = qd.static(sums.m, _width(data))
     first = team * lanes
@@ -89,10 +89,8 @@ def add_neighbors(
             for k in qd.static(range(pace)):
                 j = grid.list[begin + pace * turn + k]
                 r = predicted(particles, first + lane) - predicted(particles, j)
-                length = r.norm()
-                inverse = 1.0 / qd.max(length, 1e-15)
                 part = qd.Vector([0.0] * size)
-                visit(part, r, length, inverse, column(own, lane), _row(data, j), c, method)
+                visit(part, r, r.norm_sqr(), column(own, lane), _row(data, j), c, method)
                 for n in qd.static(range(size)):
                     if qd.static(k == 0):
                         sums[n, lane] += part[n]
@@ -127,9 +125,9 @@ def column(sums: qd.template(), lane):
 
 
 @qd.func
-def add_one(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_one(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Count neighbour j."""
-    if length < c.h:
+    if square < c.h * c.h:
         sums[0] += 1.0
 
 

@@ -5,7 +5,8 @@ q >= 1. The solver works with w and lattice sums only, so that nothing depends o
 
     code     symbol     meaning                                                unit
     q        r / h      distance in support radii                              1
-    w, dw    w, w'      shape of the kernel and its derivative                 1
+    w        w          shape of the kernel; w' is its derivative              1
+    square   q^2        what the device asks kernels for, see `kernel`         1
     sigma               makes the integral of W one                            1
     ratio    h / d      support radius in particle spacings                    1
 
@@ -28,41 +29,44 @@ TABLE_SIZE = 256  # samples of the half-space integrals over s/h in [-1, 1]
 
 
 @qd.func
-def spiky(q):
-    """Pair (w, dw/dq) of Spiky."""
+def spiky(square):
+    """Pair (w, w'/q) of Spiky."""
+    q = qd.sqrt(square)
     t = qd.max(1.0 - q, 0.0)
-    return qd.Vector([t * t * t, -3.0 * t * t])
+    return qd.Vector([t * t * t, -3.0 * t * t / qd.max(q, 1e-6)])
 
 
 @qd.func
-def poly6(q):
-    """Pair (w, dw/dq) of Poly6."""
-    t = qd.max(1.0 - q * q, 0.0)
-    return qd.Vector([t * t * t, -6.0 * q * t * t])
+def poly6(square):
+    """Pair (w, w'/q) of Poly6."""
+    t = qd.max(1.0 - square, 0.0)
+    return qd.Vector([t * t * t, -6.0 * t * t])
 
 
 @qd.func
-def cubic(q):
-    """Pair (w, dw/dq) of the cubic spline."""
+def cubic(square):
+    """Pair (w, w'/q) of the cubic spline."""
+    q = qd.sqrt(square)
     a = qd.max(1.0 - q, 0.0)
     b = qd.max(0.5 - q, 0.0)
-    return qd.Vector([2.0 * a * a * a - 8.0 * b * b * b, -6.0 * a * a + 24.0 * b * b])
+    return qd.Vector([2.0 * a * a * a - 8.0 * b * b * b, (24.0 * b * b - 6.0 * a * a) / qd.max(q, 1e-6)])
 
 
 @qd.func
-def wendland(q):
-    """Pair (w, dw/dq) of Wendland C2."""
+def wendland(square):
+    """Pair (w, w'/q) of Wendland C2."""
+    q = qd.sqrt(square)
     t = qd.max(1.0 - q, 0.0)
-    return qd.Vector([t * t * t * t * (1.0 + 4.0 * q), -20.0 * q * t * t * t])
+    return qd.Vector([t * t * t * t * (1.0 + 4.0 * q), -20.0 * t * t * t])
 
 
 @qd.func
-def poly6_spiky(q):
-    """Pair (w of Poly6, dw/dq of Spiky): the choice of Macklin and Müller 2013 and of the report.
+def poly6_spiky(square):
+    """Pair (w of Poly6, w'/q of Spiky): the choice of Macklin and Müller 2013 and of the report.
 
     The second is scaled to the integral of the first, sigma(spiky) / sigma(poly6), by `RestLattice.gradient_scale`.
     """
-    return qd.Vector([poly6(q)[0], spiky(q)[1]])
+    return qd.Vector([poly6(square)[0], spiky(square)[1]])
 
 
 #: Append only: compiled kernels are kept between runs under a kernel's number, and do not see what the tuple holds.
@@ -85,9 +89,13 @@ _SIGMA = {
 
 
 @qd.func
-def kernel(method: qd.template(), q):
-    """Pair (w, dw/dq) of the kernel with that number in KERNELS, chosen when the caller is compiled."""
-    return qd.static(KERNELS[method])(q)
+def kernel(method: qd.template(), square):
+    """Pair (w, w'/q) at `square` = q^2 of the kernel with that number in KERNELS, chosen when the caller is compiled.
+
+    A gradient is grad_i w = w'/q r_ij / h^2: a kernel that is a polynomial of q^2 needs neither root nor division.
+    Pairs nearer than 1e-6 h are pushed less, and not without bound.
+    """
+    return qd.static(KERNELS[method])(square)
 
 
 # --- on the host, in double precision ---

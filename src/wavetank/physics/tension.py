@@ -127,17 +127,18 @@ def substeps_for(kinds: Blend, dim: int, ratio: float, d: float, duration: float
 
 
 @qd.func
-def add_gradient(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_gradient(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to -sum_j 20 q t^3 n (Wendland C2); of another fluid only as far as its tension reaches."""
-    t = qd.max(1.0 - length * c.inverse_h, 0.0)
+    t = qd.max(1.0 - qd.sqrt(square) * c.inverse_h, 0.0)
     sums -= r * (20.0 * t * t * t / c.h * qd.min(1.0, b[0] / qd.max(a[0], 1e-20)))
 
 
 @qd.func
-def add_pull(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_pull(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to the force on i, over the scale of the force: (skin, cohesion) are in c."""
+    length = qd.sqrt(square)
     q = length * c.inverse_h
-    n = lift(r) * inverse
+    n = lift(r) / qd.max(length, 1e-15)
     g_a = vec3(a.x, a.y, a.z)
     g_b = vec3(b.x, b.y, b.z)
     size_a = qd.max(g_a.norm(), 1e-9)

@@ -18,22 +18,22 @@ from wavetank.state import Coefficients, Grid, Particles, Scratch
 
 
 @qd.func
-def add_xsph(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j (v_j - v_i) w_ij."""
-    dv = (b - a) * kernel(method, length * c.inverse_h)[0]
+    dv = (b - a) * kernel(method, square * c.inverse_h2)[0]
     for k in qd.static(range(r.n)):
         sums[k] += dv[k]
 
 
 @qd.func
-def add_vorticity(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_vorticity(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j (v_j - v_i) w_ij and to omega_i = sum_j (v_j - v_i) x grad_j W (Eq. 9)."""
-    w = kernel(method, length * c.inverse_h)
+    w = kernel(method, square * c.inverse_h2)
     dv = b - a
     for k in qd.static(range(r.n)):
         sums[k] += dv[k] * w[0]
     # grad_j W = -grad_i W, and a x b = -b x a.
-    turn = (r * (c.gradient_scale * w[1] * inverse)).cross(dv)
+    turn = (r * (c.gradient_scale * w[1])).cross(dv)
     if qd.static(r.n == 3):
         for k in qd.static(range(3)):
             sums[3 + k] += turn[k]
@@ -46,9 +46,9 @@ SUMS = (add_xsph, add_vorticity)
 
 
 @qd.func
-def add_mixed_xsph(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_mixed_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j (v_j - v_i) w_ij min(1, m_j / m_i); the inverse masses w are in `data`, behind v."""
-    share = kernel(method, length * c.inverse_h)[0] * qd.min(1.0, a[3] / b[3])
+    share = kernel(method, square * c.inverse_h2)[0] * qd.min(1.0, a[3] / b[3])
     for k in qd.static(range(r.n)):
         sums[k] += (b[k] - a[k]) * share
 

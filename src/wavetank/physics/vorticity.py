@@ -22,11 +22,11 @@ from wavetank.state import Coefficients, Grid, Particles, Scratch
 
 
 @qd.func
-def add_eta(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_eta(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to (grad |omega|, sum_j w omega_j, sum_j w |omega_j|)."""
-    w = kernel(method, length * c.inverse_h)
+    w = kernel(method, square * c.inverse_h2)
     size = b.norm()
-    slope = lift(r) * ((size - a.norm()) * c.gradient_scale * w[1] * inverse)
+    slope = lift(r) * ((size - a.norm()) * c.gradient_scale * w[1])
     for k in qd.static(range(3)):
         sums[k] += slope[k]
         sums[3 + k] += w[0] * b[k]

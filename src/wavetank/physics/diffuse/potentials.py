@@ -39,17 +39,19 @@ def limited(value, low, high):
 
 
 @qd.func
-def add_approach(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_approach(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum |v_ij| (1 - v_ij^ . x_ij^) W: Eq. 2; twice the speed head-on, nothing for what parts."""
     difference = a - b
-    sums += (difference.norm() - difference.dot(r) * inverse) * qd.max(1.0 - length * c.inverse_h, 0.0)
+    length = qd.sqrt(square)
+    apart = difference.dot(r) / qd.max(length, 1e-15)
+    sums += (difference.norm() - apart) * qd.max(1.0 - length * c.inverse_h, 0.0)
 
 
 @qd.func
-def add_bend(sums: qd.template(), r, length, inverse, a, b, c: Coefficients, method: qd.template()):
+def add_bend(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum (1 - n_i . n_j) W over the surface below the tangent plane: Eq. 4 to 6."""
     if b.norm_sqr() > 0.0 and r.dot(a) > 0.0:
-        sums += (1.0 - b.dot(a)) * qd.max(1.0 - length * c.inverse_h, 0.0)
+        sums += (1.0 - b.dot(a)) * qd.max(1.0 - qd.sqrt(square) * c.inverse_h, 0.0)
 
 
 @qd.func
