@@ -13,6 +13,8 @@ import weakref
 from operator import index
 from typing import Any
 
+import numpy as np
+
 NUMBERS = (int, float, bool)
 MOST = 64  # launches of a kernel that are kept; when there are more, all are forgotten
 NEEDED = {
@@ -121,10 +123,12 @@ def keep_prepared_launches(kernels: Any, runtime: Any) -> bool:
         return values[0] if len(values) == 1 else tuple(values)
 
     def prepare_one(*args: Any) -> tuple[int, bool]:
-        if type(args[6]) not in NUMBERS:
+        needed, value = args[4], args[6]
+        if type(value) in NUMBERS:
+            numbers[args[1]] = args[7]
+        elif not (hasattr(needed, "set_kernel_struct_args") and isinstance(value, np.ndarray)) or value.flags.writeable:
             return prepare(*args)
-        numbers[args[1]] = args[7]
-        return prepare(*args)[0], True
+        return prepare(*args)[0], True  # a number, or a vector that nobody can change
 
     def keep(self: Any, read: Any, _: Any, context: Any, __: Any) -> None:
         copied = read.make_launch_context()

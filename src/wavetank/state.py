@@ -12,7 +12,6 @@ the compiler then knows the arguments of a launch, which else cost more than a s
 """
 
 import dataclasses
-import functools
 from typing import Any, TypeVar
 
 import numpy as np
@@ -206,14 +205,20 @@ class Coefficients:
     cohesion: qd.f32 = 0.0  # m^(dim - 2), likewise
 
 
-@functools.lru_cache(maxsize=256)
-def _first_equal(numbers: Any) -> Any:
-    return numbers
+MOST_REMEMBERED = 512
+_remembered: dict[tuple[Any, ...], Any] = {}
 
 
 def remembered(numbers: Numbers) -> Numbers:
-    """Return the first object that equals `numbers`, which the compiler then knows."""
-    first: Numbers = _first_equal(numbers)
+    """Return the first object that equals `numbers`, which the compiler then knows.
+
+    That is a dataclass of numbers and vectors, or a vector; nobody may change it from now on.
+    """
+    parts = (numbers,) if isinstance(numbers, np.ndarray) else vars(numbers).values()
+    key = (type(numbers), *[part.tobytes() if isinstance(part, np.ndarray) else part for part in parts])
+    if len(_remembered) > MOST_REMEMBERED:
+        _remembered.clear()
+    first: Numbers = _remembered.setdefault(key, numbers)
     return first
 
 

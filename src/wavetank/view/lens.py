@@ -15,6 +15,7 @@ import dataclasses
 import numpy as np
 
 from wavetank.compiler import qd
+from wavetank.state import remembered
 
 vec2 = qd.types.vector(2, qd.f32)
 vec3 = qd.types.vector(3, qd.f32)
@@ -37,8 +38,10 @@ class Lens:
 
 
 def vector(*parts: float) -> np.ndarray:
-    """Return a vector as a kernel argument: a numpy array, with which the compiler's cache knows the call again."""
-    return np.array(parts, np.float32)
+    """Return a vector as a kernel argument: an array that is the same object each time, for the compiler to know."""
+    result = np.array(parts, np.float32)
+    result.setflags(write=False)
+    return remembered(result)
 
 
 def basis(forward: np.ndarray, up: np.ndarray) -> np.ndarray:
@@ -56,7 +59,7 @@ def lens_at(
 ) -> Lens:
     """Return the lens at `eye` [m] with the `basis` `axes` for a picture of `width` x `height` pixels."""
     right, up, forward = axes
-    return Lens(
+    return remembered(Lens(
         eye=vector(*eye),
         right=vector(*right),
         up=vector(*up),
@@ -66,7 +69,7 @@ def lens_at(
         pixel=1.0 / float(focal),
         perspective=float(perspective),
         near=float(near),
-    )
+    ))  # fmt: skip
 
 
 @qd.func

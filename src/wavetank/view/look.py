@@ -4,6 +4,7 @@ All colours are linear RGB; lengths are relative to the world, so that a puddle 
 """
 
 import dataclasses
+import functools
 
 import numpy as np
 
@@ -41,6 +42,7 @@ class Look:
     tile: qd.f32  # m: edge of the floor's tiles, 0 for none
 
 
+@functools.cache
 def studio() -> Look:
     """Neutral light studio with a warm sun from behind the left shoulder: worlds in space."""
     return Look(
@@ -69,6 +71,7 @@ def studio() -> Look:
     )
 
 
+@functools.cache
 def pool() -> Look:
     """A tiled floor in the open: worlds in space, seen as water."""
     return dataclasses.replace(
@@ -86,6 +89,7 @@ def pool() -> Look:
     )
 
 
+@functools.cache
 def paper() -> Look:
     """Even light on white paper: worlds in the plane."""
     return Look(
@@ -127,7 +131,7 @@ def fluid_optics(color: str | None, extent: Extent) -> tuple[np.ndarray, float, 
     usual = usual_depth(extent)
     seen = np.clip(to_linear(np.array(rgb_of(color or WATER[extent.dim]))), 0.02, 0.98)
     scattering = (0.5 if extent.dim == 3 else 0.9) / usual
-    return (-np.log(seen) / usual).astype(np.float32), float(scattering), (seen**0.6).astype(np.float32)
+    return vector(*(-np.log(seen) / usual)), float(scattering), vector(*seen**0.6)
 
 
 def _linear(color: str) -> np.ndarray:
@@ -135,4 +139,4 @@ def _linear(color: str) -> np.ndarray:
 
 
 def _unit(x: float, y: float, z: float) -> np.ndarray:
-    return vector(x, y, z) / np.linalg.norm([x, y, z]).astype(np.float32)
+    return vector(*(vector(x, y, z) / np.linalg.norm([x, y, z]).astype(np.float32)))

@@ -60,9 +60,9 @@ def lay(shot: Shot, buffers: Buffers, depth: Any, sunk: float) -> None:
         max(LARGEST * buffers.rows / buffers.supersample, 1.0), depth, buffers.depth, sunk, buffers.sun_depth,
         buffers.foam,
     )  # fmt: skip
-    white = (shot.look.sun + shot.look.sky).astype(np.float32)
+    white, shade = vector(*(shot.look.sun + shot.look.sky)), vector(*(SHADE * shot.look.sun * (not flat)))
     blend(
-        white, PALE if flat else white, SHADE * shot.look.sun * (not flat), buffers.supersample, buffers.foam,
+        white, PALE if flat else white, shade, buffers.supersample, buffers.foam,
         shot.look.line_strength if frame.scene.tank else 0.0, slack(shot), buffers.lines, depth, buffers.color,
     )  # fmt: skip
 
@@ -148,15 +148,17 @@ def blend(
     slack: qd.f32, lines: qd.types.ndarray(), depth: qd.types.ndarray(), color: qd.types.ndarray(),
 ):  # fmt: skip
     """Lay the sums over the picture: `white` or, over nothing, `in_air`, less `shade` where the sun is hidden."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        tau = foam[row // samples, column // samples, 0]
+    for foam_row, foam_column in qd.ndrange(foam.shape[0], foam.shape[1]):
+        tau = foam[foam_row, foam_column, 0]
         if tau > 0:
-            light = white
-            if depth[row, column] == 0x7F000000:  # FARTHEST
-                light = in_air
-            light -= shade * (1.0 - foam[row // samples, column // samples, 1] / qd.cast(tau, qd.f32))
-            cover = 1.0 - qd.exp(-tau / 256.0)
-            if line_strength > 0.0:  # the tank's edges stay in front
-                here = qd.bit_cast(depth[row, column], qd.f32)
-                cover *= 1.0 - line_strength * line_cover(lines[row, column], here, slack)
-            color[row, column] += cover * (light - color[row, column])
+            hidden = shade * (1.0 - foam[foam_row, foam_column, 1] / qd.cast(tau, qd.f32))
+            most = 1.0 - qd.exp(-tau / 256.0)
+            for row in range(foam_row * samples, foam_row * samples + samples):
+                for column in range(foam_column * samples, foam_column * samples + samples):
+                    light, cover = white - hidden, most
+                    if depth[row, column] == 0x7F000000:  # FARTHEST
+                        light = in_air - hidden
+                    if line_strength > 0.0:  # the tank's edges stay in front
+                        here = qd.bit_cast(depth[row, column], qd.f32)
+                        cover *= 1.0 - line_strength * line_cover(lines[row, column], here, slack)
+                    color[row, column] += cover * (light - color[row, column])

@@ -72,20 +72,23 @@ def develop(
 
     Four pixels of three bytes fill three words, so that the words in memory are the bytes of the picture.
     """
-    columns = color.shape[1] // samples
-    pixels = color.shape[0] // samples * columns
+    rows, columns = color.shape[0] // samples, color.shape[1] // samples
     # As an argument: portable back ends cannot divide before they start a loop.
     for group in range(groups):
         first, second, third = 0, 0, 0
+        row = 4 * group // columns
+        column = 4 * group - row * columns
         for k in range(4):
-            pixel = qd.min(4 * group + k, pixels - 1)
             total = vec3(0.0, 0.0, 0.0)
-            row, column = pixel // columns * samples, pixel % columns * samples
-            for n in range(samples * samples):
-                sample = color[row + n // samples, column + n % samples]
-                if mapped == 0:
-                    sample = neutral(sample)
-                total += sample
+            for y in range(row * samples, row * samples + samples):
+                for x in range(column * samples, column * samples + samples):
+                    sample = color[y, x]
+                    if mapped == 0:
+                        sample = neutral(sample)
+                    total += sample
+            column += 1
+            if column == columns:
+                column, row = 0, qd.min(row + 1, rows - 1)
             last = curve.shape[0] - 1
             place = total * (last / (samples * samples)) + 0.5
             for channel in qd.static(range(3)):

@@ -19,6 +19,7 @@ import dataclasses
 import numpy as np
 
 from wavetank.compiler import qd
+from wavetank.state import remembered
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import (
     Lens,
@@ -65,7 +66,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     lower, upper = walls(shot)
     if shot.frame.dim == 2:  # as deep as the water is drawn
         thick = vector(0.0, 0.0, 10.0 * shot.extent.spacing)
-        lower, upper = lower - thick, upper + thick
+        lower, upper = vector(*(lower - thick)), vector(*(upper + thick))
     lay(
         strips_of(buffers.depth), shot.lens, shot.look, optics_of(shot), lower, upper, slack(shot),
         under_water(shot, buffers), shot.frame.dim, water.depth, water.rim, water.thickness, water.dye, water.stained,
@@ -89,11 +90,11 @@ class Optics:
 
 def optics_of(shot: Shot) -> Optics:
     """Return what the fluid of a picture does to light."""
-    return Optics(
+    return remembered(Optics(
         absorption=shot.absorption, scattering=shot.scattering, glow=shot.look.glow * shot.tint, usual=shot.usual,
         coarse=float(coarseness(shot)), unit=shot.extent.spacing / UNIT, spacing=shot.extent.spacing,
         disc=DISC[2] * shot.extent.spacing,
-    )  # fmt: skip
+    ))  # fmt: skip
 
 
 @qd.func
