@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import qd, upload
+from wavetank.compiler import qd, threads, upload
 from wavetank.frame import Frame
 from wavetank.view.buffers import Buffers
 from wavetank.view.extent import Extent
@@ -39,12 +39,14 @@ class WaterBuffers:
         Any  # i32 [rows, columns]: the same while it is being smoothed, then of the nearest that is seen, water or not
     )
     thickness: Any  # i32 [rows / 2, columns / 2]: water along the view, in 1 / 4096 of a spacing
+    sums: Any  # i32 [parts x texels]: the same, of each part of the particles
     dye: Any  # i32 [rows / 2, columns / 2, 4]: the dyed part of it, and that part times linear red, green, blue
     stained: Any  # i32 [1]: 1 where any of it is dyed, else `dye` holds nothing of use
     stains: Any  # i32 [materials]: colour of each fluid as a dye, 0 where the scene has one fluid only
     light: Any  # vec2 [rows / 2, columns / 2]: share of the sun, share of the sky that reaches what is not water
     rough_light: Any  # vec2, likewise: the same while it is being smoothed
     sun_thickness: Any  # i32 [texels, texels]: water along the sun's rays, likewise
+    sun_sums: Any  # i32 [parts x texels]: the same, of each part of the particles
     sun_first: Any  # i32 [texels, texels]: bits of the depth [m] at which the sun's rays meet the water
     sun_spare: Any  # i32 [texels, texels]: the same while it is being smoothed
     caustic: Any  # i32 [texels, texels]: light that refraction brings or takes, in 1 / 4096 of the sun's
@@ -55,6 +57,7 @@ class WaterBuffers:
 
 
 SUN_MAPS = ("sun_thickness", "sun_first", "sun_spare", "caustic")
+MOST_PARTS, MOST_SUMS = 8, 1 << 23  # of particles whose discs are added apart; numbers that are kept for that
 UNIT = 4096.0  # steps of thickness in a spacing
 
 
@@ -81,6 +84,7 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
         "rim": qd.ndarray(qd.i32, shape=(rows, columns)),
         "spare": qd.ndarray(qd.i32, shape=(rows, columns)),
         "thickness": qd.ndarray(qd.i32, shape=(rows // 2 + 1, columns // 2 + 1)),
+        "sums": _sums(rows // 2 + 1, columns // 2 + 1),
         "dye": qd.ndarray(qd.i32, shape=(rows // 2 + 1, columns // 2 + 1, 4)),
         "light": qd.ndarray(vec2, shape=((rows + 1) // 2, (columns + 1) // 2)),
         "rough_light": qd.ndarray(vec2, shape=((rows + 1) // 2, (columns + 1) // 2)),
@@ -95,12 +99,19 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
     upload(fields["stains"], stains)
     texels = sun_texels(extent)
     fields |= {name: qd.ndarray(qd.i32, shape=(texels, texels)) for name in SUN_MAPS}
+    fields["sun_sums"] = _sums(texels, texels)
     buffers.water = WaterBuffers(
         cells=new_cells(frame, extent, REACH * extent.spacing),
         ellipsoids=_ellipsoids(capacity),
         key=key, **fields,
     )  # fmt: skip
     return buffers.water
+
+
+def _sums(rows: int, columns: int) -> Any:
+    """Sums over particles for each thread that adds, as many as may be kept; graphics processors add at once."""
+    parts = max(1, min(threads(), MOST_PARTS, MOST_SUMS // (rows * columns)))
+    return qd.ndarray(qd.i32, shape=(parts * rows * columns if threads() else 1,))
 
 
 def _stains(frame: Frame) -> np.ndarray:

@@ -161,4 +161,5 @@ def blend(
                     if line_strength > 0.0:  # the tank's edges stay in front
                         here = qd.bit_cast(depth[row, column], qd.f32)
                         cover *= 1.0 - line_strength * line_cover(lines[row, column], here, slack)
-                    color[row, column] += cover * (light - color[row, column])
+                    before = color[row, column]
+                    color[row, column] = before + cover * (light - before)  # += would be atomic

@@ -38,8 +38,9 @@ def see_water(shot: Shot, buffers: Buffers) -> None:
     if shot.frame.dim == 2:
         return
     water, d, sun = water_of(buffers, shot), shot.extent.spacing, shot.water_sun
-    thickness.add(
-        water.cells.x, shot.frame.count, sun, 1.0, thickness.DISC[3] * d, thickness.peak(3), water.sun_thickness
+    thickness.add_up(
+        water.cells.x, shot.frame.count, sun, 1.0, thickness.DISC[3] * d, thickness.peak(3), water.sun_sums,
+        water.sun_thickness,
     )  # fmt: skip
     surface.see(shot, buffers, sun, water.sun_first)
     flatten.even(water.sun_first, water.sun_spare, sun, CAUSTIC_SIGMA * d, d, *walls(shot))

@@ -11,12 +11,14 @@ never touches more than some twenty texels.
 """
 
 import math
+from typing import Any
 
-from wavetank.compiler import qd
+from wavetank.compiler import qd, threads
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, pixels_per_metre, to_pixel, to_view, vec3, vec4
+from wavetank.view.lens import Lens, pixels_per_metre, to_pixel, to_view, vec2, vec3, vec4
 from wavetank.view.passes.spheres import dyed
 from wavetank.view.shot import Shot
+from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import UNIT, water_of
 
 DISC = {2: 6.0, 3: 1.5}  # d; wide in a plane, where it shades from the rim to the depth
@@ -27,7 +29,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill the thickness as the eye sees it."""
     water, disc = water_of(buffers, shot), DISC[shot.frame.dim] * shot.extent.spacing
     count, coarse, tall = shot.frame.count, float(coarseness(shot)), peak(shot.frame.dim)
-    add(water.cells.x, count, shot.lens, coarse, disc, tall, water.thickness)
+    add_up(water.cells.x, count, shot.lens, coarse, disc, tall, water.sums, water.thickness)
     stain(
         water.cells.x, water.cells.order, shot.frame.dye, shot.frame.material, water.stains, count, shot.lens, coarse,
         disc, tall, water.dye, water.stained,
@@ -49,37 +51,81 @@ def peak(dim: int) -> float:
     return 3.0 / (math.pi * DISC[dim] ** 2) * UNIT
 
 
+def add_up(x: Any, count: int, lens: Lens, coarse: float, disc: float, tall: float, sums: Any, thickness: Any) -> None:
+    """Fill the map `thickness` with every particle's disc; the texel (r, c) holds the pixels from coarse r, c on."""
+    parts = int(sums.shape[0]) // int(thickness.shape[0] * thickness.shape[1])
+    add(strips_of(thickness), x, count, lens, coarse, disc, tall, parts, sums, thickness, int(threads() > 0))
+
+
+@qd.func
+def disc_of(lens: Lens, x, coarse, disc, peak, rows, columns):
+    """(column, row, 1 / radius^2, thickness in the middle) of a particle's disc in texels, and the box of those it
+    covers: first and last row, first and last column; none where it is not before the eye.
+    """
+    c, box = to_view(lens, x), qd.Vector([0, -1, 0, -1])
+    place, inverse, tall = vec2(0.0, 0.0), 1.0, 0.0
+    if c.z > lens.near + 0.3 * disc:
+        place = to_pixel(lens, c) / coarse
+        # A disc next to the eye would fill the map; it counts as much farther away.
+        wide, tall = qd.min(pixels_per_metre(lens, c.z) * disc / coarse, 24.0), peak
+        if wide < 0.75:  # smaller than a texel: keep the volume
+            tall = peak * wide * wide / 0.5625
+            wide = 0.75
+        inverse = qd.min(1.0 / (wide * wide), 2.0)  # the bound keeps the compiler from dividing at every texel
+        box[0] = qd.max(qd.cast(qd.ceil(qd.max(place.y - wide - 0.5, 0.0)), qd.i32), 0)
+        box[1] = qd.min(qd.cast(qd.floor(qd.min(place.y + wide - 0.5, rows - 1.0)), qd.i32), rows - 1)
+        box[2] = qd.max(qd.cast(qd.ceil(qd.max(place.x - wide - 0.5, 0.0)), qd.i32), 0)
+        box[3] = qd.min(qd.cast(qd.floor(qd.min(place.x + wide - 0.5, columns - 1.0)), qd.i32), columns - 1)
+    return vec4(place.x, place.y, inverse, tall), box
+
+
 @qd.kernel(fastcache=True)
 def add(
-    x: qd.types.ndarray(), count: qd.i32, lens: Lens, coarse: qd.f32, disc: qd.f32, peak: qd.f32,
-    thickness: qd.types.ndarray(),
+    strips: Strips, x: qd.types.ndarray(), count: qd.i32, lens: Lens, coarse: qd.f32, disc: qd.f32, peak: qd.f32,
+    parts: qd.i32, sums: qd.types.ndarray(), thickness: qd.types.ndarray(), shared_out: qd.template(),
 ):  # fmt: skip
-    """Add up every particle's disc; the texel (r, c) holds the pixels from coarse r, coarse c on."""
+    """Add up every particle's disc.
+
+    Where the particles are `shared_out`, each of their `parts` has sums of its own, and no thread waits for another.
+    """
     rows, columns = thickness.shape[0], thickness.shape[1]
-    for row, column in qd.ndrange(rows, columns):
-        thickness[row, column] = 0
-    for i in range(count):
-        c = to_view(lens, x[i])
-        if c.z > lens.near + 0.3 * disc:
-            place = to_pixel(lens, c) / coarse
-            # A disc next to the eye would fill the map; it counts as much farther away.
-            wide = qd.min(pixels_per_metre(lens, c.z) * disc / coarse, 24.0)
-            tall = peak
-            if wide < 0.75:  # smaller than a texel: keep the volume
-                tall = peak * wide * wide / 0.5625
-                wide = 0.75
-            inverse = 1.0 / (wide * wide)
-            top = qd.max(qd.cast(qd.ceil(qd.max(place.y - wide - 0.5, 0.0)), qd.i32), 0)
-            bottom = qd.min(qd.cast(qd.floor(qd.min(place.y + wide - 0.5, rows - 1.0)), qd.i32), rows - 1)
-            left = qd.max(qd.cast(qd.ceil(qd.max(place.x - wide - 0.5, 0.0)), qd.i32), 0)
-            right = qd.min(qd.cast(qd.floor(qd.min(place.x + wide - 0.5, columns - 1.0)), qd.i32), columns - 1)
-            for row in range(top, bottom + 1):
-                dy = row + 0.5 - place.y
-                for column in range(left, right + 1):
-                    dx = column + 0.5 - place.x
-                    near = 1.0 - (dx * dx + dy * dy) * inverse
+    if qd.static(shared_out):
+        for turn in range(512 * parts):
+            if turn & 511 == 0:  # the compiler gives a thread 512 turns at least
+                part = turn >> 9
+                for k in range(part * rows * columns, (part + 1) * rows * columns):
+                    sums[k] = 0
+                # In runs that take turns, because some parts of the water are nearer than others.
+                for run in range((count + 63) // 64):
+                    if run % parts == part:
+                        for i in range(64 * run, qd.min(64 * run + 64, count)):
+                            at, box = disc_of(lens, x[i], coarse, disc, peak, rows, columns)
+                            for row in range(box[0], box[1] + 1):
+                                dy, begin = row + 0.5 - at.y, (part * rows + row) * columns
+                                for column in range(box[2], box[3] + 1):
+                                    dx = column + 0.5 - at.x
+                                    near = qd.max(1.0 - (dx * dx + dy * dy) * at.z, 0.0)
+                                    more = qd.cast(at.w * near * near + 0.5, qd.i32)
+                                    sums[begin + column] = sums[begin + column] + more  # += would be atomic
+        for task in range(strips.count):
+            row, first, last = strip(strips, task, rows, columns)
+            for column in range(first, last):
+                total = 0
+                for part in range(parts):
+                    total += sums[(part * rows + row) * columns + column]
+                thickness[row, column] = total
+    else:
+        for row, column in qd.ndrange(rows, columns):
+            thickness[row, column] = 0
+        for i in range(count):
+            at, box = disc_of(lens, x[i], coarse, disc, peak, rows, columns)
+            for row in range(box[0], box[1] + 1):
+                dy = row + 0.5 - at.y
+                for column in range(box[2], box[3] + 1):
+                    dx = column + 0.5 - at.x
+                    near = 1.0 - (dx * dx + dy * dy) * at.z
                     if near > 0.0:
-                        qd.atomic_add(thickness[row, column], qd.cast(tall * near * near + 0.5, qd.i32))
+                        qd.atomic_add(thickness[row, column], qd.cast(at.w * near * near + 0.5, qd.i32))
 
 
 @qd.kernel(fastcache=True)
@@ -108,25 +154,15 @@ def stain(
             own = dyes[order[a]]
             if own == 0:
                 own = stains[materials[order[a]]]
-        c = to_view(lens, x[a])
-        if own != 0 and c.z > lens.near + 0.3 * disc:
-            place = to_pixel(lens, c) / coarse
-            wide = qd.min(qd.max(pixels_per_metre(lens, c.z) * disc / coarse, 0.75), 24.0)
+        if own != 0:
             strength = peak * ((own >> 24) & 127) / 127.0
+            at, box = disc_of(lens, x[a], coarse, disc, strength, dye.shape[0], dye.shape[1])
             color = dyed(vec3(0.0, 0.0, 0.0), own | (127 << 24))
-            top = qd.max(qd.cast(qd.ceil(qd.max(place.y - wide - 0.5, 0.0)), qd.i32), 0)
-            bottom = qd.min(
-                qd.cast(qd.floor(qd.min(place.y + wide - 0.5, dye.shape[0] - 1.0)), qd.i32), dye.shape[0] - 1
-            )
-            left = qd.max(qd.cast(qd.ceil(qd.max(place.x - wide - 0.5, 0.0)), qd.i32), 0)
-            right = qd.min(
-                qd.cast(qd.floor(qd.min(place.x + wide - 0.5, dye.shape[1] - 1.0)), qd.i32), dye.shape[1] - 1
-            )
-            for row in range(top, bottom + 1):
-                for column in range(left, right + 1):
-                    away = (row + 0.5 - place.y) ** 2 + (column + 0.5 - place.x) ** 2
-                    near = qd.max(1.0 - away / (wide * wide), 0.0)
-                    share = strength * near * near
+            for row in range(box[0], box[1] + 1):
+                for column in range(box[2], box[3] + 1):
+                    away = (row + 0.5 - at.y) ** 2 + (column + 0.5 - at.x) ** 2
+                    near = qd.max(1.0 - away * at.z, 0.0)
+                    share = at.w * near * near
                     qd.atomic_add(dye[row, column, 0], qd.cast(share + 0.5, qd.i32))
                     for k in qd.static(range(3)):
                         qd.atomic_add(dye[row, column, k + 1], qd.cast(share * color[k] + 0.5, qd.i32))
