@@ -2,19 +2,32 @@
 
 import sys
 
-SMOOTHING = 0.9  # share of the past in the measured pace
+SMOOTHING = 0.95  # share of the past in the measured pace
+MADE_GOOD = 0.07  # s of lateness that are: as long as a picture may keep the water waiting
 LATE = 0.9  # pace below which a machine is too slow
 TURN = 0.0005  # s
 
 
 class Pace:
-    """Holds frames back to the wall clock. Where the machine is too slow, time slows down; nothing is caught up."""
+    """Holds frames back to the wall clock. Where the machine is too slow, time slows down.
+
+    What a picture took is caught up before the next one, and no more than that.
+    """
 
     def __init__(self) -> None:
         self.due = 0.0  # s on the wall clock
-        self.measured = 1.0  # seconds of water in a second
-        self.frames_per_second = 0.0
         self._last: float | None = None
+        self._water = self._took = 0.0  # s, of a frame on average
+
+    @property
+    def measured(self) -> float:
+        """Seconds of water in a second: of averages, because frames with a picture between them take longer."""
+        return self._water / self._took if self._took > 0.0 else 1.0
+
+    @property
+    def frames_per_second(self) -> float:
+        """Frames that are computed in a second."""
+        return 1.0 / self._took if self._took > 0.0 else 0.0
 
     def wait(self, now: float) -> float:
         """Return how long [s] the next frame is to be held back."""
@@ -25,11 +38,12 @@ class Pace:
         if self._last is not None and now > self._last:
             took = now - self._last
             if took < 1.0:
-                self.measured += (1.0 - SMOOTHING) * (water / took - self.measured)
-                self.frames_per_second += (1.0 - SMOOTHING) * (1.0 / took - self.frames_per_second)
+                share = 1.0 - SMOOTHING if self._took > 0.0 else 1.0
+                self._water += share * (water - self._water)
+                self._took += share * (took - self._took)
         self._last = now
-        # Half a frame of lateness is made good; what is later than that is lost time, never hurried after.
-        self.due = max(self.due + wall, now - 0.5 * wall)
+        # What is later than that is lost time, never hurried after.
+        self.due = max(self.due + wall, now - max(0.5 * wall, MADE_GOOD))
 
     def stop(self) -> None:
         """Time stands still."""

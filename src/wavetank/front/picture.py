@@ -11,7 +11,9 @@ from wavetank.session import Session
 from wavetank.view.choices import options
 from wavetank.view.renderer import Renderer
 
-AFFORD = 0.035  # s that a picture may take while the water moves
+AFFORD = 0.025  # s that a picture may take while the water moves
+SELDOM = 1 / 15  # s between two pictures, at most, on a machine that is too slow for the water and all of them
+ENOUGH = 0.99  # of the pace that is wanted: below it there are fewer pictures
 LARGEST = 1600 * 900  # pixels
 SMALLEST = 32  # px
 STEP = 8  # px: sizes are multiples of this
@@ -29,6 +31,7 @@ class Painter:
         self.seconds = 0.0  # that the last picture took
         self.last_size = (0, 0)  # px, of the last picture
         self._share = 1.0
+        self._pause, self._next = 0.0, 0.0  # s, between two pictures; when the next one is due
         self._renderers: dict[tuple[int, int], Renderer] = {}
 
     def want(self, width: int, height: int) -> None:
@@ -49,6 +52,23 @@ class Painter:
         """Whether this picture is worth a search for neighbours: only where densities are seen."""
         return options(self.session.view, self.session.color_by).get("color_by") == "density"
 
+    def is_due(self, now: float) -> bool:
+        """Say whether the water can spare the time for a picture.
+
+        On a machine that is too slow for both, most of the time is the water's: fewer pictures show it at its pace,
+        where more of them would show it in slow motion.
+        """
+        return self.session.paused or now >= self._next
+
+    def _make_time(self) -> None:
+        """Lengthen the pause between two pictures while the water is late, and shorten it while it is not."""
+        session = self.session
+        if session.paused or session.pace.measured >= ENOUGH * session.speed:
+            self._pause *= 0.8
+        else:
+            self._pause += 0.2 * (SELDOM - self._pause)
+        self._next = time.perf_counter() + self._pause - self.seconds
+
     def paint(self, sharp: bool = False) -> np.ndarray:
         """Return a picture of the present, uint8 [height, width, 3]; `sharp` whatever it costs."""
         share = {"auto": 1.0 if sharp else self._share, "full": 1.0, "half": 0.5}[self.detail]
@@ -61,6 +81,7 @@ class Painter:
         )  # fmt: skip
         self.seconds = time.perf_counter() - began
         self.session.picture_seconds += 0.2 * (self.seconds - self.session.picture_seconds)
+        self._make_time()
         if self.detail == "auto" and not sharp:
             # Half of the way to what would take the time that is affordable; small corrections are not worth a change.
             wanted = share * math.sqrt(AFFORD / max(self.seconds, 1e-4))
