@@ -3,6 +3,7 @@
 import sys
 
 SMOOTHING = 0.95  # share of the past in the measured pace
+LONGEST = 8.0  # of the average: what a single frame may count for, as when kernels are loaded or a computer slept
 MADE_GOOD = 0.07  # s of lateness that are: as long as a picture may keep the water waiting
 LATE = 0.9  # pace below which a machine is too slow
 TURN = 0.0005  # s
@@ -35,12 +36,12 @@ class Pace:
 
     def passed(self, now: float, water: float, wall: float) -> None:
         """Note that `water` [s] were computed for which `wall` [s] should pass."""
+        if self._took == 0.0:
+            self._water, self._took = water, wall
         if self._last is not None and now > self._last:
-            took = now - self._last
-            if took < 1.0:
-                share = 1.0 - SMOOTHING if self._took > 0.0 else 1.0
-                self._water += share * (water - self._water)
-                self._took += share * (took - self._took)
+            took = min(now - self._last, LONGEST * self._took)
+            self._water += (1.0 - SMOOTHING) * (water - self._water)
+            self._took += (1.0 - SMOOTHING) * (took - self._took)
         self._last = now
         # What is later than that is lost time, never hurried after.
         self.due = max(self.due + wall, now - max(0.5 * wall, MADE_GOOD))

@@ -89,3 +89,44 @@ def test_only_a_picture_of_lateness_is_made_good():
     pace.passed(5.0, 1 / 60, 1 / 60)
     assert pace.wait(5.0) == 0.0
     assert pace.due == pytest.approx(5.0 - MADE_GOOD)
+
+
+def test_a_single_hitch_does_not_spoil_the_pace_but_slowness_does():
+    """A frame that waits for a kernel says little; frames that take 0.2 s each do."""
+    pace, now = Pace(), 0.0
+    for n in range(30):
+        now += 1.5 if n == 5 else 1 / 60
+        pace.passed(now, 1 / 60, 1 / 60)
+    assert pace.measured > 0.85
+    for _ in range(100):
+        now += 0.2
+        pace.passed(now, 1 / 60, 1 / 60)
+    assert pace.measured == pytest.approx(1 / 12, rel=0.05)
+
+
+@pytest.mark.parametrize("seconds_per_pixel", [1e-9, 5e-8, 1e-7, 1e-6])
+def test_the_size_of_pictures_settles(session, monkeypatch, seconds_per_pixel):
+    """The first picture of a size takes 80 ms more; what follows from that must not be another size."""
+    clock, sizes = [100.0], []
+    monkeypatch.setattr("wavetank.front.picture.time.perf_counter", lambda: clock[0])
+
+    class Canvas:
+        def __init__(self, width, height):
+            self.size, self.extra = (width, height), 0.08
+
+        def render(self, *_, **__):
+            clock[0] += 0.006 + self.extra + seconds_per_pixel * self.size[0] * self.size[1]
+            self.extra = 0.0
+            sizes.append(self.size[0] / 960)
+            return np.zeros((8, 8, 3), np.uint8)
+
+    monkeypatch.setattr(picture, "Renderer", Canvas)
+    painter = picture.Painter(session)
+    for _ in range(60):
+        painter.paint()
+    assert len(set(sizes[20:])) == 1
+    costs = {share: 0.006 + seconds_per_pixel * 960 * 540 * share**2 for share in picture.SHARES}
+    settled = min(picture.SHARES, key=lambda share: abs(share - sizes[-1]))
+    assert costs[settled] <= picture.CLEARLY * picture.AFFORD or settled == picture.SHARES[0]
+    larger = [share for share in picture.SHARES if share > settled]
+    assert not larger or picture.CLEARLY**2 * costs[larger[0]] > picture.AFFORD

@@ -17,7 +17,8 @@ ENOUGH = 0.99  # of the pace that is wanted: below it there are fewer pictures
 LARGEST = 1600 * 900  # pixels
 SMALLEST = 32  # px
 STEP = 8  # px: sizes are multiples of this
-SMALLEST_SHARE = 0.4  # of width and height
+SHARES = (0.4, 0.5, 0.6, 0.72, 0.85, 1.0)  # of width and height that a picture may have; few, each needs a renderer
+CLEARLY = 1.2  # by what a picture must miss what is affordable before it gets another size
 QUALITY = 84  # of JPEG
 
 
@@ -30,7 +31,7 @@ class Painter:
         self.detail = "auto"  # auto, full or half
         self.seconds = 0.0  # that the last picture took
         self.last_size = (0, 0)  # px, of the last picture
-        self._share = 1.0
+        self._level, self._cost = len(SHARES) - 1, 0.0  # place in SHARES; s that pictures of that size take on average
         self._pause, self._next = 0.0, 0.0  # s, between two pictures; when the next one is due
         self._renderers: dict[tuple[int, int], Renderer] = {}
 
@@ -40,12 +41,13 @@ class Painter:
         shrink = min(1.0, math.sqrt(LARGEST / (width * height)))
         self.wanted = (max(SMALLEST, int(width * shrink)), max(SMALLEST, int(height * shrink)))
         self.session.aspect = self.wanted[0] / self.wanted[1]
+        self._cost = 0.0
         self.session.changes += 1
 
     @property
     def is_reduced(self) -> bool:
         """Whether the last picture had fewer pixels than there is room for."""
-        return self.detail == "auto" and self._share < 0.99
+        return self.detail == "auto" and SHARES[self._level] < 1.0
 
     @property
     def _needs_densities(self) -> bool:
@@ -71,8 +73,9 @@ class Painter:
 
     def paint(self, sharp: bool = False) -> np.ndarray:
         """Return a picture of the present, uint8 [height, width, 3]; `sharp` whatever it costs."""
-        share = {"auto": 1.0 if sharp else self._share, "full": 1.0, "half": 0.5}[self.detail]
+        share = {"auto": 1.0 if sharp else SHARES[self._level], "full": 1.0, "half": 0.5}[self.detail]
         width, height = (max(SMALLEST, int(side * share) // STEP * STEP) for side in self.wanted)
+        is_first = (width, height) not in self._renderers
         self.last_size = (width, height)
         began = time.perf_counter()
         image = self._renderer(width, height).render(
@@ -82,12 +85,23 @@ class Painter:
         self.seconds = time.perf_counter() - began
         self.session.picture_seconds += 0.2 * (self.seconds - self.session.picture_seconds)
         self._make_time()
-        if self.detail == "auto" and not sharp:
-            # Half of the way to what would take the time that is affordable; small corrections are not worth a change.
-            wanted = share * math.sqrt(AFFORD / max(self.seconds, 1e-4))
-            if not 0.85 < wanted / share < 1.3 or (wanted > share and share < 1.0 and wanted / share > 1.15):
-                self._share = min(1.0, max(SMALLEST_SHARE, 0.5 * (share + wanted)))
+        if self.detail == "auto" and not sharp and not is_first:
+            self._fit_size()
         return image
+
+    def _fit_size(self) -> None:
+        """Choose the size of the next pictures by what they take on average.
+
+        The first picture of a size says nothing, because it makes all that rests: it would drive the size to and fro.
+        """
+        self._cost += (0.3 if self._cost else 1.0) * (self.seconds - self._cost)
+        now = SHARES[self._level]
+        costs = [self._cost * (share / now) ** 2 for share in SHARES]
+        if self._cost > CLEARLY * AFFORD:
+            self._level = max([k for k in range(self._level) if costs[k] <= AFFORD], default=0)
+        elif self._level + 1 < len(SHARES) and CLEARLY * costs[self._level + 1] < AFFORD:
+            self._level += 1
+        self._cost = costs[self._level]
 
     def _renderer(self, width: int, height: int) -> Renderer:
         key = (width, height)
