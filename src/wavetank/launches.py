@@ -124,11 +124,12 @@ def keep_prepared_launches(kernels: Any, runtime: Any) -> bool:
 
     def prepare_one(*args: Any) -> tuple[int, bool]:
         needed, value = args[4], args[6]
+        taken, may_be_kept = prepare(*args)
         if type(value) in NUMBERS:
-            numbers[args[1]] = args[7]
-        elif not (hasattr(needed, "set_kernel_struct_args") and isinstance(value, np.ndarray)) or value.flags.writeable:
-            return prepare(*args)
-        return prepare(*args)[0], True  # a number, or a vector that nobody can change
+            numbers[args[1]], may_be_kept = args[7], True
+        elif isinstance(value, np.ndarray) and hasattr(needed, "set_kernel_struct_args"):
+            may_be_kept = not value.flags.writeable  # a vector that nobody can change
+        return taken, may_be_kept
 
     def keep(self: Any, read: Any, _: Any, context: Any, __: Any) -> None:
         copied = read.make_launch_context()

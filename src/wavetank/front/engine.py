@@ -106,7 +106,7 @@ class Engine:
     def _paint(self, now: float) -> None:
         changed = self.session.changes != self._painted
         calm = not changed and not self._sharp and self.painter.is_reduced and now - self._painted_at > CALM
-        if not (changed or calm) or not self.painter.is_due(now):
+        if not ((changed or calm) and self.painter.is_due(now)):
             return
         self._painted, self._painted_at, self._sharp = self.session.changes, now, calm
         image = self.painter.paint(sharp=calm)

@@ -80,7 +80,7 @@ class Painter:
         began = time.perf_counter()
         image = self._renderer(width, height).render(
             self.session.sim.frame(measured=self._needs_densities), self.session.camera, legend=False,
-            hasty=share < 0.99, **options(self.session.view, self.session.color_by),
+            hasty=share < 1.0, **options(self.session.view, self.session.color_by),
         )  # fmt: skip
         self.seconds = time.perf_counter() - began
         self.session.picture_seconds += 0.2 * (self.seconds - self.session.picture_seconds)

@@ -130,7 +130,7 @@ class WebFront:
         changed = self.session.changes != self._shown
         calm = not changed and not self._sharp and self.painter.is_reduced and now - self._shown_at > CALM
         new = any(viewer.is_new for viewer in self.viewers.all)
-        if not (changed or calm or new) or not (new or self.painter.is_due(now)):
+        if not (new or ((changed or calm) and self.painter.is_due(now))):
             return
         self._shown, self._shown_at, self._sharp = self.session.changes, now, calm
         for viewer in self.viewers.all:

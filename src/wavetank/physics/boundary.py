@@ -75,9 +75,11 @@ def add_wall(sums: qd.template(), lane, value, walls: Walls, c: Coefficients):
 
 
 @qd.func
-def add_bodies(sums: qd.template(), lane, p: qd.template(), near, solids: SolidSet, walls: Walls, c: Coefficients):
-    """Add the marked solids, other than the walls of the tank, as `add_wall` does, at the place `p` of a lane."""
-    k = next_near(near, solids.tank_count - 1, solids.count)
+def add_solids(
+    sums: qd.template(), lane, p: qd.template(), near, behind, solids: SolidSet, walls: Walls, c: Coefficients
+):  # fmt: skip
+    """Add the marked solids behind number `behind`, as `add_wall` does, at the place `p` of a lane."""
+    k = next_near(near, behind, solids.count)
     while k < solids.count:
         add_wall(sums, lane, signed_distance(solids, k, lift(p)), walls, c)
         k = next_near(near, k, solids.count)
@@ -102,7 +104,8 @@ def find_walls(sums: qd.template(), team, particles: Particles, solids: SolidSet
         k = next_near(near, k, solids.tank_count)
     if near >> solids.tank_count != 0:
         for lane in range(sums.m):
-            add_bodies(sums, lane, predicted(particles, first + lane), particles.near[first + lane], solids, walls, c)
+            p = predicted(particles, first + lane)
+            add_solids(sums, lane, p, particles.near[first + lane], solids.tank_count - 1, solids, walls, c)
     return near
 
 
@@ -110,11 +113,7 @@ def find_walls(sums: qd.template(), team, particles: Particles, solids: SolidSet
 def wall_density(x: qd.template(), near, solids: SolidSet, walls: Walls, c: Coefficients):
     """(gradient [1/m], relative density) that the marked solids add at `x`."""
     sums = qd.Matrix([[0.0], [0.0], [0.0], [1.0]])
-    k = next_near(near, -1, solids.tank_count)
-    while k < solids.tank_count:
-        add_wall(sums, 0, plane_distance(solids, k, lift(x)), walls, c)
-        k = next_near(near, k, solids.tank_count)
-    add_bodies(sums, 0, x, near, solids, walls, c)
+    add_solids(sums, 0, x, near, -1, solids, walls, c)
     return vec4(sums[0, 0], sums[1, 0], sums[2, 0], 1.0 - sums[3, 0])
 
 

@@ -79,6 +79,14 @@ def disc_of(lens: Lens, x, coarse, disc, peak, rows, columns):
     return vec4(place.x, place.y, inverse, tall), box
 
 
+@qd.func
+def thickness_in(at, row, column):
+    """Thickness of a disc `at` its place, as `disc_of` has it, in the middle of a texel."""
+    away = (row + 0.5 - at.y) ** 2 + (column + 0.5 - at.x) ** 2
+    near = qd.max(1.0 - away * at.z, 0.0)
+    return at.w * near * near
+
+
 @qd.kernel(fastcache=True)
 def add(
     strips: Strips, x: qd.types.ndarray(), count: qd.i32, lens: Lens, coarse: qd.f32, disc: qd.f32, peak: qd.f32,
@@ -101,11 +109,9 @@ def add(
                         for i in range(64 * run, qd.min(64 * run + 64, count)):
                             at, box = disc_of(lens, x[i], coarse, disc, peak, rows, columns)
                             for row in range(box[0], box[1] + 1):
-                                dy, begin = row + 0.5 - at.y, (part * rows + row) * columns
+                                begin = (part * rows + row) * columns
                                 for column in range(box[2], box[3] + 1):
-                                    dx = column + 0.5 - at.x
-                                    near = qd.max(1.0 - (dx * dx + dy * dy) * at.z, 0.0)
-                                    more = qd.cast(at.w * near * near + 0.5, qd.i32)
+                                    more = qd.cast(thickness_in(at, row, column) + 0.5, qd.i32)
                                     sums[begin + column] = sums[begin + column] + more  # += would be atomic
         for task in range(strips.count):
             row, first, last = strip(strips, task, rows, columns)
@@ -120,12 +126,10 @@ def add(
         for i in range(count):
             at, box = disc_of(lens, x[i], coarse, disc, peak, rows, columns)
             for row in range(box[0], box[1] + 1):
-                dy = row + 0.5 - at.y
                 for column in range(box[2], box[3] + 1):
-                    dx = column + 0.5 - at.x
-                    near = 1.0 - (dx * dx + dy * dy) * at.z
-                    if near > 0.0:
-                        qd.atomic_add(thickness[row, column], qd.cast(at.w * near * near + 0.5, qd.i32))
+                    more = qd.cast(thickness_in(at, row, column) + 0.5, qd.i32)
+                    if more > 0:
+                        qd.atomic_add(thickness[row, column], more)
 
 
 @qd.kernel(fastcache=True)
@@ -160,9 +164,7 @@ def stain(
             color = dyed(vec3(0.0, 0.0, 0.0), own | (127 << 24))
             for row in range(box[0], box[1] + 1):
                 for column in range(box[2], box[3] + 1):
-                    away = (row + 0.5 - at.y) ** 2 + (column + 0.5 - at.x) ** 2
-                    near = qd.max(1.0 - away * at.z, 0.0)
-                    share = at.w * near * near
+                    share = thickness_in(at, row, column)
                     qd.atomic_add(dye[row, column, 0], qd.cast(share + 0.5, qd.i32))
                     for k in qd.static(range(3)):
                         qd.atomic_add(dye[row, column, k + 1], qd.cast(share * color[k] + 0.5, qd.i32))
