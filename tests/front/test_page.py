@@ -106,6 +106,7 @@ def test_a_person_plays(open_page, browser):
     browser.run("(() => { const s = document.querySelector('#scrub'); s.value = 0.2; s.oninput() })()")
     until(lambda: session.paused and session.sim.time <= 0.21)
     browser.wait_for("document.querySelector('#bookmarks button') !== null")
+    browser.wait_for("Number(document.querySelector('#clock b').textContent) <= 0.21")  # nothing moves any more
     browser.click("#bookmarks button")
     until(lambda: session.sim.time > 0.5)
 

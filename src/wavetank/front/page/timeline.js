@@ -54,15 +54,21 @@ on("status", (status) => {
     find("play").title = icon_ ? "Play (space)" : "Pause (space)";
   }
   if (document.activeElement !== speed) speed.value = SPEEDS[closest(status.speed)];
-  const list = JSON.stringify([status.bookmarks, from, to]);
-  if (list === drawn) return;
-  drawn = list;
-  find("bookmarks").replaceChildren(...status.bookmarks.map((name) => {
+  const list = JSON.stringify(status.bookmarks);
+  if (list !== drawn) {
+    drawn = list;
+    find("bookmarks").replaceChildren(...status.bookmarks.map(flag));
+  }
+  // The range grows while the water moves. Flags move with it and stay what they are, or a click on one would be lost.
+  status.bookmarks.forEach((name, k) => {
     const at = marks.get(name) ?? parseFloat(name);
-    const flag = make("button", { title: `${name}: click to go there, right click to forget it`, "aria-label": `Bookmark ${name}` });
-    flag.style.left = `${100 * Math.min(1, Math.max(0, ((at || 0) - from) / (to - from)))}%`;
-    flag.onclick = () => send({ do: "bookmark", name, action: "go" });
-    flag.oncontextmenu = (event) => { event.preventDefault(); send({ do: "bookmark", name, action: "forget" }); };
-    return flag;
-  }));
+    find("bookmarks").children[k].style.left = `${100 * Math.min(1, Math.max(0, ((at || 0) - from) / (to - from)))}%`;
+  });
 });
+
+function flag(name) {
+  const result = make("button", { title: `${name}: click to go there, right click to forget it`, "aria-label": `Bookmark ${name}` });
+  result.onclick = () => send({ do: "bookmark", name, action: "go" });
+  result.oncontextmenu = (event) => { event.preventDefault(); send({ do: "bookmark", name, action: "forget" }); };
+  return result;
+}
