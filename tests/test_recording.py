@@ -29,7 +29,7 @@ EXAMPLES = [
     c.ToolBegin(tool="pour", options={"aim": "ahead", "width": 0.2, "keep": True}, **RAY), c.ToolMove(**RAY, pointer=3),
     c.ToolEnd(pointer=3), c.ToolStop(tool="pour"), c.MoveSolid(name="ball", position=(0.5, 0.3), rotation=0.5),
     c.AddSolid(solid=wt.Box(center=(0.1, 0.2), size=(0.1, 0.1))), c.RemoveSolid(name="ball"), c.Pause(on=False),
-    c.Step(frames=3), c.Speed(factor=0.25), c.FrameLength(parts=2), c.Rewind(time=0.3),
+    c.Step(frames=3), c.Speed(factor=0.25), c.FrameLength(parts=2, filled=True), c.Rewind(time=0.3),
     c.Bookmark(name="here", action="go"), c.SetCamera(eye=(1, 2, 3), target=(0, 0, 0)), c.Orbit(azimuth=0.1),
     c.Pan(right=0.2), c.Zoom(factor=0.9), c.Home(), c.SetView(color_by="density"),
 ]  # fmt: skip
@@ -132,7 +132,7 @@ def test_real_time_is_kept_and_slowness_told(monkeypatch):
     monkeypatch.setattr("wavetank.session.time.perf_counter", lambda: clock[0])
     session = Session(pool())
     for cost, late in ((0.0, False), (0.1, True)):
-        monkeypatch.setattr(session, "tick", lambda cost=cost: clock.__setitem__(0, clock[0] + cost))
+        monkeypatch.setattr(session, "tick", lambda cost=cost: clock.__setitem__(0, clock[0] + cost) or 1 / 60)
         start, frames = clock[0], 0
         while clock[0] < start + 5.0:
             frames += session.turn()
@@ -147,8 +147,9 @@ def test_a_slow_machine_gets_shorter_frames(monkeypatch):
     session = Session(pool())
     session.smooth, session.sim.time_steps = True, 5
 
-    def tick(per_step: float) -> None:
+    def tick(per_step: float) -> float:
         clock[0] += per_step * session.frame_duration / session.sim.scene.frame_time * 5
+        return session.frame_duration
 
     for per_step, least, most in ((0.05, 0.03, 0.067), (0.001, 0.004, 0.006)):
         monkeypatch.setattr(session, "tick", lambda per_step=per_step: tick(per_step))
@@ -158,6 +159,23 @@ def test_a_slow_machine_gets_shorter_frames(monkeypatch):
         took = per_step * 5 * session.frame_duration / session.sim.scene.frame_time
         assert least <= took <= most
     assert any(isinstance(command, c.FrameLength) for _, command in session.log)
+
+
+def test_a_late_session_fills_its_frames_and_a_replay_does_as_well(monkeypatch):
+    scene = wt.Scene.load("dam-break-2d")
+    session = Session(scene)
+    session.smooth = True
+    monkeypatch.setattr(session.pace, "is_late", lambda wanted: session.sim.time > 0.2)
+    monkeypatch.setattr(session.pace, "wait", lambda now: 0.0)
+    monkeypatch.setattr("wavetank.session.SLUGGISH", 1e9)  # s: however slow this machine is, frames stay whole
+    while session.sim.time < 0.8:
+        session.turn()
+    assert [command for _, command in session.log] == [c.FrameLength(parts=1, filled=True)]
+    assert session.ticks > 0.8 * 60 + 4, "frames are shorter than a sixtieth"
+    recording = Recording.of(session, scene)
+    again = [*replay(recording)][-1]
+    assert again.sim.time == session.sim.time
+    assert digest(again) == recording.digest
 
 
 def test_rewind_brings_the_same_water_back():

@@ -160,14 +160,16 @@ class Speed(Command):
 
 
 class FrameLength(Command):
-    """Divide frames into so many.
+    """Divide frames into so many, and let them end with a time step of full length where that is sooner (`filled`).
 
-    A session on a slow machine chooses it by itself: shorter frames, and with them slower water, but a picture of each.
+    A session on a slow machine chooses it by itself. Frames in parts are slower water, but each has its picture; frames
+    that end with a time step need fewer of these.
     """
 
     do: Literal["frame-length"] = "frame-length"
     fusible: ClassVar = ("do",)
     parts: Annotated[int, Field(ge=1, le=8)] = 1
+    filled: bool = False
 
 
 class Rewind(Command):

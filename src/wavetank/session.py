@@ -51,6 +51,7 @@ class Session:
         self.notes: list[str] = []  # for the person, one sentence each
         self.paused, self.speed, self.steps_left = False, 1.0, 0
         self.frame_parts = 1  # into which a frame is divided
+        self.fills_frames = False  # whether frames end with a time step of full length
         self.smooth = False  # whether frames are made shorter on a slow machine
         self.picture_seconds = 0.0  # that the front takes for a picture, for that choice
         self.view, self.color_by = "", "speed"
@@ -75,6 +76,7 @@ class Session:
                 "allowed in a session: use a larger spacing or less fluid."
             )
         sim = Simulation(scene, self.arch)
+        sim.load_kernels()
         game = Game(scene.goal, sim.frame(measured=False)) if scene.goal else None
         self.scene, self.sim, self.game = scene, sim, game
         self.hands, self.running, self.moving = {}, {}, {}
@@ -137,10 +139,11 @@ class Session:
     @property
     def frame_duration(self) -> float:
         """Seconds of water in a frame [s]; slow motion has shorter ones, as long as they hold a good time step."""
-        return self.sim.scene.frame_time * min(1.0, max(self.speed, 1.0 / MOST_PARTS), 1.0 / self.frame_parts)
+        longest = self.sim.scene.frame_time * min(1.0, max(self.speed, 1.0 / MOST_PARTS), 1.0 / self.frame_parts)
+        return self.sim.filled(longest) if self.fills_frames else longest
 
-    def tick(self) -> None:
-        """Compute one frame, with what the hands do to it."""
+    def tick(self) -> float:
+        """Compute one frame, with what the hands do to it, and return the seconds of water in it [s]."""
         duration = self.frame_duration
         self._look_for_strangers()
         for tool, hand in [*self.hands.values(), *self.running.values()]:
@@ -158,6 +161,7 @@ class Session:
         self.history.forget_from(self.sim.time)
         if self.history.wants(self.sim.time):
             self.history.keep(self.sim.snapshot())
+        return duration
 
     def turn(self) -> bool:
         """Carry out what waits and compute a frame if one is due; say whether anything happened."""
@@ -169,8 +173,7 @@ class Session:
         if not self.steps_left and self.pace.wait(now) > 0.0:
             return happened
         self.steps_left = max(0, self.steps_left - 1)
-        duration = self.frame_duration
-        self.tick()
+        duration = self.tick()
         self.pace.passed(time.perf_counter(), duration, duration / self.speed)
         if self.smooth:
             self._fit_frame(time.perf_counter() - now)
@@ -185,11 +188,14 @@ class Session:
 
     def _fit_frame(self, took: float) -> None:
         """Shorten the frames of a machine that is too slow for them; a command, so that a recording knows."""
-        most = max(SLUGGISH, WORTH * self.picture_seconds)
-        if took > 1.2 * most and self.sim.time_steps > 1 and self.frame_parts < MOST_PARTS:
-            self.apply(FrameLength(parts=min(MOST_PARTS, math.ceil(self.frame_parts * took / most))))
-        elif took < most * SWIFT / SLUGGISH and self.frame_parts > 1:
-            self.apply(FrameLength(parts=self.frame_parts - 1))
+        most, parts = max(SLUGGISH, WORTH * self.picture_seconds), self.frame_parts
+        late = self.pace.is_late(self.speed) and self.sim.time_steps > 1
+        if took > 1.2 * most and self.sim.time_steps > 1:
+            parts = min(MOST_PARTS, math.ceil(parts * took / most))
+        elif took < most * SWIFT / SLUGGISH:
+            parts = max(1, parts - 1)
+        if parts != self.frame_parts or late and not self.fills_frames:
+            self.apply(FrameLength(parts=parts, filled=self.fills_frames or late))
 
     def wake(self) -> None:
         """End `rest` early, from any thread."""

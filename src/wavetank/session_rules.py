@@ -131,7 +131,7 @@ def speed(session: "Session", command: c.Speed) -> None:
 
 def frame_length(session: "Session", command: c.FrameLength) -> None:
     """Set how long a frame is."""
-    session.frame_parts = command.parts
+    session.frame_parts, session.fills_frames = command.parts, command.filled
 
 
 def rewind(session: "Session", command: c.Rewind) -> None:

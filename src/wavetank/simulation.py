@@ -17,7 +17,7 @@ from wavetank.params import LIVE
 from wavetank.physics import measure, population
 from wavetank.physics.coarse_grid import new_levels
 from wavetank.physics.diffuse.pool import pool_from, pool_rows
-from wavetank.physics.diffuse.update import update_diffuse
+from wavetank.physics.diffuse.update import load_kernels, update_diffuse
 from wavetank.physics.neighbors import list_room, new_grid
 from wavetank.physics.smoothing import half_space_table
 from wavetank.physics.step import (
@@ -29,7 +29,7 @@ from wavetank.physics.step import (
     step,
     update_densities,
 )  # fmt: skip
-from wavetank.physics.time_step import largest_speed, pool_depth, substeps
+from wavetank.physics.time_step import filled_share, largest_speed, pool_depth, steps_needed, whole
 from wavetank.scene import MAX_PARTICLES, Scene
 from wavetank.snapshot import Snapshot, put_snapshot, read_snapshot, take_snapshot, write_snapshot
 from wavetank.solid import Solid
@@ -48,7 +48,8 @@ class Simulation:
     def reset(self) -> None:
         """Put everything back to the start of the scene."""
         positions, velocities = self.scene.particles()
-        self.solids = MovingSolids(self._walls(), self.scene.solids, self.scene.friction, self.scene.spacing)
+        walls = self.scene.tank.walls() if self.scene.tank else []
+        self.solids = MovingSolids(walls, self.scene.solids, self.scene.friction, self.scene.spacing)
         self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
         self.pushed: list[Force] = []  # these in the next one only
         self._next_id, self._fastest_start, self._fastest_solid, self._fastest_force = 0, 0.0, 0.0, 0.0
@@ -83,9 +84,6 @@ class Simulation:
         )
         self._capacity, self._outdated = capacity, True
 
-    def _walls(self) -> list[Solid]:
-        return self.scene.tank.walls() if self.scene.tank else []
-
     # --- time ---
 
     def step(self) -> None:
@@ -109,6 +107,14 @@ class Simulation:
         for _ in range(count):
             self._advance_frame(duration)
 
+    def load_kernels(self) -> None:
+        """Load what a splash needs before there is one: a tenth of a second for each kernel, of water that stands."""
+        load_kernels(self.world, self.scene)
+
+    def filled(self, duration: float) -> float:
+        """Return the time [s] up to `duration` that time steps of full length fill; see `time_step.filled_share`."""
+        return duration * filled_share(self._steps_needed(duration))
+
     def frames(self, seconds: float, fps: float = 60.0) -> Iterator[Frame]:
         """Yield the present frame and then one every 1 / `fps` until `seconds` of water have passed."""
         if not (math.isfinite(fps) and fps > 0):
@@ -126,7 +132,7 @@ class Simulation:
     def _advance_frame(self, duration: float) -> None:
         began = time.perf_counter()
         limit = self._speed_limit(duration)
-        parts = self.time_steps = self._substeps(duration)
+        parts = self.time_steps = whole(self._steps_needed(duration))
         self.solids.grow(duration)
         for part in range(parts):
             self.world.solids_version = self.solids.move_to(part / parts, (part + 1) / parts)
@@ -144,8 +150,8 @@ class Simulation:
         self.frame_number += 1
         self._outdated = True
 
-    def _substeps(self, duration: float) -> int:
-        """Return the number of time steps for `duration` [s]."""
+    def _steps_needed(self, duration: float) -> float:
+        """Return how many time steps make up `duration` [s], as `time_step.steps_needed` has it."""
         scene, particles, count = self.scene, self.world.particles, self.count
         box = (np.zeros(scene.dim), np.array(scene.tank.size)) if scene.tank else self._start_box
         speed = max(self._solid_speed(duration), largest_speed(particles, count))
@@ -153,7 +159,7 @@ class Simulation:
         capillary = min(capillary_substeps(self.world, scene, duration), scene.largest_substeps)
         on_grid, forced = has_grid_pressure(self.world, scene), bool(self.forces or self.pushed)
         depth = 0.0 if on_grid else pool_depth(particles, count, scene.gravity, *box)
-        return max(capillary, substeps(scene, duration, speed, depth, on_grid=on_grid, forced=forced))
+        return max(capillary, steps_needed(scene, duration, speed, depth, on_grid=on_grid, forced=forced))
 
     def _solid_speed(self, duration: float) -> float:
         """Return the largest speed [m/s] at which any solid moves through the tank in this frame."""

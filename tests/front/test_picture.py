@@ -27,7 +27,7 @@ def machine(session, monkeypatch):
             return np.zeros((8, 8, 3), np.uint8)
 
     monkeypatch.setattr(painter, "_renderer", lambda *_: Canvas())
-    monkeypatch.setattr(session, "tick", lambda: clock.__setitem__(0, clock[0] + cost["frame"]))
+    monkeypatch.setattr(session, "tick", lambda: clock.__setitem__(0, clock[0] + cost["frame"]) or 1 / 60)
 
     def run(seconds: float, frame: float, picture: float) -> tuple[int, int]:
         cost.update(frame=frame, picture=picture)

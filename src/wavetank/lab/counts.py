@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from wavetank import compiler
-from wavetank.compiler import qd
+from wavetank.compiler import download, qd
 from wavetank.physics.neighbors import for_each_row_around
 from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.step import coefficients
@@ -51,7 +51,7 @@ def distance_tests(sim: Simulation) -> int:
     world, count = sim.world, sim.count
     tests = integers(count)
     count_tests(tests, world.particles, world.grid, coefficients(sim.scene, sim.scene.frame_time), count)
-    return int(tests.to_numpy()[:count].sum(dtype=np.int64))
+    return int(download(tests)[:count].sum(dtype=np.int64))
 
 
 def frame_launches(sim: Simulation) -> dict[str, int]:

@@ -23,7 +23,7 @@ import dataclasses
 
 import numpy as np
 
-from wavetank.compiler import qd, upload
+from wavetank.compiler import download, qd, upload
 from wavetank.distance import vec3
 from wavetank.errors import WavetankError
 from wavetank.meshes.tree import Tree, box_square, leaving, next_node, plant, triangle_square
@@ -71,11 +71,11 @@ def measure(points: np.ndarray, faces: np.ndarray, spacing: float, thickness: fl
     if walls is None:
         part_faces(tree, THINNEST, len(faces))
     outer, inner = (qd.ndarray(qd.f32, shape=(nx * ny * nz,)) for _ in range(2))
-    nearest_triangles(tree, outer, inner, float(tree.swell.to_numpy().max()), exact, NEARLY, nx, ny, nz)
-    distances = outer.to_numpy()
+    nearest_triangles(tree, outer, inner, float(download(tree.swell).max()), exact, NEARLY, nx, ny, nz)
+    distances = download(outer)
     if walls is None:
         inside = _inside(corners, (nx, ny, nz), cells, name).reshape(-1)
-        distances[inside] = inner.to_numpy()[inside]
+        distances[inside] = download(inner)[inside]
     return DistanceGrid((distances * np.float32(cell)).reshape(nz, ny, nx), cell)
 
 
@@ -92,7 +92,7 @@ def _inside(corners: np.ndarray, counts: tuple[int, int, int], cells: int, name:
         for array, values in zip(sides, corners.transpose(1, 0, 2), strict=True):
             upload(array, values[:, order])
         count_crossings(*sides, crossings, na, nb, nc, *_ASIDE, len(corners))
-        before = np.cumsum(crossings.to_numpy().reshape(nc, nb, na), axis=2, dtype=np.int16)
+        before = np.cumsum(download(crossings).reshape(nc, nb, na), axis=2, dtype=np.int16)
         both = (before != 0).astype(np.int8) + (before != before[:, :, -1:])
         # [nc, nb, na] -> [nz, ny, nx]
         votes += both.transpose(*(2 - order.index(k) for k in (2, 1, 0)))

@@ -12,7 +12,7 @@ does it on threads, as every particle or place is judged by itself.
 
 import numpy as np
 
-from wavetank.compiler import qd, upload
+from wavetank.compiler import download, qd, upload
 from wavetank.distance import SolidSet, lift, signed_distance, vec3
 from wavetank.physics.neighbors import copy_particle
 from wavetank.physics.places import predict_at
@@ -124,7 +124,7 @@ def inside_capsule(particles: Particles, count: int, start: np.ndarray, end: np.
         return np.zeros(0, bool)
     marks = integers(count)
     mark_capsule(marks, particles, count, start, end, radius)
-    result: np.ndarray = marks.to_numpy()[:count] == 1
+    result: np.ndarray = download(marks)[:count] == 1
     return result
 
 
@@ -140,7 +140,7 @@ def free_places(
     middle[: places.shape[1]] = places.mean(axis=0)
     reach = float(np.linalg.norm(places - places.mean(axis=0), axis=1).max())
     find_taken(taken, device, particles, solids, middle, reach, gap, wall, count, len(places))
-    result: np.ndarray = taken.to_numpy()[: len(places)] == 0
+    result: np.ndarray = download(taken)[: len(places)] == 0
     return result
 
 
@@ -166,5 +166,5 @@ def at_capacity(particles: Particles, dim: int, capacity: int) -> Particles:
     """Return a copy with room for `capacity` particles; where they are predicted to go is left open."""
     larger = new_particles(dim, capacity)
     for name in _FIELDS:
-        upload(getattr(larger, name), getattr(particles, name).to_numpy()[: capacity + 1])
+        upload(getattr(larger, name), download(getattr(particles, name))[: capacity + 1])
     return larger

@@ -25,16 +25,19 @@ from wavetank.state import Particles
 
 ALONE = 2.0 / 3.0  # of `courant` where iterations alone carry the pressure
 SHALLOWEST = 0.6  # d: way in a frame of the wave that water without a grid is taken to have, however shallow
+WORTH = 1.1  # by what the steps of a frame must be shorter than they might be, so that another frame pays
+SCALE = 8  # lengths of time steps in an octave, where these are free
 LEVELS = 64  # whole steps of height that are summed; their rounding cancels
 
 
-def substeps(
+def steps_needed(
     params: Parameters, duration: float, speed: float, depth: float, *, on_grid: bool, forced: bool = False
-) -> int:
-    """Return the number of time steps for `duration` [s]. Pressure that is solved `on_grid` reaches any depth.
+) -> float:
+    """Return how many of the longest time steps that are allowed make up `duration` [s], which is no whole number.
 
-    Where iterations alone carry it, the shallowest water needs two a frame by default; and so does water on which more
-    than gravity acts (`forced`), because a force acts before the pressure answers: in one step it would be weaker.
+    Pressure that is solved `on_grid` reaches any depth. Where iterations alone carry it, the shallowest water needs two
+    a frame by default; and so does water on which more than gravity acts (`forced`), because a force acts before the
+    pressure answers: in one step it would be weaker.
     """
     gravity = math.hypot(*params.gravity)
     usual = params.substeps * duration / params.frame_time
@@ -42,8 +45,23 @@ def substeps(
     for_speed = (speed + duration * gravity) * duration / (courant * params.spacing)
     for_waves = 0.0 if on_grid else math.sqrt(gravity * depth) * duration / (params.wave_courant * params.spacing)
     alone = 0.0 if on_grid and not forced else SHALLOWEST / params.wave_courant * duration / params.frame_time
-    steps = (usual, min(max(for_speed, alone), params.largest_substeps), for_waves)
-    return max(1, *(math.ceil(n - 1e-6) for n in steps))
+    return max(usual, min(max(for_speed, alone), params.largest_substeps), for_waves)
+
+
+def whole(steps: float) -> int:
+    """Return the number of time steps that are taken where so many are needed."""
+    return max(1, math.ceil(steps - 1e-6))
+
+
+def filled_share(steps: float) -> float:
+    """Return the share of a time for which so many `steps` are needed that fewer, of full length, fill; 1 at most.
+
+    1.4 steps are two short ones, or one of full length and 0.7 of the time. Not where that saves little: what a frame
+    takes besides its steps comes more often then. Lengths are steps of a scale, because launches of a known length are
+    known (`launches.py`).
+    """
+    length = 2.0 ** -(math.ceil(SCALE * math.log2(max(steps, 1.0)) - 1e-6) / SCALE)
+    return math.floor(1.0 / length + 1e-6) * length if whole(steps) * length >= WORTH else 1.0
 
 
 def largest_speed(particles: Particles, count: int) -> float:

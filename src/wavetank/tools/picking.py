@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import download, qd
 from wavetank.distance import SolidSet, lift, signed_distance, vec3
 from wavetank.simulation import Simulation
 from wavetank.state import scalars
@@ -87,7 +87,7 @@ def pick(sim: Simulation, origin: np.ndarray, way: np.ndarray, through_water: bo
         distances = scalars(sim.world.solids.count)
         far = 4.0 * extent.radius + float(np.linalg.norm(origin - extent.middle))
         trace_solids(distances, sim.world.solids, start, heading, far, 0.02 * sim.scene.spacing)
-        found = distances.to_numpy()
+        found = download(distances)
         for number in range(sim.world.solids.tank_count, sim.world.solids.count):
             if 0.0 <= found[number] < nearest + 1e-9:
                 nearest, kind, name = float(found[number]), "solid", sim.solids.names[number]

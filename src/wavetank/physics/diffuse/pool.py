@@ -8,7 +8,7 @@ import dataclasses
 
 import numpy as np
 
-from wavetank.compiler import qd, upload
+from wavetank.compiler import download, qd, upload
 from wavetank.distance import SolidSet, lift
 from wavetank.physics.diffuse.motion import kind_in, surroundings, water_at
 from wavetank.physics.diffuse.noise import stream, uniform
@@ -69,7 +69,7 @@ def new_pool(dim: int, capacity: int, water: int) -> Pool:
 def pool_rows(pool: Pool | None, dim: int) -> dict[str, np.ndarray]:
     """Return all that is in a pool as host arrays by name, empty ones without a pool."""
     pool = pool or new_pool(dim, 0, 0)
-    return {name: getattr(pool.now, array).to_numpy()[: pool.count] for name, array in ROWS.items()}
+    return {name: download(getattr(pool.now, array))[: pool.count].copy() for name, array in ROWS.items()}
 
 
 def pool_from(rows: dict[str, np.ndarray], born: int, capacity: int, dim: int, water: int) -> Pool | None:

@@ -56,6 +56,19 @@ def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> N
         pool.count, pool.born = min(pool.count + int(number), pool.capacity), (pool.born + int(number)) % 2**31
 
 
+def load_kernels(world: World, params: Parameters) -> None:
+    """Launch all kernels of this folder for nobody, so that the first drops do not wait for them."""
+    if not (params.foam and world.count):
+        return
+    pool, c, a = new_pool(params.dim, 1, 1), coefficients(params, params.frame_time), air(params, 1, params.frame_time)
+    water, grid, solids, shared = world.particles, world.grid, world.solids, int(current_backend() != "cpu")
+    count_births(
+        pool.births, water, grid, solids, world.walls, c, a, 0, 0.0, 0, method_number(params), grid.lanes, shared
+    )
+    bear(pool.now, pool.births, water, grid, solids, c, a, 0, 0, 0, 0)
+    move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, 0, 0, shared)
+
+
 def _can_foam(world: World, a: Air) -> bool:
     """Say whether any of the water is fast enough to make foam: where none is, not even the kernels are compiled."""
     return bool(largest_speed(world.particles, world.count) ** 2 > LEAST_ENERGY * a.speed**2)

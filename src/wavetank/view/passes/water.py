@@ -18,7 +18,7 @@ import dataclasses
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import download, qd
 from wavetank.state import remembered
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import (
@@ -57,7 +57,7 @@ def under_water(shot: Shot, buffers: Buffers) -> int:
     water = water_of(buffers, shot)
     found = qd.ndarray(qd.f32, shape=(1,))
     cut.weigh(water.cells, shot.lens.eye, shot.frame.dim, found)
-    return int(float(found.to_numpy()[0]) > 0.5 * cut.full_weight(water.cells.edge / extent.spacing, 3))
+    return int(float(download(found)[0]) > 0.5 * cut.full_weight(water.cells.edge / extent.spacing, 3))
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
