@@ -4,9 +4,11 @@ import os
 import random
 
 import numpy as np
+import pytest
 
 import wavetank as wt
 from wavetank import commands as c
+from wavetank import compiler
 from wavetank.commands import command_of
 from wavetank.session import Session
 from wavetank.tools import TOOLS
@@ -174,3 +176,28 @@ def test_rewind_brings_the_same_foam_back():
     session.apply(c.Bookmark(name="then", action="go"))
     for a, b in zip(first, future(), strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("scene", ["dam-break", "dam-break-2d"])
+def test_a_splash_waits_for_no_kernels(scene):
+    """A session has loaded all that makes and moves spray before the water does, and nothing has changed by it."""
+    launched: list[str] = []
+
+    def around(module: str, name: str, launch):
+        launched.append(f"{module}.{name}")
+        return launch()
+
+    with compiler.watched(around):
+        session = Session(wt.Scene.load(scene).changed(spacing=0.06))
+    loaded = {name for name in launched if "diffuse" in name}
+    launched.clear()
+    with compiler.watched(around):
+        while not len(session.sim.frame(measured=False).foam_positions) or session.sim.frame_number % 4:
+            session.tick()
+            assert session.sim.time < 2.0, "it foams"
+    assert {name for name in launched if "diffuse" in name} == loaded
+    plain = wt.Simulation(session.scene)
+    for _ in range(session.sim.frame_number):
+        plain.step()
+    np.testing.assert_array_equal(plain.positions, session.sim.positions)
+    np.testing.assert_array_equal(plain.foam_positions, session.sim.foam_positions)

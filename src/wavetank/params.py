@@ -75,7 +75,7 @@ class Parameters(Model):
     attraction: float = parameter(0.0, 0.0, 1.0, "", "", "Share of negative pressure that is kept; 0 keeps none, so that water parts freely.")
     viscosity: float = parameter(0.08, 0.0, 1.0, "", "c", "XSPH viscosity (Eq. 11), dimensionless; the share of one step at 240 steps a second.")
     dynamic_viscosity: float = parameter(0.0, 0.0, 1e6, "Pa s", "mu", "Dynamic viscosity of fluids whose material names none, solved implicitly; honey has 10.")
-    viscosity_iterations: int = parameter(60, 1, 1000, "", "", "Iterations of the implicit viscosity in a time step, at most; fewer are taken where fewer do.")
+    viscosity_iterations: int = parameter(100, 1, 1000, "", "", "Iterations of the implicit viscosity in a time step, at most; fewer are taken where fewer do.")
     no_slip: float = parameter(1.0, 0.0, 1.0, "", "", "Share of the viscous drag of solids that is felt; 1 is no-slip, 0 lets the fluid slide.")
     surface_tension: float = parameter(0.0, 0.0, 10.0, "N/m", "sigma", "Surface tension of fluids whose material names none; water has 0.072.")
     contact_angle: float = parameter(90.0, 0.0, 180.0, "deg", "theta", "Angle at which fluids whose material names none meet a solid, where there is tension; 0 wets.")

@@ -194,7 +194,7 @@ class Session:
             parts = min(MOST_PARTS, math.ceil(parts * took / most))
         elif took < most * SWIFT / SLUGGISH:
             parts = max(1, parts - 1)
-        if parts != self.frame_parts or late and not self.fills_frames:
+        if parts != self.frame_parts or (late and not self.fills_frames):
             self.apply(FrameLength(parts=parts, filled=self.fills_frames or late))
 
     def wake(self) -> None:

@@ -20,16 +20,8 @@ from wavetank.physics.diffuse.pool import pool_from, pool_rows
 from wavetank.physics.diffuse.update import load_kernels, update_diffuse
 from wavetank.physics.neighbors import list_room, new_grid
 from wavetank.physics.smoothing import half_space_table
-from wavetank.physics.step import (
-    World,
-    capillary_speed,
-    capillary_substeps,
-    has_grid_pressure,
-    neighbor_numbers,
-    step,
-    update_densities,
-)  # fmt: skip
-from wavetank.physics.time_step import filled_share, largest_speed, pool_depth, steps_needed, whole
+from wavetank.physics.step import World, capillary_speed, neighbor_numbers, step, steps_in, update_densities
+from wavetank.physics.time_step import filled_share, largest_speed, whole
 from wavetank.scene import MAX_PARTICLES, Scene
 from wavetank.snapshot import Snapshot, put_snapshot, read_snapshot, take_snapshot, write_snapshot
 from wavetank.solid import Solid
@@ -113,7 +105,7 @@ class Simulation:
 
     def filled(self, duration: float) -> float:
         """Return the time [s] up to `duration` that time steps of full length fill; see `time_step.filled_share`."""
-        return duration * filled_share(self._steps_needed(duration))
+        return duration * filled_share(self._steps_in(duration))
 
     def frames(self, seconds: float, fps: float = 60.0) -> Iterator[Frame]:
         """Yield the present frame and then one every 1 / `fps` until `seconds` of water have passed."""
@@ -132,7 +124,7 @@ class Simulation:
     def _advance_frame(self, duration: float) -> None:
         began = time.perf_counter()
         limit = self._speed_limit(duration)
-        parts = self.time_steps = whole(self._steps_needed(duration))
+        parts = self.time_steps = whole(self._steps_in(duration))
         self.solids.grow(duration)
         for part in range(parts):
             self.world.solids_version = self.solids.move_to(part / parts, (part + 1) / parts)
@@ -150,26 +142,22 @@ class Simulation:
         self.frame_number += 1
         self._outdated = True
 
-    def _steps_needed(self, duration: float) -> float:
-        """Return how many time steps make up `duration` [s], as `time_step.steps_needed` has it."""
-        scene, particles, count = self.scene, self.world.particles, self.count
+    def _steps_in(self, duration: float) -> float:
+        """Return how many time steps make up `duration` [s], no whole number."""
+        scene, forces = self.scene, (*self.forces, *self.pushed)
         box = (np.zeros(scene.dim), np.array(scene.tank.size)) if scene.tank else self._start_box
-        speed = max(self._solid_speed(duration), largest_speed(particles, count))
-        speed += duration * sum(force.largest_acceleration() for force in (*self.forces, *self.pushed))
-        capillary = min(capillary_substeps(self.world, scene, duration), scene.largest_substeps)
-        on_grid, forced = has_grid_pressure(self.world, scene), bool(self.forces or self.pushed)
-        depth = 0.0 if on_grid else pool_depth(particles, count, scene.gravity, *box)
-        return max(capillary, steps_needed(scene, duration, speed, depth, on_grid=on_grid, forced=forced))
+        speed = max(self._solid_speed(duration), largest_speed(self.world.particles, self.count))
+        speed += duration * sum(force.largest_acceleration() for force in forces)
+        return steps_in(self.world, scene, duration, speed, box, forced=bool(forces))
 
     def _solid_speed(self, duration: float) -> float:
         """Return the largest speed [m/s] at which any solid moves through the tank in this frame."""
         return self.solids.largest_speed(duration, self.scene.tank.size if self.scene.tank else None)
 
     def _speed_limit(self, duration: float) -> float:
-        """Return the largest speed [m/s] that gravity, the start and the solids can have given to a particle.
+        """Return the largest speed [m/s] that gravity, the start, solids and forces can have given to a particle.
 
-        That is the speed of a free fall through the tank, above the fastest particle at the start, the fastest solid
-        and the strongest forces so far. Without a tank a fall has no end, and neither has the limit.
+        Gravity gives that of a free fall through the tank. Without one a fall has no end, and neither has the limit.
         """
         if self.scene.tank is None:
             return math.inf

@@ -171,6 +171,13 @@ class Fluids:
             self.arrays[name] = vectors(4, self.capacity + MARGIN)
         return self.arrays[name]
 
+    def pairs(self, grid: Grid) -> Any:
+        """Return room for a number of each pair that `grid` lists, f32 [8 * places in its lists]."""
+        size = 8 * grid.list.shape[0]
+        if "pairs" not in self.arrays or self.arrays["pairs"].shape[0] != size:
+            self.arrays["pairs"] = scalars(size)
+        return self.arrays["pairs"]
+
 
 @dataclasses.dataclass(frozen=True)
 class Coefficients:

@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 
 import wavetank as wt
+from wavetank.compiler import download
+from wavetank.physics.density_constraint import schedule
 from wavetank.physics.implicit_viscosity import (
+    TOLERANCE,
+    carried_share,
     damper_scale,
     drag_table,
-    is_thick,
+    is_viscous,
     iterations,
     solve_viscosity,
 )  # fmt: skip
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
-from wavetank.physics.step import coefficients, prepare_fluids
+from wavetank.physics.step import coefficients, has_grid_pressure, prepare_fluids
 from wavetank.simulation import Simulation
 
 D, DT = 0.05, 1 / 300
@@ -135,8 +139,59 @@ def test_thin_fluids_pay_nothing():
     assert sim.world.fluids.arrays == {}
     c = coefficients(scene, DT)
     kinds = prepare_fluids(sim.world, sim.world.particles, scene, DT)
-    assert not is_thick(kinds, c, 3, scene.support)
+    assert not is_viscous(kinds, scene, c.dt)
     assert iterations(1.0, 60) == 0
     assert (
         1 <= iterations(1.1, 60) < iterations(100.0, 60) < iterations(1e4, 1000) == math.ceil(0.5 * 100 * math.log(200))
     )
+
+
+def mean_height(steps: int) -> float:
+    """Mean height [m] of a column of honey that has collapsed for 0.2 s in so many time steps a frame."""
+    free = {"wave_courant": 100.0, "courant": 100.0}
+    scene = wt.Scene.load("honey-2d").changed(spacing=0.003, substeps=steps, viscosity_iterations=400, **free)
+    sim = Simulation(scene)
+    for _ in range(12):
+        sim.step()
+    return float(sim.positions[:, 1].mean())
+
+
+def test_thick_fluids_do_not_flow_faster_in_longer_steps(monkeypatch):
+    """Carried pressure (Goda 1979): twelve steps a frame come as near as a hundred without it, which is first order."""
+    carried = mean_height(12)
+    monkeypatch.setattr("wavetank.physics.implicit_viscosity.CARRIED", 0.0)
+    split, fine = mean_height(12), mean_height(96)
+    assert split < 0.8 * fine
+    assert carried == pytest.approx(fine, rel=0.1)
+
+
+def test_what_presses_is_carried_on_by_thick_fluids_only():
+    shares = {}
+    for viscosity in (0.0, 0.001, 0.1, 1000.0):
+        scene = wt.Scene.load("still-tank-2d").changed(dynamic_viscosity=viscosity)
+        sim = Simulation(scene)
+        sim.step()
+        assert has_grid_pressure(sim.world, scene) is (viscosity < 1.0), "a little viscosity needs no other time steps"
+        shares[viscosity] = carried_share(prepare_fluids(sim.world, sim.world.particles, scene, DT), scene)
+    assert shares.pop(1000.0) > 0.85
+    assert not any(shares.values())
+    weightless = Simulation(wt.Scene.load("honey-2d").changed(gravity=(0, 0)))
+    for _ in range(2):
+        weightless.step()
+    assert not download(weightless.world.particles.a).any()
+
+
+@pytest.mark.parametrize("stiffest", [1.001, 1.1, 3.0, 100.0])
+def test_iterations_are_as_many_as_the_worst_mode_needs(stiffest):
+    """The polynomial of `schedule` at both ends of the spectrum: within TOLERANCE, and not with one iteration less."""
+
+    def error(number: int) -> float:
+        modes = np.linspace(1.0, stiffest, 400)
+        now, before = np.ones(400), np.ones(400)
+        for relaxation, momentum in schedule(number, 1.0, stiffest):
+            now, before = now - relaxation * modes * now + momentum * (now - before), now
+        return float(np.abs(now).max())
+
+    number = iterations(stiffest, 1000)
+    assert error(number) <= 1.001 * TOLERANCE
+    assert number == 1 or error(number - 1) > TOLERANCE

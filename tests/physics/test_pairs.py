@@ -18,7 +18,10 @@ PROGRAM = """
 import sys
 import wavetank as wt
 
-sim = wt.Simulation(wt.Scene.load(sys.argv[1]).changed(spacing=0.06, vorticity=0.01, vorticity_coherence=0.0))
+scene = wt.Scene.load(sys.argv[1]).changed(
+    spacing=0.06, vorticity=0.01, vorticity_coherence=0.0, dynamic_viscosity=0.01
+)
+sim = wt.Simulation(scene)
 sim.step()
 """
 #: Kernels of a step that go over pairs, and how many variants of them a step has.
@@ -29,6 +32,7 @@ PASSES = {
     "measure_density": 1,
     "apply_viscosity": 1,
     "confine_vorticity": 1,
+    "join_pairs": 1,
 }
 
 

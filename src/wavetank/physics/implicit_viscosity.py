@@ -20,11 +20,16 @@ Where we differ, and why:
 - f(q) = 1 - q, the weights of Müller et al. 2003 (10.2312/SCA03/154-159), not the gradient of a kernel: it has no
   pole, and B makes its second moment on the rest lattice exact, averaged over directions.
 - Chebyshev iterations instead of conjugate gradients. All eigenvalues of 1 + dt M^-1 L lie between 1 and a bound
-  that one pass finds (`stiffest_particle`), which fixes the number of iterations beforehand: no dot products, hence no
+  that one pass finds (`join_pairs`), which fixes the number of iterations beforehand: no dot products, hence no
   sums whose order threads decide, and the error of no mode ever grows, wherever the iterations end.
 - Solids hold the fluid back along their surface (no-slip) as half a rest lattice would that continues the
   velocity linearly to its value at the wall (Takeda et al. 1994, 10.1143/ptp/92.5.939; Morris et al. 1997,
   10.1006/jcph.1997.5776), from a table of the distance.
+- Viscosity acts before the constraint, so that what pressure adds to the motion is damped in the next step only. That
+  made honey flow a fifth too fast at any affordable step. A thick fluid therefore begins a step with the share w of
+  what pressed it in the last one, and only the change comes afterwards: the incremental projection of Goda 1979
+  (10.1016/0021-9991(79)90088-3; Guermond et al. 2006, 10.1016/j.cma.2005.10.010). w = `CARRIED` k / (`HALF` + k) of the
+  `thickness` k: thin water carries nothing here, it would keep its noise. docs/materials.md has the figures.
 """
 
 import functools
@@ -34,19 +39,25 @@ import numpy as np
 
 from wavetank.compiler import qd, upload
 from wavetank.distance import SolidSet, lift, signed_distance, vec3, vec4
+from wavetank.params import Parameters
 from wavetank.physics.boundary import is_near
 from wavetank.physics.density_constraint import schedule
 from wavetank.physics.friction import surface_velocity
-from wavetank.physics.integrate import accelerate
+from wavetank.physics.integrate import accelerate, free_motion
 from wavetank.physics.mixture import Blend
-from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
+from wavetank.physics.pairs import add_kept, column, keep_pairs, part_of, teams, turns
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars
 
 TOLERANCE = 1e-2  # of the slowest mode's error after the iterations
 WORTH = 1e-5  # smallest kappa - 1 on the rest lattice for which a substep solves anything
+THIN = 1.0  # `thickness` in a frame up to which nothing is carried on, and a grid may solve for the pressure
+CARRIED, HALF = 0.9, 10.0  # largest share of the pressure that is carried on; `thickness` with half of it
+LARGEST = 5.0  # of gravity, that is carried on
 NEAREST = 0.25  # d: closer to a wall than this its drag grows no further
+#: Where the elements of a symmetric matrix of 2 x 2 and 3 x 3 stand whose upper triangle is kept row by row.
+PLACES = {2: ((0, 1), (1, 2)), 3: ((0, 1, 2), (1, 3, 4), (2, 4, 5))}
 
 
 def damper_scale(dim: int, ratio: float, d: float) -> float:
@@ -74,45 +85,45 @@ def drag_table(dim: int, ratio: float) -> np.ndarray:
 
 
 @qd.func
-def add_damping(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
+def damper(square, a, b, c: Coefficients):
+    """Return mu_ij f(q) / r^2, which does not change while the velocities are solved for."""
+    f = qd.max(1.0 - qd.sqrt(square) * c.inverse_h, 0.0)
+    mu = 2.0 * a[3] * b[3] / qd.max(a[3] + b[3], 1e-20)
+    return mu * f / qd.max(square, 1e-30)
+
+
+@qd.func
+def add_damping(sums: qd.template(), r, damper, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to sum_j mu_ij f(q) ((v_j - v_i) . n) n."""
     approach = 0.0
     for k in qd.static(range(r.n)):
         approach += (b[k] - a[k]) * r[k]
-    f = qd.max(1.0 - qd.sqrt(square) * c.inverse_h, 0.0)
-    mu = 2.0 * a[3] * b[3] / qd.max(a[3] + b[3], 1e-20)
-    sums += r * (mu * f * approach / qd.max(square, 1e-30))
+    sums += r * (damper * approach)
 
 
 @qd.func
-def add_stiffness(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
-    """Add neighbour j to the rows' sums of |sum_j mu_ij f(q) n n^T|, element by element from above."""
-    f = qd.max(1.0 - qd.sqrt(square) * c.inverse_h, 0.0)
-    mu = 2.0 * a[3] * b[3] / qd.max(a[3] + b[3], 1e-20)
+def add_stiffness(sums: qd.template(), r, damper, a, b, c: Coefficients, method: qd.template()):
+    """Add neighbour j to the upper triangle of sum_j mu_ij f(q) n n^T, row by row."""
     for k in qd.static(range(r.n)):
-        for m in qd.static(range(r.n)):
-            sums[k * r.n + m] += mu * f * r[k] * r[m] / qd.max(square, 1e-30)
+        for m in qd.static(range(k, r.n)):
+            sums[qd.static(PLACES[r.n][k][m])] += damper * r[k] * r[m]
 
 
 @qd.kernel(fastcache=True)
-def pack_velocities(
-    packed: qd.types.ndarray(), other: qd.types.ndarray(), particles: Particles, rows: qd.types.ndarray(), count: qd.i32
-):
-    """Start the iterations at the velocities as they are."""
+def prepare(
+    packed: qd.types.ndarray(), other: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(),
+    particles: Particles, rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients,
+    count: qd.i32, no_slip: qd.f32,
+):  # fmt: skip
+    """Start the iterations at the velocities as they are, and find how fast the walls hold every particle back.
+
+    That is over B dt / rho, with the normal along which they do not.
+    """
     for i in range(count):
-        v = lift(particles.v[i])
-        row = vec4(v.x, v.y, v.z, rows[particles.material[i]][1])
+        own = lift(particles.v[i])
+        row = vec4(own.x, own.y, own.z, rows[particles.material[i]][1])
         packed[i] = row
         other[i] = row
-
-
-@qd.kernel(fastcache=True)
-def find_drag(
-    drag: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles, rows: qd.types.ndarray(),
-    solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, count: qd.i32, no_slip: qd.f32,
-):  # fmt: skip
-    """Find how fast the walls hold every particle back, over B dt / rho, and along which normal they do not."""
-    for i in range(count):
         near = particles.near[i]
         pull = vec4(0.0, 0.0, 0.0, 0.0)
         free = vec4(0.0, 0.0, 0.0, 0.0)
@@ -133,64 +144,71 @@ def find_drag(
                         walls += 1
             if walls > 1:  # in a corner the fluid is held in every direction
                 free = vec4(0.0, 0.0, 0.0, 0.0)
-            pull *= no_slip * rows[particles.material[i]][1]
+            pull *= no_slip * row.w
         drag[i] = pull
         normal[i] = free
 
 
 @qd.kernel(fastcache=True)
-def stiffest_particle(
-    packed: qd.types.ndarray(), drag: qd.types.ndarray(), particles: Particles, scratch: Scratch, grid: Grid,
-    c: Coefficients, count: qd.i32, rate: qd.f32, lanes: qd.template(),
+def join_pairs(
+    dampers: qd.types.ndarray(), packed: qd.types.ndarray(), drag: qd.types.ndarray(), particles: Particles,
+    scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, rate: qd.f32, lanes: qd.template(),
 ) -> qd.i32:  # fmt: skip
-    """Return the bits of kappa - 1: twice the largest row sum of a particle's own dampers, and the walls' drag.
+    """Keep the dampers of all pairs; return the bits of kappa - 1.
 
-    The matrix of one damper is at most twice its diagonal blocks, hence so is their sum.
+    That is twice the largest row sum of a particle's own dampers, and the walls' drag: the matrix of one damper is at
+    most twice its diagonal blocks, hence so is their sum.
     """
     most = 0
     for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
         part = part_of(turn, teams(count, lanes), grid.parts, lanes)
+        stiffest = 0.0
         for team in range(part[0], part[1]):
             dim = qd.static(particles.x[team].n)
-            sums = qd.Matrix.zero(qd.f32, dim * dim, lanes)
-            add_neighbors(sums, add_stiffness, team, particles, packed, grid, c, 0)
+            keep_pairs(dampers, damper, team, particles, packed, grid, c, lanes)
+            sums = qd.Matrix.zero(qd.f32, dim * (dim + 1) // 2, lanes)
+            add_kept(sums, add_stiffness, team, particles, packed, dampers, grid, c, 0)
             for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
                 sum = column(sums, i - team * lanes)
                 largest = 0.0
                 for k in qd.static(range(dim)):
                     row = 0.0
                     for m in qd.static(range(dim)):
-                        row += qd.abs(sum[k * dim + m])
+                        row += qd.abs(sum[qd.static(PLACES[dim][k][m])])
                     largest = qd.max(largest, row)
-                own = rate * scratch.weight[i] * (2.0 * largest + drag[i].w)
-                qd.atomic_max(most, qd.bit_cast(own, qd.i32))
+                stiffest = qd.max(stiffest, scratch.weight[i] * (2.0 * largest + drag[i].w))
+        if part[1] > part[0]:
+            qd.atomic_max(most, qd.bit_cast(rate * stiffest, qd.i32))
     return most
 
 
 @qd.kernel(fastcache=True)
 def relax_velocities(
-    following: qd.types.ndarray(), packed: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(),
-    particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, rate: qd.f32,
-    relaxation: qd.f32, momentum: qd.f32, lanes: qd.template(),
+    following: qd.types.ndarray(), packed: qd.types.ndarray(), dampers: qd.types.ndarray(), drag: qd.types.ndarray(),
+    normal: qd.types.ndarray(), particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32,
+    rate: qd.f32, relaxation: qd.f32, momentum: qd.f32, lanes: qd.template(),
 ):  # fmt: skip
     """One Chebyshev iteration; `following` holds the iterate before `packed` and receives the next."""
     for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
         part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
-            add_neighbors(sums, add_damping, team, particles, packed, grid, c, 0)
+            add_kept(sums, add_damping, team, particles, packed, dampers, grid, c, 0)
             for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
                 v = particles.v[i]
                 row = packed[i]
                 before = following[i]
                 force = column(sums, i - team * lanes)
-                wall = vec3(drag[i].x, drag[i].y, drag[i].z) - vec3(row.x, row.y, row.z) * drag[i].w
-                n = vec3(normal[i].x, normal[i].y, normal[i].z)
-                wall -= n * n.dot(wall)
+                if particles.near[i] != 0:
+                    wall = vec3(drag[i].x, drag[i].y, drag[i].z) - vec3(row.x, row.y, row.z) * drag[i].w
+                    n = vec3(normal[i].x, normal[i].y, normal[i].z)
+                    wall -= n * n.dot(wall)
+                    for k in qd.static(range(v.n)):
+                        force[k] += wall[k]
                 share = rate * scratch.weight[i]
                 result = row
                 for k in qd.static(range(v.n)):
-                    residual = v[k] - row[k] + share * (force[k] + wall[k])
+                    residual = v[k] - row[k] + share * force[k]
                     result[k] = row[k] + relaxation * residual + momentum * (row[k] - before[k])
                 following[i] = result
 
@@ -205,10 +223,38 @@ def take_velocities(particles: Particles, packed: qd.types.ndarray(), c: Coeffic
         accelerate(particles, i, v, c)
 
 
-def is_thick(kinds: Blend, c: Coefficients, dim: int, ratio: float) -> bool:
-    """Say whether any fluid is viscous enough to matter in a substep."""
-    lattice = 2.0 * 2.0 * (dim + 2) * (ratio / c.h) ** 2  # of 2 B sum f / dim, within a factor of two
-    return c.dt * kinds.kinematic_viscosity * lattice > WORTH
+@qd.kernel(fastcache=True)
+def carry_pressure(
+    particles: Particles, rows: qd.types.ndarray(), c: Coefficients, count: qd.i32, most: qd.f32, half: qd.f32,
+    rate: qd.f32, largest: qd.f32,
+):  # fmt: skip
+    """Keep the share of what pressure and solids accelerated thick fluids by that the next prediction begins with.
+
+    It is called before velocities are read off. `rate` is the `thickness` of the heaviest fluid over its viscosity;
+    the share is `most`, half of that where the thickness is `half`, and no more than `largest` [m/s^2] is kept.
+    """
+    for i in range(count):
+        row = rows[particles.material[i]]
+        pushed = predicted(particles, i) - free_motion(particles.x[i], particles.v[i], c)
+        a = particles.a[i] + pushed / (c.dt * c.dt)
+        thick = rate * row[0] * row[1]
+        share = most * thick / (half + thick)
+        particles.a[i] = a * (share * qd.min(1.0, largest / qd.max(a.norm(), 1e-12)))
+
+
+def thickness(viscosity: float, params: Parameters, dt: float) -> float:
+    """Return what `viscosity` [m^2/s] does to the fastest mode within `dt` [s]: kappa - 1 on the rest lattice."""
+    return dt * viscosity * 4.0 * (params.dim + 2) / params.spacing**2  # dt nu 2 B sum f / dim, within a factor of two
+
+
+def is_viscous(kinds: Blend, params: Parameters, dt: float) -> bool:
+    """Say whether the viscosity of any fluid matters in a substep of `dt` [s]."""
+    return thickness(kinds.kinematic_viscosity, params, dt) > WORTH
+
+
+def is_thick(kinds: Blend, params: Parameters) -> bool:
+    """Say whether viscosity rules the motion of any fluid from particle to particle, more than inertia."""
+    return thickness(kinds.kinematic_viscosity, params, params.frame_time / params.substeps) > THIN
 
 
 def solve_viscosity(
@@ -226,14 +272,14 @@ def solve_viscosity(
         upload(fluids.arrays["drag table"], drag_table(dim, ratio))
     packed, spare, drag, normal = (fluids.array(name) for name in ("packed", "spare", "drag", "normal"))
     rate = c.dt * damper_scale(dim, ratio, d) / kinds.largest_density
-    pack_velocities(packed, spare, particles, fluids.rows, count)
-    find_drag(drag, normal, particles, fluids.rows, solids, fluids.arrays["drag table"], c, count, no_slip)
-    bits = stiffest_particle(packed, drag, particles, scratch, grid, c, count, rate, grid.lanes)
+    dampers = fluids.pairs(grid)
+    prepare(packed, spare, drag, normal, particles, fluids.rows, solids, fluids.arrays["drag table"], c, count, no_slip)
+    bits = join_pairs(dampers, packed, drag, particles, scratch, grid, c, count, rate, grid.lanes)
     stiffest = 1.0 + 1.01 * float(np.int32(bits).view(np.float32))
     number = iterations(stiffest, largest_number)
     for relaxation, momentum in schedule(number, 1.0, stiffest) if number else []:
         relax_velocities(
-            spare, packed, drag, normal, particles, scratch, grid, c, count, rate, relaxation, momentum,
+            spare, packed, dampers, drag, normal, particles, scratch, grid, c, count, rate, relaxation, momentum,
             grid.lanes,
         )  # fmt: skip
         packed, spare = spare, packed
@@ -241,8 +287,27 @@ def solve_viscosity(
     return number
 
 
+def carry_on(
+    particles: Particles, fluids: Fluids, c: Coefficients, kinds: Blend, params: Parameters, count: int
+) -> None:  # fmt: skip
+    """Let thick fluids carry on a share of what pressed them in this step."""
+    rate, largest = thickness(1.0 / kinds.largest_density, params, c.dt), LARGEST * math.hypot(*params.gravity)
+    carry_pressure(particles, fluids.rows, c, count, CARRIED, HALF, rate, largest)
+
+
+def carried_share(kinds: Blend, params: Parameters) -> float:
+    """Return the share of what presses them in a frame that all fluids carry on, the thinnest of them included."""
+    if not (is_thick(kinds, params) and any(params.gravity)):
+        return 0.0
+    thinnest = min(fluid.viscosity / fluid.density for fluid in kinds.fluids.values())
+    thick = thickness(thinnest, params, params.frame_time / params.substeps)
+    return CARRIED * thick / (HALF + thick)
+
+
 def iterations(stiffest: float, most: int) -> int:
     """Return how many Chebyshev iterations bring every mode of 1 to `stiffest` within `TOLERANCE`, at most `most`."""
     if stiffest <= 1.0 + 1e-9:
         return 0
-    return min(most, math.ceil(0.5 * math.sqrt(stiffest) * math.log(2.0 / TOLERANCE)))
+    # The error polynomial is at most 1 / T_n(sigma) (Saad 2003, Theorem 6.25).
+    sigma = (stiffest + 1.0) / (stiffest - 1.0)
+    return min(most, math.ceil(math.acosh(1.0 / TOLERANCE) / math.acosh(sigma)))

@@ -70,13 +70,52 @@ def add_neighbors(
     what `data` holds of i and j, as vectors. `visit` is called for others than neighbours as well and adds nothing
     where |r| >= h; it is called for the particle itself, with r = 0 and a = b.
     """
-    lanes, width = qd.static(sums.m, _width(data))
+    _add(sums, visit, team, particles, data, data, False, grid, c, method)
+
+
+@qd.func
+def add_kept(
+    sums: qd.template(), visit: qd.template(), team, particles: Particles, data: qd.template(), kept: qd.template(),
+    grid: Grid, c: Coefficients, method: qd.template(),
+):  # fmt: skip
+    """Add up like `add_neighbors`, where `visit` is given what `keep_pairs` kept of a pair instead of its `square`."""
+    _add(sums, visit, team, particles, data, kept, True, grid, c, method)
+
+
+@qd.func
+def keep_pairs(
+    kept: qd.template(), strength: qd.template(), team, particles: Particles, data: qd.template(), grid: Grid,
+    c: Coefficients, lanes: qd.template(),
+):  # fmt: skip
+    """Keep ``strength(square, a, b, c)`` of each neighbour j of each i of a team, for several sums by `add_kept`.
+
+    `kept` has room for `grid.room` numbers of each particle. What follows from a distance takes a root and divisions;
+    from the second sum on it takes less to read it.
+    """
     first = team * lanes
-    own = qd.Matrix.zero(qd.f32, width, lanes)
-    for lane in range(lanes):
-        a = _row(data, first + lane)
-        for k in qd.static(range(width)):
-            own[k, lane] = a[k]
+    own = _own(data, first, lanes)
+    begin = (first >> 3) * grid.room
+    found = qd.Matrix.zero(qd.f32, 4, lanes)  # what was stored at once might be one of the arrays that are read
+    for turn in range((grid.number[first >> 3] + 3) // 4):  # as far as visits in twos and fours come
+        n = begin + 4 * turn
+        for lane in range(lanes):
+            for k in qd.static(range(4)):
+                j = grid.list[n + k]
+                r = predicted(particles, first + lane) - predicted(particles, j)
+                found[k, lane] = strength(r.norm_sqr(), column(own, lane), _row(data, j), c)
+        for k in qd.static(range(4)):
+            for lane in range(lanes):
+                kept[_place(n + k, first, lanes) + lane] = found[k, lane]
+
+
+@qd.func
+def _add(
+    sums: qd.template(), visit: qd.template(), team, particles: Particles, data: qd.template(), kept: qd.template(),
+    is_kept: qd.template(), grid: Grid, c: Coefficients, method: qd.template(),
+):  # fmt: skip
+    lanes = qd.static(sums.m)
+    first = team * lanes
+    own = _own(data, first, lanes)
     begin = (first >> 3) * grid.room
     end = begin + grid.number[first >> 3]
     # A short loop over lanes would be unrolled before it can be computed as vectors: its visits come in twos or fours.
@@ -87,19 +126,44 @@ def add_neighbors(
     for turn in range((end - begin + pace - 1) // pace):
         for lane in range(lanes):
             for k in qd.static(range(pace)):
-                j = grid.list[begin + pace * turn + k]
+                n = begin + pace * turn + k
+                j = grid.list[n]
                 r = predicted(particles, first + lane) - predicted(particles, j)
                 part = qd.Vector([0.0] * size)
-                visit(part, r, r.norm_sqr(), column(own, lane), _row(data, j), c, method)
-                for n in qd.static(range(size)):
+                if qd.static(is_kept):
+                    given = kept[_place(n, first, lanes) + lane]
+                    visit(part, r, given, column(own, lane), _row(data, j), c, method)
+                else:
+                    visit(part, r, r.norm_sqr(), column(own, lane), _row(data, j), c, method)
+                for m in qd.static(range(size)):
                     if qd.static(k == 0):
-                        sums[n, lane] += part[n]
+                        sums[m, lane] += part[m]
                     else:
-                        others[(k - 1) * size + n, lane] += part[n]
+                        others[(k - 1) * size + m, lane] += part[m]
     for k in qd.static(range(pace - 1)):
         for lane in range(lanes):
-            for n in qd.static(range(size)):
-                sums[n, lane] += others[k * size + n, lane]
+            for m in qd.static(range(size)):
+                sums[m, lane] += others[k * size + m, lane]
+
+
+@qd.func
+def _own(data: qd.template(), first, lanes: qd.template()):
+    """What `data` holds of a team's particles, a column for each."""
+    own = qd.Matrix.zero(qd.f32, qd.static(_width(data)), lanes)
+    for lane in range(lanes):
+        a = _row(data, first + lane)
+        for k in qd.static(range(own.n)):
+            own[k, lane] = a[k]
+    return own
+
+
+@qd.func
+def _place(n, first, lanes: qd.template()):
+    """Where what is kept of the entry `n` of a list begins, for the team that begins with particle `first`."""
+    place = 8 * n
+    if qd.static(lanes == 1):
+        place += first & 7
+    return place
 
 
 def _width(data: Any) -> int:

@@ -26,7 +26,7 @@ from wavetank.physics.density_constraint import (
 )
 from wavetank.physics.diffuse.pool import Pool
 from wavetank.physics.friction import apply_friction
-from wavetank.physics.implicit_viscosity import is_thick, solve_viscosity
+from wavetank.physics.implicit_viscosity import carried_share, carry_on, is_thick, is_viscous, solve_viscosity
 from wavetank.physics.integrate import predict, update_velocities
 from wavetank.physics.mixture import Blend, blend, fill_table, pack_weights, stiffening, weigh
 from wavetank.physics.neighbors import find_neighbors, sort_particles
@@ -34,6 +34,7 @@ from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.population import hold_frozen, stop_frozen
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
 from wavetank.physics.tension import apply_tension, limited_tensions, substeps_for
+from wavetank.physics.time_step import pool_depth, steps_needed
 from wavetank.physics.viscosity import apply_mixed_viscosity, apply_viscosity
 from wavetank.physics.vorticity import confine_vorticity
 from wavetank.state import CoarseGrid, Coefficients, Fluids, Grid, Particles, Scratch, Walls, exchanged, remembered
@@ -73,8 +74,10 @@ class World:
 
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
     """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
-    on_grid, method, count = has_grid_pressure(world, params), method_number(params), world.count
-    c = coefficients(params, dt, speed_limit, carries=carried(dt, params.frame_time) if on_grid else 0.0)
+    on_grid, thick = has_grid_pressure(world, params), is_thick(blend(world.materials, params), params)
+    method, count = method_number(params), world.count
+    # What thick fluids carry is kept in that measure.
+    c = coefficients(params, dt, speed_limit, carries=carried(dt, params.frame_time) if on_grid else float(thick))
     now, spare, scratch, grid, solids, walls = (
         world.particles, world.spare, world.scratch, world.grid, world.solids, world.walls,
     )  # fmt: skip
@@ -105,6 +108,8 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         if world.frozen:
             hold_frozen(now, count)
 
+    if thick:
+        carry_on(now, world.fluids, c, kinds, params, count)
     update_velocities(now, c, count)  # 21, 23
     if world.has_friction:
         apply_friction(now, scratch, solids, walls, c, count)
@@ -166,9 +171,9 @@ def has_grid_pressure(world: World, params: Parameters) -> bool:
     """
     if not (params.grid_pressure > 0.0 and world.levels) or world.frozen:
         return False
-    kinds, c = blend(world.materials, params), coefficients(params, params.frame_time / params.substeps)
-    weight = kinds.largest_density * math.hypot(*params.gravity) * c.h**2  # of water as high as a cell, per length
-    return weight >= kinds.surface_tension and not is_thick(kinds, c, params.dim, params.support)
+    kinds, h = blend(world.materials, params), params.support * params.spacing
+    weight = kinds.largest_density * math.hypot(*params.gravity) * h**2  # of water as high as a cell, per length
+    return weight >= kinds.surface_tension and not is_thick(kinds, params)
 
 
 def update_densities(world: World, params: Parameters) -> None:
@@ -192,17 +197,17 @@ def neighbor_numbers(world: World, params: Parameters) -> np.ndarray:
 
 def act_on_fluids(world: World, particles: Particles, kinds: Blend, params: Parameters, c: Coefficients) -> bool:
     """Let tension and viscosity act on velocities and predictions, and say whether there was any."""
-    tense, thick = kinds.surface_tension > 0.0, is_thick(kinds, c, params.dim, params.support)
+    tense, viscous = kinds.surface_tension > 0.0, is_viscous(kinds, params, c.dt)
     if tense:
         apply_tension(
             particles, world.scratch, world.fluids, world.grid, world.solids, c, kinds, world.count, params.support
         )
-    if thick:
+    if viscous:
         solve_viscosity(
             particles, world.scratch, world.fluids, world.grid, world.solids, c, kinds, world.count, params.support,
             params.no_slip, params.viscosity_iterations,
         )  # fmt: skip
-    return tense or thick
+    return tense or viscous
 
 
 def prepare_fluids(world: World, particles: Particles, params: Parameters, dt: float) -> Blend:
@@ -224,9 +229,20 @@ def relaxations(params: Parameters, density_ratio: float = 1.0) -> list[tuple[fl
     return schedule(params.iterations, 4.0 * params.slowest_mode / params.iterations, stiffest)
 
 
-def capillary_substeps(world: World, params: Parameters, duration: float) -> int:
-    """Return the number of time steps in `duration` [s] that surface tension needs."""
-    return substeps_for(blend(world.materials, params), params.dim, params.support, params.spacing, duration)
+def steps_in(
+    world: World, params: Parameters, duration: float, speed: float, box: tuple[np.ndarray, np.ndarray], *, forced: bool
+) -> float:
+    """Return how many time steps make up `duration` [s], no whole number; what bounds them is in `time_step.py`.
+
+    The fastest particle or solid has the `speed` [m/s], more than gravity acts where `forced`, and the water rests on
+    the bottom of the `box` from one corner to another [m]. Surface tension needs steps of its own.
+    """
+    on_grid, kinds = has_grid_pressure(world, params), blend(world.materials, params)
+    depth = 0.0 if on_grid else pool_depth(world.particles, world.count, params.gravity, *box)
+    carried_on = carried_share(kinds, params)
+    needed = steps_needed(params, duration, speed, depth, on_grid=on_grid, forced=forced, carried=carried_on)
+    capillary = substeps_for(kinds, params.dim, params.support, params.spacing, duration)
+    return max(needed, min(capillary, params.largest_substeps))
 
 
 def capillary_speed(world: World, params: Parameters) -> float:

@@ -27,23 +27,27 @@ ALONE = 2.0 / 3.0  # of `courant` where iterations alone carry the pressure
 SHALLOWEST = 0.6  # d: way in a frame of the wave that water without a grid is taken to have, however shallow
 WORTH = 1.1  # by what the steps of a frame must be shorter than they might be, so that another frame pays
 SCALE = 8  # lengths of time steps in an octave, where these are free
+CALMING = 4.5  # by how much farther waves may go where pressure is carried on
 LEVELS = 64  # whole steps of height that are summed; their rounding cancels
 
 
 def steps_needed(
-    params: Parameters, duration: float, speed: float, depth: float, *, on_grid: bool, forced: bool = False
-) -> float:
+    params: Parameters, duration: float, speed: float, depth: float, *, on_grid: bool, forced: bool = False,
+    carried: float = 0.0,
+) -> float:  # fmt: skip
     """Return how many of the longest time steps that are allowed make up `duration` [s], which is no whole number.
 
     Pressure that is solved `on_grid` reaches any depth. Where iterations alone carry it, the shallowest water needs two
     a frame by default; and so does water on which more than gravity acts (`forced`), because a force acts before the
-    pressure answers: in one step it would be weaker.
+    pressure answers: in one step it would be weaker. Waves of thick fluids, which carry on the share `carried` of their
+    pressure, are damped.
     """
     gravity = math.hypot(*params.gravity)
     usual = params.substeps * duration / params.frame_time
-    courant = params.courant if on_grid else ALONE * params.courant
+    courant = params.courant * (1.0 if on_grid else ALONE + (1.0 - ALONE) * carried)
     for_speed = (speed + duration * gravity) * duration / (courant * params.spacing)
-    for_waves = 0.0 if on_grid else math.sqrt(gravity * depth) * duration / (params.wave_courant * params.spacing)
+    wave_courant = params.wave_courant * (1.0 + CALMING * carried)
+    for_waves = 0.0 if on_grid else math.sqrt(gravity * depth) * duration / (wave_courant * params.spacing)
     alone = 0.0 if on_grid and not forced else SHALLOWEST / params.wave_courant * duration / params.frame_time
     return max(usual, min(max(for_speed, alone), params.largest_substeps), for_waves)
 
