@@ -74,10 +74,11 @@ class World:
 
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
     """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
-    on_grid, thick = has_grid_pressure(world, params), is_thick(blend(world.materials, params), params)
-    method, count = method_number(params), world.count
-    # What thick fluids carry is kept in that measure.
-    c = coefficients(params, dt, speed_limit, carries=carried(dt, params.frame_time) if on_grid else float(thick))
+    on_grid, method, count = has_grid_pressure(world, params), method_number(params), world.count
+    carries_on = is_thick(blend(world.materials, params), params) and any(params.gravity)
+    # What thick fluids carry on has been shortened to their share already.
+    share = carried(dt, params.frame_time) if on_grid else float(carries_on)
+    c = coefficients(params, dt, speed_limit, carries=share)
     now, spare, scratch, grid, solids, walls = (
         world.particles, world.spare, world.scratch, world.grid, world.solids, world.walls,
     )  # fmt: skip
@@ -108,7 +109,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         if world.frozen:
             hold_frozen(now, count)
 
-    if thick:
+    if carries_on:
         carry_on(now, world.fluids, c, kinds, params, count)
     update_velocities(now, c, count)  # 21, 23
     if world.has_friction:

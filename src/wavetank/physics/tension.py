@@ -48,6 +48,8 @@ COHESION = 0.2  # share of the bond that alone would give the tension
 #: Brings the measured period of an oscillating drop to Rayleigh's: curved surfaces pull otherwise than flat ones.
 CALIBRATION = {2: 1.35, 3: 0.62}
 QUIET = 0.2  # of the top layer's |g|: what is less is no surface
+#: How far a particle with all bonds of that tension may turn in a step [rad]; at 2 a drop in the plane hardly swings.
+TURN = 1.4
 MEAN_COSINE = {2: 1.0 / math.pi, 3: 0.25}  # of max(cos, 0) over all directions
 
 
@@ -101,9 +103,9 @@ def adhesion_table(dim: int, ratio: float) -> np.ndarray:
 
 
 def largest_tension(density: float, dim: int, ratio: float, d: float, dt: float) -> float:
-    """Return the tension [N/m] whose bonds turn the stiffest particle by one radian in a step of `dt` [s]."""
+    """Return the tension [N/m] whose bonds turn the stiffest particle by `TURN` in a step of `dt` [s]."""
     flat = flat_surface(dim, ratio)
-    return density * d**3 * (ratio / dt) ** 2 / (flat.bond * flat.stiffness)
+    return density * d**3 * (TURN * ratio / dt) ** 2 / (flat.bond * flat.stiffness)
 
 
 def limited_tensions(kinds: Blend, dim: int, ratio: float, d: float, dt: float) -> dict[int, float]:
