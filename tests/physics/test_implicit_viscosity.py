@@ -167,11 +167,11 @@ def test_thick_fluids_do_not_flow_faster_in_longer_steps(monkeypatch):
 
 def test_what_presses_is_carried_on_by_thick_fluids_only():
     shares = {}
-    for viscosity in (0.0, 0.001, 0.1, 1000.0):
+    for viscosity in (0.0, 0.001, 1.0, 1000.0):
         scene = wt.Scene.load("still-tank-2d").changed(dynamic_viscosity=viscosity)
         sim = Simulation(scene)
         sim.step()
-        assert has_grid_pressure(sim.world, scene) is (viscosity < 1.0), "a little viscosity needs no other time steps"
+        assert has_grid_pressure(sim.world, scene) is (viscosity < 0.1), "that of water needs no other time steps"
         shares[viscosity] = carried_share(prepare_fluids(sim.world, sim.world.particles, scene, DT), scene)
     assert shares.pop(1000.0) > 0.85
     assert not any(shares.values())

@@ -52,7 +52,8 @@ from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scala
 
 TOLERANCE = 1e-2  # of the slowest mode's error after the iterations
 WORTH = 1e-5  # smallest kappa - 1 on the rest lattice for which a substep solves anything
-THIN = 1.0  # `thickness` in a frame up to which nothing is carried on, and a grid may solve for the pressure
+THIN = 0.01  # `thickness` in a frame up to which a grid may solve for the pressure; oil at centimetres has 0.06
+THICK = 1.0  # the same, above which pressure is carried on
 CARRIED, HALF = 0.9, 10.0  # largest share of the pressure that is carried on; `thickness` with half of it
 LARGEST = 5.0  # of gravity, that is carried on
 NEAREST = 0.25  # d: closer to a wall than this its drag grows no further
@@ -252,9 +253,15 @@ def is_viscous(kinds: Blend, params: Parameters, dt: float) -> bool:
     return thickness(kinds.kinematic_viscosity, params, dt) > WORTH
 
 
+def is_thin(kinds: Blend, params: Parameters) -> bool:
+    """Say whether viscosity hardly matters in a frame, from particle to particle."""
+    return thickness(kinds.kinematic_viscosity, params, params.frame_time / params.substeps) <= THIN
+
+
 def is_thick(kinds: Blend, params: Parameters) -> bool:
-    """Say whether viscosity rules the motion of any fluid from particle to particle, more than inertia."""
-    return thickness(kinds.kinematic_viscosity, params, params.frame_time / params.substeps) > THIN
+    """Say whether viscosity rules the motion of any fluid from particle to particle, and gravity presses it."""
+    thick = thickness(kinds.kinematic_viscosity, params, params.frame_time / params.substeps)
+    return thick > THICK and any(params.gravity)
 
 
 def solve_viscosity(
@@ -297,7 +304,7 @@ def carry_on(
 
 def carried_share(kinds: Blend, params: Parameters) -> float:
     """Return the share of what presses them in a frame that all fluids carry on, the thinnest of them included."""
-    if not (is_thick(kinds, params) and any(params.gravity)):
+    if not is_thick(kinds, params):
         return 0.0
     thinnest = min(fluid.viscosity / fluid.density for fluid in kinds.fluids.values())
     thick = thickness(thinnest, params, params.frame_time / params.substeps)
