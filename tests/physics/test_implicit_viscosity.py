@@ -195,3 +195,10 @@ def test_iterations_are_as_many_as_the_worst_mode_needs(stiffest):
     number = iterations(stiffest, 1000)
     assert error(number) <= 1.001 * TOLERANCE
     assert number == 1 or error(number - 1) > TOLERANCE
+
+
+def test_too_many_pairs_are_told_in_one_sentence(monkeypatch):
+    sim = Simulation(wt.Scene.load("honey-2d").changed(spacing=0.004))
+    monkeypatch.setattr("wavetank.physics.implicit_viscosity.MAX_ENTRIES", 8 * sim.world.grid.list.shape[0] - 1)
+    with pytest.raises(wt.WavetankError, match="particles of viscous fluids are too many.*use a larger spacing"):
+        sim.step()

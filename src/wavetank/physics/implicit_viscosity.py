@@ -39,12 +39,14 @@ import numpy as np
 
 from wavetank.compiler import qd, upload
 from wavetank.distance import SolidSet, lift, signed_distance, vec3, vec4
+from wavetank.errors import WavetankError
 from wavetank.params import Parameters
 from wavetank.physics.boundary import is_near
 from wavetank.physics.density_constraint import schedule
 from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate, free_motion
 from wavetank.physics.mixture import Blend
+from wavetank.physics.neighbors import MAX_ENTRIES
 from wavetank.physics.pairs import add_kept, column, keep_pairs, part_of, teams, turns
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
@@ -279,6 +281,12 @@ def solve_viscosity(
         upload(fluids.arrays["drag table"], drag_table(dim, ratio))
     packed, spare, drag, normal = (fluids.array(name) for name in ("packed", "spare", "drag", "normal"))
     rate = c.dt * damper_scale(dim, ratio, d) / kinds.largest_density
+    if 8 * grid.list.shape[0] > MAX_ENTRIES:
+        raise WavetankError(
+            f"{count:,} particles of viscous fluids are too many: what joins their pairs has at most {MAX_ENTRIES:,} "
+            f"places, enough for {MAX_ENTRIES // grid.room:,} particles; use a larger spacing, less fluid, or "
+            "viscosity = 0 in its materials and dynamic_viscosity = 0."
+        )
     dampers = fluids.pairs(grid)
     prepare(packed, spare, drag, normal, particles, fluids.rows, solids, fluids.arrays["drag table"], c, count, no_slip)
     bits = join_pairs(dampers, packed, drag, particles, scratch, grid, c, count, rate, grid.lanes)

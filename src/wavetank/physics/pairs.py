@@ -113,6 +113,7 @@ def _add(
     sums: qd.template(), visit: qd.template(), team, particles: Particles, data: qd.template(), kept: qd.template(),
     is_kept: qd.template(), grid: Grid, c: Coefficients, method: qd.template(),
 ):  # fmt: skip
+    """Add up as `add_kept` does where `is_kept`, else as `add_neighbors`."""
     lanes = qd.static(sums.m)
     first = team * lanes
     own = _own(data, first, lanes)

@@ -40,7 +40,7 @@ def steps_needed(
     Pressure that is solved `on_grid` reaches any depth. Where iterations alone carry it, the shallowest water needs two
     a frame by default; and so does water on which more than gravity acts (`forced`), because a force acts before the
     pressure answers: in one step it would be weaker. Waves of thick fluids, which carry on the share `carried` of their
-    pressure, are damped.
+    pressure, are damped, and their pressure reaches farther.
     """
     gravity = math.hypot(*params.gravity)
     usual = params.substeps * duration / params.frame_time
