@@ -189,8 +189,9 @@ class Session:
     def _fit_frame(self, took: float) -> None:
         """Shorten the frames of a machine that is too slow for them; a command, so that a recording knows."""
         most, parts = max(SLUGGISH, WORTH * self.picture_seconds), self.frame_parts
-        late = self.pace.is_late(self.speed) and self.sim.time_steps > 1
-        if took > 1.2 * most and self.sim.time_steps > 1:
+        several = self.sim.time_steps > 1
+        late = several and self.pace.is_late(self.speed)
+        if several and took > 1.2 * most:
             parts = min(MOST_PARTS, math.ceil(parts * took / most))
         elif took < most * SWIFT / SLUGGISH:
             parts = max(1, parts - 1)

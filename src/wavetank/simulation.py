@@ -40,8 +40,7 @@ class Simulation:
     def reset(self) -> None:
         """Put everything back to the start of the scene."""
         positions, velocities = self.scene.particles()
-        walls = self.scene.tank.walls() if self.scene.tank else []
-        self.solids = MovingSolids(walls, self.scene.solids, self.scene.friction, self.scene.spacing)
+        self.solids = MovingSolids(self._walls(), self.scene.solids, self.scene.friction, self.scene.spacing)
         self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
         self.pushed: list[Force] = []  # these in the next one only
         self._next_id, self._fastest_start, self._fastest_solid, self._fastest_force = 0, 0.0, 0.0, 0.0
@@ -75,6 +74,9 @@ class Simulation:
             levels=new_levels(size, h) if size else [],
         )
         self._capacity, self._outdated = capacity, True
+
+    def _walls(self) -> list[Solid]:
+        return self.scene.tank.walls() if self.scene.tank else []
 
     # --- time ---
 

@@ -70,8 +70,7 @@ def put_snapshot(sim: "Simulation", snapshot: Snapshot) -> None:
     """Make an instant the present of a running world; its parameters and forces stay as they are now."""
     numbers = snapshot.numbers
     sim.scene.assign("solids", snapshot.solids)
-    walls = sim.scene.tank.walls() if sim.scene.tank else []
-    sim.solids = MovingSolids(walls, snapshot.solids, sim.scene.friction, sim.scene.spacing)
+    sim.solids = MovingSolids(sim._walls(), snapshot.solids, sim.scene.friction, sim.scene.spacing)
     sim.solids.names, sim.solids.poses = [*snapshot.names], [*snapshot.poses]
     sim.solids.targets, sim.solids.growing = {**snapshot.targets}, {**snapshot.growing}
     sim.solids.rebuild()

@@ -250,6 +250,11 @@ def thickness(viscosity: float, params: Parameters, dt: float) -> float:
     return dt * viscosity * 4.0 * (params.dim + 2) / params.spacing**2  # dt nu 2 B sum f / dim, within a factor of two
 
 
+def usual_thickness(viscosity: float, params: Parameters) -> float:
+    """Return the `thickness` in a time step as long as calm water takes it."""
+    return thickness(viscosity, params, params.frame_time / params.substeps)
+
+
 def is_viscous(kinds: Blend, params: Parameters, dt: float) -> bool:
     """Say whether the viscosity of any fluid matters in a substep of `dt` [s]."""
     return thickness(kinds.kinematic_viscosity, params, dt) > WORTH
@@ -257,13 +262,12 @@ def is_viscous(kinds: Blend, params: Parameters, dt: float) -> bool:
 
 def is_thin(kinds: Blend, params: Parameters) -> bool:
     """Say whether viscosity hardly matters in a frame, from particle to particle."""
-    return thickness(kinds.kinematic_viscosity, params, params.frame_time / params.substeps) <= THIN
+    return usual_thickness(kinds.kinematic_viscosity, params) <= THIN
 
 
 def is_thick(kinds: Blend, params: Parameters) -> bool:
     """Say whether viscosity rules the motion of any fluid from particle to particle, and gravity presses it."""
-    thick = thickness(kinds.kinematic_viscosity, params, params.frame_time / params.substeps)
-    return thick > THICK and any(params.gravity)
+    return usual_thickness(kinds.kinematic_viscosity, params) > THICK and any(params.gravity)
 
 
 def solve_viscosity(
@@ -314,8 +318,7 @@ def carried_share(kinds: Blend, params: Parameters) -> float:
     """Return the share of what presses them in a frame that all fluids carry on, the thinnest of them included."""
     if not is_thick(kinds, params):
         return 0.0
-    thinnest = min(fluid.viscosity / fluid.density for fluid in kinds.fluids.values())
-    thick = thickness(thinnest, params, params.frame_time / params.substeps)
+    thick = usual_thickness(min(fluid.viscosity / fluid.density for fluid in kinds.fluids.values()), params)
     return CARRIED * thick / (HALF + thick)
 
 
