@@ -8,6 +8,7 @@ import pytest
 import wavetank as wt
 from wavetank import compiler
 from wavetank.compiler import qd
+from wavetank.fluids import Points
 from wavetank.materials import Material
 from wavetank.physics import coarse_grid, coarse_pressure, poisson
 from wavetank.physics.coarse_grid import new_levels
@@ -152,6 +153,61 @@ def test_layers_of_different_density_rest():
     assert has_grid_pressure(sim.world, sim.scene)
     assert rms_speed(sim, 1.0) < 0.02
     assert sim.time_steps == 1
+
+
+@pytest.mark.parametrize("height", [0.4, 0.41, 0.425, 0.45, 0.475])
+def test_water_at_rest_has_no_gaps(height):
+    """Wherever its surface lies between the nodes, and however well rows fit the tank."""
+    block = wt.Block(lower=(0, 0), upper=(1.03, height))
+    sim = Simulation(wt.Scene(spacing=0.025, tank=wt.Tank(size=(1.03, 0.9)), fluids=[block]))
+    sim.advance(1.0)
+    level = sim.world.levels[0]
+    nodes = level.nx * level.ny
+    gaps, fill = level.gaps.to_numpy()[:nodes], level.fill.to_numpy()[:nodes]
+    assert gaps[fill > 0.85].mean() < 1e-3
+    assert gaps[fill > 0.85].max() < 0.03
+    assert level.lam.to_numpy()[:nodes].any()
+
+
+def test_rows_that_are_drawn_apart_have_gaps():
+    """A lattice an eighth wider leaves 1 - 1 / 1.125 of the room free, most of which is told; none next to a solid."""
+    d = 0.025
+    places = np.stack(np.meshgrid((np.arange(40) + 0.5) * 1.125 * d, (np.arange(40) + 0.5) * d), -1).reshape(-1, 2)
+    scene = wt.Scene(
+        spacing=d, tank=wt.Tank(size=(1.125, 1.2)), fluids=[Points(positions=places)], gravity=(0.0, -1e-3),
+        solids=[wt.Box(center=(1.05, 0.05), size=(0.1, 0.1))],
+    )  # fmt: skip
+    sim = Simulation(scene)
+    sim.step()
+    level = sim.world.levels[0]
+    gaps = level.gaps.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
+    inner = gaps[3 : level.ny // 2, 2 : level.nx // 2]
+    free = coarse_pressure.FULL - 1.0 / 1.125
+    assert 0.5 * free < inner.mean() < 1.05 * free
+    room = level.room.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
+    assert (room < 1.0).any()
+    assert not gaps[room < 1.0].any()
+
+
+def energy_gained(seconds: float) -> float:
+    """What a block of water that has fallen apart into a lower pool has of its energy more than at the start."""
+    fluids = [wt.Block(lower=(0, 0), upper=(0.4, 0.6)), wt.Block(lower=(0.4, 0), upper=(1.2, 0.3))]
+    sim = Simulation(wt.Scene(spacing=0.025, tank=wt.Tank(size=(1.2, 0.8)), fluids=fluids))
+
+    def energy() -> float:
+        return float(np.mean(0.5 * (sim.velocities.astype(float) ** 2).sum(1) + 9.81 * sim.positions[:, 1]))
+
+    start = energy()
+    sim.advance(seconds)
+    return energy() / start - 1.0
+
+
+def test_a_block_that_runs_into_a_pool_does_not_gain_height(monkeypatch):
+    """Conservation of energy; docs/method.md, "Rows that are drawn apart"."""
+    assert energy_gained(0.4) < 0.03
+    assert energy_gained(0.6) < 0.0
+    monkeypatch.setattr(coarse_pressure, "FULL", 0.0)
+    assert energy_gained(0.4) > 0.06
 
 
 def test_the_grid_is_for_gravity():

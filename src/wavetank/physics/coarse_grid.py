@@ -51,6 +51,16 @@ def corners(grid: CoarseGrid, low, dim: qd.template()):
     return qd.Vector([x[k & 1] + y[k >> 1 & 1] + z[k >> 2] for k in qd.static(range(2**dim))])
 
 
+@qd.func
+def nearest(grid: CoarseGrid, s: qd.template()):
+    """Number of the node nearest to the place `s` [cells]."""
+    c = qd.floor(s + 0.5, qd.i32)
+    x = qd.min(qd.max(c[0], 0), grid.nx - 1)
+    y = qd.min(qd.max(c[1], 0), grid.ny - 1)
+    z = qd.min(qd.max(c[2], 0), grid.nz - 1)
+    return x + grid.nx * (y + grid.ny * z)
+
+
 def new_levels(size: tuple[float, ...], h: float) -> list[CoarseGrid]:
     """Allocate the grid of a tank of that `size` [m] and its coarser levels, the finest first."""
     shape = [_divided(edge / (EDGE * h)) for edge in size]

@@ -28,12 +28,18 @@ At walls. Layers of a wall that move with a particle by half of its way (`smooth
 of the density that water would, so that the grid removed only 3/4 of what runs into a wall in a step, and water at rest
 made up for it by standing too close. The grid is told most of the rest: `MISSING` times what the way of this step has
 added. As it is the way that counts and not the place, it does not shift where water rests.
+
+Gaps. Particles in rows, near in one direction and far in the other, read the density of water at rest where there is
+less: the kernel is pointed and counts near ones most. The grid counts the room, so it knows. Where even the fullest
+cells around are not `FULL`, the rows have gaps that the water around may close, and an error is less by what is missing
+there. Near a free surface the cells below are full, so that water at rest is told nothing; of two cells in a row the
+mean counts, as a single one of four or eight particles is never quite even.
 """
 
 from wavetank.compiler import qd
 from wavetank.distance import SolidSet, lift, plane_distance, rotate, signed_distance, to_local, vec3, vec4
 from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
-from wavetank.physics.coarse_grid import coordinates, corners, in_cells, piece_width, tents
+from wavetank.physics.coarse_grid import coordinates, corners, in_cells, nearest, piece_width, tents
 from wavetank.physics.pairs import column, part_of, teams, turns
 from wavetank.physics.places import predict_at, predicted
 from wavetank.physics.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
@@ -46,6 +52,7 @@ REACH = 0.2  # of the support: the longest correction
 DAMPING = 0.44  # of a frame: the length of a step that damps as much, docs/method.md
 LARGEST_CARRIED = 1.2  # of gravity
 MISSING = 0.18  # of a wall's answer, over what it gives; 1/3 would be all, see docs/method.md
+FULL = 0.99  # fill of a cell without gaps: water at rest has 0.99 to 1.04
 
 
 def carried(dt: float, frame_time: float) -> float:
@@ -142,8 +149,9 @@ def add_errors(
         for k in qd.static(range(2**dim)):
             filled += weights[k] * grid.fill[nodes[k]]
         inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
-        density = scratch.rho[first + lane] * scratch.weight[first + lane]
-        error = unit * inside * qd.min(qd.max(density - 1.0 + added[0, lane], -1.0), 1.0)
+        error = scratch.rho[first + lane] * scratch.weight[first + lane] - 1.0
+        error += added[0, lane] - grid.gaps[nearest(grid, s)]
+        error = unit * inside * qd.min(qd.max(error, -1.0), 1.0)
         for k in qd.static(range(2**dim)):
             at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
             amounts[k, lane] = qd.cast(qd.round(error * weights[k]), qd.i32)
@@ -160,6 +168,28 @@ def taken(sums: qd.template(), n, nodes, parts):
         total += sums[part * nodes + n]
         sums[part * nodes + n] = 0
     return total
+
+
+@qd.func
+def gaps_at(grid: CoarseGrid, n, full):
+    """How far even the fullest two cells in a row are from `full`, of those around node `n`.
+
+    0 next to solids, since what room these leave is known only roughly.
+    """
+    here = coordinates(grid, n)
+    ends = qd.Vector([grid.nx, grid.ny, grid.nz]) - 1
+    fullest = 0.0
+    for axis in qd.static(range(3)):
+        for side in qd.static((-1, 1)):
+            if grid.nz > 1 or axis < 2:
+                before = grid.fill[n]
+                for distance in qd.static((1, 2)):
+                    c = here
+                    c[axis] = qd.min(qd.max(c[axis] + side * distance, 0), ends[axis])
+                    fill = grid.fill[c[0] + grid.nx * (c[1] + grid.ny * c[2])]
+                    fullest = qd.max(fullest, 0.5 * (before + fill))
+                    before = fill
+    return qd.max(full - fullest, 0.0) if grid.room[n] >= 1.0 else 0.0
 
 
 @qd.func
@@ -194,11 +224,11 @@ def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: 
 def gather(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     unit: qd.f32, volume: qd.f32, scale: qd.f32, inner_from: qd.f32, inner_to: qd.f32, missing: qd.f32,
-    least_open: qd.f32, least_theta: qd.f32, count: qd.i32, parts: qd.i32, searched: qd.template(),
-    mixed: qd.template(), alone: qd.template(), few: qd.template(), lanes: qd.template(),
+    full: qd.f32, least_open: qd.f32, least_theta: qd.f32, count: qd.i32, parts: qd.i32,
+    searched: qd.template(), mixed: qd.template(), alone: qd.template(), few: qd.template(), lanes: qd.template(),
     width: qd.template(),
 ):  # fmt: skip
-    """Sum the tents of all particles at the nodes, then their density errors (Eq. 2), and set up the equation.
+    """Sum the tents of all particles at the nodes, find gaps, sum density errors (Eq. 2), and set up the equation.
 
     The sums are 0 before. `volume` is that of a particle over that of a cell and over the `unit`, `scale` the same over
     the stiffness M. What solids answer to the way of a particle is increased by the share `missing`; there are only the
@@ -219,6 +249,9 @@ def gather(
         if qd.static(mixed):
             mass = taken(grid.mass_sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
             grid.density[n] = qd.max(mass, 1) / qd.cast(qd.max(total, 1), qd.f32)
+    qd.loop_config(serialize=bool(few))
+    for n in range(grid.nx * grid.ny * grid.nz):
+        grid.gaps[n] = gaps_at(grid, n, full)
     for turn in range(turns(teams(count, lanes), parts, lanes)):
         part = part_of(turn, teams(count, lanes), parts, lanes)
         for team in range(part[0], part[1]):
@@ -316,8 +349,8 @@ def correct_pressure(
     scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
     gather(
         finest, particles, scratch, solids, walls, c, UNIT, scale, share * scale / stiffness, *INNER, MISSING,
-        LEAST_OPEN, LEAST_THETA, count, finest.parts if alone else cells.parts, int(searched), int(mixed), int(alone),
-        few, cells.lanes, piece_width(),
+        FULL, LEAST_OPEN, LEAST_THETA, count, finest.parts if alone else cells.parts, int(searched), int(mixed),
+        int(alone), few, cells.lanes, piece_width(),
     )  # fmt: skip
     solve_levels(levels)
     move_particles(finest, particles, cells, solids, c, stiffness, REACH * c.h, count, few, cells.lanes)

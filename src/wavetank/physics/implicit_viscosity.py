@@ -54,8 +54,7 @@ from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scala
 
 TOLERANCE = 1e-2  # of the slowest mode's error after the iterations
 WORTH = 1e-5  # smallest kappa - 1 on the rest lattice for which a substep solves anything
-THIN = 0.01  # `thickness` in a frame up to which a grid may solve for the pressure; oil at centimetres has 0.06
-THICK = 1.0  # the same, above which pressure is carried on
+THICK = 1.0  # `thickness` in a usual step above which pressure is carried on; oil at centimetres has 0.06
 CARRIED, HALF = 0.9, 10.0  # largest share of the pressure that is carried on; `thickness` with half of it
 LARGEST = 5.0  # of gravity, that is carried on
 NEAREST = 0.25  # d: closer to a wall than this its drag grows no further
@@ -258,11 +257,6 @@ def usual_thickness(viscosity: float, params: Parameters) -> float:
 def is_viscous(kinds: Blend, params: Parameters, dt: float) -> bool:
     """Say whether the viscosity of any fluid matters in a substep of `dt` [s]."""
     return thickness(kinds.kinematic_viscosity, params, dt) > WORTH
-
-
-def is_thin(kinds: Blend, params: Parameters) -> bool:
-    """Say whether viscosity hardly matters in a frame, from particle to particle."""
-    return usual_thickness(kinds.kinematic_viscosity, params) <= THIN
 
 
 def is_thick(kinds: Blend, params: Parameters) -> bool:

@@ -26,7 +26,7 @@ from wavetank.physics.density_constraint import (
 )
 from wavetank.physics.diffuse.pool import Pool
 from wavetank.physics.friction import apply_friction
-from wavetank.physics.implicit_viscosity import carried_share, carry_on, is_thick, is_thin, is_viscous, solve_viscosity
+from wavetank.physics.implicit_viscosity import carried_share, carry_on, is_thick, is_viscous, solve_viscosity
 from wavetank.physics.integrate import predict, update_velocities
 from wavetank.physics.mixture import Blend, blend, fill_table, pack_weights, stiffening, weigh
 from wavetank.physics.neighbors import find_neighbors, sort_particles
@@ -174,7 +174,7 @@ def has_grid_pressure(world: World, params: Parameters) -> bool:
         return False
     kinds, h = blend(world.materials, params), params.support * params.spacing
     weight = kinds.largest_density * math.hypot(*params.gravity) * h**2  # of water as high as a cell, per length
-    return weight >= kinds.surface_tension and is_thin(kinds, params)
+    return weight >= kinds.surface_tension and not is_thick(kinds, params)
 
 
 def update_densities(world: World, params: Parameters) -> None:
