@@ -31,9 +31,9 @@ added. As it is the way that counts and not the place, it does not shift where w
 
 Gaps. Particles in rows, near in one direction and far in the other, read the density of water at rest where there is
 less: the kernel is pointed and counts near ones most. The grid counts the room, so it knows. Where even the fullest
-cells around are not `FULL`, the rows have gaps that the water around may close, and an error is less by what is missing
-there. Near a free surface the cells below are full, so that water at rest is told nothing; of two cells in a row the
-mean counts, as a single one of four or eight particles is never quite even.
+cells around are less than `FULL`, the rows have gaps that the water around may close, and an error is less by
+`GAP_SHARE` times what is missing there. Near a free surface the cells below are full, so that water at rest is told
+nothing; of two cells in a row the mean counts, as a single one of four or eight particles is never quite even.
 """
 
 from wavetank.compiler import qd
@@ -52,7 +52,8 @@ REACH = 0.2  # of the support: the longest correction
 DAMPING = 0.44  # of a frame: the length of a step that damps as much, docs/method.md
 LARGEST_CARRIED = 1.2  # of gravity
 MISSING = 0.18  # of a wall's answer, over what it gives; 1/3 would be all, see docs/method.md
-FULL = 0.99  # fill of a cell without gaps: water at rest has 0.99 to 1.04
+FULL = 0.96  # fill that cells without gaps have at least, also where few rows of particles do not match them
+GAP_SHARE = 4.0  # by which errors are less, of what lacks there
 
 
 def carried(dt: float, frame_time: float) -> float:
@@ -125,7 +126,7 @@ def approached(x, p, near, solids: SolidSet, walls: Walls, c: Coefficients, sear
 @qd.func
 def add_errors(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, team,
-    part, unit, inner_from, inner_to, missing, count, searched: qd.template(), lanes: qd.template(),
+    part, unit, inner_from, inner_to, missing, gap_share, count, searched: qd.template(), lanes: qd.template(),
     alone: qd.template(),
 ):  # fmt: skip
     """Add the tents of a team's particles, if inside of the water, times their errors (Eq. 2) to a `part`'s sums."""
@@ -150,7 +151,7 @@ def add_errors(
             filled += weights[k] * grid.fill[nodes[k]]
         inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
         error = scratch.rho[first + lane] * scratch.weight[first + lane] - 1.0
-        error += added[0, lane] - grid.gaps[nearest(grid, s)]
+        error += added[0, lane] - gap_share * grid.gaps[nearest(grid, s)]
         error = unit * inside * qd.min(qd.max(error, -1.0), 1.0)
         for k in qd.static(range(2**dim)):
             at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
@@ -174,11 +175,11 @@ def taken(sums: qd.template(), n, nodes, parts):
 def gaps_at(grid: CoarseGrid, n, full):
     """How far even the fullest two cells in a row are from `full`, of those around node `n`.
 
-    0 next to solids, since what room these leave is known only roughly.
+    0 near solids, since what room these leave is known only roughly.
     """
     here = coordinates(grid, n)
     ends = qd.Vector([grid.nx, grid.ny, grid.nz]) - 1
-    fullest = 0.0
+    fullest, room = 0.0, grid.room[n]
     for axis in qd.static(range(3)):
         for side in qd.static((-1, 1)):
             if grid.nz > 1 or axis < 2:
@@ -186,10 +187,11 @@ def gaps_at(grid: CoarseGrid, n, full):
                 for distance in qd.static((1, 2)):
                     c = here
                     c[axis] = qd.min(qd.max(c[axis] + side * distance, 0), ends[axis])
-                    fill = grid.fill[c[0] + grid.nx * (c[1] + grid.ny * c[2])]
-                    fullest = qd.max(fullest, 0.5 * (before + fill))
-                    before = fill
-    return qd.max(full - fullest, 0.0) if grid.room[n] >= 1.0 else 0.0
+                    at = c[0] + grid.nx * (c[1] + grid.ny * c[2])
+                    fullest = qd.max(fullest, 0.5 * (before + grid.fill[at]))
+                    room = qd.min(room, grid.room[at])
+                    before = grid.fill[at]
+    return qd.max(full - fullest, 0.0) if room >= 1.0 else 0.0
 
 
 @qd.func
@@ -224,7 +226,7 @@ def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: 
 def gather(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     unit: qd.f32, volume: qd.f32, scale: qd.f32, inner_from: qd.f32, inner_to: qd.f32, missing: qd.f32,
-    full: qd.f32, least_open: qd.f32, least_theta: qd.f32, count: qd.i32, parts: qd.i32,
+    full: qd.f32, gap_share: qd.f32, least_open: qd.f32, least_theta: qd.f32, count: qd.i32, parts: qd.i32,
     searched: qd.template(), mixed: qd.template(), alone: qd.template(), few: qd.template(), lanes: qd.template(),
     width: qd.template(),
 ):  # fmt: skip
@@ -232,7 +234,8 @@ def gather(
 
     The sums are 0 before. `volume` is that of a particle over that of a cell and over the `unit`, `scale` the same over
     the stiffness M. What solids answer to the way of a particle is increased by the share `missing`; there are only the
-    walls of the tank unless they are `searched`. Where fluids are `mixed`, their densities are averaged.
+    walls of the tank unless they are `searched`. Errors are less by `gap_share` times what cells lack of being `full`.
+    Where fluids are `mixed`, their densities are averaged.
 
     Threads share the particles in `parts`. Where these are `alone`, each has sums of its own and waits for no other.
     Where nodes are `few`, one thread is done with them before others have started.
@@ -257,7 +260,7 @@ def gather(
         for team in range(part[0], part[1]):
             add_errors(
                 grid, particles, scratch, solids, walls, c, team, alone * (turn >> 9), unit, inner_from, inner_to,
-                missing, count, searched, lanes, alone,
+                missing, gap_share, count, searched, lanes, alone,
             )  # fmt: skip
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
@@ -349,8 +352,8 @@ def correct_pressure(
     scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
     gather(
         finest, particles, scratch, solids, walls, c, UNIT, scale, share * scale / stiffness, *INNER, MISSING,
-        FULL, LEAST_OPEN, LEAST_THETA, count, finest.parts if alone else cells.parts, int(searched), int(mixed),
-        int(alone), few, cells.lanes, piece_width(),
+        FULL, GAP_SHARE, LEAST_OPEN, LEAST_THETA, count, finest.parts if alone else cells.parts, int(searched),
+        int(mixed), int(alone), few, cells.lanes, piece_width(),
     )  # fmt: skip
     solve_levels(levels)
     move_particles(finest, particles, cells, solids, c, stiffness, REACH * c.h, count, few, cells.lanes)
