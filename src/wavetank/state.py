@@ -82,7 +82,7 @@ class CoarseGrid:
     mass_sums: qd.types.ndarray()  # i32 [parts * nodes]: of the tents times densities, where these differ
     room: qd.types.ndarray()  # f32 [nodes]: share of the cell that no solid takes, 0 where next to nothing is left
     fill: qd.types.ndarray()  # f32 [nodes]: water over room
-    gaps: qd.types.ndarray()  # f32 [nodes]: what is free between rows of water, over room
+    gaps: qd.types.ndarray()  # f32 [nodes]: share of the room that is free between rows of particles
     density: qd.types.ndarray()  # f32 [nodes]: mean density over that of the heaviest fluid
     rhs: qd.types.ndarray()  # f32 [nodes]: mean density error over the stiffness
     wx: qd.types.ndarray()  # f32 [nodes], 1/m^2: coupling with the next node along x
