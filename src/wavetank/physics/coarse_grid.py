@@ -52,9 +52,8 @@ def corners(grid: CoarseGrid, low, dim: qd.template()):
 
 
 @qd.func
-def nearest(grid: CoarseGrid, s: qd.template()):
-    """Number of the node nearest to the place `s` [cells]."""
-    c = qd.floor(s + 0.5, qd.i32)
+def nearest(grid: CoarseGrid, c):
+    """Number of the node with the whole coordinates `c`, or of the nearest."""
     x = qd.min(qd.max(c[0], 0), grid.nx - 1)
     y = qd.min(qd.max(c[1], 0), grid.ny - 1)
     z = qd.min(qd.max(c[2], 0), grid.nz - 1)

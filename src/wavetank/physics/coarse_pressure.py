@@ -151,7 +151,7 @@ def add_errors(
             filled += weights[k] * grid.fill[nodes[k]]
         inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
         error = scratch.rho[first + lane] * scratch.weight[first + lane] - 1.0
-        error += added[0, lane] - gap_share * grid.gaps[nearest(grid, s)]
+        error += added[0, lane] - gap_share * grid.gaps[nearest(grid, qd.floor(s + 0.5, qd.i32))]
         error = unit * inside * qd.min(qd.max(error, -1.0), 1.0)
         for k in qd.static(range(2**dim)):
             at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
@@ -177,17 +177,15 @@ def gaps_at(grid: CoarseGrid, n, full):
 
     0 near solids, since what room these leave is known only roughly.
     """
-    here = coordinates(grid, n)
-    ends = qd.Vector([grid.nx, grid.ny, grid.nz]) - 1
     fullest, room = 0.0, grid.room[n]
     for axis in qd.static(range(3)):
         for side in qd.static((-1, 1)):
             if grid.nz > 1 or axis < 2:
+                c = coordinates(grid, n)
                 before = grid.fill[n]
-                for distance in qd.static((1, 2)):
-                    c = here
-                    c[axis] = qd.min(qd.max(c[axis] + side * distance, 0), ends[axis])
-                    at = c[0] + grid.nx * (c[1] + grid.ny * c[2])
+                for _ in qd.static(range(2)):
+                    c[axis] += side
+                    at = nearest(grid, c)
                     fullest = qd.max(fullest, 0.5 * (before + grid.fill[at]))
                     room = qd.min(room, grid.room[at])
                     before = grid.fill[at]
