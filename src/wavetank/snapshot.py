@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from wavetank.simulation import Simulation
 
 ARRAYS = ("x", "v", "a", "id", "dye", "frozen", "material")  # of the particles, in device order
+VISCOUS = "viscous"  # the same, where there are viscous fluids
 NUMBERS = (
     "time", "frame_number", "owed", "next_id", "frozen_count", "fastest_start", "fastest_solid", "fastest_force",
     "capacity", "start_box", "foam_born", "foam_capacity",
@@ -30,7 +31,7 @@ class Snapshot:
     """One instant of a world, on the host."""
 
     numbers: dict[str, Any]  # see NUMBERS
-    arrays: dict[str, np.ndarray]  # of the particles, see ARRAYS, and of foam, names that begin with foam_
+    arrays: dict[str, np.ndarray]  # of the particles, see ARRAYS and VISCOUS, and of foam, names begin with foam_
     solids: list[Solid]  # but for the walls of the tank
     names: list[str]
     poses: list[Pose]  # of all solids, the walls of the tank first, as names, targets and growing
@@ -51,6 +52,7 @@ class Snapshot:
 def take_snapshot(sim: "Simulation") -> Snapshot:
     """Return this instant of a running world."""
     particles, moving, pool = sim.world.particles, sim.solids, sim.world.pool
+    names = (*ARRAYS, VISCOUS) if sim.world.remembers_viscosity else ARRAYS
     return Snapshot(
         numbers={
             "time": sim.time, "frame_number": sim.frame_number, "owed": sim._owed, "next_id": sim._next_id,
@@ -59,7 +61,7 @@ def take_snapshot(sim: "Simulation") -> Snapshot:
             "start_box": [end.tolist() for end in sim._start_box], "foam_born": pool.born if pool else -1,
             "foam_capacity": pool.capacity if pool else 0,
         },
-        arrays={name: download(getattr(particles, name))[: sim.count].copy() for name in ARRAYS}
+        arrays={name: download(getattr(particles, name))[: sim.count].copy() for name in names}
         | pool_rows(pool, sim.scene.dim),
         solids=[*sim.scene.solids], names=[*moving.names], poses=[*moving.poses], targets={**moving.targets},
         growing={**moving.growing},
@@ -79,6 +81,8 @@ def put_snapshot(sim: "Simulation", snapshot: Snapshot) -> None:
     sim._renew_solids()
     for name in ARRAYS:
         upload(getattr(sim.world.particles, name), snapshot.arrays[name])
+    if VISCOUS in snapshot.arrays or sim.world.remembers_viscosity:
+        sim.world.remember_viscosity(snapshot.arrays.get(VISCOUS, np.zeros(0)))
     sim.world.materials = sim.scene.materials_of(snapshot.arrays["material"])
     sim.world.count, sim.world.frozen = len(snapshot.arrays["id"]), int(numbers["frozen_count"])
     sim.world.pool = pool_from(
@@ -158,7 +162,10 @@ def read_snapshot(path: str | Path, solids: Any) -> tuple[Snapshot, str]:
         members = solids(scene)
         snapshot = Snapshot(
             numbers={name: about["numbers"][name] for name in NUMBERS},
-            arrays={name: data[name] for name in (*ARRAYS, *(name for name in data if name.startswith("foam_")))},
+            arrays={
+                name: data[name]
+                for name in (*ARRAYS, *(name for name in data if name == VISCOUS or name.startswith("foam_")))
+            },
             solids=members,
             names=about["names"],
             poses=[_pose(row) for row in about["poses"]],

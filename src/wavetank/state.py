@@ -33,6 +33,7 @@ class Particles:
     pz: qd.types.ndarray()  # likewise; unused in 2-D
     v: qd.types.ndarray()  # vec [capacity], m/s
     a: qd.types.ndarray()  # vec [capacity], m/s^2: by the pressure of the grid, see `physics/coarse_pressure.py`
+    viscous: qd.types.ndarray()  # vec [capacity], m/s^2: by viscosity in the last step; [1] where nothing is viscous
     id: qd.types.ndarray()  # i32 [capacity]: name of the particle for life; those of removed ones are not used again
     material: qd.types.ndarray()  # i32 [capacity]: number of its material
     near: qd.types.ndarray()  # i32 [capacity]: bit k is set where solid k is near, bit 30 for all solids from 30 on
@@ -166,10 +167,10 @@ class Fluids:
     weighed: bool = False  # whether Scratch.weight differs from 1
     arrays: dict[str, Any] = dataclasses.field(default_factory=dict)
 
-    def array(self, name: str) -> Any:
-        """Return the vec4 [capacity] of that name, made when it is first asked for."""
+    def array(self, name: str, rows: int = 0) -> Any:
+        """Return the vec4 [rows, or capacity] of that name, made when it is first asked for."""
         if name not in self.arrays:
-            self.arrays[name] = vectors(4, self.capacity + MARGIN)
+            self.arrays[name] = vectors(4, rows or self.capacity + MARGIN)
         return self.arrays[name]
 
     def pairs(self, grid: Grid) -> Any:
@@ -275,7 +276,14 @@ def new_particles(dim: int, capacity: int) -> Particles:
     for component in (px, py, pz)[:dim]:
         upload(component, places)
     x, v, a = (vectors(dim, rows) for _ in range(3))
-    return Particles(x, px, py, pz, v, a, *(integers(rows) for _ in range(5)))
+    return Particles(x, px, py, pz, v, a, vectors(dim, 1), *(integers(rows) for _ in range(5)))
+
+
+def with_viscosity(particles: Particles) -> Particles:
+    """Return the particles with room for what viscosity did to each, zero where there was none."""
+    if particles.viscous.shape == particles.x.shape:
+        return particles
+    return dataclasses.replace(particles, viscous=vectors(particles.x.element_shape[0], particles.x.shape[0]))
 
 
 def new_scratch(capacity: int) -> Scratch:

@@ -7,9 +7,9 @@ import pytest
 
 import wavetank as wt
 from wavetank.compiler import download
+from wavetank.physics.conjugate_gradients import TOLERANCE
 from wavetank.physics.density_constraint import schedule
 from wavetank.physics.implicit_viscosity import (
-    TOLERANCE,
     carried_share,
     damper_scale,
     drag_table,
@@ -37,6 +37,7 @@ def solved(x: np.ndarray, v: np.ndarray, viscosity: float, most: int = 400, **se
     before = world.particles.v.to_numpy()[: sim.count].astype(np.float64)
     c = coefficients(scene, DT)
     kinds = prepare_fluids(world, world.particles, scene, DT)
+    world.remember_viscosity()
     number = solve_viscosity(
         world.particles, world.scratch, world.fluids, world.grid, world.solids, c, kinds, sim.count, scene.support,
         scene.no_slip, most,
@@ -93,8 +94,8 @@ def test_rotation_is_left_alone(dim):
 def test_a_thousand_times_thicker_is_stable_and_takes_no_more_than_asked():
     rng = np.random.default_rng(3)
     x = lattice(2, 16)
-    _, before, after, number = solved(x, rng.normal(0, 1, x.shape), 1e6, 60)
-    assert number == 60
+    _, before, after, number = solved(x, rng.normal(0, 1, x.shape), 1e6, 20)
+    assert number == 20
     assert np.isfinite(after).all()
     assert np.sum(after**2) < 0.5 * np.sum(before**2)
 
@@ -142,7 +143,7 @@ def test_thin_fluids_pay_nothing():
     assert not is_viscous(kinds, scene, c.dt)
     assert iterations(1.0, 60) == 0
     assert (
-        1 <= iterations(1.1, 60) < iterations(100.0, 60) < iterations(1e4, 1000) == math.ceil(0.5 * 100 * math.log(200))
+        1 <= iterations(1.1, 60) < iterations(100.0, 60) < iterations(1e4, 1000) == math.ceil(0.5 * 100 * math.log(100))
     )
 
 

@@ -14,14 +14,12 @@ free surface too, and m_i dv_i is antisymmetric, so momentum and angular momentu
     rate      dt B / rho      what a pair does in a substep, over mu                      1/(Pa s)
     packed                    iterate of the velocity, and mu_i                           m/s, Pa s
     drag      T v_w, T        rate of the walls' drag in this substep over mu             1
-    stiffest  kappa           bound of the largest eigenvalue of 1 + dt M^-1 L            1
 
 Where we differ, and why:
 - f(q) = 1 - q, the weights of Müller et al. 2003 (10.2312/SCA03/154-159), not the gradient of a kernel: it has no
   pole, and B makes its second moment on the rest lattice exact, averaged over directions.
-- Chebyshev iterations instead of conjugate gradients. All eigenvalues of 1 + dt M^-1 L lie between 1 and a bound
-  that one pass finds (`join_pairs`), which fixes the number of iterations beforehand: no dot products, hence no
-  sums whose order threads decide, and the error of no mode ever grows, wherever the iterations end.
+- Conjugate gradients (`conjugate_gradients.py`) start at what viscosity did in the last step, which is not far off:
+  a sixth of the iterations that they take from rest, or Chebyshev's, where the fluid is thick (docs/materials.md).
 - Solids hold the fluid back along their surface (no-slip) as half a rest lattice would that continues the
   velocity linearly to its value at the wall (Takeda et al. 1994, 10.1143/ptp/92.5.939; Morris et al. 1997,
   10.1006/jcph.1997.5776), from a table of the distance.
@@ -38,21 +36,21 @@ import math
 import numpy as np
 
 from wavetank.compiler import qd, upload
-from wavetank.distance import SolidSet, lift, signed_distance, vec3, vec4
+from wavetank.distance import SolidSet, lift, signed_distance, vec4
 from wavetank.errors import WavetankError
 from wavetank.params import Parameters
 from wavetank.physics.boundary import is_near
-from wavetank.physics.density_constraint import schedule
+from wavetank.physics.conjugate_gradients import TOLERANCE, solve
 from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate, free_motion
 from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import MAX_ENTRIES
-from wavetank.physics.pairs import add_kept, column, keep_pairs, part_of, teams, turns
+from wavetank.physics.pairs import keep_pairs, part_of, teams, turns
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars
 
-TOLERANCE = 1e-2  # of the slowest mode's error after the iterations
+STIFFER = 3.0  # times as stiff as the rest lattice: water in motion, and the drag of walls
 WORTH = 1e-5  # smallest kappa - 1 on the rest lattice for which a substep solves anything
 THICK = 1.0  # `thickness` in a usual step above which pressure is carried on; oil at centimetres has 0.06
 CARRIED, HALF = 0.9, 10.0  # largest share of the pressure that is carried on; `thickness` with half of it
@@ -66,6 +64,17 @@ def damper_scale(dim: int, ratio: float, d: float) -> float:
     """Return B [1/m^2] for the support radius `ratio` * `d` and the spacing `d` [m]."""
     distance = np.linalg.norm(rest_points(dim, ratio), axis=1)
     return float(2.0 * dim * (dim + 2) / np.sum((1.0 - distance / ratio) * distance**2)) / d**2
+
+
+@functools.cache
+def stiffness(dim: int, ratio: float) -> float:
+    """Return a bound of the largest eigenvalue of dt M^-1 L over dt nu B on the rest lattice.
+
+    That is twice what a particle's own dampers do: the matrix of one damper is at most twice its diagonal blocks,
+    hence so is their sum.
+    """
+    distance = np.linalg.norm(rest_points(dim, ratio), axis=1)
+    return float(2.0 * np.sum(1.0 - distance / ratio) / dim)
 
 
 @functools.cache
@@ -91,41 +100,23 @@ def damper(square, a, b, c: Coefficients):
     """Return mu_ij f(q) / r^2, which does not change while the velocities are solved for."""
     f = qd.max(1.0 - qd.sqrt(square) * c.inverse_h, 0.0)
     mu = 2.0 * a[3] * b[3] / qd.max(a[3] + b[3], 1e-20)
-    return mu * f / qd.max(square, 1e-30)
-
-
-@qd.func
-def add_damping(sums: qd.template(), r, damper, a, b, c: Coefficients, method: qd.template()):
-    """Add neighbour j to sum_j mu_ij f(q) ((v_j - v_i) . n) n."""
-    approach = 0.0
-    for k in qd.static(range(r.n)):
-        approach += (b[k] - a[k]) * r[k]
-    sums += r * (damper * approach)
-
-
-@qd.func
-def add_stiffness(sums: qd.template(), r, damper, a, b, c: Coefficients, method: qd.template()):
-    """Add neighbour j to the upper triangle of sum_j mu_ij f(q) n n^T, row by row."""
-    for k in qd.static(range(r.n)):
-        for m in qd.static(range(k, r.n)):
-            sums[qd.static(PLACES[r.n][k][m])] += damper * r[k] * r[m]
+    return mu * f / qd.max(square, 1e-24)
 
 
 @qd.kernel(fastcache=True)
 def prepare(
-    packed: qd.types.ndarray(), other: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(),
-    particles: Particles, rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients,
-    count: qd.i32, no_slip: qd.f32,
+    packed: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles,
+    rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, count: qd.i32,
+    no_slip: qd.f32,
 ):  # fmt: skip
-    """Start the iterations at the velocities as they are, and find how fast the walls hold every particle back.
+    """Start at what viscosity did in the last step, and find how fast the walls hold every particle back.
 
     That is over B dt / rho, with the normal along which they do not.
     """
     for i in range(count):
-        own = lift(particles.v[i])
+        own = lift(particles.v[i] + c.dt * particles.viscous[i])
         row = vec4(own.x, own.y, own.z, rows[particles.material[i]][1])
         packed[i] = row
-        other[i] = row
         near = particles.near[i]
         pull = vec4(0.0, 0.0, 0.0, 0.0)
         free = vec4(0.0, 0.0, 0.0, 0.0)
@@ -153,75 +144,25 @@ def prepare(
 
 @qd.kernel(fastcache=True)
 def join_pairs(
-    dampers: qd.types.ndarray(), packed: qd.types.ndarray(), drag: qd.types.ndarray(), particles: Particles,
-    scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, rate: qd.f32, lanes: qd.template(),
-) -> qd.i32:  # fmt: skip
-    """Keep the dampers of all pairs; return the bits of kappa - 1.
-
-    That is twice the largest row sum of a particle's own dampers, and the walls' drag: the matrix of one damper is at
-    most twice its diagonal blocks, hence so is their sum.
-    """
-    most = 0
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        stiffest = 0.0
-        for team in range(part[0], part[1]):
-            dim = qd.static(particles.x[team].n)
-            keep_pairs(dampers, damper, team, particles, packed, grid, c, lanes)
-            sums = qd.Matrix.zero(qd.f32, dim * (dim + 1) // 2, lanes)
-            add_kept(sums, add_stiffness, team, particles, packed, dampers, grid, c, 0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                sum = column(sums, i - team * lanes)
-                largest = 0.0
-                for k in qd.static(range(dim)):
-                    row = 0.0
-                    for m in qd.static(range(dim)):
-                        row += qd.abs(sum[qd.static(PLACES[dim][k][m])])
-                    largest = qd.max(largest, row)
-                stiffest = qd.max(stiffest, scratch.weight[i] * (2.0 * largest + drag[i].w))
-        if part[1] > part[0]:
-            qd.atomic_max(most, qd.bit_cast(rate * stiffest, qd.i32))
-    return most
-
-
-@qd.kernel(fastcache=True)
-def relax_velocities(
-    following: qd.types.ndarray(), packed: qd.types.ndarray(), dampers: qd.types.ndarray(), drag: qd.types.ndarray(),
-    normal: qd.types.ndarray(), particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32,
-    rate: qd.f32, relaxation: qd.f32, momentum: qd.f32, lanes: qd.template(),
+    dampers: qd.types.ndarray(), packed: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients,
+    count: qd.i32, lanes: qd.template(),
 ):  # fmt: skip
-    """One Chebyshev iteration; `following` holds the iterate before `packed` and receives the next."""
+    """Keep the dampers of all pairs."""
     for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
         part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
-            add_kept(sums, add_damping, team, particles, packed, dampers, grid, c, 0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                v = particles.v[i]
-                row = packed[i]
-                before = following[i]
-                force = column(sums, i - team * lanes)
-                if particles.near[i] != 0:
-                    wall = vec3(drag[i].x, drag[i].y, drag[i].z) - vec3(row.x, row.y, row.z) * drag[i].w
-                    n = vec3(normal[i].x, normal[i].y, normal[i].z)
-                    wall -= n * n.dot(wall)
-                    for k in qd.static(range(v.n)):
-                        force[k] += wall[k]
-                share = rate * scratch.weight[i]
-                result = row
-                for k in qd.static(range(v.n)):
-                    residual = v[k] - row[k] + share * force[k]
-                    result[k] = row[k] + relaxation * residual + momentum * (row[k] - before[k])
-                following[i] = result
+            keep_pairs(dampers, damper, team, particles, packed, grid, c, lanes)
 
 
 @qd.kernel(fastcache=True)
 def take_velocities(particles: Particles, packed: qd.types.ndarray(), c: Coefficients, count: qd.i32):
     """Adopt the velocities that were found, and move the predicted positions with them."""
     for i in range(count):
-        v = particles.v[i]
+        before = particles.v[i]
+        v = before
         for k in qd.static(range(v.n)):
             v[k] = packed[i][k]
+        particles.viscous[i] = (v - before) / c.dt
         accelerate(particles, i, v, c)
 
 
@@ -277,7 +218,7 @@ def solve_viscosity(
     if "drag table" not in fluids.arrays:
         fluids.arrays["drag table"] = scalars(TABLE_SIZE + 1)
         upload(fluids.arrays["drag table"], drag_table(dim, ratio))
-    packed, spare, drag, normal = (fluids.array(name) for name in ("packed", "spare", "drag", "normal"))
+    packed, drag, normal = (fluids.array(name) for name in ("packed", "drag", "normal"))
     rate = c.dt * damper_scale(dim, ratio, d) / kinds.largest_density
     if 8 * grid.list.shape[0] > MAX_ENTRIES:
         raise WavetankError(
@@ -286,16 +227,13 @@ def solve_viscosity(
             "viscosity = 0 in its materials and dynamic_viscosity = 0."
         )
     dampers = fluids.pairs(grid)
-    prepare(packed, spare, drag, normal, particles, fluids.rows, solids, fluids.arrays["drag table"], c, count, no_slip)
-    bits = join_pairs(dampers, packed, drag, particles, scratch, grid, c, count, rate, grid.lanes)
-    stiffest = 1.0 + 1.01 * float(np.int32(bits).view(np.float32))
-    number = iterations(stiffest, largest_number)
-    for relaxation, momentum in schedule(number, 1.0, stiffest) if number else []:
-        relax_velocities(
-            spare, packed, dampers, drag, normal, particles, scratch, grid, c, count, rate, relaxation, momentum,
-            grid.lanes,
-        )  # fmt: skip
-        packed, spare = spare, packed
+    prepare(packed, drag, normal, particles, fluids.rows, solids, fluids.arrays["drag table"], c, count, no_slip)
+    join_pairs(dampers, packed, particles, grid, c, count, grid.lanes)
+    stiffest = 1.0 + STIFFER * rate * kinds.largest_density * kinds.kinematic_viscosity * stiffness(dim, ratio)
+    number = solve(
+        packed, dampers, drag, normal, particles, scratch, fluids, grid, c, count, rate,
+        iterations(stiffest, largest_number),
+    )  # fmt: skip
     take_velocities(particles, packed, c, count)
     return number
 
@@ -317,9 +255,10 @@ def carried_share(kinds: Blend, params: Parameters) -> float:
 
 
 def iterations(stiffest: float, most: int) -> int:
-    """Return how many Chebyshev iterations bring every mode of 1 to `stiffest` within `TOLERANCE`, at most `most`."""
+    """Return how many iterations bring every mode of 1 to `stiffest` within `TOLERANCE`, at most `most`."""
     if stiffest <= 1.0 + 1e-9:
         return 0
-    # The error polynomial is at most 1 / T_n(sigma) (Saad 2003, Theorem 6.25).
+    # In the energy norm no polynomial is better than theirs, and Chebyshev's is at most 1 / T_n(sigma) (Saad 2003,
+    # Theorem 6.25).
     sigma = (stiffest + 1.0) / (stiffest - 1.0)
     return min(most, math.ceil(math.acosh(1.0 / TOLERANCE) / math.acosh(sigma)))

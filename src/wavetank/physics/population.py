@@ -86,6 +86,8 @@ def append_rows(
         particles.x[first + i] = x[i]
         particles.v[first + i] = v[i]
         particles.a[first + i] = 0.0 * v[i]
+        if particles.viscous.shape[0] > 1:
+            particles.viscous[first + i] = 0.0 * v[i]
         particles.id[first + i] = first_id + i
         particles.near[first + i] = 0
         particles.dye[first + i] = dye[i]
@@ -95,9 +97,14 @@ def append_rows(
 
 @qd.kernel(fastcache=True)
 def copy_chosen(target: Particles, particles: Particles, grid: Grid, count: qd.i32):
-    """Copy the first `count` particles that `grid.order` names to the front of `target`."""
+    """Copy the first `count` particles that `grid.order` names to the front of `target`.
+
+    What viscosity did is forgotten: it no longer sums up to nothing where a neighbour has gone.
+    """
     for n in range(count):
         copy_particle(target, n, particles, grid.order[n])
+        if target.viscous.shape[0] > 1:
+            target.viscous[n] *= 0.0
 
 
 @qd.kernel(fastcache=True)

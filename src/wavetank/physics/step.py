@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.compiler import upload
 from wavetank.distance import SolidSet
 from wavetank.materials import Material
 from wavetank.params import Parameters
@@ -37,7 +38,18 @@ from wavetank.physics.tension import apply_tension, limited_tensions, substeps_f
 from wavetank.physics.time_step import pool_depth, steps_needed
 from wavetank.physics.viscosity import apply_mixed_viscosity, apply_viscosity
 from wavetank.physics.vorticity import confine_vorticity
-from wavetank.state import CoarseGrid, Coefficients, Fluids, Grid, Particles, Scratch, Walls, exchanged, remembered
+from wavetank.state import (
+    CoarseGrid,
+    Coefficients,
+    Fluids,
+    Grid,
+    Particles,
+    Scratch,
+    Walls,
+    exchanged,
+    remembered,
+    with_viscosity,
+)  # fmt: skip
 
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
 #: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; measured, docs/method.md.
@@ -71,11 +83,25 @@ class World:
         """Whether there is anything solid besides the walls of the tank, which are planes and need no search."""
         return bool(self.solids.count > self.solids.tank_count)
 
+    @property
+    def remembers_viscosity(self) -> bool:
+        """Whether there is room for what viscosity did to each particle."""
+        return bool(self.particles.viscous.shape == self.particles.x.shape)
+
+    def remember_viscosity(self, values: np.ndarray | None = None) -> None:
+        """Make room for what viscosity did to each particle, and set it to `values` [m/s^2], [n, dim], if any."""
+        self.particles, self.spare = with_viscosity(self.particles), with_viscosity(self.spare)
+        if values is not None:
+            upload(self.particles.viscous, values)
+
 
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
     """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
     on_grid, method, count = has_grid_pressure(world, params), method_number(params), world.count
-    carries_on = is_thick(blend(world.materials, params), params)
+    kinds = blend(world.materials, params)
+    carries_on = is_thick(kinds, params)
+    if is_viscous(kinds, params, dt):
+        world.remember_viscosity()
     # What thick fluids carry on has been shortened to their share already.
     share = carried(dt, params.frame_time) if on_grid else float(carries_on)
     c = coefficients(params, dt, speed_limit, carries=share)

@@ -119,7 +119,7 @@ def pour(
     down = np.array((0.0, -SPEED, 0.0))
     scene = Scene(
         spacing=d, tank=Tank(size=(room, top + 4.0 * d, room)), rest_density=DENSITY, dynamic_viscosity=VISCOSITY,
-        frame_time=FRAME, substeps=2, courant=3.0, viscosity_iterations=60,
+        frame_time=FRAME, substeps=2, courant=3.0,
         wave_courant=100.0,  # the jet is not a column that carries its weight by pressure
         fluids=[Points(positions=x + middle, velocities=np.tile(down, (len(x), 1)))],
     )  # fmt: skip
