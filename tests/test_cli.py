@@ -59,6 +59,9 @@ def test_run_writes_what_was_asked_for(tmp_path):
     ("arguments", "words"),
     [
         (("run", "no-such-scene"), ["no-such-scene", "obstacle-tank"]),
+        (("run", "drop-2d", "--out", f"{__file__}/x"), ["test_cli.py/x", "cannot be made"]),
+        (("run", "obstacle-tnk"), ["did you mean 'obstacle-tank'?"]),
+        (("run", "drop-2d", "--set", "spacing=5"), ["no particle", "spacing = 5 m"]),
         (("run", "drop", "--set", "viscos=1"), ["'viscos'", "did you mean 'viscosity'"]),
         (("run", "drop", "--set", "viscosity=nan"), ["viscosity = nan"]),
         (("run", "drop", "--set", "viscosity=thick"), ["viscosity = 'thick'"]),
@@ -89,6 +92,7 @@ def test_run_writes_what_was_asked_for(tmp_path):
         (("converge", "drop-2d", "--iterations", "0"), ["--iterations = 0"]),
         (("play", "no-such-scene"), ["no-such-scene", "obstacle-tank"]),
         (("play", "drop-2d", "--record", "no-folder/x.toml"), ["--record", "folder"]),
+        (("play", "drop-2d", "--record", "."), ["--record .", "name a file"]),
         (("play", "drop-2d", "--host", "256.1.1.1", "--no-browser"), ["--host 256.1.1.1"]),
         (("play", "drop-2d", "--most", "10", "--no-browser"), ["at most 10"]),
         (("replay", "no-such-file.toml"), ["no-such-file.toml", "cannot be read"]),

@@ -269,7 +269,7 @@ def test_play_records_and_replay_repeats(tmp_path):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
     line = process.stdout.readline()
-    port, token = re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+?);", line).groups()
+    port, token = re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", line).groups()
     with connect(f"ws://127.0.0.1:{port}/socket?token={token}", max_size=None) as socket:
         socket.send('{"do": "point-begin", "x": 0.5, "y": 0.7, "tool": "stir"}')
         socket.send('{"do": "set", "name": "viscosity", "value": 0.2}')

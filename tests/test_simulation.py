@@ -129,8 +129,10 @@ def test_a_state_from_before_pressure_was_carried_on_is_read(tmp_path):
 
 def test_a_file_that_is_no_state(tmp_path):
     (tmp_path / "x.npz").write_bytes(b"nothing")
-    with pytest.raises(wt.WavetankError, match=r"x\.npz: this is not a state"):
+    with pytest.raises(wt.WavetankError, match=r"x\.npz: this is not a state.*it holds objects, not arrays\.$"):
         Simulation.restore(tmp_path / "x.npz")
+    with pytest.raises(wt.WavetankError, match=r"y\.npz: the state cannot be read: No such file"):
+        Simulation.restore(tmp_path / "y.npz")
 
 
 def test_live_parameters():
@@ -147,6 +149,16 @@ def test_live_parameters():
     assert sim.gravity == (1.0, 0.0, 0.0)
     with pytest.raises(AttributeError):
         _ = sim.no_such_thing
+    with pytest.raises(wt.WavetankError, match=r"'viscositty' is no parameter; did you mean 'viscosity'\?"):
+        sim.viscositty = 0.5
+    with pytest.raises(wt.WavetankError, match="spacing cannot change while the water runs.*changed"):
+        sim.spacing = 0.5
+    sim.note = "of my own"
+
+
+def test_a_name_is_no_scene():
+    with pytest.raises(wt.WavetankError, match="'drop' is no Scene; use wt.Scene.load"):
+        Simulation("drop")
 
 
 def test_bad_times_are_refused():

@@ -21,7 +21,7 @@ Settings = Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help
 Arch = Annotated[str, typer.Option(help="Back end: cpu, gpu (the best there is), cuda, vulkan, metal, amdgpu.")]
 View = Annotated[str | None, typer.Option(help="water, particles, slice or foam; water unless particles are coloured.")]
 Quality = Annotated[str, typer.Option(help="draft, standard (2 x 2 samples a pixel) or film (64 pictures averaged).")]
-ColorBy = Annotated[str | None, typer.Option(help="speed, density, foam, or a colour such as #3f99da.")]
+ColorBy = Annotated[str | None, typer.Option(help="speed, density, material, foam, or a colour such as #3f99da.")]
 Cut = Annotated[str | None, typer.Option(help="Where a slice lies: z=0.35 for example.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object as the last line.")]
 
@@ -103,7 +103,7 @@ def run(
 def render(
     world: Annotated[str, typer.Argument(metavar="SCENE|STATE.npz", help="A scene, or a state that was saved.")],
     at: Annotated[
-        float | None, typer.Option(help="Time of the picture [s]; 0.5 for a scene, its own for a state.")
+        float | None, typer.Option(help="Time of the picture [s]; a scene's best moment, mostly 0.5; a state's own.")
     ] = None,
     out: Annotated[Path, typer.Option(help="The picture, PNG.")] = Path("picture.png"),
     width: Annotated[int, typer.Option(help="Pixels.")] = 1280,

@@ -5,11 +5,13 @@ in the reference, and whether it may change while the water moves (live) or need
 """
 
 import dataclasses
+import difflib
 import math
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from wavetank.errors import WavetankError
 from wavetank.model import Model, Vector
 
 
@@ -120,6 +122,18 @@ PARAMETERS: tuple[Parameter, ...] = tuple(
     for name, field in Parameters.model_fields.items()
 )
 LIVE = frozenset(p.name for p in PARAMETERS if p.live)
+
+
+def refuse_assignment(name: str) -> None:
+    """Refuse `name` for an attribute of a running world if it is, or nearly is, that of a parameter."""
+    if any(p.name == name for p in PARAMETERS):
+        raise WavetankError(
+            f"{name} cannot change while the water runs; begin anew: Simulation(sim.scene.changed({name}=...))."
+        )
+    for near in difflib.get_close_matches(name, LIVE, 1, 0.8):
+        raise WavetankError(f"{name!r} is no parameter; did you mean {near!r}?")
+
+
 
 #: Values that a preset puts in place of the defaults. `paper` is the report's Table 1, which belongs to its own units:
 #: h = 1.1, m = 1, rho_0 = 3, so that d = 0.68195 is the lattice whose Poly6 density is 3. There S_0 = 1.3607, so that

@@ -17,6 +17,7 @@ import wavetank
 from wavetank.commands import Command, command_of, table_of
 from wavetank.errors import WavetankError
 from wavetank.model import Model
+from wavetank.replacing import replacing
 from wavetank.scene import Scene
 from wavetank.session import MOST_PARTICLES, Session
 
@@ -57,10 +58,8 @@ class Recording(Model):
 
     def save(self, path: str | Path) -> None:
         """Write this as TOML; a file of that name is replaced in one move."""
-        target = Path(path)
-        partial = target.with_name(target.name + ".partial")
-        partial.write_text(self.text(), encoding="utf-8")
-        partial.replace(target)
+        with replacing(path) as partial:
+            partial.write_text(self.text(), encoding="utf-8")
 
     def text(self) -> str:
         """Return this as TOML."""

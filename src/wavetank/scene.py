@@ -1,5 +1,6 @@
 """A scene: plain validated data that says what a world is made of, from Python or from a TOML file."""
 
+import difflib
 import functools
 import importlib.resources
 import json
@@ -20,6 +21,7 @@ from wavetank.goal import Goal
 from wavetank.materials import COLORS, Material, Properties
 from wavetank.model import Model, Size, sentence
 from wavetank.params import PRESETS, QUALITIES, Parameters
+from wavetank.replacing import replacing
 from wavetank.solid import Solid
 from wavetank.solids import AnySolid, HalfSpace
 
@@ -211,6 +213,11 @@ class Scene(Parameters):
         """
         parts = self._lattices()
         positions = np.concatenate([np.empty((0, self.dim)), *(x for x, _ in parts)])
+        if not len(positions) and any(not isinstance(fluid, Points) for fluid in self.fluids):
+            raise WavetankError(
+                f"the fluids of this scene hold no particle at spacing = {self.spacing:g} m outside of solids; use a "
+                "smaller spacing or larger fluids."
+            )
         velocities = np.concatenate([np.empty((0, self.dim)), *(v for _, v in parts)])
         return positions.astype(np.float32), velocities.astype(np.float32)
 
@@ -232,6 +239,13 @@ class Scene(Parameters):
 
     # --- files ---
 
+    @staticmethod
+    def checked(scene: Any) -> "Scene":
+        """Return `scene`, or say that it is none."""
+        if not isinstance(scene, Scene):
+            raise WavetankError(f"{scene!r} is no Scene; use wt.Scene.load(name) for a bundled one or a TOML file.")
+        return scene
+
     @classmethod
     def load(cls, name: str | Path) -> "Scene":
         """Read a bundled scene by name, or a TOML file by path."""
@@ -250,10 +264,8 @@ class Scene(Parameters):
 
     def save(self, path: str | Path) -> None:
         """Write this scene as TOML; a file of that name is replaced in one move."""
-        target = Path(path)
-        partial = target.with_name(target.name + ".partial")
-        partial.write_text(self.text(), encoding="utf-8")
-        partial.replace(target)
+        with replacing(path) as partial:
+            partial.write_text(self.text(), encoding="utf-8")
 
     def text(self) -> str:
         """Return this scene as TOML."""
@@ -356,9 +368,11 @@ def _read(name: str | Path) -> tuple[str, str, Path]:
             )
     path = Path(name)
     if not path.is_file():
+        near = difflib.get_close_matches(str(name), [*_names("scenes"), *_names("levels")], 1)
         raise WavetankError(
-            f"scene {str(name)!r} is neither a file nor a bundled scene; bundled are: {', '.join(_names('scenes'))}; "
-            f"levels: {', '.join(_names('levels'))}."
+            f"scene {str(name)!r} is neither a file nor a bundled scene; "
+            + (f"did you mean {near[0]!r}? B" if near else "b")
+            + f"undled are: {', '.join(_names('scenes'))}; levels: {', '.join(_names('levels'))}."
         )
     try:
         return path.read_text("utf-8"), str(path), path.parent

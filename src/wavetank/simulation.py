@@ -13,7 +13,7 @@ from wavetank.errors import WavetankError
 from wavetank.forces import Force
 from wavetank.frame import Frame
 from wavetank.moving_solids import MovingSolids
-from wavetank.params import LIVE
+from wavetank.params import LIVE, refuse_assignment
 from wavetank.physics import measure, population
 from wavetank.physics.coarse_grid import new_levels
 from wavetank.physics.diffuse.pool import pool_from, pool_rows
@@ -34,7 +34,7 @@ class Simulation:
     def __init__(self, scene: Scene, arch: str = "cpu") -> None:
         compiler.start(arch)
         self.arch = compiler.current_backend()
-        self.scene = scene.model_copy(deep=True)
+        self.scene = Scene.checked(scene).model_copy(deep=True)
         self.reset()
 
     def reset(self) -> None:
@@ -379,6 +379,8 @@ class Simulation:
         if name in LIVE:
             self.scene.assign(name, value)
         else:
+            if name not in self.__dict__:
+                refuse_assignment(name)
             super().__setattr__(name, value)
 
     # --- files ---

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import zipfile
 import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from wavetank.compiler import download, upload
 from wavetank.errors import WavetankError
 from wavetank.moving_solids import MovingSolids, Pose
 from wavetank.physics.diffuse.pool import pool_from, pool_rows
+from wavetank.replacing import replacing
 from wavetank.solid import Solid
 
 if TYPE_CHECKING:
@@ -137,8 +139,6 @@ def _packed(plane: np.ndarray) -> tuple[bool, bytes]:
 
 def write_snapshot(path: str | Path, snapshot: Snapshot, scene: str) -> None:
     """Write a snapshot and the JSON of its scene to an .npz file, replaced in one move."""
-    target = Path(path)
-    partial = target.with_name(target.name + ".partial")
     about = {
         "numbers": snapshot.numbers,
         "names": snapshot.names,
@@ -146,9 +146,8 @@ def write_snapshot(path: str | Path, snapshot: Snapshot, scene: str) -> None:
         "targets": {k: _pose_list(pose) for k, pose in snapshot.targets.items()},
         "growing": snapshot.growing,
     }
-    with partial.open("wb") as file:
+    with replacing(path) as partial, partial.open("wb") as file:
         np.savez(file, format=2, scene=scene, about=json.dumps(about), allow_pickle=False, **snapshot.arrays)
-    partial.replace(target)
 
 
 def read_snapshot(path: str | Path, solids: Any) -> tuple[Snapshot, str]:
@@ -172,8 +171,11 @@ def read_snapshot(path: str | Path, solids: Any) -> tuple[Snapshot, str]:
             targets={int(k): _pose(row) for k, row in about["targets"].items()},
             growing={int(k): (age, time) for k, (age, time) in about["growing"].items()},
         )
-    except (OSError, KeyError, ValueError, EOFError) as error:
-        raise WavetankError(f"{path}: this is not a state that `Simulation.save` wrote: {error}.") from None
+    except OSError as error:
+        raise WavetankError(f"{path}: the state cannot be read: {error.strerror or error}.") from None
+    except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        why = "it holds objects, not arrays" if "pickle" in str(error) else str(error).rstrip(".")
+        raise WavetankError(f"{path}: this is not a state that `Simulation.save` wrote: {why}.") from None
     return snapshot, scene
 
 

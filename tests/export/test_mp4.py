@@ -73,6 +73,8 @@ def test_no_picture_no_file(tmp_path):
 def test_mistakes_are_named(tmp_path):
     with pytest.raises(WavetankError, match="rates"):
         VideoWriter(tmp_path / "a.mp4", 64, 48, fps=0.0)
+    with pytest.raises(WavetankError, match="ends with .mp4"):
+        VideoWriter(tmp_path / "a.avi", 64, 48)
     with pytest.raises(WavetankError, match="no folder"):
         VideoWriter(tmp_path / "missing" / "a.mp4", 64, 48)
     with VideoWriter(tmp_path / "a.mp4", 64, 48) as video, pytest.raises(WavetankError, match="does not fit"):

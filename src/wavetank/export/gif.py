@@ -7,7 +7,7 @@ from types import TracebackType
 import numpy as np
 
 from wavetank.errors import WavetankError
-from wavetank.export.replacing import partial_path
+from wavetank.replacing import partial_path
 
 SUFFIXES = (".gif",)
 KIND = "video"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.errors import WavetankError
-from wavetank.export.replacing import partial_path
+from wavetank.replacing import partial_path
 
 SUFFIXES = (".mp4",)
 KIND = "video"
@@ -31,6 +31,8 @@ class VideoWriter:
                 f"video: {width} x {height} at {fps} frames per second is not allowed; "
                 "sizes start at 1, rates lie between 0.1 and 1000."
             )
+        if Path(path).suffix.lower() != ".mp4":
+            raise WavetankError(f"{str(path)!r}: a video is an MP4; give the file a name that ends with .mp4.")
         self.path, self.width, self.height = Path(path), int(width), int(height)
         self.count = 0
         self._rate = Fraction(fps).limit_denominator(1001)

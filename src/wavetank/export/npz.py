@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wavetank.export.replacing import replacing
 from wavetank.frame import Frame
+from wavetank.replacing import replacing
 
 SUFFIXES = (".npz",)
 KIND = "particles"

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from wavetank.errors import WavetankError
-from wavetank.export.replacing import replacing
 from wavetank.frame import Frame
+from wavetank.replacing import replacing
 
 SUFFIXES = (".ply",)
 KIND = "particles"

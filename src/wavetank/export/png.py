@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from wavetank.errors import WavetankError
-from wavetank.export.replacing import replacing
+from wavetank.replacing import replacing
 
 SUFFIXES = (".png",)
 KIND = "picture"

@@ -21,6 +21,7 @@ from wavetank.export.gif import LARGEST_RATE, GifWriter
 from wavetank.export.mp4 import VideoWriter
 from wavetank.export.png import write_png
 from wavetank.frame import Frame
+from wavetank.replacing import make_folder
 from wavetank.simulation import Simulation
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import QUALITIES, quality_named
@@ -70,7 +71,7 @@ def record(
     look = {**look, "samples": samples}
     renderer = Renderer(*size, supersample)
     renderer.render(sim.frame(), **look)  # what is wrong with the look shows before anything is written
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     files: list[str] = []
     summary = _Summary(sim, seconds)
     with ExitStack() as stack:
@@ -216,6 +217,7 @@ class _Summary:
             "arch": self.sim.arch,
             "interrupted": self.interrupted,
             "seconds_of_water": self.sim.time - self.begin,
+            "energy_start": energies[0],
             "worst": {
                 "density_error_mean": max(row["density_error_mean"] for row in rows),
                 "density_error_p99": max(row["density_error_p99"] for row in rows),

@@ -13,6 +13,7 @@ from typing import Any
 from wavetank.errors import WavetankError
 from wavetank.front.gate import is_loopback
 from wavetank.recording import Recording
+from wavetank.replacing import partial_path
 from wavetank.scene import Scene
 from wavetank.session import Session
 
@@ -88,8 +89,18 @@ def play_in_window(scene: Scene, arch: str, *, record: Path | None = None, most:
 
 
 def _check_folder(record: Path | None) -> None:
-    if record is not None and not record.resolve().parent.is_dir():
+    if record is None:
+        return
+    if not record.resolve().parent.is_dir():
         raise WavetankError(f"--record {record}: the folder {record.resolve().parent} is not there; make it first.")
+    if record.is_dir():
+        raise WavetankError(f"--record {record}: this is a folder; name a file in it.")
+    partial = partial_path(record)
+    try:
+        partial.touch()
+        partial.unlink()
+    except OSError as error:
+        raise WavetankError(f"--record {record}: the file cannot be written: {error.strerror or error}.") from None
 
 
 def _keep(record: Path | None, session: Session, start: Scene) -> None:
@@ -111,7 +122,7 @@ def play_in_browser(
     with _ends_with(front.stop):
         front.start()
         where = "" if is_loopback(host) else " (anyone with this link can steer; it is not encrypted)"
-        print(f"wavetank plays at {front.url}{where}; Ctrl-C ends it", flush=True)
+        print(f"wavetank plays at {front.url}{where} (Ctrl-C ends it)", flush=True)
         if browser:
             threading.Thread(target=webbrowser.open, args=(front.url,), daemon=True).start()
         try:

@@ -7,8 +7,8 @@ from typing import Any
 from wavetank import __version__
 from wavetank.errors import WavetankError
 from wavetank.export import exporter_for
-from wavetank.export.replacing import partial_path
 from wavetank.frame import Frame
+from wavetank.replacing import partial_path
 from wavetank.scene import Scene
 from wavetank.simulation import Simulation
 from wavetank.view.camera import Camera

@@ -8,8 +8,8 @@ from typing import Any
 from rich.table import Table
 
 from wavetank.errors import WavetankError
-from wavetank.export.replacing import replacing
 from wavetank.lab.stages import STAGE_NAMES
+from wavetank.replacing import replacing
 
 Figures = dict[str, Any]
 

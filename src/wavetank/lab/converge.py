@@ -17,6 +17,7 @@ from rich.console import Console
 from wavetank.errors import WavetankError
 from wavetank.lab.plots import BLUE, RED, pyplot, tidy
 from wavetank.params import PAPER_SPACING
+from wavetank.replacing import make_folder
 from wavetank.scene import Scene
 from wavetank.simulation import Simulation
 
@@ -45,7 +46,7 @@ def converge(
     if not 1 <= iterations <= 100:
         raise WavetankError(f"--iterations = {iterations} is not allowed; it must be a whole number from 1 to 100.")
     plt = pyplot()
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     say: Callable[[str], None] = console.print if console is not None else lambda text: None
     within: list[Row] = []
     along: list[Row] = []

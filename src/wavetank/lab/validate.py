@@ -14,6 +14,7 @@ from wavetank.errors import WavetankError
 from wavetank.lab.cases import CASES
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import pyplot
+from wavetank.replacing import make_folder
 
 
 def validate(
@@ -97,7 +98,7 @@ def bounds_text(figure: dict[str, Any]) -> str:
 
 
 def _write(folder: Path, case: Case, outcome: Outcome, plt: Any) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     with (folder / f"{case.name}.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(outcome.series)

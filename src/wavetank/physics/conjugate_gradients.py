@@ -16,8 +16,9 @@ inner product of masses, sum m a . b, and no eigenvalue is below one.
     beta        beta               share of the last direction                                1
 
 It starts at what viscosity did in the last step, and ends where the velocities are right to a part of what it does in
-this one. No eigenvalue below one: the square of their error is at most that of the energy norm, of which the iterations
-since a look took at least alpha gamma each (Strakos and Tichy 2002, Electron. Trans. Numer. Anal. 13, 56).
+this one. As no eigenvalue is below one, their error squared is at most that of the energy norm, of which an iteration
+takes alpha gamma: what the last few took tells what was left before them (Strakos and Tichy 2002, Electronic
+Transactions on Numerical Analysis 13, 56).
 
 The sums are those of equal slices, in order: they do not depend on threads. Forces between particles cancel in each of
 the vectors, so momentum is exact wherever the iterations end.

@@ -17,6 +17,15 @@ def partial_path(path: str | Path) -> Path:
     return target.with_name(f".{target.name}.{os.getpid()}.partial")
 
 
+def make_folder(path: str | Path) -> Path:
+    """Make a folder, and those that it is in, where there is none; raises `WavetankError` if that is not possible."""
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WavetankError(f"the folder {str(path)!r} cannot be made: {error.strerror or error}.") from None
+    return Path(path)
+
+
 @contextlib.contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """Give a temporary path to write to; it takes the place of `path` on success and is removed on an error."""
