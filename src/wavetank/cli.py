@@ -152,9 +152,9 @@ def play(
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
     record: Annotated[Path | None, typer.Option(help="Write the session to this TOML file at the end.")] = None,
     particles: Annotated[
-        int,
-        typer.Option(min=-1, help="Choose the spacing for about so many; 0 keeps the scene's. Without SCENE: 6000."),
-    ] = -1,
+        int | None,
+        typer.Option(min=0, help="Choose the spacing for about so many; 0 keeps the scene's. Without SCENE: 6000."),
+    ] = None,
     most: Annotated[int, typer.Option(min=1, help="Particles that a session may have.")] = 200_000,
     settings: Settings = [],  # noqa: B006
     arch: Arch = "cpu",
@@ -165,7 +165,7 @@ def play(
 
     name = _chosen(scene, level)
     world = _configured(name or "obstacle-tank", settings)
-    wanted = particles if particles >= 0 else 0 if name or settings else 6000
+    wanted = particles if particles is not None else 0 if name or settings else 6000
     if wanted:
         world = with_particles(world, wanted)
     begin(
@@ -244,7 +244,7 @@ def bench(
     ] = [],  # noqa: B006
     sizes: Annotated[str, typer.Option(help="Numbers of particles, as 10000,100000.")] = "",
     seconds: Annotated[float | None, typer.Option(help="Seconds of water of each run [0.5].")] = None,
-    repeats: Annotated[int, typer.Option(help="Passes that the medians are taken over.")] = 3,
+    repeats: Annotated[int, typer.Option(help="Passes that the medians are taken over, 2 or more.")] = 3,
     threads: Annotated[int | None, typer.Option(min=1, max=1024, help="Threads on the CPU; all without it.")] = None,
     peers: Annotated[bool, typer.Option("--peers", help="Compare with SPlisHSPlasH on the same dam break.")] = False,
     roofline: Annotated[

@@ -219,6 +219,8 @@ def test_the_legend_stays_in_its_corner(splash):
         ({"view": "slice", "cut": "w"}, "cut"),
         ({"view": "slice", "cut": "z=inf"}, "cut"),
         ({"view": "slice", "cut": ""}, "cut"),
+        ({"view": "slice", "cut": "z=1.2"}, "from 0 to 1 m"),
+        ({"view": "water", "cut": "z=0.5"}, "does not go with"),
         ({"samples": 0}, "samples"),
     ],
 )

@@ -118,6 +118,7 @@ def _loop(
     )  # fmt: skip
     with progress:
         task = progress.add_task("wavetank", total=seconds or 1.0, time=sim.time, fps=0.0, count=sim.count, error=0.0)
+        first = 0.0  # s until the first frame was done, with the kernels that it compiled
         with _interruptible() as interrupted:
             for number, frame in enumerate(sim.frames(seconds, fps)):
                 image = renderer.render(frame, **look) if renderer is not None else None
@@ -125,7 +126,8 @@ def _loop(
                     sink(number, frame, image)
                 summary.add()
                 elapsed = progress.tasks[0].elapsed or 0.0
-                speed = number / elapsed if elapsed > 0 else 0.0
+                first = elapsed if number == 0 else first
+                speed = number / (elapsed - first) if elapsed > first else 0.0
                 progress.update(
                     task, completed=sim.time - summary.begin, time=sim.time, fps=speed, count=sim.count,
                     error=summary.last["density_error_mean"],

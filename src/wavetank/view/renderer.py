@@ -109,7 +109,7 @@ class Renderer:
             scattering=scattering,
             tint=tint,
             usual=usual_depth(extent),
-            plane=style.plane(extent),
+            plane=style.plane(extent, frame.scene.tank is not None),
             hasty=style.hasty,
         )
 

@@ -50,6 +50,10 @@ class Style:
                 f"render: color_by = {self.color_by!r} does not go with the view {self.view!r}, which has the colour "
                 "of its fluid; use a colour such as '#3f99da', or the view particles or slice."
             )
+        if self.cut is not None and self.kind.name != "slice":
+            raise WavetankError(
+                f"render: cut = {self.cut!r} does not go with the view {self.view!r}; use the view slice."
+            )
         radius = self.radius
         if radius is not None and not (isinstance(radius, int | float) and 0.0 < radius <= 10.0):
             raise WavetankError(f"render: radius = {radius!r} must be a number of spacings above 0, at most 10.")
@@ -90,8 +94,8 @@ class Style:
             raise WavetankError(f"render: limits = {self.limits} must be two finite numbers, the lower one first.")
         return key_of(color_by), (low, high), name, colors
 
-    def plane(self, extent: Extent) -> tuple[Any, float]:
-        """Unit normal [3] of a slice, and its distance from the origin along it [m]."""
+    def plane(self, extent: Extent, tank: bool) -> tuple[Any, float]:
+        """Unit normal [3] of a slice, and its distance from the origin along it [m], which is inside of a tank."""
         axis, equals, place = ("z" if self.cut is None else self.cut).partition("=")
         axes = "xyz" if extent.dim == 3 else "z"
         try:
@@ -104,6 +108,11 @@ class Style:
             ) from None
         if not (math.isfinite(offset)):
             raise WavetankError(f"render: cut = {self.cut!r} is not allowed; the place must be a finite number [m].")
+        low, high = extent.lower[number], extent.upper[number]
+        if (tank or extent.dim == 2) and not low <= offset <= high:
+            raise WavetankError(
+                f"render: cut = {self.cut!r} is beside the water; the place must be from {low:g} to {high:g} m."
+            )
         return np.eye(3)[number], offset
 
 
