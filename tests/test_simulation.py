@@ -224,9 +224,10 @@ def test_particles_come_and_go_and_the_others_keep_their_ids(dim):
     sim.advance(0.05)
 
 
-def test_a_world_grows_without_a_trace():
+@pytest.mark.parametrize("viscosity", [0.0, 100.0])
+def test_a_world_grows_without_a_trace(viscosity):
     """Room made on the way changes nothing: the same water as with all of it from the start."""
-    scene = small()
+    scene = small(dynamic_viscosity=viscosity)
     late, early = Simulation(scene), Simulation(scene)
     early._make_room(10 * early.count)
     for sim in (late, early):
@@ -264,6 +265,23 @@ def test_a_state_keeps_all_that_tools_left_behind(tmp_path):
     for what in ("ids", "positions", "velocities", "dyes"):
         np.testing.assert_array_equal(getattr(again.frame(), what), getattr(sim.frame(), what))
     assert again.world.frozen == sim.world.frozen > 0
+
+
+@pytest.mark.parametrize("viscosity", [0.0, 1e3, 1e5])
+def test_what_lay_on_a_solid_falls_freely_without_it(viscosity):
+    """Neither the pressure that thick fluids carry on nor the drag they start from outlives the solid."""
+    plate = wt.Box(name="plate", center=(0.15, 0.1), size=(4.0, 0.2))
+    block = wt.Block(lower=(0.0, 0.2), upper=(0.3, 0.5), velocity=(3.0, 0.0))
+    sim = Simulation(
+        wt.Scene(spacing=0.02, gravity=(0, -9.81), dynamic_viscosity=viscosity, fluids=[block], solids=[plate])
+    )
+    for _ in range(3):
+        sim.step()
+    sim.remove_solid("plate")
+    before, start = sim.velocities.mean(axis=0), sim.time
+    sim.advance(0.1)
+    fall = [0.0, -9.81 * (sim.time - start)]
+    np.testing.assert_allclose(sim.velocities.mean(axis=0) - before, fall, atol=5e-3)
 
 
 def test_solids_come_and_go():

@@ -2,27 +2,31 @@
 
 import dataclasses
 import re
-from typing import Annotated
+from typing import Any
 
 from pydantic import Field, field_validator
 
-from wavetank.model import Model, Positive
-from wavetank.params import Parameters
+from wavetank.model import Model
+from wavetank.params import PARAMETERS, Parameters
 
 #: Colours of fluids that name none, in the order of the materials of a scene.
 COLORS = ("#2f7fd0", "#e0a526", "#c8553d", "#3c9a6b", "#8a63b8", "#6b7885")
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Angle = Annotated[float, Field(ge=0, le=180, allow_inf_nan=False)]
+
+
+def _as(name: str) -> Any:
+    """Declare a value that may be what the scene's parameter `name` may be."""
+    like = next(p for p in PARAMETERS if p.name == name)
+    return Field(default=None, ge=like.low, le=like.high, allow_inf_nan=False)
 
 
 class Material(Model):
     """A kind of fluid. What is not given is that of the scene."""
 
     name: str = ""
-    density: Positive | None = None  # kg/m^3
-    viscosity: NotNegative | None = None  # Pa s, dynamic
-    surface_tension: NotNegative | None = None  # N/m, towards air
-    contact_angle: Angle | None = None  # deg, on solids in air: 0 wets, 180 repels
+    density: float | None = _as("rest_density")  # kg/m^3
+    viscosity: float | None = _as("dynamic_viscosity")  # Pa s, dynamic
+    surface_tension: float | None = _as("surface_tension")  # N/m, towards air
+    contact_angle: float | None = _as("contact_angle")  # deg, on solids in air: 0 wets, 180 repels
     color: str | None = None  # '#rrggbb'
 
     @field_validator("color")

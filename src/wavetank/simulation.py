@@ -196,6 +196,7 @@ class Simulation:
         if number < 0:
             raise WavetankError(f"{name!r} is a wall of the tank, which stays; only other solids can be removed.")
         self.scene.assign("solids", [solid for k, solid in enumerate(self.scene.solids) if k != number])
+        population.forget_solid(self.world.particles, self.count, number + self.solids.tank_count)
         self.solids.remove(number + self.solids.tank_count)
         self._renew_solids()
 

@@ -157,7 +157,8 @@ def test_materials_of_one_density_cost_nothing():
         ({"materials": [{"name": "a"}, {"name": "a"}], "fluids": []}, "the name 'a' is used twice"),
         ({"materials": [{"name": "heavy", "colour": "#000000"}, {"name": "light"}]}, "did you mean 'color'"),
         ({"materials": [{"name": "heavy", "color": "red"}, {"name": "light"}]}, "write it as '#rrggbb'"),
-        ({"materials": [{"name": "heavy", "density": 0}, {"name": "light"}]}, "greater than 0"),
+        ({"materials": [{"name": "heavy", "density": 0}, {"name": "light"}]}, "density = 0 is not .* at least 0.001"),
+        ({"materials": [{"name": "heavy", "viscosity": 1e15}, {"name": "light"}]}, "at most 1000000"),
     ],
 )
 def test_mistakes_are_one_sentence(change, says):

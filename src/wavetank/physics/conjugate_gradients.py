@@ -21,7 +21,7 @@ takes alpha gamma: what the last few took tells what was left before them (Strak
 Transactions on Numerical Analysis 13, 56).
 
 The sums are those of equal slices, in order: they do not depend on threads. Forces between particles cancel in each of
-the vectors, so momentum is exact wherever the iterations end.
+the vectors, so momentum is as exact as that of the start, wherever the iterations end.
 """
 
 from typing import Any

@@ -6,7 +6,8 @@ Consistent Implicit Viscosity Solver for SPH Fluids" (10.1111/cgf.13349):
     rho_i dv_i/dt = sum_j mu_ij B f(q_ij) ((v_j - v_i) . n) n,     B = 2 dim (dim + 2) / sum_lattice f(q) r^2
 
 which is mu lap v for a flow without divergence. A damper along the line leaves translations and rotations alone, at a
-free surface too, and m_i dv_i is antisymmetric, so momentum and angular momentum are exact however far the solver gets.
+free surface too, and m_i dv_i is antisymmetric: from rest, momentum and angular momentum about where particles are
+predicted are exact however far the solver gets.
 
     code      symbol          meaning                                                     unit
     n         n               unit vector from j to i                                     1
@@ -19,7 +20,8 @@ Where we differ, and why:
 - f(q) = 1 - q, the weights of Müller et al. 2003 (10.2312/SCA03/154-159), not the gradient of a kernel: it has no
   pole, and B makes its second moment on the rest lattice exact, averaged over directions.
 - Conjugate gradients (`conjugate_gradients.py`) start at what viscosity did in the last step, which is not far off:
-  a sixth of the iterations that they take from rest, or Chebyshev's, where the fluid is thick (docs/materials.md).
+  half of the iterations that they take from rest, a quarter of Chebyshev's, where the fluid is thick
+  (docs/materials.md). Momentum is still exact; what is so stiff that it is turned (`turning.py`) keeps it to 1 %.
 - Solids hold the fluid back along their surface (no-slip) as half a rest lattice would that continues the
   velocity linearly to its value at the wall (Takeda et al. 1994, 10.1143/ptp/92.5.939; Morris et al. 1997,
   10.1006/jcph.1997.5776), from a table of the distance.
@@ -48,16 +50,16 @@ from wavetank.physics.neighbors import MAX_ENTRIES
 from wavetank.physics.pairs import keep_pairs, part_of, teams, turns
 from wavetank.physics.places import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.physics.turning import FORGET, RIGID, SHEARED, STIFF, turn_along
 from wavetank.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars
 
 STIFFER = 3.0  # times as stiff as the rest lattice: water in motion, and the drag of walls
 WORTH = 1e-5  # smallest kappa - 1 on the rest lattice for which a substep solves anything
+STIFFEST = 1e7  # eigenvalue beyond which single precision cannot tell what moves as a whole
 THICK = 1.0  # `thickness` in a usual step above which pressure is carried on; oil at centimetres has 0.06
 CARRIED, HALF = 0.9, 10.0  # largest share of the pressure that is carried on; `thickness` with half of it
 LARGEST = 5.0  # of gravity, that is carried on
 NEAREST = 0.25  # d: closer to a wall than this its drag grows no further
-#: Where the elements of a symmetric matrix of 2 x 2 and 3 x 3 stand whose upper triangle is kept row by row.
-PLACES = {2: ((0, 1), (1, 2)), 3: ((0, 1, 2), (1, 3, 4), (2, 4, 5))}
 
 
 def damper_scale(dim: int, ratio: float, d: float) -> float:
@@ -107,15 +109,15 @@ def damper(square, a, b, c: Coefficients):
 def prepare(
     packed: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles,
     rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, count: qd.i32,
-    no_slip: qd.f32,
+    no_slip: qd.f32, most: qd.f32,
 ):  # fmt: skip
-    """Start at what viscosity did in the last step, and find how fast the walls hold every particle back.
+    """Pack velocities and viscosities [Pa s], `most` at most, and find how fast the walls hold every particle back.
 
     That is over B dt / rho, with the normal along which they do not.
     """
     for i in range(count):
-        own = lift(particles.v[i] + c.dt * particles.viscous[i])
-        row = vec4(own.x, own.y, own.z, rows[particles.material[i]][1])
+        own = lift(particles.v[i])
+        row = vec4(own.x, own.y, own.z, qd.min(rows[particles.material[i]][1], most))
         packed[i] = row
         near = particles.near[i]
         pull = vec4(0.0, 0.0, 0.0, 0.0)
@@ -152,6 +154,14 @@ def join_pairs(
         part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
             keep_pairs(dampers, damper, team, particles, packed, grid, c, lanes)
+
+
+@qd.kernel(fastcache=True)
+def start(velocities: qd.types.ndarray(), particles: Particles, c: Coefficients, count: qd.i32):
+    """Start at the velocities that there are if viscosity does what it did in the last step."""
+    for i in range(count):
+        for k in qd.static(range(particles.v[i].n)):
+            velocities[i][k] = particles.v[i][k] + c.dt * particles.viscous[i][k]
 
 
 @qd.kernel(fastcache=True)
@@ -227,12 +237,17 @@ def solve_viscosity(
             "viscosity = 0 in its materials and dynamic_viscosity = 0."
         )
     dampers = fluids.pairs(grid)
-    prepare(packed, drag, normal, particles, fluids.rows, solids, fluids.arrays["drag table"], c, count, no_slip)
+    most = STIFFEST / (STIFFER * rate * stiffness(dim, ratio))
+    prepare(packed, drag, normal, particles, fluids.rows, solids, fluids.arrays["drag table"], c, count, no_slip, most)
     join_pairs(dampers, packed, particles, grid, c, count, grid.lanes)
     stiffest = 1.0 + STIFFER * rate * kinds.largest_density * kinds.kinematic_viscosity * stiffness(dim, ratio)
+    start(packed, particles, c, count)
+    if stiffest > STIFF:
+        turn_along(particles, packed, dampers, grid, c, count, RIGID / SHEARED[dim], FORGET, grid.lanes)
+        start(packed, particles, c, count)
     number = solve(
         packed, dampers, drag, normal, particles, scratch, fluids, grid, c, count, rate,
-        iterations(stiffest, largest_number),
+        iterations(min(stiffest, STIFFEST), largest_number),
     )  # fmt: skip
     take_velocities(particles, packed, c, count)
     return number

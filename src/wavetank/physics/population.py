@@ -16,9 +16,9 @@ from wavetank.compiler import download, qd, upload
 from wavetank.distance import SolidSet, lift, signed_distance, vec3
 from wavetank.physics.neighbors import copy_particle
 from wavetank.physics.places import predict_at
-from wavetank.state import Grid, Particles, integers, new_particles, vectors
+from wavetank.state import Grid, Particles, integers, new_particles, vectors, with_viscosity
 
-_FIELDS = ("x", "v", "a", "id", "material", "near", "dye", "frozen")
+_FIELDS: tuple[str, ...] = ("x", "v", "a", "id", "material", "near", "dye", "frozen")
 
 
 @qd.func
@@ -108,6 +108,15 @@ def copy_chosen(target: Particles, particles: Particles, grid: Grid, count: qd.i
 
 
 @qd.kernel(fastcache=True)
+def clear_forces(particles: Particles, count: qd.i32):
+    """Forget what accelerated the particles in the last step."""
+    for i in range(count):
+        particles.a[i] *= 0.0
+        if particles.viscous.shape[0] > 1:
+            particles.viscous[i] *= 0.0
+
+
+@qd.kernel(fastcache=True)
 def find_taken(
     taken: qd.types.ndarray(), places: qd.types.ndarray(), particles: Particles, solids: SolidSet, middle: vec3,
     reach: qd.f32, gap: qd.f32, wall: qd.f32, count: qd.i32, number: qd.i32,
@@ -151,6 +160,15 @@ def free_places(
     return result
 
 
+def forget_solid(particles: Particles, count: int, number: int) -> None:
+    """Forget what pressed and dragged the fluid if any of it was near the solid `number`, which is no longer there.
+
+    Thick fluids carry pressure on, and start where viscosity left off: they would go on lying on what is gone.
+    """
+    if np.any(download(particles.near)[:count] >> min(number, 30) & 1):
+        clear_forces(particles, count)
+
+
 def append(
     particles: Particles, count: int, x: np.ndarray, v: np.ndarray, dye: np.ndarray, material: np.ndarray, first_id: int
 ) -> None:
@@ -171,7 +189,9 @@ def keep_only(particles: Particles, spare: Particles, grid: Grid, keep: np.ndarr
 
 def at_capacity(particles: Particles, dim: int, capacity: int) -> Particles:
     """Return a copy with room for `capacity` particles; where they are predicted to go is left open."""
-    larger = new_particles(dim, capacity)
-    for name in _FIELDS:
+    larger, fields = new_particles(dim, capacity), _FIELDS
+    if particles.viscous.shape == particles.x.shape:
+        larger, fields = with_viscosity(larger), (*_FIELDS, "viscous")
+    for name in fields:
         upload(getattr(larger, name), download(getattr(particles, name))[: capacity + 1])
     return larger
