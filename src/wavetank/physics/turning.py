@@ -27,7 +27,7 @@ from wavetank.distance import lift, vec3
 from wavetank.physics.pairs import add_kept, column, part_of, teams, turns
 from wavetank.state import Coefficients, Grid, Particles
 
-STIFF = 3000.0  # largest eigenvalue from which on it is done: of what is less stiff, iterations come to all modes
+STIFF = 5000.0  # largest eigenvalue from which on it is done: of what is less stiff, iterations come to all modes
 RIGID = 10.0
 FORGET = 5.0
 #: sum D (m . dv)^2 / (h^2 omega^2 sum D m^2) in simple shear: the mean of (2 omega n_x n_y)^2 over directions is
