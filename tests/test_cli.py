@@ -73,6 +73,10 @@ def test_run_writes_what_was_asked_for(tmp_path):
         (("run", "drop", "--seconds", "nan"), ["--seconds = nan"]),
         (("run", "drop", "--fps", "0"), ["--fps = 0.0"]),
         (("run", "drop", "--size", "big"), ["--size = 'big'", "1280x720"]),
+        (("run", "drop", "--size", "10000x100"), ["--size = '10000x100'", "8192x8192"]),
+        (("run", "drop", "--name", "a/b"), ["--name = 'a/b'", "--out"]),
+        (("run", "drop", "--set", "viscosity=abc"), ["viscosity = 'abc'", "must be a number."]),
+        (("run", "drop", "--set", "gravity=0,-9.81,0"), ["gravity", "as [0, -9.81, 0]"]),
         (("run", "drop", "--export", "obj"), ["'obj'", "npz, csv, ply"]),
         (("run", "drop", "--color-by", "taste"), ["'taste'", "speed"]),
         (("run", "drop", "--arch", "opengl"), ["'opengl'", "cpu"]),
@@ -182,7 +186,7 @@ def test_ctrl_c_finishes_the_files(tmp_path):
     time.sleep(2.0)
     os.kill(process.pid, signal.SIGINT)
     stdout, stderr = process.communicate(timeout=120)
-    assert process.returncode == 0, stderr
+    assert (process.returncode, stderr.splitlines()[-1]) == (130, "wavetank: stopped."), stderr
     figures = json.loads(stdout.strip().splitlines()[-1])
     assert figures["interrupted"] is True
     assert len(pictures(tmp_path / "drop-2d.mp4")) > 0

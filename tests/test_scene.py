@@ -36,7 +36,7 @@ def scene(**keys) -> wt.Scene:
         ({"gravity": (0, -9.81)}, ["gravity", "2 components"]),
         ({"gravity": (0, float("inf"), 0)}, ["gravity", "inf", "finite"]),
         ({"iterations": 0}, ["iterations", "0", "at least 1"]),
-        ({"substeps": 2.5}, ["substeps", "2.5", "integer"]),
+        ({"substeps": 2.5}, ["substeps", "2.5", "whole number"]),
         ({"preset": "papers"}, ["preset", "'papers'", "'paper'"]),
     ],
 )
@@ -128,7 +128,7 @@ def test_schema_names_every_parameter():
 
 
 def test_files_that_are_not_scenes(tmp_path):
-    with pytest.raises(wt.WavetankError, match="neither a file nor a bundled scene.*obstacle-tank"):
+    with pytest.raises(wt.WavetankError, match="no file .*no bundled scene of that name.*obstacle-tank"):
         wt.Scene.load("no-such-scene")
     broken = tmp_path / "broken.toml"
     broken.write_text("spacing = = 3")

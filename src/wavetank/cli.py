@@ -97,13 +97,18 @@ def run(
         print(json.dumps(figures))
     else:
         _report(figures)
+    if figures["interrupted"]:
+        raise typer.Exit(130)
 
 
 @app.command()
 def render(
     world: Annotated[str, typer.Argument(metavar="SCENE|STATE.npz", help="A scene, or a state that was saved.")],
     at: Annotated[
-        float | None, typer.Option(help="Time of the picture [s]; a scene's best moment, mostly 0.5; a state's own.")
+        float | None,
+        typer.Option(
+            help="Time of the picture [s], to which a saved state goes on; its own, or a scene's best moment."
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(help="The picture, PNG.")] = Path("picture.png"),
     width: Annotated[int, typer.Option(help="Pixels.")] = 1280,
@@ -306,7 +311,7 @@ def _compare_backends(arch: str, as_json: bool) -> None:
         print(json.dumps(result))
         return
     table = Table(f"{result['scene']}, {result['particles']:,} particles, {result['seconds']:g} s", "cpu", arch)
-    for name, values in {**result["figures"], "mean height [m]": result["height"]}.items():
+    for name, values in {**result["figures"], "mean height, m": result["height"]}.items():
         table.add_row(name, *(f"{value:.4g}" for value in values))
     for view, seen in result["views"].items():
         text = f"{100 * seen['close']:.3f} % within {backends.CLOSE}/255, largest {seen['largest']}"
@@ -315,18 +320,23 @@ def _compare_backends(arch: str, as_json: bool) -> None:
 
 
 def main() -> None:
-    """Run the command line; a mistake is one line on stderr and exit code 1."""
+    """Run the command line; a mistake is one line on stderr and exit code 1, Ctrl-C exit code 130."""
     try:
         app(standalone_mode=True)
+    except SystemExit as end:
+        if end.code == 130:
+            print("wavetank: stopped.", file=sys.stderr)
+        raise
     except WavetankError as error:
         print(f"wavetank: {error}", file=sys.stderr)
         sys.exit(1)
     except (OSError, MemoryError) as error:
-        print(f"wavetank: {type(error).__name__}: {error}", file=sys.stderr)
+        place, reason = getattr(error, "filename", None), getattr(error, "strerror", None)
+        print(f"wavetank: {f'{place}: {reason}.' if place else f'{type(error).__name__}: {error}'}", file=sys.stderr)
         sys.exit(1)
     except KeyboardInterrupt:
         print("wavetank: stopped.", file=sys.stderr)
-        sys.exit(1)
+        sys.exit(130)
 
 
 def _configured(name: str, settings: list[str]) -> Scene:
@@ -364,8 +374,8 @@ def _value(text: str) -> Any:
 
 def _size(text: str) -> tuple[int, int]:
     width, _, height = text.lower().partition("x")
-    if not (width.isdigit() and height.isdigit() and 1 <= int(width) <= 16384 and 1 <= int(height) <= 16384):
-        raise WavetankError(f"--size = {text!r} is not allowed; write it as 1280x720, from 1x1 to 16384x16384.")
+    if not (width.isdigit() and height.isdigit() and 1 <= int(width) <= 8192 and 1 <= int(height) <= 8192):
+        raise WavetankError(f"--size = {text!r} is not allowed; write it as 1280x720, from 1x1 to 8192x8192.")
     return int(width), int(height)
 
 

@@ -71,7 +71,8 @@ class Recording(Model):
         try:
             table = tomllib.loads(Path(path).read_text("utf-8"))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise WavetankError(f"{path}: this recording cannot be read: {error}.") from None
+            reason = (isinstance(error, OSError) and error.strerror) or error
+            raise WavetankError(f"{path}: this recording cannot be read: {reason}.") from None
         recording: Recording = cls.parse(table, str(path))
         return recording
 

@@ -370,7 +370,7 @@ def _read(name: str | Path) -> tuple[str, str, Path]:
     if not path.is_file():
         near = difflib.get_close_matches(str(name), [*_names("scenes"), *_names("levels")], 1)
         raise WavetankError(
-            f"scene {str(name)!r} is neither a file nor a bundled scene; "
+            f"there is no file {str(name)!r}, and no bundled scene of that name; "
             + (f"did you mean {near[0]!r}? B" if near else "b")
             + f"undled are: {', '.join(_names('scenes'))}; levels: {', '.join(_names('levels'))}."
         )

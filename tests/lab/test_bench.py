@@ -100,6 +100,12 @@ def test_a_result_is_kept_and_compared(result, tmp_path):
     shown = text(bench_tables.comparison_table(old, new))
     assert "2.000 *" in shown
     assert shown.count("*") == 1
+    new["runs"][0]["size"] += 1
+    other = text(bench_tables.comparison_table(old, {**new, "runs": new["runs"][:1]}))
+    assert "no run in common" in other
+    assert f"{old['runs'][0]['scene']} {old['runs'][0]['size']:,} on cpu" in other
+    with pytest.raises(WavetankError, match="No such file"):
+        bench_tables.load_result(tmp_path / "none.json")
     (tmp_path / "other.json").write_text("{}")
     with pytest.raises(WavetankError, match=r"--compare .*other.json: this is not a result"):
         bench_tables.load_result(tmp_path / "other.json")

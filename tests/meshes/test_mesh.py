@@ -172,9 +172,15 @@ def test_data_that_is_none_is_refused():
 
 
 def test_a_library_that_is_missing_is_one_sentence(scene_file, monkeypatch):
+    from wavetank.meshes.mesh import _triangles
+
     monkeypatch.setitem(__import__("sys").modules, "trimesh", None)
-    with pytest.raises(wt.WavetankError, match=r"read by trimesh; install it: pip install 'wavetank\[mesh\]'"):
+    told = r"read by trimesh; install it: pip install 'wavetank\[mesh\]'"
+    with pytest.raises(wt.WavetankError, match=told):
         wt.Scene.load(scene_file)
+    _triangles.cache_clear()
+    with pytest.raises(wt.WavetankError, match=told):  # a bundled model is read by those who need it
+        wt.Simulation(wt.Scene.load("knot"))
 
 
 def test_grids_are_measured_once(cache, monkeypatch):

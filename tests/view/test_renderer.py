@@ -222,6 +222,8 @@ def test_the_legend_stays_in_its_corner(splash):
         ({"view": "slice", "cut": "z=1.2"}, "from 0 to 1 m"),
         ({"view": "water", "cut": "z=0.5"}, "does not go with"),
         ({"samples": 0}, "samples"),
+        ({"colour_by": "speed"}, "no option 'colour_by'; did you mean 'color_by'"),
+        ({"xyz": 1}, "no option 'xyz'; options are view, color_by"),
     ],
 )
 def test_mistakes_are_named(splash, options, message):
@@ -240,6 +242,9 @@ def test_render_takes_frames_and_whatever_has_one(splash):
     image = render(world, *SIZE)
     assert (image == render(splash, *SIZE)).all()
     assert (image == Renderer(*SIZE, 2).render(splash)).all()
+    assert (render(splash, *SIZE, quality="draft") == Renderer(*SIZE, 1).render(splash)).all()
+    with pytest.raises(WavetankError, match="quality = 'best' is not known; use one of draft, standard, film"):
+        render(splash, *SIZE, quality="best")
     with pytest.raises(WavetankError, match="int"):
         render(3)
 

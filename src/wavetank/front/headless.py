@@ -66,6 +66,8 @@ def record(
         raise WavetankError(f"--fps = {fps} is not allowed; it must be a number from 1 to 240.")
     if gif and fps > LARGEST_RATE:
         raise WavetankError(f"--fps = {fps} is too fast for --gif; at most {LARGEST_RATE:g}.")
+    if not name or Path(name).name != name:
+        raise WavetankError(f"--name = {name!r} is not allowed; it is the front part of file names, --out the folder.")
     writers = [exporter_named(format_) for format_ in exports]
     supersample, samples = QUALITIES[quality_named(quality)]
     look = {**look, "samples": samples}

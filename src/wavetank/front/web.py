@@ -237,6 +237,7 @@ def _listen(host: str, port: int | None) -> socket.socket:
             listener.close()
             if number == ports[-1]:
                 raise WavetankError(
-                    f"--port {number} on --host {host} cannot be opened: {error}; try 0 for any free one."
+                    f"--port {number} on --host {host} cannot be opened: {error}; "
+                    "try --port 0 for any free one, and --host 127.0.0.1."
                 ) from None
     raise AssertionError

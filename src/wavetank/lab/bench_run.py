@@ -121,7 +121,7 @@ def _peers(
     )  # fmt: skip
     found, (pbf, dfsph) = result["peers"], result["settings"]["particles"]
     table = Table(
-        "against SPlisHSPlasH", "ours / theirs", "[low, high]", "ours", "theirs", "density error, ours; theirs"
+        "against SPlisHSPlasH", "ours / theirs", "(low, high)", "ours", "theirs", "density error, ours; theirs"
     )
     for title, one, name in (
         (f"PBF, {pbf:,}: M particle-iterations/s", found["splishsplash_pbf"], "particle_iterations_per_second"),

@@ -68,6 +68,9 @@ def comparison_table(old: Figures, new: Figures) -> Table:
     """Return old, new and new / old of every run that both results have; a star marks what got worse by over 5 %."""
     table = Table("run", "figure", "old", "new", "new / old")
     before = {_key(old, run): run for run in old["runs"]}
+    if not before.keys() & {_key(new, run) for run in new["runs"]}:
+        known = ", ".join(f"{scene} {size:,} on {arch}" for scene, size, arch in before) or "none"
+        table.add_row("no run in common", f"the old result has: {known}")
     for run in new["runs"]:
         earlier = before.get(_key(new, run))
         if earlier is None:
@@ -96,9 +99,14 @@ def load_result(path: Path) -> Figures:
             raise TypeError("no runs")
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise WavetankError(
-            f"--compare {path}: this is not a result of `wavetank bench --out FILE`: {type(error).__name__}: {error}."
+            f"--compare {path}: this is not a result of `wavetank bench --out FILE`: {_reason(error)}."
         ) from None
     return result
+
+
+def _reason(error: Exception) -> str:
+    missing = f"no {error}" if isinstance(error, KeyError) else str(error)
+    return (isinstance(error, OSError) and error.strerror) or missing
 
 
 def save_result(result: Figures, path: Path) -> None:

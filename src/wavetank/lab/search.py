@@ -111,7 +111,7 @@ def _grid(x: np.ndarray, c: Any, repeats: int) -> tuple[list[float], int, int]:
 
 def search_table(result: dict[str, Any]) -> Table:
     """Return one row for each size and layout."""
-    table = Table("particles", "layout", "grid and lists [ns a particle]", "k-d tree [ns a particle]", "tree / grid")
+    table = Table("particles", "layout", "grid and lists, ns a particle", "k-d tree, ns a particle", "tree / grid")
     for row in result["search"]:
         count = row["particles"]
         table.add_row(

@@ -90,7 +90,7 @@ class Mesh(Solid):
     def grid(self, spacing: float) -> DistanceGrid:
         """Return the distances to this mesh for particles of that spacing [m], in its own frame.
 
-        Raises `WavetankError` for a mesh that is not closed or too large.
+        Raises `WavetankError` for a mesh that cannot be read, is not closed or too large.
         """
         triangles = self._triangles()
         points = triangles.vertices.astype(np.float64)
@@ -104,7 +104,10 @@ class Mesh(Solid):
         return grid_of(points * factor, triangles.faces, spacing, self.thickness, key, self.name or self._label())
 
     def _triangles(self) -> Triangles:
-        return _triangles(self.path, self.data)
+        try:
+            return _triangles(self.path, self.data)
+        except ValueError as error:
+            raise WavetankError(str(error)) from None
 
     def _label(self) -> str:
         return self.path or "the mesh"

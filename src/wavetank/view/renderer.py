@@ -22,7 +22,7 @@ from wavetank.view.look import Look, fluid_optics, paper, pool, studio, usual_de
 from wavetank.view.passes import tonemap
 from wavetank.view.quantities import QUANTITIES, usual
 from wavetank.view.shot import Shot
-from wavetank.view.style import Style
+from wavetank.view.style import QUALITIES, Style, quality_named
 from wavetank.view.views import Pass
 from wavetank.view.water_buffers import sun_texels
 
@@ -64,7 +64,7 @@ class Renderer:
         `options` are the fields of `Style`; `timings`, a dict, receives the milliseconds of each pass. Raises
         `WavetankError` for what is not allowed.
         """
-        style = Style(**options)
+        style = Style.of(options)
         shot = self.shot(frame, camera, style)
         if not self._rested(style, shot):
             self._run(style.kind.once, shot, timings)
@@ -252,13 +252,18 @@ _kept: collections.OrderedDict[tuple[int, int, int], Renderer] = collections.Ord
 
 
 def render(
-    world: Any, width: int = 1280, height: int = 720, *, supersample: int | None = None, **options: Any
-) -> np.ndarray:
+    world: Any, width: int = 1280, height: int = 720, *, quality: str | None = None, supersample: int | None = None,
+    **options: Any,
+) -> np.ndarray:  # fmt: skip
     """Return a picture of a `Frame` or a `Simulation`, uint8 [height, width, 3].
 
-    `options` are those of `Renderer.render`: a view by name, a camera and the fields of `Style`. Without a number
-    `supersample` is 2, or 1 for pictures of more than 16 million pixels. Renderers of the last few sizes are kept.
+    `options` are those of `Renderer.render`: a view by name, a camera and the fields of `Style`. `quality` is draft,
+    standard or film. Without either `supersample` is 2, or 1 for pictures of more than 16 million pixels. Renderers of
+    the last few sizes are kept.
     """
+    if quality is not None:
+        samples = QUALITIES[quality_named(quality)]
+        supersample, options = supersample or samples[0], {"samples": samples[1], **options}
     # Neighbours are searched for only where densities are seen.
     frame = world.frame(measured=options.get("color_by") == "density") if hasattr(world, "frame") else world
     if not (hasattr(frame, "scene") and hasattr(frame, "x")):

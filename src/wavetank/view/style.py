@@ -1,6 +1,7 @@
 """What a picture should show and how: the options of a picture, checked."""
 
 import dataclasses
+import difflib
 import math
 from typing import Any
 
@@ -33,6 +34,17 @@ class Style:
     legend: bool = True
     hasty: bool = False  # leave out what movement hides: smooth outlines, every second look of the sun at the water
     samples: int = 1  # pictures, each from a slightly other eye and sun, that are averaged
+
+    @classmethod
+    def of(cls, options: dict[str, Any]) -> "Style":
+        """Return the style with these options; raises `WavetankError` for a name that is none."""
+        known = [field.name for field in dataclasses.fields(cls)]
+        for name in options:
+            if name not in known:
+                near = difflib.get_close_matches(name, known, 1)
+                hint = f"did you mean {near[0]!r}?" if near else f"options are {', '.join(known)}."
+                raise WavetankError(f"render: there is no option {name!r}; {hint}")
+        return cls(**options)
 
     def __post_init__(self) -> None:
         """Check what needs no frame to be checked."""
@@ -119,5 +131,5 @@ class Style:
 def quality_named(name: str) -> str:
     """Return the name of a quality, or raise `WavetankError`."""
     if name not in QUALITIES:
-        raise WavetankError(f"--quality = {name!r} is not known; use one of {', '.join(QUALITIES)}.")
+        raise WavetankError(f"quality = {name!r} is not known; use one of {', '.join(QUALITIES)}.")
     return name
