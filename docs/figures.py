@@ -98,7 +98,7 @@ def figures(names: list[str]) -> None:
         return
     foam_figures()
     with tempfile.TemporaryDirectory() as folder:
-        converge(wt.Scene.load("obstacle-tank"), Path(folder), seconds=1.5)
+        converge(wt.Scene.load("obstacle-tank"), Path(folder), seconds=2.0)
         shutil.copy(Path(folder) / "converge.png", DOCS / "converge.png")
 
 

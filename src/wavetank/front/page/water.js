@@ -35,7 +35,7 @@ function build({ parameters, values }) {
     else {
       const range = about.name === "spacing" ? { low: values.spacing / 2, high: values.spacing * 2, default: null } : {};
       made = control({ ...about, ...range }, values[about.name], (v) => set(about, v));
-      if (!about.live) made.element.querySelector("label").append(make("small", { textContent: "reset" }));
+      if (!about.live) made.element.querySelector("label").append(make("small", { textContent: "at restart", title: "Takes effect when the water starts again" }));
     }
     controls.set(about.name, made);
     (about.everyday ? everyday : more).append(made.element);
