@@ -267,6 +267,63 @@ def test_a_state_keeps_all_that_tools_left_behind(tmp_path):
     assert again.world.frozen == sim.world.frozen > 0
 
 
+def test_a_look_after_growth_changes_nothing():
+    """What viscosity did has room where particles are sorted to, with viscosity and after it."""
+    found = []
+    for looks in (True, False):
+        sim = Simulation(small(dynamic_viscosity=100.0))
+        sim.step()
+        sim._make_room(20 * sim.count)
+        if looks:
+            assert sim.frame().densities.all()
+        sim.advance(0.05)
+        found.append(sim.positions)
+        sim.dynamic_viscosity = 0.0
+        sim._make_room(40 * sim.count)
+        sim.advance(0.02)
+        assert not sim.world.remembers_viscosity
+    np.testing.assert_array_equal(*found)
+
+
+def test_thawed_dough_falls_at_once():
+    """What held the ice does not hold what becomes of it: free fall, as water's."""
+    block = wt.Block(lower=(0.4, 0.4), upper=(0.6, 0.6))
+    sim = Simulation(
+        wt.Scene(spacing=0.02, gravity=(0, -9.81), dynamic_viscosity=1e3, tank=wt.Tank(size=(1, 1)), fluids=[block])
+    )
+    ends = np.array([0.0, 0.5, 0.0]), np.array([1.0, 0.5, 0.0])
+    sim.freeze_inside(*ends, 0.5)
+    assert sim.world.frozen == sim.count
+    sim.advance(0.2)
+    sim.freeze_inside(*ends, 0.5, frozen=False)
+    sim.advance(0.1)
+    assert sim.velocities[:, 1].mean() == pytest.approx(-0.981, rel=0.02)
+    sim.freeze_inside(*ends, 0.5)
+    sim.remove_inside(*ends, 0.5)
+    assert (sim.count, sim.world.frozen) == (0, 0)
+
+
+def test_the_second_of_two_solids_is_forgotten_like_the_first():
+    """Which solid the fluid lies on is asked where it is, not when neighbours were last searched for."""
+    falls = []
+    for others in ((), ("far",)):
+        plates = [wt.Box(name=name, center=(0.5, y), size=(1.0, 0.1)) for name, y in (("far", 0.9), ("shelf", 0.3))]
+        block = wt.Block(lower=(0.3, 0.35), upper=(0.7, 0.55))
+        tank = wt.Tank(size=(1, 1))
+        sim = Simulation(
+            wt.Scene(
+                spacing=0.02, gravity=(0, -9.81), dynamic_viscosity=300.0, tank=tank, fluids=[block], solids=plates
+            )
+        )
+        sim.advance(0.1)
+        for name in (*others, "shelf"):
+            sim.remove_solid(name)
+        before = sim.velocities[:, 1].mean()
+        sim.advance(0.1)
+        falls.append(sim.velocities[:, 1].mean() - before)
+    assert falls == pytest.approx([-0.981, -0.981], abs=0.02)
+
+
 @pytest.mark.parametrize("viscosity", [0.0, 1e3, 1e5])
 def test_what_lay_on_a_solid_falls_freely_without_it(viscosity):
     """Neither the pressure that thick fluids carry on nor the drag they start from outlives the solid."""
@@ -281,7 +338,7 @@ def test_what_lay_on_a_solid_falls_freely_without_it(viscosity):
     before, start = sim.velocities.mean(axis=0), sim.time
     sim.advance(0.1)
     fall = [0.0, -9.81 * (sim.time - start)]
-    np.testing.assert_allclose(sim.velocities.mean(axis=0) - before, fall, atol=5e-3)
+    np.testing.assert_allclose(sim.velocities.mean(axis=0) - before, fall, atol=1e-2)
 
 
 def test_solids_come_and_go():

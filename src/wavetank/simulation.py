@@ -196,7 +196,8 @@ class Simulation:
         if number < 0:
             raise WavetankError(f"{name!r} is a wall of the tank, which stays; only other solids can be removed.")
         self.scene.assign("solids", [solid for k, solid in enumerate(self.scene.solids) if k != number])
-        population.forget_solid(self.world.particles, self.count, number + self.solids.tank_count)
+        device, reach = self.solids.device, 2.0 * self.scene.support * self.scene.spacing
+        population.forget_solid(self.world.particles, self.count, device, number + self.solids.tank_count, reach)
         self.solids.remove(number + self.solids.tank_count)
         self._renew_solids()
 
@@ -265,7 +266,7 @@ class Simulation:
     def _keep(self, keep: np.ndarray) -> int:
         removed = int(len(keep) - keep.sum())
         if removed:
-            population.keep_only(self.world.particles, self.world.spare, self.world.grid, keep)
+            self.world.frozen = population.keep_only(self.world.particles, self.world.spare, self.world.grid, keep)
             self.world.particles, self.world.spare = self.world.spare, self.world.particles
             self.world.count -= removed
             self._outdated = True
@@ -275,7 +276,7 @@ class Simulation:
         """Move to a world with room for more particles."""
         before = self.world
         self._fill(capacity)
-        self.world.particles = population.at_capacity(before.particles, self.scene.dim, capacity)
+        self.world.adopt(population.at_capacity(before.particles, self.scene.dim, capacity))
         self.world.count, self.world.frozen, self.world.materials = before.count, before.frozen, before.materials
         if before.pool is not None:
             rows = pool_rows(before.pool, self.scene.dim)

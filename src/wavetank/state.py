@@ -286,6 +286,11 @@ def with_viscosity(particles: Particles) -> Particles:
     return dataclasses.replace(particles, viscous=vectors(particles.x.element_shape[0], particles.x.shape[0]))
 
 
+def without_viscosity(particles: Particles) -> Particles:
+    """Return the particles with one row of what viscosity did, as worlds have where nothing is viscous."""
+    return dataclasses.replace(particles, viscous=vectors(particles.x.element_shape[0], 1))
+
+
 def new_scratch(capacity: int) -> Scratch:
     """Allocate the scratch arrays."""
     rows = capacity + MARGIN

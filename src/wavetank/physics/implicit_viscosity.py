@@ -57,8 +57,9 @@ STIFFER = 3.0  # times as stiff as the rest lattice: water in motion, and the dr
 WORTH = 1e-5  # smallest kappa - 1 on the rest lattice for which a substep solves anything
 STIFFEST = 1e7  # eigenvalue beyond which single precision cannot tell what moves as a whole
 THICK = 1.0  # `thickness` in a usual step above which pressure is carried on; oil at centimetres has 0.06
-CARRIED, HALF = 0.9, 10.0  # largest share of the pressure that is carried on; `thickness` with half of it
+CARRIED, HALF = 0.83, 10.0  # largest share of the pressure that is carried on; `thickness` with half of it
 LARGEST = 5.0  # of gravity, that is carried on
+AGAIN = 6.0  # times the push of the same step, that is carried on; at rest it is `CARRIED` / (1 - `CARRIED`) = 4.9
 NEAREST = 0.25  # d: closer to a wall than this its drag grows no further
 
 
@@ -179,12 +180,13 @@ def take_velocities(particles: Particles, packed: qd.types.ndarray(), c: Coeffic
 @qd.kernel(fastcache=True)
 def carry_pressure(
     particles: Particles, rows: qd.types.ndarray(), c: Coefficients, count: qd.i32, most: qd.f32, half: qd.f32,
-    rate: qd.f32, largest: qd.f32,
+    rate: qd.f32, largest: qd.f32, again: qd.f32,
 ):  # fmt: skip
     """Keep the share of what pressure and solids accelerated thick fluids by that the next prediction begins with.
 
     It is called before velocities are read off. `rate` is the `thickness` of the heaviest fluid over its viscosity;
-    the share is `most`, half of that where the thickness is `half`, and no more than `largest` [m/s^2] is kept.
+    the share is `most`, half of that where the thickness is `half`, and no more than `largest` [m/s^2] is kept, nor
+    more than `again` times the push of this step: what has left the floor is not pushed any more.
     """
     for i in range(count):
         row = rows[particles.material[i]]
@@ -192,7 +194,8 @@ def carry_pressure(
         a = particles.a[i] + pushed / (c.dt * c.dt)
         thick = rate * row[0] * row[1]
         share = most * thick / (half + thick)
-        particles.a[i] = a * (share * qd.min(1.0, largest / qd.max(a.norm(), 1e-12)))
+        limit = qd.min(largest, again * pushed.norm() / (c.dt * c.dt))
+        particles.a[i] = a * (share * qd.min(1.0, limit / qd.max(a.norm(), 1e-12)))
 
 
 def thickness(viscosity: float, params: Parameters, dt: float) -> float:
@@ -258,7 +261,7 @@ def carry_on(
 ) -> None:  # fmt: skip
     """Let thick fluids carry on a share of what pressed them in this step."""
     rate, largest = thickness(1.0 / kinds.largest_density, params, c.dt), LARGEST * math.hypot(*params.gravity)
-    carry_pressure(particles, fluids.rows, c, count, CARRIED, HALF, rate, largest)
+    carry_pressure(particles, fluids.rows, c, count, CARRIED, HALF, rate, largest, AGAIN)
 
 
 def carried_share(kinds: Blend, params: Parameters) -> float:

@@ -87,7 +87,7 @@ def copy_particle(target: Particles, to, source: Particles, i):
     predict_at(target, to, predicted(source, i))
     target.v[to] = source.v[i]
     target.a[to] = source.a[i]
-    if source.viscous.shape[0] > 1:
+    if source.viscous.shape[0] > 1 and target.viscous.shape[0] > 1:
         target.viscous[to] = source.viscous[i]
     target.id[to] = source.id[i]
     target.material[to] = source.material[i]

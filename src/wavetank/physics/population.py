@@ -74,6 +74,9 @@ def stop_frozen(particles: Particles, count: qd.i32):
     for i in range(count):
         if particles.frozen[i] == 1:
             particles.v[i] *= 0.0
+            particles.a[i] *= 0.0
+            if particles.viscous.shape[0] > 1:
+                particles.viscous[i] *= 0.0
 
 
 @qd.kernel(fastcache=True)
@@ -160,12 +163,22 @@ def free_places(
     return result
 
 
-def forget_solid(particles: Particles, count: int, number: int) -> None:
-    """Forget what pressed and dragged the fluid if any of it was near the solid `number`, which is no longer there.
+@qd.kernel(fastcache=True)
+def count_near(particles: Particles, solids: SolidSet, number: qd.i32, reach: qd.f32, count: qd.i32) -> qd.i32:
+    """Count the particles within `reach` [m] of the solid `number`, where both are now."""
+    total = 0
+    for i in range(count):
+        if signed_distance(solids, number, lift(particles.x[i])).w < reach:
+            total += 1
+    return total
+
+
+def forget_solid(particles: Particles, count: int, solids: SolidSet, number: int, reach: float) -> None:
+    """Forget what pressed and dragged the fluid if any is within `reach` [m] of the solid `number`, which is to go.
 
     Thick fluids carry pressure on, and start where viscosity left off: they would go on lying on what is gone.
     """
-    if np.any(download(particles.near)[:count] >> min(number, 30) & 1):
+    if count and count_near(particles, solids, number, reach, count):
         clear_forces(particles, count)
 
 
@@ -180,11 +193,15 @@ def append(
     append_rows(particles, count, *arrays, rows, first_id)
 
 
-def keep_only(particles: Particles, spare: Particles, grid: Grid, keep: np.ndarray) -> None:
-    """Copy the particles where `keep`, bool [count] in device order, to the front of `spare`."""
+def keep_only(particles: Particles, spare: Particles, grid: Grid, keep: np.ndarray) -> int:
+    """Copy the particles where `keep`, bool [count] in device order, to the front of `spare`.
+
+    Return how many of them are ice.
+    """
     chosen = np.flatnonzero(keep)
     upload(grid.order, chosen)
     copy_chosen(spare, particles, grid, len(chosen))
+    return int(np.count_nonzero(download(spare.frozen)[: len(chosen)]))
 
 
 def at_capacity(particles: Particles, dim: int, capacity: int) -> Particles:

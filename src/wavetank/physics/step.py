@@ -49,6 +49,7 @@ from wavetank.state import (
     exchanged,
     remembered,
     with_viscosity,
+    without_viscosity,
 )  # fmt: skip
 
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
@@ -88,11 +89,21 @@ class World:
         """Whether there is room for what viscosity did to each particle."""
         return bool(self.particles.viscous.shape == self.particles.x.shape)
 
+    def adopt(self, particles: Particles) -> None:
+        """Take other particles, and make room for all that is known of them where they are sorted to."""
+        self.particles = particles
+        if self.remembers_viscosity:
+            self.remember_viscosity()
+
     def remember_viscosity(self, values: np.ndarray | None = None) -> None:
         """Make room for what viscosity did to each particle, and set it to `values` [m/s^2], [n, dim], if any."""
         self.particles, self.spare = with_viscosity(self.particles), with_viscosity(self.spare)
         if values is not None:
             upload(self.particles.viscous, values)
+
+    def forget_viscosity(self) -> None:
+        """Forget what viscosity did before it was switched off: the fluid will be elsewhere when it comes back."""
+        self.particles, self.spare = without_viscosity(self.particles), without_viscosity(self.spare)
 
 
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
@@ -102,6 +113,8 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     carries_on = is_thick(kinds, params)
     if is_viscous(kinds, params, dt):
         world.remember_viscosity()
+    elif world.remembers_viscosity:
+        world.forget_viscosity()
     # What thick fluids carry on has been shortened to their share already.
     share = carried(dt, params.frame_time) if on_grid else float(carries_on)
     c = coefficients(params, dt, speed_limit, carries=share)
