@@ -2,7 +2,13 @@
 
 from wavetank.compiler import qd
 
-SCAN_BLOCK = 1024  # values that one thread sums up; the kernel spells it out
+SCAN_BLOCK = 128  # values, or sums of as many, that one thread sums up; the kernel spells it out
+
+
+def blocks_of(values: int) -> int:
+    """Return how many sums `sum_up` needs room for: of all blocks, and of all blocks of these."""
+    blocks = -(-values // SCAN_BLOCK)
+    return max(1, blocks + -(-blocks // SCAN_BLOCK))
 
 
 @qd.func
@@ -43,38 +49,48 @@ def sort_by(
 
 
 @qd.func
+def sum_of(values: qd.template(), begin, end):
+    """The sum of the values from `begin` to `end`."""
+    total = 0
+    for k in range(begin, end):
+        total += values[k]
+    return total
+
+
+@qd.func
+def run_up(values: qd.template(), begin, end, total):
+    """Replace the values from `begin` to `end` by `total` and the sums of those before them; return the sum of all."""
+    for k in range(begin, end):
+        own = values[k]
+        values[k] = total
+        total += own
+    return total
+
+
+@qd.func
 def sum_up(values: qd.template(), blocks: qd.template(), count, shared: qd.template()):
     """Replace the first `count` values by the sums of those before them, and write the total behind.
 
-    One thread does it, or all threads share it where `shared`. To be called at the top level of a kernel.
+    One thread does it, or all threads share it where `shared`, in blocks and blocks of blocks (Blelloch 1990, "Prefix
+    sums and their applications"). To be called at the top level of a kernel.
     """
     if qd.static(shared):
-        for b in range((count + 1023) // 1024):
-            total = 0
-            for k in range(b * 1024, qd.min((b + 1) * 1024, count)):
-                total += values[k]
-            blocks[b] = total
+        for b in range((count + 127) // 128):
+            blocks[b] = sum_of(values, b * 128, qd.min((b + 1) * 128, count))
+        for b in range(((count + 127) // 128 + 127) // 128):
+            few = (count + 127) // 128
+            blocks[few + b] = sum_of(blocks, b * 128, qd.min((b + 1) * 128, few))
         qd.loop_config(serialize=True)
         for _ in range(1):
-            total = 0
-            for b in range((count + 1023) // 1024):
-                own = blocks[b]
-                blocks[b] = total
-                total += own
-            values[count] = total
-        for b in range((count + 1023) // 1024):
-            total = blocks[b]
-            for k in range(b * 1024, qd.min((b + 1) * 1024, count)):
-                own = values[k]
-                values[k] = total
-                total += own
+            few = (count + 127) // 128
+            values[count] = run_up(blocks, few, few + (few + 127) // 128, 0)
+        for b in range(((count + 127) // 128 + 127) // 128):
+            few = (count + 127) // 128
+            run_up(blocks, b * 128, qd.min((b + 1) * 128, few), blocks[few + b])
+        for b in range((count + 127) // 128):
+            run_up(values, b * 128, qd.min((b + 1) * 128, count), blocks[b])
     else:
         # A processor is done with it before other threads have started, or nearly so.
         qd.loop_config(serialize=True)
         for _ in range(1):
-            total = 0
-            for k in range(count):
-                own = values[k]
-                values[k] = total
-                total += own
-            values[count] = total
+            values[count] = run_up(values, 0, count, 0)

@@ -12,7 +12,7 @@ from wavetank.physics.diffuse.potentials import add_potentials, find_normals, li
 from wavetank.physics.diffuse.update import air
 from wavetank.physics.pairs import part_of, teams, turns
 from wavetank.state import Air, Births, Coefficients, Grid, Particles, Walls, integers, scalars
-from wavetank.sums import sum_up
+from wavetank.sums import blocks_of, sum_up
 
 
 @qd.kernel
@@ -122,10 +122,10 @@ def test_random_numbers_are_even_and_independent():
 
 
 @pytest.mark.parametrize("shared", [0, 1])
-@pytest.mark.parametrize("count", [0, 1, 1023, 1024, 1025, 70_000])
+@pytest.mark.parametrize("count", [0, 1, 127, 128, 129, 16_384, 16_385, 70_000])
 def test_the_scan_is_a_prefix_sum(count, shared):
     values = np.random.default_rng(count).integers(0, 5, count)
-    device, blocks = integers(count + 1), integers(-(-count // 1024))
+    device, blocks = integers(count + 1), integers(blocks_of(count))
     upload(device, values)
     scan(device, blocks, count, shared)
     np.testing.assert_array_equal(device.to_numpy()[: count + 1], np.concatenate([[0], np.cumsum(values)]))

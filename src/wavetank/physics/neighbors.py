@@ -29,7 +29,7 @@ from wavetank.errors import WavetankError
 from wavetank.physics.pairs import part_of, turns
 from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles, integers
-from wavetank.sums import SCAN_BLOCK, sort_by
+from wavetank.sums import blocks_of, sort_by
 
 PARTS = 8  # of a pass for each thread: enough to even out what takes longer
 MAX_ENTRIES = 2**31 - 1  # of a device array: the compiler counts them, and computes places in them, with 32 bits
@@ -97,7 +97,7 @@ def copy_particle(target: Particles, to, source: Particles, i):
 
 
 @qd.func
-def list_group(group, particles: Particles, grid: Grid, h2, count):
+def list_group(group, particles: Particles, grid: Grid, h2, count, lanes: qd.template()):
     """Write the neighbours of a group and return their number, even if it had no room."""
     room = grid.room
     dim = qd.static(particles.x[group].n)
@@ -131,9 +131,9 @@ def list_group(group, particles: Particles, grid: Grid, h2, count):
                     end = grid.start[over]
                 while begin < end:
                     length = qd.min(end - begin, block)
-                    hits = near_bits(particles, run, begin, length, h2)
+                    hits = near_bits(particles, run, begin, length, h2, lanes > 1)
                     if begin_run > first:
-                        hits &= ~near_bits(particles, earlier, begin, length, h2)
+                        hits &= ~near_bits(particles, earlier, begin, length, h2, lanes > 1)
                     while hits != qd.u32(0):
                         grid.list[group * room + qd.min(n, room - 1)] = begin + qd.math.ffs(hits) - 1
                         hits &= hits - qd.u32(1)
@@ -153,7 +153,16 @@ def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.
     for turn in range(turns((count + 7) >> 3, grid.parts, lanes)):
         part = part_of(turn, (count + 7) >> 3, grid.parts, lanes)
         for group in range(part[0], part[1]):
-            qd.atomic_max(most, list_group(group, particles, grid, c.h * c.h, count))
+            found = list_group(group, particles, grid, c.h * c.h, count, lanes)
+            if qd.static(lanes > 1):
+                qd.atomic_max(most, found)
+    if qd.static(lanes == 1):
+        # Few threads bring together what they have found (`time_step.largest_square`).
+        for thread in range(16384):
+            found = 0
+            for k in range(((count + 7 >> 3) + 16383 - thread) // 16384):
+                found = qd.max(found, grid.number[thread + 16384 * k])
+            qd.atomic_max(most, found)
     return most
 
 
@@ -170,11 +179,13 @@ def places_of(particles: Particles, first, begin, end):
 
 
 @qd.func
-def near_bits(particles: Particles, places: qd.template(), begin, length, h2):
-    """Bits of the particles from `begin` on, at most a block, that are within the root of `h2` of any of `places`."""
+def near_bits(particles: Particles, places: qd.template(), begin, length, h2, whole: qd.template()):
+    """Bits of the particles from `begin` on, at most a block, that are within the root of `h2` of any of `places`.
+
+    Vectors want a `whole` block, whose number of turns the compiler knows: the bits of what is too many are cut off.
+    """
     hits = qd.u32(0)
-    # Always a whole block, whose number of turns the compiler knows: the bits of what is too many are cut off.
-    for k in range(qd.static(32 if places.n == 3 else 16)):
+    for k in range(qd.static(32 if places.n == 3 else 16) if qd.static(whole) else length):
         p = predicted(particles, begin + k)
         nearest = 2.0 * h2
         for column in qd.static(range(places.m)):
@@ -228,7 +239,7 @@ def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, 
     total = int(cells.prod())
     return Grid(
         cell=integers(capacity), start=integers(total + 1), fill=integers(total),
-        blocks=integers(-(-total // SCAN_BLOCK)), order=integers(capacity), number=integers(_groups(capacity)),
+        blocks=integers(blocks_of(total)), order=integers(capacity), number=integers(_groups(capacity)),
         list=entries, room=room, lanes=lanes(),
         parts=PARTS * max(threads(), 1),
         nowhere=capacity,

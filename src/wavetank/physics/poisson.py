@@ -15,13 +15,14 @@ time step before: pressures that are carried over make water pulse (docs/method.
 import itertools
 import math
 
-from wavetank.compiler import qd, worth_sharing
+from wavetank.compiler import current_backend, qd, worth_sharing
 from wavetank.physics.coarse_grid import coordinates, piece_width
 from wavetank.state import CoarseGrid
 
 SWEEPS, MOST_SWEEPS = 8, 200  # of a level, and of the coarsest
 OVER_RELAXATION = 1.5
 LEAST_THETA = 0.1
+BLOCK_NODES = 8192  # at most, of a level that one block of a graphics processor sees to
 ZERO, FROM_COARSER, GO_ON = 0, 1, 2  # where a level starts
 
 
@@ -121,6 +122,22 @@ def relax_nodes(grid: CoarseGrid, row, first, last, over_relaxation):
             grid.lam[n] = qd.min(lam + over_relaxation * (total * grid.inverse[n] - lam), 0.0)
 
 
+@qd.func
+def start_piece(grid: CoarseGrid, coarser: CoarseGrid, piece, start, width: qd.template()):
+    """Set lambda of `width` nodes of a row to what `start` says."""
+    first = piece % grid.pieces * width
+    start_nodes(grid, coarser, piece // grid.pieces, first, qd.min(first + width, grid.nx), start)
+
+
+@qd.func
+def relax_piece(grid: CoarseGrid, piece, colour, over_relaxation, width: qd.template()):
+    """Relax those of `width` nodes of a row that have a `colour`."""
+    row = piece // grid.pieces
+    first = piece % grid.pieces * width
+    x = first + (row % grid.ny + row // grid.ny + colour) % 2
+    relax_nodes(grid, row, x, qd.min(first + width, grid.nx), over_relaxation)
+
+
 @qd.kernel(fastcache=True)
 def solve(
     grid: CoarseGrid, coarser: CoarseGrid, start: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32,
@@ -132,14 +149,10 @@ def solve(
     """
     if qd.static(shared):
         for piece in range(grid.pieces * grid.ny * grid.nz):
-            first = piece % grid.pieces * width
-            start_nodes(grid, coarser, piece // grid.pieces, first, qd.min(first + width, grid.nx), start)
+            start_piece(grid, coarser, piece, start, width)
         for colour in qd.static(range(2 * shared)):
             for piece in range(grid.pieces * grid.ny * grid.nz):
-                row = piece // grid.pieces
-                first = piece % grid.pieces * width
-                x = first + (row % grid.ny + row // grid.ny + colour) % 2
-                relax_nodes(grid, row, x, qd.min(first + width, grid.nx), over_relaxation)
+                relax_piece(grid, piece, colour, over_relaxation, width)
     else:
         # A grid of some thousand nodes is done before other threads have started.
         qd.loop_config(serialize=True)
@@ -149,6 +162,44 @@ def solve(
             for colour in range(2 * sweeps):
                 for row in range(grid.ny * grid.nz):
                     relax_nodes(grid, row, (row % grid.ny + row // grid.ny + colour) % 2, grid.nx, over_relaxation)
+
+
+@qd.func
+def wait_for_block(fenced: qd.template()):
+    """Wait until all threads of the block are here; what they wrote is read from here on.
+
+    On CUDA that is what the barrier means, elsewhere it must be said, so that waits are `fenced`.
+    """
+    if qd.static(fenced):
+        qd.simt.grid.mem_fence()
+    qd.simt.block.sync()
+    if qd.static(fenced):
+        qd.simt.grid.mem_fence()
+
+
+@qd.kernel(fastcache=True)
+def solve_in_block(
+    grid: CoarseGrid, coarser: CoarseGrid, start: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32,
+    fenced: qd.template(), width: qd.template(),
+):  # fmt: skip
+    """Do what `solve` does, in one launch on a graphics processor: its threads wait for each other after each colour.
+
+    Only those of a block can, so that this is for levels of some thousand nodes.
+    """
+    qd.loop_config(block_dim=512)
+    for thread in range(512):
+        pieces = grid.pieces * grid.ny * grid.nz
+        piece = thread
+        while piece < pieces:
+            start_piece(grid, coarser, piece, start, width)
+            piece += 512
+        wait_for_block(fenced)
+        for colour in range(2 * sweeps):
+            piece = thread
+            while piece < pieces:
+                relax_piece(grid, piece, colour, over_relaxation, width)
+                piece += 512
+            wait_for_block(fenced)
 
 
 @qd.func
@@ -184,9 +235,32 @@ def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: 
         couple_nodes(coarse, piece, least_theta, width)
 
 
+@qd.kernel(fastcache=True)
+def restrict_in_block(
+    coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, fenced: qd.template(), width: qd.template()
+):
+    """Do what `restrict` does, in one launch of one block on a graphics processor."""
+    qd.loop_config(block_dim=512)
+    for thread in range(512):
+        n = thread
+        while n < coarse.nx * coarse.ny * coarse.nz:
+            average_node(coarse, fine, n)
+            n += 512
+        wait_for_block(fenced)
+        piece = thread
+        while piece < coarse.pieces * coarse.ny * coarse.nz:
+            couple_nodes(coarse, piece, least_theta, width)
+            piece += 512
+
+
 def is_shared(level: CoarseGrid) -> bool:
     """Whether all threads see to a `level`."""
     return worth_sharing(level.nx * level.ny * level.nz)
+
+
+def in_block(level: CoarseGrid) -> bool:
+    """Whether one block of a graphics processor sees to a `level`: it is done before as many launches have begun."""
+    return current_backend() != "cpu" and level.nx * level.ny * level.nz <= BLOCK_NODES
 
 
 def coarsest_relaxation(level: CoarseGrid) -> tuple[int, float]:
@@ -209,18 +283,24 @@ def coarsest_relaxation(level: CoarseGrid) -> tuple[int, float]:
 
 def solve_levels(levels: list[CoarseGrid]) -> None:
     """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set."""
+    fenced, width = int(current_backend() != "cuda"), piece_width()
     for fine, coarse in itertools.pairwise(levels):
-        restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)), piece_width())
+        if in_block(coarse):
+            restrict_in_block(coarse, fine, LEAST_THETA, fenced, width)
+        else:
+            restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)), width)
     coarsest = coarser = levels[-1]
     for level in reversed(levels):
         start, sweeps, over_relaxation = FROM_COARSER, SWEEPS, OVER_RELAXATION
         if level is coarsest:
             start = ZERO
             sweeps, over_relaxation = coarsest_relaxation(level)
-        if is_shared(level):
+        if in_block(level):
+            solve_in_block(level, coarser, start, sweeps, over_relaxation, fenced, width)
+        elif is_shared(level):
             for _ in range(sweeps // SWEEPS):
-                solve(level, coarser, start, sweeps, over_relaxation, SWEEPS, piece_width())
+                solve(level, coarser, start, sweeps, over_relaxation, SWEEPS, width)
                 start = GO_ON
         else:
-            solve(level, coarser, start, sweeps, over_relaxation, 0, piece_width())
+            solve(level, coarser, start, sweeps, over_relaxation, 0, width)
         coarser = level

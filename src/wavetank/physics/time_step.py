@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.compiler import lanes, qd
 from wavetank.params import Parameters
 from wavetank.state import Particles
 
@@ -70,7 +70,7 @@ def filled_share(steps: float) -> float:
 
 def largest_speed(particles: Particles, count: int) -> float:
     """Return the largest speed [m/s] of the first `count` particles, 0 without any."""
-    return math.sqrt(float(np.int32(largest_square(particles, count)).view(np.float32))) if count else 0.0
+    return math.sqrt(float(np.int32(largest_square(particles, count, lanes())).view(np.float32))) if count else 0.0
 
 
 def pool_depth(
@@ -86,30 +86,66 @@ def pool_depth(
     if not height:
         return 0.0
     total = summed_levels(
-        particles, count, np.array([*up, 0.0][:3], np.float32), float(ends.min(axis=0).sum()), height / LEVELS
+        particles,
+        count,
+        np.array([*up, 0.0][:3], np.float32),
+        float(ends.min(axis=0).sum()),
+        height / LEVELS,
+        lanes(),
     )
     return max(0.0, 2.0 * height / LEVELS * total / count)
 
 
+@qd.func
+def square_at(particles: Particles, i):
+    """The bits of a squared speed: as integers, numbers of one sign stand in the same order."""
+    return qd.bit_cast(particles.v[i].norm_sqr(), qd.i32)
+
+
 @qd.kernel(fastcache=True)
-def largest_square(particles: Particles, count: qd.i32) -> qd.i32:
-    """Return the bits of the largest squared speed: as integers, numbers of one sign stand in the same order."""
+def largest_square(particles: Particles, count: qd.i32, lanes: qd.template()) -> qd.i32:
+    """Return the bits of the largest squared speed.
+
+    On a graphics processor, `lanes` = 1, few threads go through many particles each: what they have found they bring
+    together one by one, as do all threads that there are room for, were it a loop over particles.
+    """
     most = 0
-    for i in range(count):
-        qd.atomic_max(most, qd.bit_cast(particles.v[i].norm_sqr(), qd.i32))
+    if qd.static(lanes == 1):
+        for thread in range(16384):
+            own = 0
+            for k in range((count + 16383 - thread) // 16384):
+                own = qd.max(own, square_at(particles, thread + 16384 * k))
+            qd.atomic_max(most, own)
+    else:
+        for i in range(count):
+            qd.atomic_max(most, square_at(particles, i))
     return most
+
+
+@qd.func
+def level_at(particles: Particles, i, up, base, step):
+    """The height of a particle along `up` above `base`, in whole steps of `step` [m]."""
+    x = particles.x[i]
+    height = -base
+    for k in qd.static(range(x.n)):
+        height += up[k] * x[k]
+    return qd.cast(qd.round(height / step), qd.i32)
 
 
 @qd.kernel(fastcache=True)
 def summed_levels(
-    particles: Particles, count: qd.i32, up: qd.types.vector(3, qd.f32), base: qd.f32, step: qd.f32
-) -> qd.i32:
+    particles: Particles, count: qd.i32, up: qd.types.vector(3, qd.f32), base: qd.f32, step: qd.f32,
+    lanes: qd.template(),
+) -> qd.i32:  # fmt: skip
     """Sum the heights along `up` above `base`, each in whole steps of `step` [m]: whole numbers repeat in any order."""
     levels = 0
-    for i in range(count):
-        x = particles.x[i]
-        height = -base
-        for k in qd.static(range(x.n)):
-            height += up[k] * x[k]
-        qd.atomic_add(levels, qd.cast(qd.round(height / step), qd.i32))
+    if qd.static(lanes == 1):
+        for thread in range(16384):
+            own = 0
+            for k in range((count + 16383 - thread) // 16384):
+                own += level_at(particles, thread + 16384 * k, up, base, step)
+            qd.atomic_add(levels, own)
+    else:
+        for i in range(count):
+            qd.atomic_add(levels, level_at(particles, i, up, base, step))
     return levels

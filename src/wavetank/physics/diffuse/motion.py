@@ -41,7 +41,7 @@ def add_water(sums: qd.template(), point, begin, end, water: Particles, h):
         place[k, 0] = point[k]
     first = begin
     while first < end:
-        hits = near_bits(water, place, first, qd.min(end - first, block), h * h)
+        hits = near_bits(water, place, first, qd.min(end - first, block), h * h, True)
         while hits != qd.u32(0):
             j = first + qd.math.ffs(hits) - 1
             hits &= hits - qd.u32(1)

@@ -25,7 +25,7 @@ from wavetank.state import (
     scalars,
     vectors,
 )  # fmt: skip
-from wavetank.sums import SCAN_BLOCK
+from wavetank.sums import blocks_of
 
 #: What a saved state holds of spray, foam and bubbles, and the array of it.
 ROWS = {
@@ -60,7 +60,7 @@ def new_pool(dim: int, capacity: int, water: int) -> Pool:
     """Allocate an empty pool beside room for `water` particles."""
     births = Births(
         normal=vectors(dim, water + MARGIN), first=integers(water + 1), kept=integers(capacity + 1),
-        blocks=integers(-(-max(capacity, water) // SCAN_BLOCK)), reluctance=scalars(1),
+        blocks=integers(blocks_of(max(capacity, water))), reluctance=scalars(1),
     )  # fmt: skip
     births.reluctance.fill(1.0)
     return Pool(new_diffuse(dim, capacity), new_diffuse(dim, capacity), births, capacity)

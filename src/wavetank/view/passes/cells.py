@@ -12,7 +12,7 @@ import math
 from wavetank.compiler import qd, worth_sharing
 from wavetank.distance import lift
 from wavetank.frame import Frame
-from wavetank.sums import SCAN_BLOCK, sort_by
+from wavetank.sums import blocks_of, sort_by
 from wavetank.view.extent import Extent
 from wavetank.view.lens import vec3
 
@@ -47,7 +47,7 @@ def new_cells(frame: Frame, extent: Extent, edge: float) -> Cells:
         sizes[sizes.index(max(sizes))] = max(3, max(sizes) // 2)
     total = math.prod(sizes)
     start, fill = (qd.ndarray(qd.i32, shape=(n,)) for n in (total + 1, total))
-    blocks = qd.ndarray(qd.i32, shape=(-(-total // SCAN_BLOCK) + 1,))
+    blocks = qd.ndarray(qd.i32, shape=(blocks_of(total),))
     cell, order = (qd.ndarray(qd.i32, shape=(capacity,)) for _ in range(2))
     x = qd.ndarray(vec3, shape=(capacity,))
     nx, ny, nz = sizes
