@@ -16,6 +16,10 @@ from wavetank.scene import bundled_levels, scene_schema
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 console = Console(stderr=True)
 
+CASE_NAMES = (
+    "buckling, calm-vorticity, coiling, column, cup, drop, elliptical-drop, energy, gravity-current, layers, "
+    "lock-exchange, martin-moyce, momentum, resolution, seeds, shear-wave, standing-wave, still-tank, tension-drop"
+)
 SceneName = Annotated[str, typer.Argument(help="A bundled scene or the path of a TOML file.")]
 Settings = Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="Set a key of the scene.")]
 Arch = Annotated[str, typer.Option(help="Back end: cpu, gpu (the best there is), cuda, vulkan, metal, amdgpu.")]
@@ -222,7 +226,7 @@ def converge(
 
 @app.command()
 def validate(
-    cases: Annotated[list[str], typer.Argument(metavar="[CASE]...", help="Names of cases; all without a name.")] = [],  # noqa: B006
+    cases: Annotated[list[str], typer.Argument(metavar="[CASE]...", help=f"Of {CASE_NAMES}; all without a name.")] = [],  # noqa: B006
     quick: Annotated[bool, typer.Option("--quick", help="Coarser and shorter runs with bounds of their own.")] = False,
     out: Annotated[Path | None, typer.Option(help="Folder for a picture and a table of each case.")] = None,
     arch: Arch = "cpu",

@@ -120,7 +120,7 @@ def test_the_machine_is_described_without_its_name():
 
 def test_roofline_shares_follow_from_the_ceilings(monkeypatch):
     monkeypatch.setattr(roofline, "LARGE", 1 << 16)
-    monkeypatch.setattr(roofline, "CHAINS", 1 << 10)
+    monkeypatch.setattr(roofline, "SPINS", 1 << 10)
     result = roofline.roofline("dam-break", 400, seconds=0.05, repeats=2)
     assert all(value > 0.0 for value in result["ceilings"].values())
     assert {"solve_multipliers", "correct_positions", "list_neighbors", "reorder"} <= set(result["kernels"])

@@ -35,6 +35,10 @@ OPEN = {
 }
 
 
+def test_the_help_names_all_cases():
+    assert cli.CASE_NAMES.split(", ") == sorted(case.name for case in CASES)
+
+
 @pytest.mark.parametrize("name", QUICK)
 def test_quick_case_is_within_its_bounds(name):
     result = room.validate([name], quick=True)

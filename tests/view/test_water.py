@@ -111,17 +111,34 @@ def test_deeper_water_is_darker_and_has_its_colour(make_frame):
 
 
 def test_dye_colours_the_water_where_it_is(make_frame):
-    """Half of a pool is dyed red: that half is red, the other keeps its colour."""
+    """Half of a pool is dyed red, that to which the sunlight goes: that half is red, the other keeps its colour."""
     frame = pool(make_frame)
     dye = frame.dye.to_numpy()
-    dye[: frame.count] = np.where(frame.positions[:, 0] < 0.5, (127 << 24) | (230 << 16) | (30 << 8) | 40, 0)
+    dye[: frame.count] = np.where(frame.positions[:, 0] > 0.5, (127 << 24) | (230 << 16) | (30 << 8) | 40, 0)
     above = Camera(eye=(0.5, 4.0, 0.5), target=(0.5, 0.0, 0.5))
     clear = Renderer(64, 48).render(frame, above).astype(int)
     frame.dye.from_numpy(dye)
     dyed = Renderer(64, 48).render(frame, above).astype(int)
     left, right = (slice(20, 28), slice(24, 28)), (slice(20, 28), slice(36, 40))
-    assert dyed[left][..., 0].mean() > dyed[left][..., 2].mean() + 40
-    assert np.abs(dyed[right] - clear[right]).max() <= 2
+    assert dyed[right][..., 0].mean() > dyed[right][..., 2].mean() + 40
+    assert np.abs(dyed[left] - clear[left]).max() <= 2
+
+
+def test_the_shadow_of_dyed_water_has_its_colour(make_frame):
+    """Light that has gone through red water falls on the floor beside the tank (law of Beer and Lambert)."""
+    frame = pool(make_frame)
+    above = Camera(eye=(1.3, 4.0, 0.5), target=(1.3, 0.0, 0.5))
+    spot = Renderer(64, 48, supersample=1)
+    row, column = above.project((1.06, 0.0, 0.5), 64, 48)[0, 1::-1].astype(int)
+    dye = np.zeros_like(frame.dye.to_numpy())
+    shown = []
+    for own in (0, (127 << 24) | (230 << 16) | (30 << 8) | 40):
+        dye[: frame.count] = own
+        frame.dye.from_numpy(dye)
+        shown.append(spot.render(frame, above)[row, column].astype(int))
+    clear, dyed = shown
+    assert clear[2] > clear[0]
+    assert dyed[0] > dyed[2] + 15
 
 
 def test_what_stands_behind_the_water_is_seen_through_it_and_moved(make_frame):
@@ -261,3 +278,16 @@ def test_the_sun_of_a_sample_moves_within_its_size(make_frame):
     assert np.abs(offsets).max() <= 0.5
     assert np.abs(offsets.mean(axis=0)).max() < 0.06
     assert dataclasses.replace(moved[0], lens=shot.lens, sun=shot.sun, water_sun=shot.water_sun, look=shot.look) == shot
+
+
+def test_a_drop_on_the_glass_is_nearly_as_clear_as_the_glass(make_frame):
+    """Seen aslant it would mirror what is around, which the glass does not: a grey disc."""
+    tank = Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 1.0)))
+    place = np.array([[0.5, 0.6, 1.0 - 0.25 * D]], np.float32)
+    camera = Camera(eye=(2.5, 0.9, 1.6), target=tuple(place[0]), field_of_view=0.2)
+    with_drop, without = (
+        Renderer(64, 48).render(make_frame(tank, x), camera).astype(int) for x in (place, np.zeros((0, 3), np.float32))
+    )
+    change = np.abs(with_drop - without).max(axis=-1)
+    assert change[24, 26:30].max() < 20  # what lies flat on the glass: 46 when it mirrored
+    assert change.max() > 50  # its bulge on the other side is seen

@@ -4,7 +4,8 @@
 Three ceilings are measured with small kernels of the same compiler on the same threads, fastest of several tries:
 
 - copy: bytes per second of a copy, read and written counted, of arrays as large as the run's own, and of large ones;
-- arithmetic: multiplications and additions per second of independent chains that stay in registers;
+- arithmetic: multiplications and additions per second of independent chains that stay in registers, on a processor in
+  vectors, as many as hide how long each takes;
 - walk: neighbours per second of a loop over the run's own lists that does nothing but add up the ways to them, which
   every pass over lists has to pay.
 
@@ -27,15 +28,15 @@ from wavetank.errors import WavetankError
 from wavetank.lab.bench import check, measured, sized, timed
 from wavetank.lab.counts import water_bytes
 from wavetank.lab.machine import load, machine
-from wavetank.physics.pairs import add_neighbors, column, count_neighbors, part_of, teams, turns
+from wavetank.physics.pairs import add_neighbors, count_neighbors, part_of, teams, turns
 from wavetank.physics.step import coefficients
 from wavetank.scene import Scene
 from wavetank.simulation import Simulation
 from wavetank.state import Coefficients, Grid, Particles, scalars
 
 LARGE = 1 << 26  # numbers in each of two arrays that no cache holds
-CHAINS = 1 << 20
-OPERATIONS = 4 * 32 * 2  # of one chain element, see `spin`
+SPINS, TURNS, CHAINS = 1 << 15, 256, 8  # the kernel `spin` spells the last out
+WIDE = 32  # lanes of a chain on a processor, so that the compiler takes the longest vectors it has
 TRIES = 9
 
 
@@ -73,25 +74,29 @@ def copy(target: qd.types.ndarray(), source: qd.types.ndarray(), count: qd.i32):
 
 
 @qd.kernel(fastcache=True)
-def spin(values: qd.types.ndarray(), count: qd.i32, a: qd.f32, b: qd.f32):
-    """Multiply and add in four independent chains of 32 for each number."""
+def spin(values: qd.types.ndarray(), count: qd.i32, a: qd.f32, b: qd.f32, turns: qd.i32, wide: qd.template()):
+    """Multiply and add in eight independent chains of `wide` lanes for each number."""
     for i in range(count):
-        x = values[i]
-        y = x + 1.0
-        z = x + 2.0
-        w = x + 3.0
-        for _ in qd.static(range(32)):
-            x = x * a + b
-            y = y * a + b
-            z = z * a + b
-            w = w * a + b
-        values[i] = x + y + z + w
+        x = qd.Matrix.zero(qd.f32, 8, wide)
+        for lane in range(wide):
+            for k in qd.static(range(8)):
+                x[k, lane] = values[i] + k + lane
+        for _ in range(turns):
+            for lane in range(wide):
+                for k in qd.static(range(8)):
+                    x[k, lane] = x[k, lane] * a + b
+        # Not the sum: of that the compiler would compute the chains of all at once.
+        largest = 0.0
+        for lane in range(wide):
+            for k in qd.static(range(8)):
+                largest = qd.max(largest, x[k, lane])
+        values[i] = largest
 
 
 @qd.func
 def add_way(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add up the ways to the neighbours: the least that a pass over the lists can do."""
-    sums += r
+    sums[0] += r.sum()
 
 
 @qd.kernel(fastcache=True)
@@ -102,10 +107,10 @@ def walk(
     for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
         part = part_of(turn, teams(count, lanes), grid.parts, lanes)
         for team in range(part[0], part[1]):
-            ways = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+            ways = qd.Matrix.zero(qd.f32, 1, lanes)
             add_neighbors(ways, add_way, team, particles, particles.v, grid, c, 0)
             for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                total[i] = column(ways, i - team * lanes).norm_sqr()
+                total[i] = ways[0, i - team * lanes]
 
 
 def roofline(
@@ -162,11 +167,17 @@ def measure_ceilings(scene: Scene, arch: str) -> dict[str, float]:
     own = min(LARGE, max(1024, water_bytes(sim) // 8))
     target, source, c = scalars(LARGE), scalars(LARGE), coefficients(scene, scene.frame_time)
     source.fill(1.0)
+    wide = WIDE if compiler.lanes() > 1 else 1
     lists = int(count_neighbors(world.particles, world.grid, c, count).sum())
     return {
         "copy": 8.0 * own / _fastest(lambda: copy(target, source, own)),
         "copy_large": 8.0 * LARGE / _fastest(lambda: copy(target, source, LARGE)),
-        "arithmetic": CHAINS * OPERATIONS / _fastest(lambda: spin(target, CHAINS, 0.999, 0.001)),
+        "arithmetic": 2.0
+        * SPINS
+        * TURNS
+        * CHAINS
+        * wide
+        / _fastest(lambda: spin(target, SPINS, 0.999, 0.001, TURNS, wide)),
         "walk": lists / _fastest(lambda: walk(target, world.particles, world.grid, c, count, world.grid.lanes)),
     }
 

@@ -78,6 +78,7 @@ class Quantity:
     colormap: str
     limits: Callable[[Any], Limits]  # of the scene, so that the colours of a film do not jump
     palette: Callable[[Any], tuple[str, ...]] | None = None  # colours of bands instead of a colour map
+    title: str = ""  # in the legend, where that is not its name
 
 
 def usual(scene: Any) -> str:
@@ -89,7 +90,7 @@ QUANTITIES: dict[str, Quantity] = {
     "speed": Quantity(speed, "m/s", "water", _speed_limits),
     "density": Quantity(density, "kg/m^3", "balance", _density_limits),
     "material": Quantity(material, "", "viridis", _material_limits, _palette),
-    "foam": Quantity(speed, "m/s", "foam", _foam_limits),
+    "foam": Quantity(speed, "m/s", "foam", _foam_limits, title="speed"),
 }
 
 

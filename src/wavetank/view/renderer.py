@@ -227,7 +227,7 @@ def _write_legend(picture: np.ndarray, shot: Shot, style: Style, supersample: in
     elif color_by in QUANTITIES:
         quantity = QUANTITIES[color_by]
         colors = table(style.colormap or quantity.colormap)
-        column = legends.draw_bar(picture, colors, shot.limits, f"{color_by} [{quantity.unit}]")
+        column = legends.draw_bar(picture, colors, shot.limits, f"{quantity.title or color_by} [{quantity.unit}]")
     legends.write_time(picture, shot.frame.time, shot.frame.count, column)
     if shot.lens.perspective == 0.0:
         legends.draw_scale(picture, shot.lens.focal / supersample)

@@ -49,6 +49,7 @@ class WaterBuffers:
     sun_sums: Any  # i32 [parts x texels]: the same, of each part of the particles
     sun_first: Any  # i32 [texels, texels]: bits of the depth [m] at which the sun's rays meet the water
     sun_spare: Any  # i32 [texels, texels]: the same while it is being smoothed
+    sun_dye: Any  # i32 [texels, texels, 4]: the dyed part of the water along the sun's rays, as `dye`
     caustic: Any  # i32 [texels, texels]: light that refraction brings or takes, in 1 / 4096 of the sun's
     in_sun: Any  # vec3 [rows, columns]: radiance of what is not water that comes from the sun
     in_sky: Any  # vec3 [rows, columns]: and that comes from elsewhere, both without any water
@@ -99,6 +100,7 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
     upload(fields["stains"], stains)
     texels = sun_texels(extent)
     fields |= {name: qd.ndarray(qd.i32, shape=(texels, texels)) for name in SUN_MAPS}
+    fields["sun_dye"] = qd.ndarray(qd.i32, shape=(texels, texels, 4))
     fields["sun_sums"] = _sums(texels, texels)
     buffers.water = WaterBuffers(
         cells=new_cells(frame, extent, REACH * extent.spacing),

@@ -12,7 +12,7 @@ BUTTON = 2.3  # em
 NAMES = ("1/16 ×", "1/8 ×", "1/4 ×", "1/2 ×", "1 ×", "2 ×")
 
 
-def header(desk: Desk, frames_per_second: float) -> None:
+def header(desk: Desk, pictures_in_a_second: int) -> None:
     """Draw the line on top: the scene, particles, rates, and the truth about the pace."""
     em, status, world = imgui.get_font_size(), desk.status, desk.world
     at = imgui.get_cursor_screen_pos()
@@ -22,7 +22,7 @@ def header(desk: Desk, frames_per_second: float) -> None:
     imgui.same_line(0, em)
     imgui.text_colored(rgba(SOFT), world["title"] or "Scene")
     # A picture that rests is not a slow one.
-    rate = "" if status["paused"] else f"{frames_per_second:.0f} pictures/s     "
+    rate = "" if status["paused"] else f"{pictures_in_a_second} pictures/s     "
     text = f"{status['count']:,} particles     {rate}{world['arch']}"
     late = status["late"] and status["ticks"] > 10
     pace = "paused" if status["paused"] else f"{status['pace']:.2f} s of water a second"

@@ -1,6 +1,7 @@
 """The window itself: opens it, lays it out, shows the picture of the water, and keeps the beat."""
 
 import time
+from collections import deque
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ class Window:
         self.frames = 0
         self._plate: Plate | None = None
         self._shown = 0  # number of the picture on it
+        self._pictures: deque[float] = deque(maxlen=120)  # when the last ones came
         self._params = self._settings(size)
         self._stopped = False
 
@@ -129,7 +131,7 @@ class Window:
         texture = imgui.ImTextureRef(shown.glo) if shown is not None else None
         stage = (ImVec2(2 * GAP + rail, top), ImVec2(max(64.0, wide), max(64.0, room.y - top - bottom - 2 * GAP)))
         if self._part("header", ImVec2(GAP, 0), ImVec2(room.x - 2 * GAP, top), bare=True):
-            timeline.header(self.desk, imgui.get_io().framerate)
+            timeline.header(self.desk, self.pictures_in_a_second())
         imgui.end()
         if self._part("tools", ImVec2(GAP, top), ImVec2(rail, room.y - top - GAP)):
             self._tools()
@@ -186,3 +188,9 @@ class Window:
         if self._plate is not None and shown.image is not None and shown.number != self._shown:
             self._shown = shown.number
             self._plate.show(shown.image)
+            self._pictures.append(time.perf_counter())
+
+    def pictures_in_a_second(self) -> int:
+        """Return how many pictures of the water the last second brought; the window itself is drawn more often."""
+        now = time.perf_counter()
+        return sum(now - came < 1.0 for came in self._pictures)

@@ -22,7 +22,7 @@ from wavetank.view.look import Look
 from wavetank.view.passes.shade import background, smoothstep, surface_radiance
 from wavetank.view.passes.sunlight import LIGHT_STEP
 from wavetank.view.passes.tank import with_tank
-from wavetank.view.passes.thickness import thickness_at
+from wavetank.view.passes.thickness import dye_in, swallowed_by, thickness_at
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import UNIT, water_of
@@ -45,7 +45,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     paint(
         strips_of(buffers.depth), shot.lens, shot.water_sun, shot.look, shot.absorption, lower, upper,
         extent.spacing / UNIT, shot.frame.dim, buffers.depth, water.in_sun, water.in_sky, water.sun_thickness,
-        water.sun_first, water.caustic, buffers.lines, int(shot.frame.scene.tank is not None), water.behind,
+        water.sun_first, water.sun_dye, water.stained, shot.usual, water.caustic, buffers.lines,
+        int(shot.frame.scene.tank is not None), water.behind,
     )  # fmt: skip
 
 
@@ -68,7 +69,8 @@ def light_at(light: qd.template(), depth: qd.template(), row, column, step, z):
 
 @qd.func
 def sun_through_water(
-    sun: Lens, look: Look, absorption, at, unit, tau_map: qd.template(), first: qd.template(), caustic: qd.template()
+    sun: Lens, look: Look, absorption, at, unit, tau_map: qd.template(), first: qd.template(), dye: qd.template(),
+    stained, usual, caustic: qd.template(),
 ):  # fmt: skip
     """Share of the sun, per colour, that reaches the point `at` through the water."""
     c = to_view(sun, at)
@@ -77,7 +79,8 @@ def sun_through_water(
     texels = tau_map.shape[0]
     if qd.min(place.x, place.y) > 2.0 and qd.max(place.x, place.y) < texels - 2.0:
         light = 1.0 + look.caustic * qd.min(thickness_at(caustic, place, 1.0 / 4096.0), 3.0)
-        tau = thickness_at(tau_map, place, unit)
+        whole = thickness_at(tau_map, place, unit)
+        tau = whole
         if tau > 0.0:
             nearest = qd.bit_cast(first[qd.cast(place.y, qd.i32), qd.cast(place.x, qd.i32)], qd.f32)
             if nearest < 1e30:  # what lies above the water is in the full sun
@@ -85,8 +88,11 @@ def sun_through_water(
                 light = 1.0 + (light - 1.0) * qd.min(within / tau, 1.0)
                 tau = qd.min(tau, within)
         if tau > 0.0 or light != 1.0:
+            swallow = absorption
+            if stained == 1 and whole > 0.0:
+                swallow = swallowed_by(dye_in(dye, place, whole / unit), absorption, usual)
             veil = look.veil * (1.0 - qd.exp(-tau * (absorption.x + absorption.y)))
-            through = light * (1.0 - veil) * qd.exp(-0.6 * tau * absorption)
+            through = light * (1.0 - veil) * qd.exp(-0.6 * tau * swallow)
     return through
 
 
@@ -132,8 +138,8 @@ def divide(
 def paint(
     strips: Strips, lens: Lens, sun: Lens, look: Look, absorption: vec3, lower: vec3, upper: vec3, unit: qd.f32,
     dim: qd.template(), depth: qd.types.ndarray(), in_sun: qd.types.ndarray(), in_sky: qd.types.ndarray(),
-    tau_map: qd.types.ndarray(), first_depth: qd.types.ndarray(), caustic: qd.types.ndarray(),
-    lines: qd.types.ndarray(), has_tank: qd.i32, behind: qd.types.ndarray(),
+    tau_map: qd.types.ndarray(), first_depth: qd.types.ndarray(), dye: qd.types.ndarray(), stained: qd.types.ndarray(),
+    usual: qd.f32, caustic: qd.types.ndarray(), lines: qd.types.ndarray(), has_tank: qd.i32, behind: qd.types.ndarray(),
 ):  # fmt: skip
     """Put sun and sky together as far as the water leaves them, and lay the tank over it."""
     for task in range(strips.count):
@@ -146,7 +152,9 @@ def paint(
             if qd.static(dim == 3):
                 if z < 1e30:
                     at = origin + z * direction
-                    through = sun_through_water(sun, look, absorption, at, unit, tau_map, first_depth, caustic)
+                    through = sun_through_water(
+                        sun, look, absorption, at, unit, tau_map, first_depth, dye, stained[0], usual, caustic
+                    )
                     if through.x != 1.0 or through.z != 1.0:
                         # The sky comes from everywhere; water above takes some of it.
                         dim_sky = 0.45 + 0.55 * qd.min(through, 1.0)

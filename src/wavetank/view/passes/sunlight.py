@@ -42,6 +42,7 @@ def see_water(shot: Shot, buffers: Buffers) -> None:
         water.cells.x, shot.frame.count, sun, 1.0, thickness.DISC[3] * d, thickness.peak(3), water.sun_sums,
         water.sun_thickness,
     )  # fmt: skip
+    thickness.add_dye(shot, water, sun, 1.0, water.sun_dye)
     surface.see(shot, buffers, sun, water.sun_first)
     flatten.even(water.sun_first, water.sun_spare, sun, CAUSTIC_SIGMA * d, d, *walls(shot))
     panes.clip(sun, *walls(shot), water.sun_first)

@@ -19,7 +19,7 @@ from wavetank.view.lens import Lens, pixels_per_metre, to_pixel, to_view, vec2, 
 from wavetank.view.passes.spheres import dyed
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
-from wavetank.view.water_buffers import UNIT, water_of
+from wavetank.view.water_buffers import UNIT, WaterBuffers, water_of
 
 DISC = {2: 6.0, 3: 1.5}  # d; wide in a plane, where it shades from the rim to the depth
 TEXELS = 2.0  # of a map per spacing, at most
@@ -30,9 +30,15 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     water, disc = water_of(buffers, shot), DISC[shot.frame.dim] * shot.extent.spacing
     count, coarse, tall = shot.frame.count, float(coarseness(shot)), peak(shot.frame.dim)
     add_up(water.cells.x, count, shot.lens, coarse, disc, tall, water.sums, water.thickness)
+    add_dye(shot, water, shot.lens, coarse, water.dye)
+
+
+def add_dye(shot: Shot, water: WaterBuffers, lens: Lens, coarse: float, dye: Any) -> None:
+    """Fill the map `dye` with the discs of coloured particles, and `water.stained`."""
+    frame, disc = shot.frame, DISC[shot.frame.dim] * shot.extent.spacing
     stain(
-        water.cells.x, water.cells.order, shot.frame.dye, shot.frame.material, water.stains, count, shot.lens, coarse,
-        disc, tall, water.dye, water.stained,
+        water.cells.x, water.cells.order, frame.dye, frame.material, water.stains, frame.count, lens, coarse, disc,
+        peak(frame.dim), dye, water.stained,
     )  # fmt: skip
 
 
@@ -184,6 +190,23 @@ def dye_at(dye: qd.template(), place):
         total[k] = top + ((dye[r1, c, k] * (1.0 - u) + dye[r1, c1, k] * u) - top) * v
     part = qd.max(total[0], 1e-6)
     return vec4(total[0], total[1] / part, total[2] / part, total[3] / part)
+
+
+@qd.func
+def dye_in(dye: qd.template(), place, tau):
+    """(share of water `tau` [steps] thick that is dyed, linear colour of its dye) at a place in texels."""
+    found = dye_at(dye, place)
+    color = qd.min(qd.max(vec3(found[1], found[2], found[3]), 0.02), 0.98)
+    return vec4(qd.min(found[0] / tau, 1.0), color.x, color.y, color.z)
+
+
+@qd.func
+def swallowed_by(dye, absorption, usual):
+    """What water absorbs [1/m] where `dye_in` tells its dye: what the colour lacks.
+
+    Strong dye shows in a layer thinner than is `usual` [m].
+    """
+    return absorption + dye[0] * (-qd.log(vec3(dye[1], dye[2], dye[3])) * (2.5 / usual) - absorption)
 
 
 @qd.func

@@ -41,7 +41,7 @@ from wavetank.view.passes.panes import share_behind, tank_interval
 from wavetank.view.passes.shade import background, smoothstep
 from wavetank.view.passes.surface import normal_of, rise_at
 from wavetank.view.passes.tank import line_cover, slack
-from wavetank.view.passes.thickness import DISC, coarseness, dye_at, thickness_at
+from wavetank.view.passes.thickness import DISC, coarseness, dye_in, swallowed_by, thickness_at
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import UNIT, water_of
@@ -315,21 +315,23 @@ def shine(
         e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), depth.shape[1] - 1)
         if qd.bit_cast(depth[r, e], qd.f32) > z:  # not what stands in front of the water
             shown = picture_at(behind, there)
+    glossy = 1.0
     if qd.static(dim == 3):
-        # Less water than in a sheet of single particles is a drop: a ball turns a ray twice by the same angle.
-        ball = smoothstep((0.75 - tau / optics.spacing) / 0.3)
+        # Less water than in a sheet of single particles is a drop: a ball turns a ray twice by the same angle. Against
+        # the glass drops and films are flat, and mirror no more than the glass around them.
+        layers, gap = tau / optics.spacing, qd.min((at - lower).min(), (upper - at).min()) / optics.spacing
+        off = smoothstep((gap - 0.05) / 0.2)
+        ball = smoothstep((0.75 - layers) / 0.3) * off
+        glossy = 1.0 - smoothstep((1.6 - layers) / 0.8) * (1.0 - off)
         if ball > 0.0:
             out = 2.0 * bent.dot(ahead) * bent - ahead
             shown += ball * (behind_drop(lens, look, at + travel * bent, out, row, column, z, depth, behind) - shown)
     swallow, tint = optics.absorption, optics.glow
     if stained == 1:
-        dyed = dye_at(dye, place / optics.coarse)
-        if dyed[0] > 0.0:
-            # Dyed water swallows what its colour lacks; strong dye shows in a layer thinner than the usual.
-            color_of_dye = qd.min(qd.max(vec3(dyed[1], dyed[2], dyed[3]), 0.02), 0.98)
-            share = qd.min(dyed[0] * optics.unit / tau, 1.0)
-            swallow += share * (-qd.log(color_of_dye) * (2.5 / optics.usual) - swallow)
-            tint += share * (look.glow * color_of_dye - tint)
+        found = dye_in(dye, place / optics.coarse, tau / optics.unit)
+        if found[0] > 0.0:
+            swallow = swallowed_by(found, swallow, optics.usual)
+            tint += found[0] * (look.glow * vec3(found[1], found[2], found[3]) - tint)
     result = shown * qd.exp(-travel * swallow) + (1.0 - qd.exp(-travel * optics.scattering)) * tint
     if qd.static(dim == 2):  # the rim of the sheet catches the light, and on paper there is nothing to mirror
         # Light comes from above left, and less of it reaches the bottom.
@@ -337,7 +339,7 @@ def shine(
         result *= (0.75 + 0.3 * qd.max(n.dot(look.to_sun), 0.0)) * (0.78 + 0.4 * qd.min(high, 1.0))
         result += 0.35 * look.lamp * smoothstep((0.85 - tau / optics.spacing) / 0.3)
     else:
-        mirror = 0.02 + 0.98 * (1.0 - cosi) ** 5
+        mirror = glossy * (0.02 + 0.98 * (1.0 - cosi) ** 5)
         result += mirror * (environment(look, ahead + 2.0 * cosi * n) - result)
         half = (look.to_sun - ahead).normalized(1e-9)
         result += qd.min(qd.max(n.dot(half), 0.0), 1.0) ** 600 * look.sparkle * look.sun
