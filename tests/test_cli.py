@@ -77,7 +77,7 @@ def test_run_writes_what_was_asked_for(tmp_path):
         (("run", "drop", "--name", "a/b"), ["--name = 'a/b'", "--out"]),
         (("run", "drop", "--set", "viscosity=abc"), ["viscosity = 'abc'", "must be a number."]),
         (("run", "drop", "--set", "gravity=0,-9.81,0"), ["gravity", "as [0, -9.81, 0]"]),
-        (("run", "drop", "--export", "obj"), ["'obj'", "npz, csv, ply"]),
+        (("run", "drop", "--export", "xyz"), ["'xyz'", "npz, csv, ply"]),
         (("run", "drop", "--color-by", "taste"), ["'taste'", "speed"]),
         (("run", "drop", "--arch", "opengl"), ["'opengl'", "cpu"]),
         (("run", "drop", "--arch", "metal"), ["'metal'", "available"]),

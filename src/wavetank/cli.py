@@ -75,7 +75,7 @@ def run(
     video: Annotated[bool, typer.Option("--video", help="Write an MP4.")] = False,
     gif: Annotated[bool, typer.Option("--gif", help="Write an animated GIF.")] = False,
     frames: Annotated[bool, typer.Option("--frames", help="Write a PNG for each frame.")] = False,
-    export: Annotated[list[str], typer.Option(help="Write particles: npz, csv, ply.")] = [],  # noqa: B006
+    export: Annotated[list[str], typer.Option(help="Write particles: npz, csv, ply; or their surface: obj.")] = [],  # noqa: B006
     fps: Annotated[float, typer.Option(help="Frames per second of water in video and files.")] = 30.0,
     size: Annotated[str, typer.Option(help="Width x height of pictures.")] = "1280x720",
     view: View = None,

@@ -85,6 +85,7 @@ Result cuMemcpyHtoD_v2(void *to, void *from, size_t size) { return copy("send", 
 Result cuMemcpyHtoDAsync_v2(void *to, void *from, size_t size, Handle stream) { return copy("send", to, from, size); }
 Result cuMemcpyDtoD_v2(void *to, void *from, size_t size) { return copy("copy", to, from, size); }
 Result cuMemsetD8_v2(void *to, unsigned char value, size_t size) { return memset(to, value, size), 0; }
+Result cuMemsetD8Async(void *to, unsigned char value, size_t size, Handle stream) { return memset(to, value, size), 0; }
 Result cuMemsetD32_v2(unsigned *to, unsigned value, size_t count) {
     while (count) to[--count] = value;
     return 0;

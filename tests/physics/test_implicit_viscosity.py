@@ -221,6 +221,26 @@ def test_thick_fluids_lie_where_they_lie_and_do_not_bounce(viscosity, spacing, s
         assert sim.positions[:, 1].min() < (2.0 if above else 0.6) * spacing
 
 
+def test_ice_holds_what_sticks_to_it():
+    """A beam of dough with one end frozen sags as a viscous beam does: q L^4 / (8 3 mu I) at its end, 4 mm in 0.2 s."""
+    d, mu, density = 0.01, 1e5, 1400.0
+    beam = wt.Block(lower=(0.0, 0.0), upper=(0.24, 0.06))
+    sim = Simulation(
+        wt.Scene(spacing=d, gravity=(0.0, -9.81), rest_density=density, dynamic_viscosity=mu, fluids=[beam])
+    )
+    sim.freeze_inside(np.array([0.0, 0.03, 0.0]), np.array([0.0, 0.03, 0.0]), 0.068)
+    ice = np.sort(download(sim.world.particles.id)[: sim.count][download(sim.world.particles.frozen)[: sim.count] == 1])
+    length, thick = 0.24 - 0.06, 0.06
+    rate = density * 9.81 * thick * length**4 / (8.0 * 3.0 * mu * thick**3 / 12.0)
+    end = sim.positions[:, 0] > 0.23
+    before = sim.positions.copy()
+    sim.advance(0.2)
+    assert len(ice) > 20
+    np.testing.assert_array_equal(sim.positions[ice], before[ice])
+    sag = float((before[end] - sim.positions[end])[:, 1].mean())
+    assert 0.2 * rate * 0.5 < sag < 0.2 * rate * 2.0  # it falls by 196 mm where ice does not hold it
+
+
 @pytest.mark.parametrize("stiffest", [1.001, 1.1, 3.0, 100.0])
 def test_iterations_are_as_many_as_the_worst_mode_needs(stiffest):
     """The polynomial of `schedule` at both ends of the spectrum: within TOLERANCE, and not with one iteration less."""

@@ -6,29 +6,36 @@ A module of this package has ``SUFFIXES`` (with the dot, lower case), ``KIND`` a
     picture       write(path, image, metadata=None): uint8 [height, width, 3], one file a picture
     video         write(path, width, height, fps): a context manager with write(image)
     particles     write(path, frame): one file an instant
+    surface       likewise
+
+and may have `check(scene)`, which raises `WavetankError` before a run whose worlds it cannot write.
 """
 
 from pathlib import Path
 from types import ModuleType
 
 from wavetank.errors import WavetankError
-from wavetank.export import csv, gif, mp4, npz, ply, png
+from wavetank.export import csv, gif, mp4, npz, obj, ply, png
 
-EXPORTERS: tuple[ModuleType, ...] = (png, mp4, npz, csv, ply, gif)
-
-
-def suffixes(kind: str | None = None) -> tuple[str, ...]:
-    """Return the suffixes that can be written, of one kind or of all."""
-    return tuple(suffix for module in EXPORTERS if kind in (None, module.KIND) for suffix in module.SUFFIXES)
+EXPORTERS: tuple[ModuleType, ...] = (png, mp4, npz, csv, ply, obj, gif)
 
 
-def exporter_named(name: str, kind: str = "particles") -> ModuleType:
-    """Return the module of a format such as ``npz``; raises `WavetankError` if there is none of that kind."""
+INSTANTS = ("particles", "surface")  # kinds that write a frame
+
+
+def suffixes(*kinds: str) -> tuple[str, ...]:
+    """Return the suffixes that can be written, of these kinds or of all."""
+    return tuple(suffix for module in EXPORTERS if not kinds or module.KIND in kinds for suffix in module.SUFFIXES)
+
+
+def exporter_named(name: str, *kinds: str) -> ModuleType:
+    """Return the module of a format such as ``npz``, of these kinds or of `INSTANTS`; raises `WavetankError`."""
+    kinds = kinds or INSTANTS
     for module in EXPORTERS:
-        if f".{name.lstrip('.').lower()}" in module.SUFFIXES and kind == module.KIND:
+        if f".{name.lstrip('.').lower()}" in module.SUFFIXES and module.KIND in kinds:
             return module
-    names = ", ".join(suffix[1:] for suffix in suffixes(kind))
-    raise WavetankError(f"{name!r} is not a format for {kind}; use one of {names}.")
+    names = ", ".join(suffix[1:] for suffix in suffixes(*kinds))
+    raise WavetankError(f"{name!r} is not a format for {' or '.join(kinds)}; use one of {names}.")
 
 
 def exporter_for(path: str | Path, kind: str | None = None) -> ModuleType:
@@ -37,4 +44,6 @@ def exporter_for(path: str | Path, kind: str | None = None) -> ModuleType:
         if Path(path).suffix.lower() in module.SUFFIXES and kind in (None, module.KIND):
             return module
     what = f"{kind} files" if kind else "files"
-    raise WavetankError(f"{str(path)!r} cannot be written; {what} end in one of {', '.join(suffixes(kind))}.")
+    raise WavetankError(
+        f"{str(path)!r} cannot be written; {what} end in one of {', '.join(suffixes(*([kind] if kind else [])))}."
+    )

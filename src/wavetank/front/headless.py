@@ -69,6 +69,9 @@ def record(
     if not name or Path(name).name != name:
         raise WavetankError(f"--name = {name!r} is not allowed; it is the front part of file names, --out the folder.")
     writers = [exporter_named(format_) for format_ in exports]
+    for writer in writers:
+        if hasattr(writer, "check"):
+            writer.check(sim.scene)
     supersample, samples = QUALITIES[quality_named(quality)]
     look = {**look, "samples": samples}
     renderer = Renderer(*size, supersample)

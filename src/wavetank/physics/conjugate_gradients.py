@@ -20,6 +20,8 @@ this one. As no eigenvalue is below one, their error squared is at most that of 
 takes alpha gamma: what the last few took tells what was left before them (Strakos and Tichy 2002, Electronic
 Transactions on Numerical Analysis 13, 56).
 
+Ice keeps its velocity, 0: it has no residual, and no equation of its own.
+
 The sums are those of equal slices, in order: they do not depend on threads. Forces between particles cancel in each of
 the vectors, so momentum is as exact as that of the start, wherever the iterations end.
 """
@@ -76,7 +78,7 @@ def start_residual(
                 result = own * 0.0
                 for k in qd.static(range(v.n)):
                     result[k] = v[k] - own[k] + rate * scratch.weight[i] * force[k]
-                residual[i] = result
+                residual[i] = result * (1.0 - particles.frozen[i])
 
 
 @qd.kernel(fastcache=True)
@@ -102,8 +104,8 @@ def pull(
                 result = r
                 change = 0.0
                 for k in qd.static(range(force.n)):
-                    result[k] = r[k] - rate * scratch.weight[i] * force[k]
-                    change += (x[i][k] - particles.v[i][k]) ** 2
+                    result[k] = (r[k] - rate * scratch.weight[i] * force[k]) * (1.0 - particles.frozen[i])
+                    change += (x[i][k] - particles.v[i][k]) ** 2 * (1.0 - particles.frozen[i])
                 pulled[i] = result
                 product += vec4(r.dot(r), r.dot(result), change, 0.0) / scratch.weight[i]
             products[team] = product

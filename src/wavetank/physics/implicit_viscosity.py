@@ -159,10 +159,11 @@ def join_pairs(
 
 @qd.kernel(fastcache=True)
 def start(velocities: qd.types.ndarray(), particles: Particles, c: Coefficients, count: qd.i32):
-    """Start at the velocities that there are if viscosity does what it did in the last step."""
+    """Start at the velocities that there are if viscosity does what it did in the last step; ice has none."""
     for i in range(count):
         for k in qd.static(range(particles.v[i].n)):
-            velocities[i][k] = particles.v[i][k] + c.dt * particles.viscous[i][k]
+            v = particles.v[i][k] + c.dt * particles.viscous[i][k]
+            velocities[i][k] = v * (1.0 - particles.frozen[i])
 
 
 @qd.kernel(fastcache=True)
@@ -173,7 +174,7 @@ def take_velocities(particles: Particles, packed: qd.types.ndarray(), c: Coeffic
         v = before
         for k in qd.static(range(v.n)):
             v[k] = packed[i][k]
-        particles.viscous[i] = (v - before) / c.dt
+        particles.viscous[i] = (v - before) * (1.0 - particles.frozen[i]) / c.dt
         accelerate(particles, i, v, c)
 
 
