@@ -20,10 +20,10 @@ class Geyser(Force):
 
     x: float
     width: float = 0.08
-    strength: float = 30.0  # m/s^2
+    strength: float = 20.0  # m/s^2
 
     def apply(self, particles, count, dt, time):
-        pulse = self.strength if time % 0.5 < 0.3 else 0.0
+        pulse = self.strength if time % 0.6 < 0.2 else 0.0
         lift_up(particles, self.x, self.width, pulse, dt, count)
 
     def largest_acceleration(self):
@@ -36,6 +36,6 @@ class Geyser(Force):
 sim = wt.Simulation(wt.Scene.load("still-tank-2d").changed(spacing=0.02))
 sim.forces.append(Geyser(x=0.25))
 sim.forces.append(Vortex(center=(0.7, 0.2), radius=0.2, speed=1.0, axis=(0, 0, 1)))
-sim.advance(0.8)
-Image.fromarray(wt.render(sim, width=960, height=540)).save("geyser.png")
+sim.advance(0.5)
+Image.fromarray(wt.render(sim, width=480, height=720)).save("geyser.png")
 print(f"the highest drop is at {sim.positions[:, 1].max():.2f} m: geyser.png")

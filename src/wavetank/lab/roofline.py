@@ -168,16 +168,12 @@ def measure_ceilings(scene: Scene, arch: str) -> dict[str, float]:
     target, source, c = scalars(LARGE), scalars(LARGE), coefficients(scene, scene.frame_time)
     source.fill(1.0)
     wide = WIDE if compiler.lanes() > 1 else 1
+    operations = 2.0 * SPINS * TURNS * CHAINS * wide
     lists = int(count_neighbors(world.particles, world.grid, c, count).sum())
     return {
         "copy": 8.0 * own / _fastest(lambda: copy(target, source, own)),
         "copy_large": 8.0 * LARGE / _fastest(lambda: copy(target, source, LARGE)),
-        "arithmetic": 2.0
-        * SPINS
-        * TURNS
-        * CHAINS
-        * wide
-        / _fastest(lambda: spin(target, SPINS, 0.999, 0.001, TURNS, wide)),
+        "arithmetic": operations / _fastest(lambda: spin(target, SPINS, 0.999, 0.001, TURNS, wide)),
         "walk": lists / _fastest(lambda: walk(target, world.particles, world.grid, c, count, world.grid.lanes)),
     }
 

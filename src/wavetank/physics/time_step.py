@@ -85,14 +85,8 @@ def pool_depth(
     height = float(np.abs(ends[1] - ends[0]).sum())
     if not height:
         return 0.0
-    total = summed_levels(
-        particles,
-        count,
-        np.array([*up, 0.0][:3], np.float32),
-        float(ends.min(axis=0).sum()),
-        height / LEVELS,
-        lanes(),
-    )
+    base, along = float(ends.min(axis=0).sum()), np.array([*up, 0.0][:3], np.float32)
+    total = summed_levels(particles, count, along, base, height / LEVELS, lanes())
     return max(0.0, 2.0 * height / LEVELS * total / count)
 
 
