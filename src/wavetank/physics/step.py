@@ -52,6 +52,7 @@ from wavetank.state import (
     without_viscosity,
 )  # fmt: skip
 
+LEAST_MIXING = 1e-6  # of S_0: a particle without neighbours has no gradient to divide by
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
 #: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; measured, docs/method.md.
 DISORDER = {2: 0.75, 3: 0.35}
@@ -315,7 +316,7 @@ def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf, *
             inverse_h2=1.0 / h**2,
             density_scale=rest.density_scale,
             gradient_scale=rest.gradient_scale / h**2,
-            eps=params.force_mixing * s_0,
+            eps=max(params.force_mixing, LEAST_MIXING) * s_0,
             relaxation=params.relaxation,
             momentum=0.0,
             attraction=params.attraction,
