@@ -104,3 +104,15 @@ def test_an_impossible_squeeze_stays_in_the_tank():
         sim.step()
         assert np.isfinite(sim.positions).all()
         assert np.all((sim.positions >= 0) & (sim.positions <= np.array(scene.tank.size)))
+
+
+def test_a_solid_that_stands_in_the_water_pushes_none_through_a_wall():
+    """The way out of the block leads through the lid, which is farther from the water than it feels."""
+    d = 0.02
+    block = wt.Box(name="block", center=(0.3, 0.5), size=(0.4, 0.42))
+    water = wt.Block(lower=(0.2, 0.3), upper=(0.4, 0.6))
+    tank = wt.Tank(size=(0.6, 0.7))
+    sim = Simulation(wt.Scene(spacing=d, gravity=(0.0, 0.0), tank=tank, fluids=[water], solids=[block]))
+    for _ in range(3):
+        sim.step()
+        assert np.all((sim.positions >= 0.0) & (sim.positions <= np.array(tank.size, np.float32)))

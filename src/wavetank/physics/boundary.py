@@ -193,7 +193,10 @@ def stopped(origin, target, near, solids: SolidSet, gap):
                 target = solids.position[k] + rotate(rotation, out)
                 moved = 1
             k = next_near(near, k, solids.count)
-        inside = kept_in_tank(target, near, solids, gap)
+        marks = near
+        if moved == 1:  # perhaps farther than its marks reach
+            marks |= (1 << solids.tank_count) - 1
+        inside = kept_in_tank(target, marks, solids, gap)
         if (inside - target).norm_sqr() > 0.0:
             target = inside
             moved = 1
