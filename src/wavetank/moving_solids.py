@@ -10,8 +10,12 @@ import numpy as np
 from wavetank import solids
 from wavetank.compiler import upload
 from wavetank.errors import WavetankError
+from wavetank.fluids import Points
+from wavetank.physics.population import free_places
 from wavetank.rotations import interpolate, turned, unit_quaternion
+from wavetank.scene import Scene
 from wavetank.solid import Solid
+from wavetank.state import Particles
 
 Pose = tuple[np.ndarray, np.ndarray]  # position [m], shape [3], and rotation (w, x, y, z)
 SMALLEST = 0.02  # size at which a growing solid starts, of its full size
@@ -62,6 +66,20 @@ class MovingSolids:
             del column[number]
         self.targets, self.growing = without(self.targets), without(self.growing)
         self.rebuild()
+
+    def free_of(self, scene: Scene, places: np.ndarray, particles: Particles) -> np.ndarray:
+        """Say which `places` [n, dim] of a scene's fluids are outside of solids, bool [n]; those of `Points` stay.
+
+        Raises `WavetankError` where none is.
+        """
+        boxes = [fluid.bounds() for fluid in scene.fluids if not isinstance(fluid, Points)]
+        if not any(_meet(solid, *box) for solid in self.members[self.tank_count :] for box in boxes):
+            return np.ones(len(places), bool)
+        wall = scene.wall_gap * scene.spacing
+        free = free_places(places, particles, self.device, 0, 0.0, wall, self.tank_count) | scene.given()
+        if not free.any():
+            raise WavetankError("the fluids of this scene are inside of its solids; move them, or make them larger.")
+        return free
 
     def find(self, name: str) -> int:
         """Return the number of a solid; raise `WavetankError` for an unknown name."""
@@ -167,3 +185,9 @@ class MovingSolids:
         while not name or name in self.names:
             name, number = f"solid {number}", number + 1
         return name
+
+
+def _meet(solid: Solid, lower: np.ndarray, upper: np.ndarray) -> bool:
+    """Say whether the ball around a solid reaches into a box [m]."""
+    center = solid.origin[: len(lower)]
+    return bool(np.linalg.norm(center - np.clip(center, lower, upper)) < solid.reach())

@@ -206,8 +206,13 @@ class Scene(Parameters):
         ]
         return np.concatenate([np.empty(0, np.int32), *parts])
 
+    def given(self) -> np.ndarray:
+        """Say of which particles the scene gives every place, bool [n], in the order of `particles`."""
+        parts = zip(self.fluids, self._lattices(), strict=True)
+        return np.concatenate([np.empty(0, bool), *(np.full(len(x), isinstance(f, Points)) for f, (x, _) in parts)])
+
     def particles(self) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [m] and velocities [m/s], float32 [n, dim], of the fluids outside of the solids.
+        """Positions [m] and velocities [m/s], float32 [n, dim], of the fluids; a simulation leaves out those in solids.
 
         Where fluids overlap, the first one wins.
         """
@@ -215,8 +220,8 @@ class Scene(Parameters):
         positions = np.concatenate([np.empty((0, self.dim)), *(x for x, _ in parts)])
         if not len(positions) and any(not isinstance(fluid, Points) for fluid in self.fluids):
             raise WavetankError(
-                f"the fluids of this scene hold no particle at spacing = {self.spacing:g} m outside of solids; use a "
-                "smaller spacing or larger fluids."
+                f"the fluids of this scene hold no particle at spacing = {self.spacing:g} m; use a smaller spacing or "
+                "larger fluids."
             )
         velocities = np.concatenate([np.empty((0, self.dim)), *(v for _, v in parts)])
         return positions.astype(np.float32), velocities.astype(np.float32)

@@ -45,12 +45,12 @@ class Simulation:
         self.pushed: list[Force] = []  # these in the next one only
         self._next_id, self._fastest_start, self._fastest_solid, self._fastest_force = 0, 0.0, 0.0, 0.0
         self._fill(len(positions))
-        self.add(positions, velocities, materials=self.scene.kinds())
-        box = positions if len(positions) else np.zeros((1, self.scene.dim))
+        free = self.solids.free_of(self.scene, positions, self.world.particles)
+        self.add(positions[free], velocities[free], materials=self.scene.kinds()[free])
+        box = positions[free] if free.any() else np.zeros((1, self.scene.dim))
         self._start_box = (box.min(axis=0), box.max(axis=0))
-        self.time, self.frame_number, self._owed = 0.0, 0, 0.0
+        self.time, self.frame_number, self._owed, self.seconds_per_frame = 0.0, 0, 0.0, math.nan
         self.time_steps = 1  # of the last frame
-        self.seconds_per_frame = math.nan
 
     def _fill(self, capacity: int) -> None:
         """Make an empty world with room for `capacity` particles."""

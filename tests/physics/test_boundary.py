@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 
@@ -110,9 +112,40 @@ def test_a_solid_that_stands_in_the_water_pushes_none_through_a_wall():
     """The way out of the block leads through the lid, which is farther from the water than it feels."""
     d = 0.02
     block = wt.Box(name="block", center=(0.3, 0.5), size=(0.4, 0.42))
-    water = wt.Block(lower=(0.2, 0.3), upper=(0.4, 0.6))
+    x = d * np.stack(np.meshgrid(np.arange(10, 20), np.arange(15, 30), indexing="ij"), -1).reshape(-1, 2)
     tank = wt.Tank(size=(0.6, 0.7))
+    water = wt.Points(positions=x.tolist())
     sim = Simulation(wt.Scene(spacing=d, gravity=(0.0, 0.0), tank=tank, fluids=[water], solids=[block]))
     for _ in range(3):
         sim.step()
         assert np.all((sim.positions >= 0.0) & (sim.positions <= np.array(tank.size, np.float32)))
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [wt.Sphere(center=(0.51, 0.22), radius=0.15), wt.Box(center=(0.5, 0.2), size=(0.4, 0.3), rotation=0.4)],
+    ids=["sphere", "box"],
+)
+def test_water_around_a_solid_begins_at_rest(solid):
+    """A block of water that is drawn over a solid leaves it out; pushed out, it would begin at 4 m/s."""
+    water = wt.Block(lower=(0, 0), upper=(1.0, 0.5))
+    sim = Simulation(wt.Scene(spacing=0.025, tank=wt.Tank(size=(1.0, 1.0)), fluids=[water], solids=[solid]))
+    left_out = 1.0 - sim.count / 800
+    area = math.pi * 0.15**2 if solid.shape == "sphere" else 0.12
+    assert left_out == pytest.approx(area / 0.5, rel=0.15)
+    sim.step()
+    assert sim.stats()["density_error_max"] < 0.01
+    for _ in range(30):
+        sim.step()
+    assert sim.stats()["speed_max"] < 0.8
+
+
+def test_places_that_a_scene_gives_are_kept_and_no_water_is_said():
+    box = wt.Box(center=(0.3, 0.3), size=(0.2, 0.2))
+    tank = wt.Tank(size=(0.6, 0.6))
+    given = Simulation(wt.Scene(spacing=0.05, tank=tank, fluids=[wt.Points(positions=[[0.3, 0.3]])], solids=[box]))
+    assert given.count == 1
+    with pytest.raises(wt.WavetankError, match="inside of its solids"):
+        Simulation(
+            wt.Scene(spacing=0.05, tank=tank, fluids=[wt.Block(lower=(0.25, 0.25), upper=(0.35, 0.35))], solids=[box])
+        )

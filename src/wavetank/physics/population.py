@@ -122,12 +122,12 @@ def clear_forces(particles: Particles, count: qd.i32):
 @qd.kernel(fastcache=True)
 def find_taken(
     taken: qd.types.ndarray(), places: qd.types.ndarray(), particles: Particles, solids: SolidSet, middle: vec3,
-    reach: qd.f32, gap: qd.f32, wall: qd.f32, count: qd.i32, number: qd.i32,
+    reach: qd.f32, gap: qd.f32, wall: qd.f32, count: qd.i32, number: qd.i32, first: qd.i32,
 ):  # fmt: skip
     """Mark places, all within `reach` of `middle`, nearer than `gap` to a particle or `wall` to a solid."""
     for k in range(number):
         taken[k] = 0
-        for solid in range(solids.count):
+        for solid in range(first, solids.count):
             if signed_distance(solids, solid, lift(places[k])).w < wall:
                 taken[k] = 1
     for i in range(count):
@@ -148,9 +148,12 @@ def inside_capsule(particles: Particles, count: int, start: np.ndarray, end: np.
 
 
 def free_places(
-    places: np.ndarray, particles: Particles, solids: SolidSet, count: int, gap: float, wall: float
+    places: np.ndarray, particles: Particles, solids: SolidSet, count: int, gap: float, wall: float, first: int = 0
 ) -> np.ndarray:
-    """Say which of the places [n, dim] are no nearer than `gap` [m] to particles and `wall` to solids, bool [n]."""
+    """Say which of the places [n, dim] are no nearer than `gap` [m] to particles and `wall` to solids, bool [n].
+
+    Solids before number `first` do not count.
+    """
     if not len(places):
         return np.zeros(0, bool)
     device, taken = vectors(places.shape[1], len(places)), integers(len(places))
@@ -158,7 +161,7 @@ def free_places(
     middle = np.zeros(3, np.float32)
     middle[: places.shape[1]] = places.mean(axis=0)
     reach = float(np.linalg.norm(places - places.mean(axis=0), axis=1).max())
-    find_taken(taken, device, particles, solids, middle, reach, gap, wall, count, len(places))
+    find_taken(taken, device, particles, solids, middle, reach, gap, wall, count, len(places), first)
     result: np.ndarray = download(taken)[: len(places)] == 0
     return result
 
