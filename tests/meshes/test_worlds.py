@@ -22,7 +22,7 @@ def test_a_cup_holds_its_water(wall, carried):
     solid = wt.Mesh.of(*cup(radius, height, wall), name="cup", center=(0.3, 0.3, 0.3), size=(0.24, 0.24, 0.24))
     water = wt.Block(lower=(0.22, 0.2, 0.22), upper=(0.38, 0.3, 0.38))
     sim = Simulation(wt.Scene(spacing=d, tank=wt.Tank(size=(0.6, 0.6, 0.6)), solids=[solid], fluids=[water]))
-    center = np.array([0.3, 0.3, 0.3])
+    center, filled = np.array([0.3, 0.3, 0.3]), sim.count
     for k in range(150):
         if carried:
             turn = 0.08 * k * min(k, 60) / 60
@@ -30,7 +30,7 @@ def test_a_cup_holds_its_water(wall, carried):
             sim.move("cup", position=center)
         sim.step()
     out = outside_of_cup(sim.positions - center, radius + 0.5 * d, height)
-    assert sim.count == 320
+    assert sim.count == filled == (300 if wall == d else 320)  # corners of the block touch the thick wall
     assert not out.any()
 
 
