@@ -109,10 +109,7 @@ def run(
 def render(
     world: Annotated[str, typer.Argument(metavar="SCENE|STATE.npz", help="A scene, or a state that was saved.")],
     at: Annotated[
-        float | None,
-        typer.Option(
-            help="Time of the picture [s], to which a saved state goes on; its own, or a scene's best moment."
-        ),
+        float | None, typer.Option(help="Time [s], to which a saved state goes on; its own, or a scene's best moment.")
     ] = None,
     out: Annotated[Path, typer.Option(help="The picture, PNG.")] = Path("picture.png"),
     width: Annotated[int, typer.Option(help="Pixels.")] = 1280,
@@ -377,9 +374,11 @@ def _value(text: str) -> Any:
 
 
 def _size(text: str) -> tuple[int, int]:
+    from wavetank.view.renderer import LARGEST_SIDE as LARGEST
+
     width, _, height = text.lower().partition("x")
-    if not (width.isdigit() and height.isdigit() and 1 <= int(width) <= 8192 and 1 <= int(height) <= 8192):
-        raise WavetankError(f"--size = {text!r} is not allowed; write it as 1280x720, from 1x1 to 8192x8192.")
+    if not all(side.isdigit() and 1 <= int(side) <= LARGEST for side in (width, height)):
+        raise WavetankError(f"--size = {text!r} is not allowed; write it as 1280x720, from 1x1 to {LARGEST}x{LARGEST}.")
     return int(width), int(height)
 
 

@@ -49,6 +49,16 @@ def sort_by(
 
 
 @qd.func
+def share_of(thread, count):
+    """How many of `count` things one of 16,384 threads sees to: number `thread`, `thread` + 16,384 and so on.
+
+    For one number from all of them on a graphics processor. There every 32 threads bring in what they have found, one
+    exchange after the other, and in a loop over things there are as many threads as the card has room for.
+    """
+    return (count + 16383 - thread) // 16384
+
+
+@qd.func
 def sum_of(values: qd.template(), begin, end):
     """The sum of the values from `begin` to `end`."""
     total = 0

@@ -18,8 +18,6 @@ from wavetank.errors import WavetankError
 from wavetank.export import csv, gif, mp4, npz, obj, ply, png
 
 EXPORTERS: tuple[ModuleType, ...] = (png, mp4, npz, csv, ply, obj, gif)
-
-
 INSTANTS = ("particles", "surface")  # kinds that write a frame
 
 
@@ -38,12 +36,10 @@ def exporter_named(name: str, *kinds: str) -> ModuleType:
     raise WavetankError(f"{name!r} is not a format for {' or '.join(kinds)}; use one of {names}.")
 
 
-def exporter_for(path: str | Path, kind: str | None = None) -> ModuleType:
+def exporter_for(path: str | Path, *kinds: str) -> ModuleType:
     """Return the module that writes `path`, chosen by its suffix; raises `WavetankError` if there is none."""
     for module in EXPORTERS:
-        if Path(path).suffix.lower() in module.SUFFIXES and kind in (None, module.KIND):
+        if Path(path).suffix.lower() in module.SUFFIXES and (not kinds or module.KIND in kinds):
             return module
-    what = f"{kind} files" if kind else "files"
-    raise WavetankError(
-        f"{str(path)!r} cannot be written; {what} end in one of {', '.join(suffixes(*([kind] if kind else [])))}."
-    )
+    what = f"{' or '.join(kinds)} files" if kinds else "files"
+    raise WavetankError(f"{str(path)!r} cannot be written; {what} end in one of {', '.join(suffixes(*kinds))}.")

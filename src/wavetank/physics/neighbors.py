@@ -29,7 +29,7 @@ from wavetank.errors import WavetankError
 from wavetank.physics.pairs import part_of, turns
 from wavetank.physics.places import predict_at, predicted
 from wavetank.state import Coefficients, Grid, Particles, integers
-from wavetank.sums import blocks_of, sort_by
+from wavetank.sums import blocks_of, share_of, sort_by
 
 PARTS = 8  # of a pass for each thread: enough to even out what takes longer
 MAX_ENTRIES = 2**31 - 1  # of a device array: the compiler counts them, and computes places in them, with 32 bits
@@ -157,10 +157,9 @@ def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.
             if qd.static(lanes > 1):
                 qd.atomic_max(most, found)
     if qd.static(lanes == 1):
-        # Few threads bring together what they have found (`time_step.largest_square`).
         for thread in range(16384):
             found = 0
-            for k in range(((count + 7 >> 3) + 16383 - thread) // 16384):
+            for k in range(share_of(thread, (count + 7) >> 3)):
                 found = qd.max(found, grid.number[thread + 16384 * k])
             qd.atomic_max(most, found)
     return most

@@ -22,6 +22,7 @@ import numpy as np
 from wavetank.compiler import lanes, qd
 from wavetank.params import Parameters
 from wavetank.state import Particles
+from wavetank.sums import share_of
 
 ALONE = 2.0 / 3.0  # of `courant` where iterations alone carry the pressure
 SHALLOWEST = 0.6  # d: way in a frame of the wave that water without a grid is taken to have, however shallow
@@ -98,16 +99,12 @@ def square_at(particles: Particles, i):
 
 @qd.kernel(fastcache=True)
 def largest_square(particles: Particles, count: qd.i32, lanes: qd.template()) -> qd.i32:
-    """Return the bits of the largest squared speed.
-
-    On a graphics processor, `lanes` = 1, few threads go through many particles each: what they have found they bring
-    together one by one, as do all threads that there are room for, were it a loop over particles.
-    """
+    """Return the bits of the largest squared speed; on a graphics processor, `lanes` = 1, by few threads."""
     most = 0
     if qd.static(lanes == 1):
         for thread in range(16384):
             own = 0
-            for k in range((count + 16383 - thread) // 16384):
+            for k in range(share_of(thread, count)):
                 own = qd.max(own, square_at(particles, thread + 16384 * k))
             qd.atomic_max(most, own)
     else:
@@ -136,7 +133,7 @@ def summed_levels(
     if qd.static(lanes == 1):
         for thread in range(16384):
             own = 0
-            for k in range((count + 16383 - thread) // 16384):
+            for k in range(share_of(thread, count)):
                 own += level_at(particles, thread + 16384 * k, up, base, step)
             qd.atomic_add(levels, own)
     else:
