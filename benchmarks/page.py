@@ -15,7 +15,7 @@ from typing import Any
 from websockets.sync.client import connect
 
 import wavetank as wt
-from wavetank.front.web import WebFront
+from wavetank.front.page.server import WebFront
 
 
 def next_picture(socket: Any) -> bytes:

@@ -3,9 +3,9 @@
 from PIL import Image
 
 import wavetank as wt
-from wavetank.compiler import qd
-from wavetank.forces import Force, Vortex
-from wavetank.state import Particles
+from wavetank.device.compiler import qd
+from wavetank.device.state import Particles
+from wavetank.scene.forces import Force, Vortex
 
 
 @qd.kernel(fastcache=True)

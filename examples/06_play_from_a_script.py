@@ -3,8 +3,8 @@
 from PIL import Image
 
 import wavetank as wt
-from wavetank import commands as do
-from wavetank.recording import Recording, digest, replay
+from wavetank.session import commands as do
+from wavetank.session.recording import Recording, digest, replay
 
 
 def down(x, y):

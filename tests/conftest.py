@@ -2,7 +2,7 @@
 
 import pytest
 
-from wavetank import compiler
+from wavetank.device import compiler
 
 
 @pytest.fixture(scope="session", autouse=True)

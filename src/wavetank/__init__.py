@@ -10,17 +10,17 @@ image = wt.render(sim)
 from importlib.metadata import version as _version
 from typing import TYPE_CHECKING, Any
 
-from wavetank.errors import WavetankError
-from wavetank.fluids import Ball, Block, Points
-from wavetank.meshes.mesh import Mesh
-from wavetank.params import PARAMETERS, PRESETS
-from wavetank.scene import Scene, Tank, bundled_scenes
-from wavetank.solids import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.params import PARAMETERS, PRESETS
+from wavetank.scene.fluids import Ball, Block, Points
+from wavetank.scene.scene import Scene, Tank, bundled_scenes
+from wavetank.solids.meshes.mesh import Mesh
+from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
 
 if TYPE_CHECKING:
     from wavetank.front.notebook import show
-    from wavetank.session import Session
-    from wavetank.simulation import Simulation
+    from wavetank.session.session import Session
+    from wavetank.simulation.simulation import Simulation
     from wavetank.view.camera import Camera
     from wavetank.view.renderer import render
 
@@ -36,11 +36,11 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """Import what needs the kernels' sources only when it is first used: data alone should load fast."""
     if name == "Simulation":
-        from wavetank.simulation import Simulation
+        from wavetank.simulation.simulation import Simulation
 
         return Simulation
     if name == "Session":
-        from wavetank.session import Session
+        from wavetank.session.session import Session
 
         return Session
     if name == "show":

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from wavetank import Scene, WavetankError, __version__, bundled_scenes
-from wavetank.scene import bundled_levels, scene_schema
+from wavetank.scene.scene import bundled_levels, scene_schema
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 console = Console(stderr=True)
@@ -47,7 +47,7 @@ def scenes(
     if schema:
         print(scene_schema())
         return
-    from wavetank.scores import scores
+    from wavetank.session.scores import scores
 
     rows = [(name, Scene.load(name)) for name in bundled_scenes()]
     levels, best = [(name, Scene.load(name)) for name in bundled_levels()], scores()
@@ -89,7 +89,7 @@ def run(
 ) -> None:
     """Simulate a scene and write video, pictures, particles and figures."""
     from wavetank.front.headless import record
-    from wavetank.simulation import Simulation
+    from wavetank.simulation.simulation import Simulation
 
     world = _configured(scene, settings)
     figures = record(
@@ -265,7 +265,7 @@ def bench(
     as_json: Json = False,
 ) -> None:
     """Measure milliseconds per stage, rates, start-up; compare with an earlier run, a peer, the machine's ceilings."""
-    from wavetank.lab import bench_run
+    from wavetank.lab.bench import run as bench_run
 
     order = bench_run.Order(
         scenes=scenes, sizes=sizes, seconds=seconds, repeats=repeats, threads=threads, peers=peers, roofline=roofline,

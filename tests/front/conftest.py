@@ -5,8 +5,8 @@ import threading
 import pytest
 
 import wavetank as wt
-from wavetank.front.web import WebFront
-from wavetank.session import Session
+from wavetank.front.page.server import WebFront
+from wavetank.session.session import Session
 
 
 class Playing:

@@ -3,7 +3,7 @@ import json
 import pytest
 
 from wavetank import cli
-from wavetank.errors import WavetankError
+from wavetank.foundation.errors import WavetankError
 from wavetank.front import backends
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank.front.engine import Engine
-from wavetank.session import Session
+from wavetank.front.window.engine import Engine
+from wavetank.session.session import Session
 
 
 @pytest.fixture
@@ -50,8 +50,8 @@ def test_pictures_of_any_size_arrive(context):
 
 def test_a_world_is_played_without_a_display(context):
     """The window's engine and its texture, without the window: commands go in, other pictures come out."""
-    from wavetank import commands
     from wavetank.front.window.plate import Plate
+    from wavetank.session import commands
 
     engine, plate = Engine(Session(wt.Scene.load("dam-break-2d").changed(spacing=0.05))), Plate(context)
 

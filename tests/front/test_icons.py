@@ -5,7 +5,7 @@ import math
 import pytest
 
 from wavetank.front.window.icons import lines
-from wavetank.tools import TOOLS
+from wavetank.session.tools import TOOLS
 
 
 def test_lines_curves_and_arcs_end_where_they_say():

@@ -7,8 +7,8 @@ import time
 import pytest
 
 import wavetank as wt
-from wavetank import commands as do
-from wavetank.lab.chromium import Browser, executable
+from wavetank.lab.bench.chromium import Browser, executable
+from wavetank.session import commands as do
 
 BASIN = wt.Scene(
     title="Basin", spacing=0.05, tank=wt.Tank(size=(1.2, 0.6, 0.4)),

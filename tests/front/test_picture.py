@@ -3,8 +3,8 @@ import pytest
 
 import wavetank as wt
 from wavetank.front import picture
-from wavetank.pace import MADE_GOOD, Pace
-from wavetank.session import Session
+from wavetank.session.pace import MADE_GOOD, Pace
+from wavetank.session.session import Session
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def session():
 def machine(session, monkeypatch):
     """A session on a machine whose frames and pictures take so many seconds; runs it and counts both."""
     clock, cost = [100.0], {}
-    monkeypatch.setattr("wavetank.session.time.perf_counter", lambda: clock[0])  # of the module that all share
+    monkeypatch.setattr("wavetank.session.session.time.perf_counter", lambda: clock[0])  # of the module that all share
     painter = picture.Painter(session)
 
     class Canvas:

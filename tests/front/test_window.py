@@ -12,8 +12,8 @@ from xvfb import Display, missing
 
 import wavetank as wt
 from wavetank.front import play
-from wavetank.recording import Recording
-from wavetank.session import Session
+from wavetank.session.recording import Recording
+from wavetank.session.session import Session
 
 BASIN = wt.Scene(
     title="Basin", spacing=0.05, tank=wt.Tank(size=(1.2, 0.6, 0.4)),

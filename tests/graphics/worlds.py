@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 import wavetank as wt
-from wavetank.lab.bench import sized
-from wavetank.physics import poisson
+from wavetank.lab.bench.scenes import sized
+from wavetank.physics.grid_pressure import poisson
 
 
 def compile_kernels() -> None:

@@ -9,12 +9,15 @@ import time
 import pytest
 from rich.console import Console
 
-from wavetank import Scene, WavetankError, cli, compiler
-from wavetank.lab import bench as room
-from wavetank.lab import bench_run, bench_tables, machine, roofline, startup
-from wavetank.lab.stages import STAGE_NAMES, Clock, stage_of
+from wavetank import Scene, WavetankError, cli
+from wavetank.device import compiler
+from wavetank.lab.bench import machine, roofline, startup
+from wavetank.lab.bench import run as bench_run
+from wavetank.lab.bench import scenes as room
+from wavetank.lab.bench import tables as bench_tables
+from wavetank.lab.bench.stages import STAGE_NAMES, Clock, stage_of
 from wavetank.physics import neighbors, step
-from wavetank.simulation import Simulation
+from wavetank.simulation.simulation import Simulation
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +78,7 @@ def test_the_clock_accounts_for_all_of_the_time():
 
 def test_every_kernel_of_the_physics_has_a_stage():
     assert stage_of("wavetank.physics.neighbors") == "neighbours"
-    assert stage_of("wavetank.physics.diffuse.pool") == "foam"
+    assert stage_of("wavetank.physics.foam.pool") == "foam"
     assert stage_of("wavetank.physics.a_new_force") == "velocities"
     assert stage_of("wavetank.view.passes.shade") == "render"
     assert stage_of("quadrants._kernels") == "other"

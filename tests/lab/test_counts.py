@@ -7,11 +7,11 @@ so that they do not depend on how the last digit of a sum came out.
 import numpy as np
 import pytest
 
-from wavetank.fluids import Points
-from wavetank.lab import counts
-from wavetank.lab.bench import sized
-from wavetank.scene import Scene, Tank
-from wavetank.simulation import Simulation
+from wavetank.lab.bench import counts
+from wavetank.lab.bench.scenes import sized
+from wavetank.scene.fluids import Points
+from wavetank.scene.scene import Scene, Tank
+from wavetank.simulation.simulation import Simulation
 
 SPACING = 1 / 16
 #: ordered pairs, distance tests of the list build, bytes of all that the water needs

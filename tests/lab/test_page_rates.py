@@ -4,10 +4,10 @@ import os
 
 import pytest
 
-from wavetank.errors import WavetankError
-from wavetank.lab import page
-from wavetank.lab.bench_run import Order, perform
-from wavetank.lab.chromium import executable
+from wavetank.foundation.errors import WavetankError
+from wavetank.lab.bench import page
+from wavetank.lab.bench.chromium import executable
+from wavetank.lab.bench.run import Order, perform
 
 
 def order(**options) -> Order:

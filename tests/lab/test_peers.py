@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from wavetank import WavetankError
-from wavetank.lab.peers import compare, environment, runs, splishsplash
-from wavetank.lab.peers.runs import Dam, ours, pace, rate
+from wavetank.lab.bench.peers import compare, environment, runs, splishsplash
+from wavetank.lab.bench.peers.runs import Dam, ours, pace, rate
 
 #: Stands in for the peer: answers like its script, and says what it was told.
 FAKE = """

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from wavetank.errors import WavetankError
-from wavetank.lab.bench_run import Order, perform
-from wavetank.lab.search import SPACING, places, search, search_table
+from wavetank.foundation.errors import WavetankError
+from wavetank.lab.bench.run import Order, perform
+from wavetank.lab.bench.search import SPACING, places, search, search_table
 
 
 def test_grid_and_tree_find_the_same_pairs():

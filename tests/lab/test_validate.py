@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from wavetank import Scene, WavetankError, cli
-from wavetank.fluids import Points
 from wavetank.lab import validate as room
 from wavetank.lab.cases import CASES, coiling
 from wavetank.lab.cases.case import Case, Figure, Outcome, measured, surface
@@ -19,8 +18,9 @@ from wavetank.lab.cases.martin_moyce import A, front
 from wavetank.lab.cases.packing import settled
 from wavetank.lab.cases.seeds import world
 from wavetank.lab.cases.standing_wave import AMPLITUDE, DEPTH, LENGTH, PERIOD, K, displaced
-from wavetank.scene import Tank
-from wavetank.simulation import Simulation
+from wavetank.scene.fluids import Points
+from wavetank.scene.scene import Tank
+from wavetank.simulation.simulation import Simulation
 
 QUICK = ["still-tank", "column", "martin-moyce", "standing-wave", "elliptical-drop", "drop", "energy", "momentum",
          "seeds", "layers", "lock-exchange", "shear-wave", "gravity-current", "buckling", "tension-drop",

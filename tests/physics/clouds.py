@@ -7,7 +7,7 @@ import numpy as np
 import wavetank as wt
 from wavetank.physics.smoothing import NAMES, kernel_shape, sigma
 from wavetank.physics.step import coefficients, method_number
-from wavetank.simulation import Simulation
+from wavetank.simulation.simulation import Simulation
 
 
 class Cloud:

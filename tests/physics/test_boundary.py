@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank.simulation import Simulation
+from wavetank.simulation.simulation import Simulation
 
 
 @pytest.mark.parametrize("dim", [2, 3])

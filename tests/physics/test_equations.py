@@ -7,8 +7,8 @@ import pytest
 from clouds import Cloud
 
 from wavetank.physics.density_constraint import correct_positions, schedule, start_multipliers
-from wavetank.physics.viscosity import apply_viscosity
 from wavetank.physics.vorticity import confine_vorticity
+from wavetank.physics.xsph_viscosity import apply_viscosity
 
 CASES = [(2, "spiky"), (3, "spiky"), (3, "poly6-spiky"), (2, "cubic"), (3, "wendland")]
 cases = pytest.mark.parametrize(("dim", "kernel"), CASES)
@@ -147,7 +147,7 @@ def test_solid_rotation_has_twice_its_rate_as_vorticity():
     """curl of omega x r is 2 omega; inside a lattice Eq. 9 finds it up to the kernel's lattice error."""
     import wavetank as wt
     from wavetank.physics.step import coefficients
-    from wavetank.simulation import Simulation
+    from wavetank.simulation.simulation import Simulation
 
     axis = np.arange(-5, 6) * 0.1
     x = np.stack(np.meshgrid(axis, axis, axis), -1).reshape(-1, 3).astype(np.float32)

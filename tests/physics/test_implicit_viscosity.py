@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank.compiler import download
-from wavetank.physics.conjugate_gradients import TOLERANCE
+from wavetank.device.compiler import download
 from wavetank.physics.density_constraint import schedule
-from wavetank.physics.implicit_viscosity import (
+from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE
+from wavetank.physics.dynamic_viscosity.implicit_viscosity import (
     CARRIED,
     carried_share,
     damper_scale,
@@ -20,7 +20,7 @@ from wavetank.physics.implicit_viscosity import (
 )  # fmt: skip
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.physics.step import coefficients, has_grid_pressure, prepare_fluids
-from wavetank.simulation import Simulation
+from wavetank.simulation.simulation import Simulation
 
 D, DT = 0.05, 1 / 300
 
@@ -161,7 +161,7 @@ def mean_height(steps: int) -> float:
 def test_thick_fluids_do_not_flow_faster_in_longer_steps(monkeypatch):
     """Carried pressure (Goda 1979): twelve steps a frame come as near as a hundred without it, which is first order."""
     carried = mean_height(12)
-    monkeypatch.setattr("wavetank.physics.implicit_viscosity.CARRIED", 0.0)
+    monkeypatch.setattr("wavetank.physics.dynamic_viscosity.implicit_viscosity.CARRIED", 0.0)
     split, fine = mean_height(12), mean_height(96)
     assert split < 0.8 * fine
     assert carried == pytest.approx(fine, rel=0.1)
@@ -259,6 +259,8 @@ def test_iterations_are_as_many_as_the_worst_mode_needs(stiffest):
 
 def test_too_many_pairs_are_told_in_one_sentence(monkeypatch):
     sim = Simulation(wt.Scene.load("honey-2d").changed(spacing=0.004))
-    monkeypatch.setattr("wavetank.physics.implicit_viscosity.MAX_ENTRIES", 8 * sim.world.grid.list.shape[0] - 1)
+    monkeypatch.setattr(
+        "wavetank.physics.dynamic_viscosity.implicit_viscosity.MAX_ENTRIES", 8 * sim.world.grid.list.shape[0] - 1
+    )
     with pytest.raises(wt.WavetankError, match="particles of viscous fluids are too many.*use a larger spacing"):
         sim.step()

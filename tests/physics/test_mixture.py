@@ -5,11 +5,11 @@ import pytest
 from clouds import Cloud
 
 import wavetank as wt
-from wavetank.compiler import upload
-from wavetank.materials import Material
+from wavetank.device.compiler import upload
+from wavetank.foundation.materials import Material
 from wavetank.physics.density_constraint import correct_positions, start_multipliers
 from wavetank.physics.mixture import blend, pack_weights, stiffening
-from wavetank.physics.viscosity import apply_mixed_viscosity
+from wavetank.physics.xsph_viscosity import apply_mixed_viscosity
 
 
 def mixed_cloud(dim: int, ratio: float = 100.0, **settings) -> tuple[Cloud, np.ndarray]:

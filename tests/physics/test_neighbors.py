@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 import wavetank as wt
-from wavetank.compiler import upload
+from wavetank.device.compiler import upload
 from wavetank.physics import neighbors
 from wavetank.physics.integrate import forget_predictions
 from wavetank.physics.neighbors import new_grid, reorder
 from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.step import coefficients
-from wavetank.simulation import Simulation
+from wavetank.simulation.simulation import Simulation
 
 
 def neighbor_sets(sim: Simulation) -> list[set[int]]:

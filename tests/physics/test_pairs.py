@@ -8,11 +8,11 @@ import sys
 
 import pytest
 
-from wavetank import compiler
-from wavetank.compiler import qd
+from wavetank.device import compiler
+from wavetank.device.compiler import qd
+from wavetank.device.state import Grid, integers
 from wavetank.physics.neighbors import new_grid
 from wavetank.physics.pairs import part_of, teams, turns
-from wavetank.state import Grid, integers
 
 PROGRAM = """
 import sys

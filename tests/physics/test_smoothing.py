@@ -3,7 +3,7 @@ import pytest
 from scipy import integrate
 
 import wavetank as wt
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.physics import smoothing
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, lattice_density, rest_lattice, sigma
 from wavetank.physics.step import coefficients, relaxations
@@ -72,7 +72,7 @@ def test_lattice_densities():
 
 def test_the_reports_units():
     """With h = 1.1, m = 1 the lattice of density 3 has d = 0.682, and eps = 100 is 73.5 times S_0."""
-    from wavetank.params import PAPER_S0, PAPER_SPACING, PRESETS
+    from wavetank.foundation.params import PAPER_S0, PAPER_SPACING, PRESETS
 
     ratio = 1.1 / PAPER_SPACING
     assert lattice_density("poly6", 3, ratio) / PAPER_SPACING**3 == pytest.approx(3.0, abs=1e-4)

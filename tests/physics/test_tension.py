@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank.materials import Material
+from wavetank.foundation.materials import Material
 from wavetank.physics.mixture import blend
 from wavetank.physics.smoothing import rest_points
 from wavetank.physics.tension import adhesion_table, flat_surface, largest_tension, limited_tensions, substeps_for
-from wavetank.simulation import Simulation
+from wavetank.simulation.simulation import Simulation
 
 
 def drop(dim: int, number: int = 10, **settings) -> Simulation:

@@ -7,7 +7,7 @@ import pytest
 
 import wavetank as wt
 from wavetank.physics.time_step import ALONE, filled_share, largest_speed, pool_depth, steps_needed, whole
-from wavetank.simulation import Simulation
+from wavetank.simulation.simulation import Simulation
 
 
 def pool(depth: float, d: float, dim: int = 2, **more) -> wt.Scene:

@@ -5,7 +5,7 @@ import pytest
 
 import wavetank as wt
 from wavetank.physics.measure import density_error
-from wavetank.simulation import Simulation
+from wavetank.simulation.simulation import Simulation
 
 
 @pytest.fixture(scope="module", params=[(0.025, 21952, 1.5), (0.04, 4913, 6.0)], ids=["as it is", "for long"])

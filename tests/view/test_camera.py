@@ -5,7 +5,7 @@ import pytest
 from worlds import frame_of
 
 from wavetank import Block, Scene, Sphere, Tank
-from wavetank.errors import WavetankError
+from wavetank.foundation.errors import WavetankError
 from wavetank.view.camera import Camera
 from wavetank.view.extent import extent_of, extent_of_water
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from wavetank.errors import WavetankError
+from wavetank.foundation.errors import WavetankError
 from wavetank.view.colormaps import COLORMAPS, ENTRIES, oklab, rgb_of, table, to_linear, to_srgb
 from wavetank.view.quantities import QUANTITIES
 

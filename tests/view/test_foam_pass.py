@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from wavetank import Camera, Scene, Tank
-from wavetank.compiler import upload
-from wavetank.state import new_diffuse
+from wavetank.device.compiler import upload
+from wavetank.device.state import new_diffuse
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import Style
 from wavetank.view.views import VIEWS

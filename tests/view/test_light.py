@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wavetank import Scene, Sphere, Tank
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import allocate
 from wavetank.view.camera import Camera
 from wavetank.view.lens import vec3

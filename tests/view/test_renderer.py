@@ -3,9 +3,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wavetank import Block, Box, HalfSpace, Scene, Tank, compiler
-from wavetank.errors import WavetankError
-from wavetank.simulation import Simulation
+from wavetank import Block, Box, HalfSpace, Scene, Tank
+from wavetank.device import compiler
+from wavetank.foundation.errors import WavetankError
+from wavetank.simulation.simulation import Simulation
 from wavetank.view import renderer as module
 from wavetank.view.camera import Camera
 from wavetank.view.passes import ellipsoids, shadow, sunlight

@@ -8,7 +8,7 @@ import pytest
 from test_ellipsoids import lattice
 
 from wavetank import Box, Scene, Simulation, Tank
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view import renderer as renderer_module
 from wavetank.view.camera import Camera
 from wavetank.view.lens import vector

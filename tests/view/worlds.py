@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from wavetank import compiler
-from wavetank.frame import Frame
-from wavetank.solids import build
+from wavetank.device import compiler
+from wavetank.simulation.frame import Frame
+from wavetank.solids.shapes import build
 
 compiler.start("cpu")
-from wavetank.compiler import qd  # noqa: E402
+from wavetank.device.compiler import qd  # noqa: E402
 
 
 def device(values, kind, length):

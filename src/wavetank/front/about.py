@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.fluids import Points
+from wavetank.foundation.params import PARAMETERS, Parameters
 from wavetank.front.picture import Painter
-from wavetank.params import PARAMETERS, Parameters
-from wavetank.scene import Scene, bundled_levels, bundled_scenes
-from wavetank.session import Session
-from wavetank.tools import TOOLS, describe
+from wavetank.scene.fluids import Points
+from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
+from wavetank.session.session import Session
+from wavetank.session.tools import TOOLS, describe
 from wavetank.view.choices import colorings, views
 from wavetank.view.extent import ENDLESS, extent_of
 

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.errors import WavetankError
-from wavetank.scene import Scene
-from wavetank.simulation import Simulation
+from wavetank.foundation.errors import WavetankError
+from wavetank.scene.scene import Scene
+from wavetank.simulation.simulation import Simulation
 from wavetank.view.renderer import render
 
 SCENE, SPACING, SECONDS, SIZE = "obstacle-tank", 0.04, 0.5, (480, 270)

@@ -15,14 +15,14 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from wavetank.errors import WavetankError
-from wavetank.export import exporter_named
-from wavetank.export.gif import LARGEST_RATE, GifWriter
-from wavetank.export.mp4 import VideoWriter
-from wavetank.export.png import write_png
-from wavetank.frame import Frame
-from wavetank.replacing import make_folder
-from wavetank.simulation import Simulation
+from wavetank.formats import exporter_named
+from wavetank.formats.gif import LARGEST_RATE, GifWriter
+from wavetank.formats.mp4 import VideoWriter
+from wavetank.formats.png import write_png
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.replacing import make_folder
+from wavetank.simulation.frame import Frame
+from wavetank.simulation.simulation import Simulation
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import QUALITIES, quality_named
 
@@ -171,7 +171,7 @@ def replay_session(
 
     The video follows the recorded camera and shows one frame of the session in each of its own, so slow motion is slow.
     """
-    from wavetank.recording import Recording, digest, replay
+    from wavetank.session.recording import Recording, digest, replay
     from wavetank.view.choices import options
 
     if not 1.0 <= fps <= 240.0:

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.game import Game
-from wavetank.scene import bundled_levels
-from wavetank.scores import keep_score, key_of, scores
-from wavetank.session import Session
+from wavetank.scene.scene import bundled_levels
+from wavetank.session.game import Game
+from wavetank.session.scores import keep_score, key_of, scores
+from wavetank.session.session import Session
 
 Place = list[float]  # u, v: shares of a picture's width and height
 

@@ -4,9 +4,9 @@ import html
 import threading
 from typing import Any
 
-from wavetank.front.web import WebFront
-from wavetank.scene import Scene
-from wavetank.session import Session
+from wavetank.front.page.server import WebFront
+from wavetank.scene.scene import Scene
+from wavetank.session.session import Session
 
 
 class Show:

@@ -7,7 +7,7 @@ import time
 import numpy as np
 from PIL import Image
 
-from wavetank.session import Session
+from wavetank.session.session import Session
 from wavetank.view.choices import options
 from wavetank.view.renderer import Renderer
 

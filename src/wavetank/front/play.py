@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from wavetank.errors import WavetankError
-from wavetank.front.gate import is_loopback
-from wavetank.recording import Recording
-from wavetank.replacing import partial_path
-from wavetank.scene import Scene
-from wavetank.session import Session
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.replacing import partial_path
+from wavetank.front.page.gate import is_loopback
+from wavetank.scene.scene import Scene
+from wavetank.session.recording import Recording
+from wavetank.session.session import Session
 
 
 def play(
@@ -114,7 +114,7 @@ def play_in_browser(
     record: Path | None = None, most: int = 200_000,
 ) -> None:  # fmt: skip
     """Serve a page until Ctrl-C and print one line with its address, token included."""
-    from wavetank.front.web import WebFront
+    from wavetank.front.page.server import WebFront
 
     _check_folder(record)
     session = Session(scene, arch, most_particles=most)

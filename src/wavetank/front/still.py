@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from wavetank import __version__
-from wavetank.errors import WavetankError
-from wavetank.export import exporter_for
-from wavetank.frame import Frame
-from wavetank.replacing import partial_path
-from wavetank.scene import Scene
-from wavetank.simulation import Simulation
+from wavetank.formats import exporter_for
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.replacing import partial_path
+from wavetank.scene.scene import Scene
+from wavetank.simulation.frame import Frame
+from wavetank.simulation.simulation import Simulation
 from wavetank.view.camera import Camera
 from wavetank.view.extent import extent_of_water
 from wavetank.view.renderer import Renderer, affordable

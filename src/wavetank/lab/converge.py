@@ -14,12 +14,12 @@ from typing import Any
 
 from rich.console import Console
 
-from wavetank.errors import WavetankError
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.params import PAPER_SPACING
+from wavetank.foundation.replacing import make_folder
 from wavetank.lab.plots import BLUE, RED, pyplot, tidy
-from wavetank.params import PAPER_SPACING
-from wavetank.replacing import make_folder
-from wavetank.scene import Scene
-from wavetank.simulation import Simulation
+from wavetank.scene.scene import Scene
+from wavetank.simulation.simulation import Simulation
 
 REST_DENSITY = 3.0
 PRESETS = {"paper": "report, Table 1", "standard": "wavetank, default"}

@@ -7,7 +7,7 @@ import shutil
 import sys
 from typing import Any
 
-from wavetank import compiler
+from wavetank.device import compiler
 
 _PACKAGES = {
     "quadrants": "", "numpy": "", "pydantic": "", "typer": "", "rich": "", "pillow": "", "av": "", "tomli-w": "",

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from wavetank.errors import WavetankError
+from wavetank.foundation.errors import WavetankError
 
 BLUE, RED = "#1f6f8b", "#c8553d"
 

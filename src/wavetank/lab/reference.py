@@ -3,7 +3,7 @@
 python -m wavetank.lab.reference > docs/parameters.md
 """
 
-from wavetank.params import PARAMETERS, PRESETS, QUALITIES
+from wavetank.foundation.params import PARAMETERS, PRESETS, QUALITIES
 
 
 def parameters_page() -> str:
@@ -12,7 +12,7 @@ def parameters_page() -> str:
         "# Parameters",
         "",
         "Keys of a scene file, options of `wavetank run --set NAME=VALUE`, and attributes of `Scene` and, where live,",
-        "of a running `Simulation`. Written from `src/wavetank/params.py`; do not edit.",
+        "of a running `Simulation`. Written from `src/wavetank/foundation/params.py`; do not edit.",
         "",
         "| name | symbol | default | range | unit | live | meaning |",
         "|---|---|---|---|---|---|---|",

@@ -10,11 +10,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from wavetank.errors import WavetankError
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.replacing import make_folder
 from wavetank.lab.cases import CASES
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import pyplot
-from wavetank.replacing import make_folder
 
 
 def validate(

@@ -15,8 +15,10 @@ assumed, so that a table of one variable replaces a volume grid for each solid.
 Contact: conservative advancement along the path (Hart 1996, "Sphere tracing", 10.1007/s003710050084).
 """
 
-from wavetank.compiler import qd
-from wavetank.distance import (
+from wavetank.device.compiler import qd
+from wavetank.device.state import Coefficients, Particles, Walls
+from wavetank.physics.predicted_positions import predict_at, predicted
+from wavetank.solids.distance import (
     SolidSet,
     lift,
     local_distance,
@@ -27,8 +29,6 @@ from wavetank.distance import (
     vec3,
     vec4,
 )  # fmt: skip
-from wavetank.physics.places import predict_at, predicted
-from wavetank.state import Coefficients, Particles, Walls
 
 # Bit 30 of `near` stands for every solid from number 30 on.
 

@@ -30,13 +30,13 @@ Chebyshev for Jacobi solvers of constraints: Wang 2015 (10.1145/2816795.2818063)
 multiplier: Moreau and Jean's projected iteration, as in Tonge et al. 2012 (10.1145/2185520.2185601).
 """
 
-from wavetank.compiler import qd
-from wavetank.distance import SolidSet, lift, vec4
+from wavetank.device.compiler import qd
+from wavetank.device.state import Coefficients, Grid, Particles, Scratch, Walls
 from wavetank.physics.boundary import find_walls, flattened, kept_in_tank, stopped
 from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
-from wavetank.physics.places import predict_at, predicted
+from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.smoothing import kernel
-from wavetank.state import Coefficients, Grid, Particles, Scratch, Walls
+from wavetank.solids.distance import SolidSet, lift, vec4
 
 
 @qd.func

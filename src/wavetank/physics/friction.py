@@ -9,11 +9,11 @@ Position-based friction after Macklin et al. 2014, "Unified Particle Physics" (1
     slip     v_t       velocity along the wall, in the wall's motion     m/s
 """
 
-from wavetank.compiler import qd
-from wavetank.distance import SolidSet, lift, rotate, signed_distance, to_local, vec3
+from wavetank.device.compiler import qd
+from wavetank.device.state import Coefficients, Particles, Scratch, Walls
 from wavetank.physics.boundary import is_near, wall_share
-from wavetank.physics.places import predicted
-from wavetank.state import Coefficients, Particles, Scratch, Walls
+from wavetank.physics.predicted_positions import predicted
+from wavetank.solids.distance import SolidSet, lift, rotate, signed_distance, to_local, vec3
 
 
 @qd.kernel(fastcache=True)

@@ -1,12 +1,12 @@
 """The two ends of a position-based step: predict positions, and read velocities off the corrected ones."""
 
-from wavetank.compiler import qd
-from wavetank.distance import SolidSet, lift, vec3
+from wavetank.device.compiler import qd
+from wavetank.device.state import Coefficients, Grid, Particles
 from wavetank.physics.boundary import flattened, kept_in_tank, near_bodies, stopped, walls_near
 from wavetank.physics.neighbors import cell_of
 from wavetank.physics.pairs import part_of, teams, turns
-from wavetank.physics.places import predict_at, predicted
-from wavetank.state import Coefficients, Grid, Particles
+from wavetank.physics.predicted_positions import predict_at, predicted
+from wavetank.solids.distance import SolidSet, lift, vec3
 
 
 @qd.func
@@ -35,9 +35,9 @@ def predict(
 ):  # fmt: skip
     """Accelerate, move freely (Algorithm 1, lines 2-3), mark what is near, stay out of it, and find the cell.
 
-    With gravity acts the share of the grid's pressure that is carried on (`coarse_pressure.py`). Where solids are not
-    `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they are, wherever that
-    is.
+    With gravity acts the share of the grid's pressure that is carried on (`grid_pressure/correction.py`). Where solids
+    are not `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they are, wherever
+    that is.
     """
     for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
         gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)

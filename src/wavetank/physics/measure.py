@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wavetank.params import Parameters
+from wavetank.foundation.params import Parameters
 
 
 def density_error(densities: np.ndarray, rest_density: float | np.ndarray) -> np.ndarray:

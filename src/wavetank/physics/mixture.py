@@ -19,10 +19,10 @@ import math
 
 import numpy as np
 
-from wavetank.compiler import qd, upload
-from wavetank.materials import Material, Properties
-from wavetank.params import Parameters
-from wavetank.state import Fluids, Particles, Scratch
+from wavetank.device.compiler import qd, upload
+from wavetank.device.state import Fluids, Particles, Scratch
+from wavetank.foundation.materials import Material, Properties
+from wavetank.foundation.params import Parameters
 
 #: Largest eigenvalue that a factor of ten between the densities adds to the Jacobi matrix; docs/materials.md.
 PER_DECADE = 0.2

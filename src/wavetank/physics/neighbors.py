@@ -24,12 +24,12 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import lanes, qd, threads, worth_sharing
-from wavetank.errors import WavetankError
+from wavetank.device.compiler import lanes, qd, threads, worth_sharing
+from wavetank.device.state import Coefficients, Grid, Particles, integers
+from wavetank.device.sums import blocks_of, share_of, sort_by
+from wavetank.foundation.errors import WavetankError
 from wavetank.physics.pairs import part_of, turns
-from wavetank.physics.places import predict_at, predicted
-from wavetank.state import Coefficients, Grid, Particles, integers
-from wavetank.sums import blocks_of, share_of, sort_by
+from wavetank.physics.predicted_positions import predict_at, predicted
 
 PARTS = 8  # of a pass for each thread: enough to even out what takes longer
 MAX_ENTRIES = 2**31 - 1  # of a device array: the compiler counts them, and computes places in them, with 32 bits

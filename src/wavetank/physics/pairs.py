@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import download, qd
-from wavetank.physics.places import predicted
-from wavetank.state import Coefficients, Grid, Particles, integers
+from wavetank.device.compiler import download, qd
+from wavetank.device.state import Coefficients, Grid, Particles, integers
+from wavetank.physics.predicted_positions import predicted
 
 
 @qd.func

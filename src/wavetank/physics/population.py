@@ -12,11 +12,11 @@ does it on threads, as every particle or place is judged by itself.
 
 import numpy as np
 
-from wavetank.compiler import download, qd, upload
-from wavetank.distance import SolidSet, lift, signed_distance, vec3
+from wavetank.device.compiler import download, qd, upload
+from wavetank.device.state import Grid, Particles, integers, new_particles, vectors, with_viscosity
 from wavetank.physics.neighbors import copy_particle
-from wavetank.physics.places import predict_at
-from wavetank.state import Grid, Particles, integers, new_particles, vectors, with_viscosity
+from wavetank.physics.predicted_positions import predict_at
+from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3
 
 _FIELDS: tuple[str, ...] = ("x", "v", "a", "id", "material", "near", "dye", "frozen")
 

@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 
 WALL_STIFFENING = 0.5  # by how much a wall's layers move with a particle half a spacing away; see `half_space`
 TABLE_SIZE = 256  # samples of the half-space integrals over s/h in [-1, 1]

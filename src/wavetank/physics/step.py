@@ -12,33 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import upload
-from wavetank.distance import SolidSet
-from wavetank.materials import Material
-from wavetank.params import Parameters
-from wavetank.physics.boundary import keep_out_of_solids
-from wavetank.physics.coarse_pressure import LARGEST_CARRIED, carried, correct_pressure
-from wavetank.physics.density_constraint import (
-    correct_positions,
-    measure_density,
-    schedule,
-    solve_multipliers,
-    start_multipliers,
-)
-from wavetank.physics.diffuse.pool import Pool
-from wavetank.physics.friction import apply_friction
-from wavetank.physics.implicit_viscosity import carried_share, carry_on, is_thick, is_viscous, solve_viscosity
-from wavetank.physics.integrate import predict, update_velocities
-from wavetank.physics.mixture import Blend, blend, fill_table, pack_weights, stiffening, weigh
-from wavetank.physics.neighbors import find_neighbors, sort_particles
-from wavetank.physics.pairs import count_neighbors
-from wavetank.physics.population import hold_frozen, stop_frozen
-from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
-from wavetank.physics.tension import apply_tension, limited_tensions, substeps_for
-from wavetank.physics.time_step import pool_depth, steps_needed
-from wavetank.physics.viscosity import apply_mixed_viscosity, apply_viscosity
-from wavetank.physics.vorticity import confine_vorticity
-from wavetank.state import (
+from wavetank.device.compiler import upload
+from wavetank.device.state import (
     CoarseGrid,
     Coefficients,
     Fluids,
@@ -51,6 +26,37 @@ from wavetank.state import (
     with_viscosity,
     without_viscosity,
 )  # fmt: skip
+from wavetank.foundation.materials import Material
+from wavetank.foundation.params import Parameters
+from wavetank.physics.boundary import keep_out_of_solids
+from wavetank.physics.density_constraint import (
+    correct_positions,
+    measure_density,
+    schedule,
+    solve_multipliers,
+    start_multipliers,
+)
+from wavetank.physics.dynamic_viscosity.implicit_viscosity import (
+    carried_share,
+    carry_on,
+    is_thick,
+    is_viscous,
+    solve_viscosity,
+)
+from wavetank.physics.foam.pool import Pool
+from wavetank.physics.friction import apply_friction
+from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED, carried, correct_pressure
+from wavetank.physics.integrate import predict, update_velocities
+from wavetank.physics.mixture import Blend, blend, fill_table, pack_weights, stiffening, weigh
+from wavetank.physics.neighbors import find_neighbors, sort_particles
+from wavetank.physics.pairs import count_neighbors
+from wavetank.physics.population import hold_frozen, stop_frozen
+from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
+from wavetank.physics.tension import apply_tension, limited_tensions, substeps_for
+from wavetank.physics.time_step import pool_depth, steps_needed
+from wavetank.physics.vorticity import confine_vorticity
+from wavetank.physics.xsph_viscosity import apply_mixed_viscosity, apply_viscosity
+from wavetank.solids.distance import SolidSet
 
 LEAST_MIXING = 1e-6  # of S_0: a particle without neighbours has no gradient to divide by
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep

@@ -34,15 +34,15 @@ import math
 
 import numpy as np
 
-from wavetank.compiler import qd, upload
-from wavetank.distance import SolidSet, lift, signed_distance, vec3, vec4
+from wavetank.device.compiler import qd, upload
+from wavetank.device.state import MARGIN, Coefficients, Fluids, Grid, Particles, Scratch, remembered, scalars
 from wavetank.physics.boundary import is_near
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend
 from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
-from wavetank.physics.places import predicted
+from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
-from wavetank.state import MARGIN, Coefficients, Fluids, Grid, Particles, Scratch, remembered, scalars
+from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3, vec4
 
 COHESION = 0.2  # share of the bond that alone would give the tension
 #: Brings the measured period of an oscillating drop to Rayleigh's: curved surfaces pull otherwise than flat ones.

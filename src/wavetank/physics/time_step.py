@@ -1,7 +1,7 @@
 """How long a time step may be: the fastest particle and the fastest wave go a share of a spacing.
 
 The first is the usual Courant condition. The second is what keeps deep water stiff where no grid carries the pressure
-(`coarse_pressure.py`). A few iterations carry pressure a
+(`grid_pressure/correction.py`). A few iterations carry pressure a
 few spacings far: water answers a load as if sound went at c = beta d / dt, with beta near 4 for four iterations,
 whatever the depth. Water of depth H then compresses by g H / (2 c^2) on average, as in weakly compressible SPH, and
 where that is more than a few per cent, columns fall into themselves, bounce and boil. With w = sqrt(g H) dt / d the
@@ -19,10 +19,10 @@ import math
 
 import numpy as np
 
-from wavetank.compiler import lanes, qd
-from wavetank.params import Parameters
-from wavetank.state import Particles
-from wavetank.sums import share_of
+from wavetank.device.compiler import lanes, qd
+from wavetank.device.state import Particles
+from wavetank.device.sums import share_of
+from wavetank.foundation.params import Parameters
 
 ALONE = 2.0 / 3.0  # of `courant` where iterations alone carry the pressure
 SHALLOWEST = 0.6  # d: way in a frame of the wave that water without a grid is taken to have, however shallow

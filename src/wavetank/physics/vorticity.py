@@ -11,14 +11,14 @@ Where we differ, and why: N has length one even where eta is noise, so that Eq. 
 from particle to particle, a vortex does not: |sum w omega_j| / sum w |omega_j| is 1 in a vortex and about 1 / sqrt(n)
 for n neighbours that turn at random. Below `vorticity_coherence` of it there is no force, nor where the water turns
 slower than the smallest waves do (`CALM` in step.py); a coherence of 0 leaves Eq. 10 as it is. The vorticity itself,
-Eq. 9, is summed in the sweep of XSPH (`viscosity.py`).
+Eq. 9, is summed in the sweep of XSPH (`xsph_viscosity.py`).
 """
 
-from wavetank.compiler import qd
-from wavetank.distance import lift, vec3
+from wavetank.device.compiler import qd
+from wavetank.device.state import Coefficients, Grid, Particles, Scratch
 from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
 from wavetank.physics.smoothing import kernel
-from wavetank.state import Coefficients, Grid, Particles, Scratch
+from wavetank.solids.distance import lift, vec3
 
 
 @qd.func

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import download, qd, upload
+from wavetank.device.compiler import download, qd, upload
 from wavetank.view.colormaps import to_srgb
 from wavetank.view.lens import vec2, vec3
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.errors import WavetankError
+from wavetank.foundation.errors import WavetankError
 from wavetank.view.extent import Extent, extent_of
 from wavetank.view.lens import Lens, basis, lens_at
 

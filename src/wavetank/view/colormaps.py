@@ -8,7 +8,7 @@ import functools
 
 import numpy as np
 
-from wavetank.errors import WavetankError
+from wavetank.foundation.errors import WavetankError
 
 ENTRIES = 256
 

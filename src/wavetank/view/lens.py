@@ -14,8 +14,8 @@ import dataclasses
 
 import numpy as np
 
-from wavetank.compiler import qd
-from wavetank.state import remembered
+from wavetank.device.compiler import qd
+from wavetank.device.state import remembered
 
 vec2 = qd.types.vector(2, qd.f32)
 vec3 = qd.types.vector(3, qd.f32)

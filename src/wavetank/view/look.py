@@ -8,7 +8,7 @@ import functools
 
 import numpy as np
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.colormaps import rgb_of, to_linear
 from wavetank.view.extent import Extent
 from wavetank.view.lens import vec3, vector

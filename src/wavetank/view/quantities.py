@@ -10,7 +10,7 @@ import zlib
 from collections.abc import Callable
 from typing import Any
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.extent import extent_of
 
 Limits = tuple[float, float]

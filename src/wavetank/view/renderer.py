@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import current_backend, download, qd, synchronize, upload
-from wavetank.errors import WavetankError
-from wavetank.frame import Frame
+from wavetank.device.compiler import current_backend, download, qd, synchronize, upload
+from wavetank.foundation.errors import WavetankError
+from wavetank.simulation.frame import Frame
 from wavetank.view import legend as legends
 from wavetank.view.buffers import allocate
 from wavetank.view.camera import Camera

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Any
 
-from wavetank.frame import Frame
+from wavetank.simulation.frame import Frame
 from wavetank.view.extent import Extent
 from wavetank.view.lens import Lens
 from wavetank.view.look import Look

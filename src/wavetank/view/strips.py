@@ -10,7 +10,7 @@ import functools
 import math
 from typing import Any
 
-from wavetank.compiler import qd, threads
+from wavetank.device.compiler import qd, threads
 
 LEAST_TASKS = 512  # that the compiler gives to a processor's thread, whatever they cost
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.errors import WavetankError
-from wavetank.frame import Frame
+from wavetank.foundation.errors import WavetankError
+from wavetank.simulation.frame import Frame
 from wavetank.view.colormaps import ENTRIES, bands, rgb_of, table, to_linear
 from wavetank.view.extent import Extent
 from wavetank.view.quantities import QUANTITIES, key_of, usual

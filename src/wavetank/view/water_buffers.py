@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import qd, threads, upload
-from wavetank.frame import Frame
+from wavetank.device.compiler import qd, threads, upload
+from wavetank.simulation.frame import Frame
 from wavetank.view.buffers import Buffers
 from wavetank.view.extent import Extent
 from wavetank.view.lens import vec2, vec3

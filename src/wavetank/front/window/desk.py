@@ -6,12 +6,12 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
-from wavetank.errors import WavetankError
+from wavetank.foundation.errors import WavetankError
 from wavetank.front.about import everything
-from wavetank.front.engine import Engine
+from wavetank.front.window.engine import Engine
 from wavetank.front.window.icons import LOOK
-from wavetank.scene import Scene
-from wavetank.tools import TOOLS, describe
+from wavetank.scene.scene import Scene
+from wavetank.session.tools import TOOLS, describe
 
 LOOK_TOOL = {
     "name": "look", "label": "Look", "key": "l", "icon": LOOK, "options": [], "cursor": False,
@@ -99,7 +99,7 @@ class Desk:
 
     def set(self, about: dict[str, Any], value: Any) -> None:
         """Set a live parameter; one that is not waits for a reset."""
-        from wavetank.commands import SetParameter
+        from wavetank.session.commands import SetParameter
 
         if not about["live"]:
             self.pending[about["name"]] = value
@@ -154,7 +154,7 @@ class Desk:
 
     def begin(self, **which: str) -> None:
         """Begin a bundled scene or level by `name`, or one whose file says `text`."""
-        from wavetank.commands import LoadScene, Pause
+        from wavetank.session.commands import LoadScene, Pause
 
         self.pending.clear()
         self.engine.do(LoadScene, **which)

@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 from imgui_bundle import ImVec2, imgui
 
-from wavetank.commands import Bookmark, Home, Orbit, Pause, Reset, Rewind, Speed, Step, ToolStop, Zoom
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.look import ACCENT, RAISED, SOFT, ink, rgba
+from wavetank.session.commands import Bookmark, Home, Orbit, Pause, Reset, Rewind, Speed, Step, ToolStop, Zoom
 
 SPEEDS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0)
 SHOWN = (

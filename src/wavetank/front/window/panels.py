@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from imgui_bundle import ImVec2, imgui, implot
 
-from wavetank.commands import SetView
-from wavetank.export import exporter_for
+from wavetank.formats import exporter_for
 from wavetank.front.window import keys, scenes
 from wavetank.front.window.controls import control, words
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.look import ACCENT, GROUND, SOFT, WARM, button, hint, ink, pills, rgba, title
-from wavetank.recording import Recording
+from wavetank.session.commands import SetView
+from wavetank.session.recording import Recording
 
 DETAILS = (("auto", "Automatic"), ("full", "Sharp"), ("half", "Fast"))
 COLOURS = (("#3f99da", "Blue"), ("#e8eef2", "Milk"))

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from wavetank.commands import Orbit, Pan, ToolBegin, ToolEnd, ToolMove, Zoom
 from wavetank.front.window.controls import control, words
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.hud import draw_game
 from wavetank.front.window.look import ACCENT, GROUND, LINE, SOFT, TEXT, button, floating, heading, ink
+from wavetank.session.commands import Orbit, Pan, ToolBegin, ToolEnd, ToolMove, Zoom
 
 TURN = 3.2  # rad for a drag over the height of the picture
 FLIGHT = 0.8  # heights in view a second
@@ -160,7 +160,7 @@ class Stage:
 
     def _running(self, at: ImVec2) -> None:
         """Buttons that stop what goes on by itself."""
-        from wavetank.commands import ToolStop
+        from wavetank.session.commands import ToolStop
 
         for n, name in enumerate(self.desk.status["running"]):
             if n:

@@ -2,11 +2,11 @@
 
 from imgui_bundle import ImVec2, imgui
 
-from wavetank.commands import Bookmark, Rewind, Speed, Step
 from wavetank.front.window import keys
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.icons import BACK, BOOKMARK, DROP, PAUSE, PLAY, RESET, STEP
 from wavetank.front.window.look import ACCENT, ACCENT_GROUND, HOVER, SOFT, TEXT, chip, draw_icon, hint, ink, rgba
+from wavetank.session.commands import Bookmark, Rewind, Speed, Step
 
 BUTTON = 2.3  # em
 NAMES = ("1/16 ×", "1/8 ×", "1/4 ×", "1/2 ×", "1 ×", "2 ×")

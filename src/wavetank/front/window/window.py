@@ -9,9 +9,9 @@ import glfw
 import moderngl
 from imgui_bundle import ImVec2, glfw_utils, hello_imgui, imgui, implot
 
-from wavetank.front.engine import Engine
 from wavetank.front.window import keys, timeline
 from wavetank.front.window.desk import Desk
+from wavetank.front.window.engine import Engine
 from wavetank.front.window.look import (
     ACCENT,
     ACCENT_GROUND,
@@ -28,7 +28,7 @@ from wavetank.front.window.look import (
 from wavetank.front.window.panels import panel
 from wavetank.front.window.plate import Plate
 from wavetank.front.window.stage import Stage
-from wavetank.session import Session
+from wavetank.session.session import Session
 
 BEAT = 1.0 / 60.0  # s: between two pictures of the window
 GAP = 8.0  # px between its parts

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.fluids import Block
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene, Tank
-from wavetank.simulation import Simulation
+from wavetank.scene.fluids import Block
+from wavetank.scene.scene import Scene, Tank
+from wavetank.simulation.simulation import Simulation
 
 WIDTH, FALL, SPEED, ROOM = 0.01, 0.12, 0.3, 0.12  # m, m, m/s, m
 SHEETS = {"Re = 0.06": 0.05, "Re = 3": 0.001}  # nu [m^2/s]

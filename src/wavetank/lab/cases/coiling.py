@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from wavetank.compiler import qd
-from wavetank.distance import vec3
-from wavetank.fluids import Points
-from wavetank.forces.force import Force, in_space
+from wavetank.device.compiler import qd
+from wavetank.device.state import Particles
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene, Tank
-from wavetank.simulation import Simulation
-from wavetank.state import Particles
+from wavetank.scene.fluids import Points
+from wavetank.scene.forces.force import Force, in_space
+from wavetank.scene.scene import Scene, Tank
+from wavetank.simulation.simulation import Simulation
+from wavetank.solids.distance import vec3
 
 RADIUS, SPEED, VISCOSITY, DENSITY = 0.001, 0.3, 200.0, 1400.0  # m, m/s, Pa s, kg/m^3
 LONG, SHORT = 9.0, 3.0  # falls, in diameters

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.fluids import Block, Points
 from wavetank.lab.cases.case import Case, Figure, Outcome, Series
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene, Tank
-from wavetank.simulation import Simulation
-from wavetank.solids import Box, Cylinder, Difference
+from wavetank.scene.fluids import Block, Points
+from wavetank.scene.scene import Scene, Tank
+from wavetank.simulation.simulation import Simulation
+from wavetank.solids.shapes import Box, Cylinder, Difference
 
 D, WIDTH, HEIGHT, FLOOR = 0.01, 0.12, 0.18, 0.05  # m: spacing and wall, inside of a cup, its floor above the tank's
 SQUARE, ROUND = np.array([0.25, FLOOR, 0.15]), np.array([0.65, FLOOR, 0.15])  # m: centres of the inner floors

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.fluids import Ball, Block
 from wavetank.lab.cases.case import Case, Figure, Outcome, surface
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene, Tank
-from wavetank.simulation import Simulation
+from wavetank.scene.fluids import Ball, Block
+from wavetank.scene.scene import Scene, Tank
+from wavetank.simulation.simulation import Simulation
 
 SIZE = (0.5, 0.8, 0.5)  # m
 POOL, GRAVITY = 0.2, 9.81  # m, m/s^2

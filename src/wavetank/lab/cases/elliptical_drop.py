@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.fluids import Points
 from wavetank.lab.cases.case import Case, Figure, Outcome, measured
 from wavetank.lab.cases.packing import settled
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene
-from wavetank.simulation import Simulation
+from wavetank.scene.fluids import Points
+from wavetank.scene.scene import Scene
+from wavetank.simulation.simulation import Simulation
 
 SOURCE = "Monaghan 1994"
 BOX = 2.4  # m: edge of the settled water that the disc is cut out of

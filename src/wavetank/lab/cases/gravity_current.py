@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.fluids import Block
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene, Tank
-from wavetank.simulation import Simulation
+from wavetank.scene.fluids import Block
+from wavetank.scene.scene import Scene, Tank
+from wavetank.simulation.simulation import Simulation
 
 SIDE, VISCOSITY, LENGTH = 0.2, 20.0, 1.2  # m, Pa s, m
 SOURCE = "Huppert 1982"

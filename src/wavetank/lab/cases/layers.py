@@ -10,8 +10,8 @@ import numpy as np
 
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene
-from wavetank.simulation import Simulation
+from wavetank.scene.scene import Scene
+from wavetank.simulation.simulation import Simulation
 
 LOWER, UPPER, WIDTH = 0.3, 0.6, 1.0  # m
 

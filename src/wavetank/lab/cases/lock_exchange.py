@@ -14,8 +14,8 @@ import numpy as np
 
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene
-from wavetank.simulation import Simulation
+from wavetank.scene.scene import Scene
+from wavetank.simulation.simulation import Simulation
 
 DEPTH, LENGTH, RATIO, EIGHTH = 0.3, 1.4, 0.8, 8
 SOURCE = "Benjamin 1968; Shin et al. 2004"

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.fluids import Ball
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene
-from wavetank.simulation import Simulation
+from wavetank.scene.fluids import Ball
+from wavetank.scene.scene import Scene
+from wavetank.simulation.simulation import Simulation
 
 
 def run(quick: bool, arch: str) -> Outcome:

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wavetank.fluids import Points
-from wavetank.scene import Scene, Tank
-from wavetank.simulation import Simulation
+from wavetank.scene.fluids import Points
+from wavetank.scene.scene import Scene, Tank
+from wavetank.simulation.simulation import Simulation
 
 SHAKEN, SEED = 0.3, 0  # d
 SECONDS = 0.5

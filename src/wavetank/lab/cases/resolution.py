@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.fluids import Points
 from wavetank.lab.cases.case import Case, Figure, Outcome, Series
 from wavetank.lab.cases.martin_moyce import GRAVITY, A, scene
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene
-from wavetank.simulation import Simulation
+from wavetank.scene.fluids import Points
+from wavetank.scene.scene import Scene
+from wavetank.simulation.simulation import Simulation
 
 RATE = math.sqrt(2.0 * GRAVITY / A)  # T per second
 STARTS = 4

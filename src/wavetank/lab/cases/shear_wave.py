@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.fluids import Points
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene
-from wavetank.simulation import Simulation
+from wavetank.scene.fluids import Points
+from wavetank.scene.scene import Scene
+from wavetank.simulation.simulation import Simulation
 
 HEIGHT, WIDTH, DENSITY = 0.2, 0.4, 1000.0  # m, m, kg/m^3
 K = 2.0 * math.pi / HEIGHT

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.fluids import Points
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene, Tank
-from wavetank.simulation import Simulation
+from wavetank.scene.fluids import Points
+from wavetank.scene.scene import Scene, Tank
+from wavetank.simulation.simulation import Simulation
 
 LENGTH, DEPTH, AMPLITUDE, GRAVITY = 2.0, 1.0, 0.06, 9.81  # m, m, m, m/s^2
 K = math.pi / LENGTH

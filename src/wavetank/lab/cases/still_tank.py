@@ -9,8 +9,8 @@ import numpy as np
 
 from wavetank.lab.cases.case import Case, Figure, Outcome, surface
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene
-from wavetank.simulation import Simulation
+from wavetank.scene.scene import Scene
+from wavetank.simulation.simulation import Simulation
 
 DEPTH = 0.5  # m
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.fluids import Block, Points
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
-from wavetank.scene import Scene
-from wavetank.simulation import Simulation
+from wavetank.scene.fluids import Block, Points
+from wavetank.scene.scene import Scene
+from wavetank.simulation.simulation import Simulation
 
 RADIUS, SIGMA, STRETCH = 0.01, 0.072, 1.1  # m, N/m, of the long axis at the start
 SIDE = 0.01  # m, of the square

@@ -5,7 +5,7 @@ tau                 water along the sun's ray before it reaches a point         
 through             share of the sun that is left, per colour                        1
 """
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import (
     Lens,

@@ -13,7 +13,7 @@ the place is then found by halving. What bulges beyond the sun's view is not kno
     k         cos^2    of the refracted ray's angle; negative: total reflection       1
 """
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, view_ray
 from wavetank.view.look import Look

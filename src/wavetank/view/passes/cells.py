@@ -9,10 +9,10 @@ Inside a cell particles stand in the order of their ids, so that sums over them 
 import dataclasses
 import math
 
-from wavetank.compiler import qd, worth_sharing
-from wavetank.distance import lift
-from wavetank.frame import Frame
-from wavetank.sums import blocks_of, sort_by
+from wavetank.device.compiler import qd, worth_sharing
+from wavetank.device.sums import blocks_of, sort_by
+from wavetank.simulation.frame import Frame
+from wavetank.solids.distance import lift
 from wavetank.view.extent import Extent
 from wavetank.view.lens import vec3
 

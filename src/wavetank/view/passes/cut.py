@@ -11,7 +11,7 @@ less than 0.22 of those of full water, as next to an edge of the tank, there is 
 
 import math
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec3, vector, view_ray
 from wavetank.view.passes import cells as sorting

@@ -20,7 +20,7 @@ Particles deep inside are not drawn: cells whose neighbours are all well filled 
 
 from typing import Any
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import vec3, vector
 from wavetank.view.passes import cells as sorting

@@ -21,7 +21,7 @@ seen to flicker beside it. Large windows are sampled at up to `TAPS` pairs.
 
 from typing import Any
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec3, view_ray
 from wavetank.view.passes.ellipsoids import OPEN, walls

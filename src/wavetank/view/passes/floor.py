@@ -1,6 +1,6 @@
 """The floor: the plane y = 0, seen from above only, without end."""
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec3, view_ray
 from wavetank.view.shot import Shot

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.compiler import qd
-from wavetank.distance import lift
-from wavetank.state import Diffuse
+from wavetank.device.compiler import qd
+from wavetank.device.state import Diffuse
+from wavetank.solids.distance import lift
 from wavetank.view.buffers import Buffers
 from wavetank.view.colormaps import rgb_of, to_linear
 from wavetank.view.lens import Lens, pixels_per_metre, to_pixel, to_view, vec3, vector

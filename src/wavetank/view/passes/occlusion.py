@@ -12,7 +12,7 @@ with the probes of `probes.py`.
 
 from typing import Any
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, from_view, pixels_per_metre, point_at, vec3, vector
 from wavetank.view.passes.probes import pattern_turn, spiral, turned

@@ -12,7 +12,7 @@ none. Both happen along a line in the picture, and a pixel on that line has a sh
     there                share of a pixel that shows water at all                            1
 """
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, vec4, view_ray
 from wavetank.view.passes.solids import box_interval
 

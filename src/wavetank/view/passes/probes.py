@@ -6,7 +6,7 @@ averages out without a rest.
 
 import math
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.lens import vec2
 
 

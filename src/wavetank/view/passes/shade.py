@@ -7,7 +7,7 @@ lit                share of the sun that arrives, its angle included       1
 far                share of the background in what is far away             1
 """
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec3, vector, view_ray
 from wavetank.view.look import Look

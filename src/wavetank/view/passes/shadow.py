@@ -14,7 +14,7 @@ smooth pass averages that pattern away.
 
 from typing import Any
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import FARTHEST, Buffers
 from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec2, vec3
 from wavetank.view.passes import solids, spheres

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, pixels_per_metre
 from wavetank.view.shot import Shot

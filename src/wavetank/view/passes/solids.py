@@ -14,8 +14,8 @@ particles, which are balls around that plane and would cover the rim of every so
 import dataclasses
 from typing import Any
 
-from wavetank.compiler import qd
-from wavetank.distance import SolidSet, grain, signed_distance
+from wavetank.device.compiler import qd
+from wavetank.solids.distance import SolidSet, grain, signed_distance
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, vector, view_ray
 from wavetank.view.shot import Shot

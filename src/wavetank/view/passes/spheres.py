@@ -15,8 +15,8 @@ view is drawn smaller rather than cut off, which bounds the work of one particle
 drawn.
 """
 
-from wavetank.compiler import qd
-from wavetank.distance import lift
+from wavetank.device.compiler import qd
+from wavetank.solids.distance import lift
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import (
     Lens,

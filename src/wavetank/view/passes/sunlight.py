@@ -5,7 +5,7 @@ backdrop pass interpolates between those that lie on the same surface. The water
 its thickness along the sun's rays, and of the depth at which they meet it.
 """
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import FARTHEST, Buffers
 from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec2, vec3
 from wavetank.view.passes import flatten, occlusion, panes, shadow, smooth, surface, thickness

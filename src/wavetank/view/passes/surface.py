@@ -17,7 +17,7 @@ Within an ellipsoid rays count as parallel; at a distance of a hundred radii tha
 
 from typing import Any
 
-from wavetank.compiler import qd, threads
+from wavetank.device.compiler import qd, threads
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import (
     Lens,

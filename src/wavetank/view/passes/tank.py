@@ -12,7 +12,7 @@ order is irrelevant.
 
 from typing import Any
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, vector, view_ray
 from wavetank.view.look import Look

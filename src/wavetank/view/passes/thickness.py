@@ -13,7 +13,7 @@ never touches more than some twenty texels.
 import math
 from typing import Any
 
-from wavetank.compiler import qd, threads
+from wavetank.device.compiler import qd, threads
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, pixels_per_metre, to_pixel, to_view, vec2, vec3, vec4
 from wavetank.view.passes.spheres import dyed

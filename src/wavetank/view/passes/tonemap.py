@@ -6,7 +6,7 @@ brighter ones lose saturation on their way to white.
 
 from typing import Any
 
-from wavetank.compiler import qd
+from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import vec3
 from wavetank.view.shot import Shot

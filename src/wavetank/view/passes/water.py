@@ -18,8 +18,8 @@ import dataclasses
 
 import numpy as np
 
-from wavetank.compiler import download, qd
-from wavetank.state import remembered
+from wavetank.device.compiler import download, qd
+from wavetank.device.state import remembered
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import (
     Lens,

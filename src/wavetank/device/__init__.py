@@ -1,0 +1,1 @@
+"""The kernel compiler, what lies on the device, and launches."""

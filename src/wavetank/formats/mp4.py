@@ -1,0 +1,122 @@
+"""H.264 video in MP4, for every browser and player."""
+
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.replacing import partial_path
+
+SUFFIXES = (".mp4",)
+KIND = "video"
+
+_BT709 = 1  # the number of ITU-R BT.709 for primaries, transfer and matrix (ITU-T H.273)
+_LIMITED = 1  # libav's number for video range, 16 to 235
+
+
+class VideoWriter:
+    """Writes pictures of one size to a file that appears when it is complete.
+
+    Use it in a ``with``. An interrupt (Ctrl-C) still completes the file with the pictures that were written; any other
+    error leaves nothing, and a file of that name as it was.
+    """
+
+    def __init__(self, path: str | Path, width: int, height: int, fps: float = 60.0, *, quality: int = 18) -> None:
+        """Open `path` for pictures of `width` x `height` pixels; `quality` is H.264's CRF, lower is better."""
+        if width < 1 or height < 1 or not 0.1 <= fps <= 1000.0:
+            raise WavetankError(
+                f"video: {width} x {height} at {fps} frames per second is not allowed; "
+                "sizes start at 1, rates lie between 0.1 and 1000."
+            )
+        if Path(path).suffix.lower() != ".mp4":
+            raise WavetankError(f"{str(path)!r}: a video is an MP4; give the file a name that ends with .mp4.")
+        self.path, self.width, self.height = Path(path), int(width), int(height)
+        self.count = 0
+        self._rate = Fraction(fps).limit_denominator(1001)
+        self._partial = partial_path(path)
+        self._container = _open(self._partial)
+        # The format halves the resolution of colours: sizes must be even, odd ones get one more row or column.
+        self._stream = _add_stream(self._container, width + width % 2, height + height % 2, self._rate, quality)
+
+    def write(self, image: np.ndarray) -> None:
+        """Append a picture, uint8 [height, width, 3]."""
+        import av
+
+        if image.dtype != np.uint8 or image.shape != (self.height, self.width, 3):
+            raise WavetankError(
+                f"video: a picture of {image.dtype} {list(image.shape)} does not fit; "
+                f"this video takes uint8 [{self.height}, {self.width}, 3]."
+            )
+        padding = ((0, self.height % 2), (0, self.width % 2), (0, 0))
+        padded = np.pad(image, padding, mode="edge") if self.height % 2 or self.width % 2 else image
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(padded), format="rgb24")
+        encoded = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+        encoded.pts = self.count
+        encoded.time_base = 1 / self._rate
+        for packet in self._stream.encode(encoded):
+            self._container.mux(packet)
+        self.count += 1
+
+    def close(self) -> None:
+        """Complete the file and give it its name; without a single picture no file is left."""
+        if self._container is None:
+            return
+        try:
+            if self.count:
+                for packet in self._stream.encode(None):
+                    self._container.mux(packet)
+            self._container.close()
+            self._container = None
+            if self.count:
+                self._partial.replace(self.path)
+        finally:
+            self.discard()
+
+    def discard(self) -> None:
+        """Stop and leave nothing."""
+        container, self._container = self._container, None
+        if container is not None:
+            container.close()
+        self._partial.unlink(missing_ok=True)
+
+    def __enter__(self) -> "VideoWriter":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None or not issubclass(kind, Exception):  # KeyboardInterrupt, SystemExit
+            self.close()
+        else:
+            self.discard()
+
+
+def _open(path: Path) -> Any:
+    try:
+        import av
+    except ImportError:
+        raise WavetankError("video needs the package `av`; install it with `pip install av`.") from None
+    try:
+        # The index goes first (faststart), so that a browser plays while it loads.
+        return av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"})
+    except OSError as error:
+        raise WavetankError(f"{str(path)!r} cannot be written: {error}.") from None
+
+
+def _add_stream(container: Any, width: int, height: int, rate: Fraction, quality: int) -> Any:
+    import av
+
+    name = "libx264" if "libx264" in av.codecs_available else "h264"
+    stream = container.add_stream(name, rate=rate)
+    stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+    stream.options = {"crf": str(quality), "preset": "veryfast"}
+    context = stream.codec_context
+    context.color_primaries = context.color_trc = context.colorspace = _BT709
+    context.color_range = _LIMITED
+    return stream
+
+
+write = VideoWriter

@@ -1,0 +1,42 @@
+"""PNG pictures."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.replacing import replacing
+
+SUFFIXES = (".png",)
+KIND = "picture"
+
+
+def write_png(path: str | Path, image: np.ndarray, metadata: Mapping[str, object] | None = None) -> None:
+    """Write `image`, uint8 [height, width, 3], with `metadata` (scene, time, ...) as named texts in the file."""
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
+    checked = np.ascontiguousarray(image)
+    if checked.dtype != np.uint8 or checked.ndim != 3 or checked.shape[2] != 3:
+        raise WavetankError(
+            f"png: an image of {checked.dtype} {list(checked.shape)} cannot be written; "
+            "it must be uint8 [height, width, 3]."
+        )
+    texts = PngInfo()
+    for name, value in (metadata or {}).items():
+        texts.add_itxt(name, str(value))
+    with replacing(path) as partial:
+        Image.fromarray(checked).save(partial, format="PNG", pnginfo=texts, compress_level=4)
+
+
+def read_metadata(path: str | Path) -> dict[str, str]:
+    """Return the texts that `write_png` put into a file."""
+    from PIL import Image
+
+    with Image.open(path) as image:
+        image.load()
+        return {name: str(value) for name, value in image.text.items()}  # type: ignore[attr-defined]
+
+
+write = write_png

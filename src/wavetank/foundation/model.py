@@ -1,0 +1,152 @@
+"""Validated plain data: pydantic models whose errors are one sentence that a user can act on."""
+
+import difflib
+import math
+from typing import Annotated, Any, cast
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic._internal._model_construction import ModelMetaclass
+
+from wavetank.foundation.errors import WavetankError
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Vector = tuple[Number, Number] | tuple[Number, Number, Number]
+Size = tuple[Positive, Positive] | tuple[Positive, Positive, Positive]
+Quaternion = tuple[Number, Number, Number, Number]
+
+
+class _OneSentence(ModelMetaclass):
+    """Turns pydantic's report into one `WavetankError` when a user calls a model's constructor."""
+
+    def __call__(
+        cls,  # noqa: N805
+        *args: Any,
+        **kwargs: Any,
+    ) -> Any:
+        try:
+            return super().__call__(*args, **kwargs)
+        except ValidationError as report:
+            raise WavetankError(sentence(report, cast(type[BaseModel], cls))) from None
+
+
+class Model(BaseModel, metaclass=_OneSentence):
+    """Strictly validated data: unknown keys are refused, assignments are checked."""
+
+    model_config = ConfigDict(extra="forbid", validate_assignment=True, arbitrary_types_allowed=True)
+
+    @classmethod
+    def parse(cls, table: dict[str, Any], origin: str = "", **context: Any) -> Any:
+        """Validate `table` as this model; raise `WavetankError` naming `origin`, the key and what is allowed.
+
+        `context` tells where files are that the table names: `folder`, and `files` = False where none may be opened.
+        """
+        try:
+            return cls.model_validate(table, context=context)
+        except ValidationError as report:
+            raise WavetankError((f"{origin}: " if origin else "") + sentence(report, cls)) from None
+
+
+def sentence(report: ValidationError, model: type[BaseModel]) -> str:
+    """Say the most telling error of `report` in one line: key, value, what is allowed."""
+    errors = report.errors(include_url=False)
+    # An unknown key explains more than what it leads to, and in a union the deepest complaint is the meant one.
+    error = max(errors, key=lambda e: (e["type"] == "extra_forbidden", len(e["loc"])))
+    key = _key(error["loc"]) or model.__name__
+    value = error.get("input")
+    shown = _short(value)
+    kind, limits = error["type"], error.get("ctx") or {}
+    if kind == "extra_forbidden":
+        known = _known_keys(model, error["loc"][:-1])
+        near = difflib.get_close_matches(str(error["loc"][-1]), known, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]!r}?" if near else f"known keys: {', '.join(sorted(known))}."
+        return f"unknown key {key!r} (value {shown}); {hint}"
+    if kind == "missing":
+        return f"{key} is missing; it is required."
+    if kind == "value_error":
+        return str(limits.get("error", error["msg"]))
+    allowed = {
+        "greater_than": "a number greater than {gt}",
+        "greater_than_equal": "a number of at least {ge}",
+        "less_than": "a number less than {lt}",
+        "less_than_equal": "a number of at most {le}",
+        "finite_number": "a finite number",
+        "float_parsing": "a number",
+        "float_type": "a number",
+        "int_parsing": "a whole number",
+        "int_type": "a whole number",
+        "int_from_float": "a whole number",
+        "tuple_type": "a list of numbers, as [0, -9.81, 0]",
+        "bool_parsing": "true or false",
+        "bool_type": "true or false",
+        "union_tag_invalid": "one of {expected_tags}",
+        "union_tag_not_found": "a table with the key {discriminator}",
+        "literal_error": "one of {expected}",
+    }.get(kind)
+    if allowed is None:
+        message = error["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
+        allowed = message[:1].lower() + message[1:]
+    else:
+        allowed = allowed.format(**{name: _tidy(limit) for name, limit in limits.items()})
+    return f"{key} = {shown} is not allowed; it must be {allowed}."
+
+
+def _key(location: tuple[str | int, ...]) -> str:
+    text = ""
+    for part in location:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        elif part.startswith(("tuple[", "constrained-")) or part in _SHAPE_TAGS:
+            continue
+        else:
+            text += f".{part}" if text else part
+    return text
+
+
+#: Tags of discriminated unions; pydantic puts them into an error's location, a user's file does not have them.
+_SHAPE_TAGS: set[str] = set()
+
+
+def register_tags(*tags: str) -> None:
+    """Tell `sentence` which location parts are union tags rather than keys."""
+    _SHAPE_TAGS.update(tags)
+
+
+def _known_keys(model: type[BaseModel], path: tuple[str | int, ...]) -> list[str]:
+    """Names of the fields that are allowed at `path` below `model`."""
+    tags = [part for part in path if isinstance(part, str) and part in _SHAPE_TAGS]
+    if tags:
+        model = _MODEL_OF_TAG.get(tags[-1], model)
+    else:
+        for part in path:
+            field = model.model_fields.get(part) if isinstance(part, str) else None
+            inner = [t for t in _types(field.annotation) if _is_model(t)] if field is not None else []
+            model = inner[0] if inner else model
+    return list(model.model_fields)
+
+
+_MODEL_OF_TAG: dict[str, type[BaseModel]] = {}
+
+
+def register_model(tag: str, model: type[BaseModel]) -> None:
+    """Tell `sentence` which model a union tag stands for."""
+    register_tags(tag)
+    _MODEL_OF_TAG[tag] = model
+
+
+def _types(annotation: Any) -> list[Any]:
+    arguments = getattr(annotation, "__args__", ())
+    return [annotation, *(inner for argument in arguments for inner in _types(argument))]
+
+
+def _is_model(candidate: Any) -> bool:
+    return isinstance(candidate, type) and issubclass(candidate, BaseModel)
+
+
+def _short(value: Any) -> str:
+    text = repr(value).replace("\n", " ")
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _tidy(limit: Any) -> Any:
+    return int(limit) if isinstance(limit, float) and math.isfinite(limit) and limit == int(limit) else limit

@@ -1,0 +1,54 @@
+"""Unit quaternions (w, x, y, z) on the host."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wavetank.foundation.errors import WavetankError
+
+
+def unit_quaternion(rotation: Sequence[float] | float) -> np.ndarray:
+    """Return (w, x, y, z) of unit length from a quaternion or from an angle about z [rad]."""
+    if isinstance(rotation, int | float):
+        return np.array([np.cos(0.5 * rotation), 0.0, 0.0, np.sin(0.5 * rotation)])
+    q = np.asarray(rotation, float)
+    length = np.linalg.norm(q)
+    if q.shape != (4,) or not np.isfinite(length) or length < 1e-12:
+        raise WavetankError(f"rotation = {rotation} is not a quaternion (w, x, y, z) of non-zero length.")
+    return q / length
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the quaternion that turns by `b` first and then by `a`."""
+    w, v = a[0] * b[0] - a[1:] @ b[1:], a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
+    return np.concatenate([[w], v])
+
+
+def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Return vector `v` turned by the unit quaternion `q`."""
+    return v + 2.0 * np.cross(q[1:], np.cross(q[1:], v) + q[0] * v)
+
+
+def turn_from_y(axis: np.ndarray) -> np.ndarray:
+    """Return the shortest turn that takes the y axis to the direction of `axis` (identity for a zero vector)."""
+    length = float(np.linalg.norm(axis))
+    if length < 1e-12:
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    y = np.array([0.0, 1.0, 0.0])
+    direction = axis / length
+    if direction[1] < -1.0 + 1e-9:
+        return np.array([0.0, 0.0, 0.0, 1.0])
+    q = np.concatenate([[1.0 + y @ direction], np.cross(y, direction)])
+    return q / np.linalg.norm(q)
+
+
+def interpolate(a: np.ndarray, b: np.ndarray, share: float) -> np.ndarray:
+    """Return the unit quaternion that lies `share` of the shortest way from `a` to `b`."""
+    cosine = float(a @ b)
+    b = -b if cosine < 0 else b
+    angle = float(np.arccos(min(abs(cosine), 1.0)))
+    if angle < 1e-6:
+        q = (1.0 - share) * a + share * b
+    else:
+        q = (np.sin((1.0 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle)
+    return q / np.linalg.norm(q)

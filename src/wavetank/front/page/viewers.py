@@ -1,0 +1,218 @@
+"""The people at a page: one drives, the others watch. Runs in the server's event loop."""
+
+import asyncio
+import json
+import time
+from collections.abc import Callable
+from typing import Any
+
+from wavetank.foundation.errors import WavetankError
+from wavetank.session.commands import Command, ToolBegin, ToolEnd, ToolMove, command_of
+
+RATE, BURST = 500.0, 1000.0  # messages a second, and at once: more than any hand makes
+MOST_VIEWERS = 16
+LONGEST_SIDE = 8192  # px
+
+Ray = Callable[[float, float], dict[str, Any]]
+
+
+class Bucket:
+    """Lets so many messages a second through."""
+
+    def __init__(self) -> None:
+        self.left, self.last = BURST, time.monotonic()
+
+    def take(self) -> bool:
+        """Say whether one more may pass."""
+        now = time.monotonic()
+        self.left, self.last = min(BURST, self.left + RATE * (now - self.last)), now
+        if self.left < 1.0:
+            return False
+        self.left -= 1.0
+        return True
+
+
+class Viewer:
+    """One socket: at most one picture is on its way to it, and the next one may wait here."""
+
+    def __init__(self, socket: Any) -> None:
+        self.socket, self.bucket = socket, Bucket()
+        self.is_busy = False  # with a picture that is on its way
+        self.next_picture: bytes | None = None
+        self.is_new = True  # and has not seen one yet
+        self.size = (960, 540)
+        self.outbox: asyncio.Queue[dict[str, Any] | bytes] = asyncio.Queue(maxsize=64)
+        self.status: dict[str, Any] | None = None  # waits in the outbox; a later one joins it there
+
+    def post(self, message: dict[str, Any] | bytes) -> None:
+        """Send soon; on a line that is too slow statuses become one, and notes that do not fit are dropped."""
+        if isinstance(message, dict) and message["type"] == "status":
+            if self.status is not None:
+                self.status.update(message, notes=[*self.status["notes"], *message["notes"]][-20:])
+                return
+            message = self.status = dict(message)
+        if not self.outbox.full():
+            self.outbox.put_nowait(message)
+        elif message is self.status:
+            self.status = None
+
+    def show(self, picture: bytes) -> None:
+        """Send a picture as soon as the one before was shown; a later one takes its place until then."""
+        if self.is_busy:
+            self.next_picture = picture
+        else:
+            self.is_busy = True
+            self.post(picture)
+
+    def shown(self) -> None:
+        """Send the picture that waits: the page has shown the one before."""
+        picture, self.next_picture, self.is_busy = self.next_picture, None, False
+        if picture is not None:
+            self.show(picture)
+
+    async def send_all(self) -> None:
+        """Send what is posted, for ever."""
+        while True:
+            message = await self.outbox.get()
+            if message is self.status:
+                self.status = None
+            if isinstance(message, bytes):
+                await self.socket.send_bytes(message)
+            else:
+                await self.socket.send_text(json.dumps(message, allow_nan=False))
+
+
+class Viewers:
+    """All sockets, in the order in which they came."""
+
+    def __init__(self, submit: Callable[[Command], bool], ray: Ray, hello: Callable[[], dict[str, Any]]) -> None:
+        self.submit, self.ray, self.hello = submit, ray, hello
+        self.all: list[Viewer] = []
+        self.driver: Viewer | None = None
+        self.detail = "auto"
+        self.wake: Callable[[], None] = lambda: None
+        self.down: set[int] = set()  # pointers of the driver that are down
+
+    @property
+    def anyone_ready(self) -> bool:
+        """Whether someone has use for a picture: one is made while the one before is on its way."""
+        return any(viewer.next_picture is None for viewer in self.all)
+
+    async def serve(self, socket: Any) -> None:
+        """Talk with one page until it leaves."""
+        await socket.accept()
+        if len(self.all) >= MOST_VIEWERS:
+            await socket.close(1013, "too many viewers")
+            return
+        viewer = Viewer(socket)
+        self.all.append(viewer)
+        self.driver = self.driver or viewer
+        viewer.post(self.hello())
+        self._tell_roles()
+        sender = asyncio.create_task(viewer.send_all())
+        try:
+            await self._listen(viewer)
+        finally:
+            sender.cancel()
+            self._leave(viewer)
+
+    async def _listen(self, viewer: Viewer) -> None:
+        while True:
+            message = await viewer.socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            if not viewer.bucket.take():
+                # Reading slowly makes the other side wait; the simulation does not notice.
+                await asyncio.sleep(0.02)
+                continue
+            try:
+                self.hear(viewer, _table(message))
+            except WavetankError as error:
+                viewer.post({"type": "note", "text": str(error)[:400]})
+
+    def hear(self, viewer: Viewer, table: dict[str, Any]) -> None:
+        """Act on one message; raises `WavetankError` for what is not allowed."""
+        do = table.get("do")
+        if do == "ack":
+            viewer.shown()
+            self.wake()
+        elif do == "size":
+            viewer.size = (_whole(table, "width", LONGEST_SIDE), _whole(table, "height", LONGEST_SIDE))
+            self.wake()
+        elif do == "drive":
+            self._lift_pointers()
+            self.driver = viewer
+            self._tell_roles()
+        elif viewer is not self.driver:
+            raise WavetankError("You are watching; take the helm to join in.")
+        elif do == "detail" and table.get("detail") in ("auto", "full", "half"):
+            self.detail = table["detail"]
+            self.wake()
+        elif do in ("point-begin", "point-move", "point-end"):
+            self._point(table)
+        elif not self.submit(command_of(table)):
+            raise WavetankError("Too much at once: a command was dropped.")
+
+    def _point(self, table: dict[str, Any]) -> None:
+        """Turn a place in the picture, shares of its width and height, into a ray into the world."""
+        pointer = _whole(table, "pointer", 9, least=0)
+        if table["do"] == "point-end":
+            self.down.discard(pointer)
+            self.submit(ToolEnd(pointer=pointer))
+            return
+        u, v = table.get("x"), table.get("y")
+        for share in (u, v):
+            if isinstance(share, bool) or not isinstance(share, int | float) or not -2.0 <= share <= 3.0:
+                raise WavetankError("a pointer's x and y must be shares of the picture, numbers around 0 to 1.")
+        ray = {"pointer": pointer, **self.ray(float(u or 0.0), float(v or 0.0))}
+        if table["do"] == "point-begin":
+            self.down.add(pointer)
+            self.submit(ToolBegin.parse({**ray, "tool": table.get("tool"), "options": table.get("options") or {}}))
+        else:
+            self.submit(ToolMove.parse(ray))
+
+    def broadcast(self, message: dict[str, Any]) -> None:
+        """Post to everyone."""
+        for viewer in self.all:
+            viewer.post(message)
+
+    def show(self, picture: bytes) -> None:
+        """Send a picture to everyone, to each at its pace."""
+        for viewer in self.all:
+            viewer.show(picture)
+
+    def _leave(self, viewer: Viewer) -> None:
+        self.all.remove(viewer)
+        if viewer is self.driver:
+            self._lift_pointers()
+            self.driver = self.all[0] if self.all else None
+        self._tell_roles()
+
+    def _lift_pointers(self) -> None:
+        for pointer in self.down:
+            self.submit(ToolEnd(pointer=pointer))
+        self.down.clear()
+
+    def _tell_roles(self) -> None:
+        for viewer in self.all:
+            viewer.post({"type": "role", "driving": viewer is self.driver, "viewers": len(self.all)})
+
+
+def _table(message: dict[str, Any]) -> dict[str, Any]:
+    text = message.get("text")
+    if text is None:
+        raise WavetankError("a message must be text: JSON with the key 'do'.")
+    try:
+        table = json.loads(text)
+    except (ValueError, RecursionError):
+        raise WavetankError("a message must be JSON with the key 'do'.") from None
+    if not isinstance(table, dict):
+        raise WavetankError("a message must be a JSON object with the key 'do'.")
+    return table
+
+
+def _whole(table: dict[str, Any], key: str, most: int, least: int = 1) -> int:
+    value = table.get(key, 0)
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise WavetankError(f"{key} = {str(value)[:20]} must be a whole number from {least} to {most}.")
+    return value

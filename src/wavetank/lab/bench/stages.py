@@ -1,0 +1,70 @@
+"""Where the time of a frame goes: a clock around every kernel, summed by the file that the kernel lives in.
+
+The clock waits for the device before and after each launch, so watched frames are slower than others and are never
+used for a total. What is left of a watched frame is the host's: Python between the launches.
+"""
+
+import collections
+import contextlib
+import dataclasses
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from wavetank.device import compiler
+
+#: Stage of a kernel by the beginning of its module's name; the first that fits counts.
+STAGES = (
+    ("wavetank.physics.neighbors", "neighbours"),
+    ("wavetank.physics.boundary", "contact"),
+    ("wavetank.physics.density_constraint", "constraint"),
+    ("wavetank.physics.grid_pressure", "grid"),
+    ("wavetank.physics.time_step", "time step"),
+    ("wavetank.physics.foam", "foam"),
+    ("wavetank.physics", "velocities"),
+    ("wavetank.view", "render"),
+)
+#: In the order of a frame, as tables show them.
+STAGE_NAMES = ("contact", "neighbours", "grid", "constraint", "velocities", "foam", "time step", "other", "host")
+
+
+def stage_of(module: str) -> str:
+    """Name the stage of a kernel that lives in `module`."""
+    return next((stage for start, stage in STAGES if module.startswith(start)), "other")
+
+
+@dataclasses.dataclass
+class Clock:
+    """Seconds and launches of each kernel, by (stage, name of the kernel)."""
+
+    seconds: collections.defaultdict[tuple[str, str], float] = dataclasses.field(
+        default_factory=lambda: collections.defaultdict(float)
+    )
+    launches: collections.Counter[tuple[str, str]] = dataclasses.field(default_factory=collections.Counter)
+
+    @contextlib.contextmanager
+    def running(self) -> Iterator[None]:
+        """Time every kernel while the context lasts; the time between kernels is the host's."""
+
+        def around(module: str, name: str, launch: Callable[[], Any]) -> Any:
+            compiler.synchronize()
+            began = time.perf_counter()
+            result = launch()
+            compiler.synchronize()
+            key = stage_of(module), name
+            self.seconds[key] += time.perf_counter() - began
+            self.launches[key] += 1
+            return result
+
+        began, before = time.perf_counter(), sum(self.seconds.values())
+        with compiler.watched(around):
+            yield
+        elapsed = time.perf_counter() - began
+        self.seconds["host", ""] += elapsed - (sum(self.seconds.values()) - before)
+
+    def stages(self) -> dict[str, float]:
+        """Return the seconds of each stage."""
+        total: dict[str, float] = dict.fromkeys(STAGE_NAMES, 0.0)
+        for (stage, _), seconds in self.seconds.items():
+            total[stage] = total.get(stage, 0.0) + seconds
+        return total

@@ -1,0 +1,1 @@
+"""Viscosity in Pa s, from water to honey and beyond."""

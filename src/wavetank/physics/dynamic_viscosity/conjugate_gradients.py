@@ -1,0 +1,185 @@
+"""Conjugate gradients for the velocities of viscous fluids: (1 + dt M^-1 L) v = b, whose damping is `L`.
+
+Hestenes and Stiefel 1952 (10.6028/jres.049.044), in the form of Chronopoulos and Gear 1989
+(10.1016/0377-0427(89)90045-9), which needs both products of an iteration at once. The matrix A is symmetric in the
+inner product of masses, sum m a . b, and no eigenvalue is below one.
+
+    code        symbol             meaning                                                    unit
+    x           x                  velocity so far                                            m/s
+    residual    r = b - A x                                                                   m/s
+    pulled      A r                                                                           m/s
+    direction   p                  where the iteration goes                                   m/s
+    slope       A p                                                                           m/s
+    gamma       (r, r)             products of all particles, masses over the largest         m^2/s^2
+    delta       (r, A r)           likewise                                                   m^2/s^2
+    alpha       alpha              how far it goes, between 0 and 1 as A has no smaller one   1
+    beta        beta               share of the last direction                                1
+
+It starts at what viscosity did in the last step, and ends where the velocities are right to a part of what it does in
+this one. As no eigenvalue is below one, their error squared is at most that of the energy norm, of which an iteration
+takes alpha gamma: what the last few took tells what was left before them (Strakos and Tichy 2002, Electronic
+Transactions on Numerical Analysis 13, 56).
+
+Ice keeps its velocity, 0: it has no residual, and no equation of its own.
+
+The sums are those of equal slices, in order: they do not depend on threads. Forces between particles cancel in each of
+the vectors, so momentum is as exact as that of the start, wherever the iterations end.
+"""
+
+from typing import Any
+
+from wavetank.device.compiler import current_backend, download, qd
+from wavetank.device.state import Coefficients, Fluids, Grid, Particles, Scratch
+from wavetank.physics.pairs import add_kept, column, part_of, teams, turns
+from wavetank.solids.distance import vec3, vec4
+
+TOLERANCE = 0.02  # of what viscosity changes in a step
+LOOK = 8  # iterations between two looks at the error: over fewer, what is slow to come seems to be there
+SLICES = 256  # of the sums; the kernel spells it out
+
+
+@qd.func
+def add_damping(sums: qd.template(), r, damper, a, b, c: Coefficients, method: qd.template()):
+    """Add neighbour j to sum_j mu_ij f(q) ((v_j - v_i) . n) n."""
+    approach = 0.0
+    for k in qd.static(range(r.n)):
+        approach += (b[k] - a[k]) * r[k]
+    sums += r * (damper * approach)
+
+
+@qd.func
+def along_walls(pull, normal):
+    """What is left of the pull of the walls without its part along their `normal`."""
+    n = vec3(normal.x, normal.y, normal.z)
+    return pull - n * n.dot(pull)
+
+
+@qd.kernel(fastcache=True)
+def start_residual(
+    residual: qd.types.ndarray(), x: qd.types.ndarray(), dampers: qd.types.ndarray(), drag: qd.types.ndarray(),
+    normal: qd.types.ndarray(), particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32,
+    rate: qd.f32, lanes: qd.template(),
+):  # fmt: skip
+    """Set r = b - A x, where b are the velocities as they are and what moving walls add."""
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
+            add_kept(sums, add_damping, team, particles, x, dampers, grid, c, 0)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                v = particles.v[i]
+                own = x[i]
+                force = column(sums, i - team * lanes)
+                if particles.near[i] != 0:
+                    wall = vec3(drag[i].x, drag[i].y, drag[i].z) - vec3(own.x, own.y, own.z) * drag[i].w
+                    wall = along_walls(wall, normal[i])
+                    for k in qd.static(range(v.n)):
+                        force[k] += wall[k]
+                result = own * 0.0
+                for k in qd.static(range(v.n)):
+                    result[k] = v[k] - own[k] + rate * scratch.weight[i] * force[k]
+                residual[i] = result * (1.0 - particles.frozen[i])
+
+
+@qd.kernel(fastcache=True)
+def pull(
+    pulled: qd.types.ndarray(), products: qd.types.ndarray(), residual: qd.types.ndarray(), x: qd.types.ndarray(),
+    dampers: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles,
+    scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, rate: qd.f32, lanes: qd.template(),
+):  # fmt: skip
+    """Set A r, and each team's share of (r, r), (r, A r) and (x - b, x - b)."""
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
+            add_kept(sums, add_damping, team, particles, residual, dampers, grid, c, 0)
+            product = vec4(0.0, 0.0, 0.0, 0.0)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                r = residual[i]
+                force = column(sums, i - team * lanes)
+                if particles.near[i] != 0:
+                    wall = along_walls(vec3(r.x, r.y, r.z) * -drag[i].w, normal[i])
+                    for k in qd.static(range(force.n)):
+                        force[k] += wall[k]
+                result = r
+                change = 0.0
+                for k in qd.static(range(force.n)):
+                    result[k] = (r[k] - rate * scratch.weight[i] * force[k]) * (1.0 - particles.frozen[i])
+                    change += (x[i][k] - particles.v[i][k]) ** 2 * (1.0 - particles.frozen[i])
+                pulled[i] = result
+                product += vec4(r.dot(r), r.dot(result), change, 0.0) / scratch.weight[i]
+            products[team] = product
+
+
+@qd.kernel(fastcache=True)
+def go_on(
+    x: qd.types.ndarray(), residual: qd.types.ndarray(), direction: qd.types.ndarray(), slope: qd.types.ndarray(),
+    pulled: qd.types.ndarray(), products: qd.types.ndarray(), totals: qd.types.ndarray(), count: qd.i32, first: qd.i32,
+    looked: qd.i32, lanes: qd.template(), shared: qd.template(),
+):  # fmt: skip
+    """Go on to the next x. Threads share the sums where `shared`.
+
+    `totals` has (gamma, alpha, beta, 0), then (what was gained since it was `looked` at, (x - b, x - b), 0, 0), then
+    the slices.
+    """
+    qd.loop_config(serialize=not shared)
+    for b in range(256):
+        size = (teams(count, lanes) + 255) // 256
+        total = vec4(0.0, 0.0, 0.0, 0.0)
+        for team in range(b * size, qd.min(b * size + size, teams(count, lanes))):
+            total += products[team]
+        totals[2 + b] = total
+    qd.loop_config(serialize=True)
+    for _ in range(1):
+        total = vec4(0.0, 0.0, 0.0, 0.0)
+        for b in range(256):
+            total += totals[2 + b]
+        gamma, delta = total.x, total.y
+        before = totals[0]
+        alpha, beta = 0.0, 0.0
+        # What is left may be less than rounding: then it stays where it is.
+        if gamma > 0.0 and (first == 1 or before.y > 0.0):
+            if first == 0:
+                beta = gamma / before.x
+                delta -= beta * gamma / before.y
+            if delta > 0.5 * gamma:
+                alpha = gamma / delta
+        totals[0] = vec4(gamma, alpha, beta, 0.0)
+        gained = alpha * gamma
+        if looked == 0:
+            gained += totals[1].x
+        totals[1] = vec4(gained, total.z, 0.0, 0.0)
+    for i in range(count):
+        alpha, beta = totals[0].y, totals[0].z
+        p, q = residual[i], pulled[i]
+        if first == 0:
+            p += beta * direction[i]
+            q += beta * slope[i]
+        direction[i] = p
+        slope[i] = q
+        x[i] += alpha * p
+        residual[i] -= alpha * q
+
+
+def solve(
+    x: Any, dampers: Any, drag: Any, normal: Any, particles: Particles, scratch: Scratch, fluids: Fluids, grid: Grid,
+    c: Coefficients, count: int, rate: float, most: int,
+) -> int:  # fmt: skip
+    """Solve for the velocities `x`, which hold where to start; return the number of iterations, at most `most`."""
+    residual, pulled, direction, slope, products = (
+        fluids.array(name) for name in ("residual", "pulled", "direction", "slope", "products")
+    )
+    totals = fluids.array("totals", 2 + SLICES)
+    shared = int(current_backend() != "cpu")
+    start_residual(residual, x, dampers, drag, normal, particles, scratch, grid, c, count, rate, grid.lanes)
+    for number in range(most):
+        pull(pulled, products, residual, x, dampers, drag, normal, particles, scratch, grid, c, count, rate, grid.lanes)
+        looked = int(number % LOOK == 0)
+        go_on(
+            x, residual, direction, slope, pulled, products, totals, count, int(number == 0), looked, grid.lanes, shared
+        )
+        if (number + 1) % LOOK == 0 and number + 1 < most:
+            gained, change = map(float, download(totals)[1][:2])
+            if gained <= TOLERANCE**2 * change:
+                return number + 1
+    return most

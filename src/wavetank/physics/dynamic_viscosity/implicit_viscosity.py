@@ -1,0 +1,283 @@
+"""Dynamic viscosity from water to honey: an implicit step for the velocities, stable at any time step.
+
+Every pair of neighbours is joined by a damper along the line between them, as in Weiler et al. 2018, "A Physically
+Consistent Implicit Viscosity Solver for SPH Fluids" (10.1111/cgf.13349):
+
+    rho_i dv_i/dt = sum_j mu_ij B f(q_ij) ((v_j - v_i) . n) n,     B = 2 dim (dim + 2) / sum_lattice f(q) r^2
+
+which is mu lap v for a flow without divergence. A damper along the line leaves translations and rotations alone, at a
+free surface too, and m_i dv_i is antisymmetric: from rest, momentum and angular momentum about where particles are
+predicted are exact however far the solver gets.
+
+    code      symbol          meaning                                                     unit
+    n         n               unit vector from j to i                                     1
+    mu        mu_ij           2 mu_i mu_j / (mu_i + mu_j) (Cleary 1998)                   Pa s
+    rate      dt B / rho      what a pair does in a substep, over mu                      1/(Pa s)
+    packed                    iterate of the velocity, and mu_i                           m/s, Pa s
+    drag      T v_w, T        rate of the walls' drag in this substep over mu             1
+
+Where we differ, and why:
+- f(q) = 1 - q, the weights of Müller et al. 2003 (10.2312/SCA03/154-159), not the gradient of a kernel: it has no
+  pole, and B makes its second moment on the rest lattice exact, averaged over directions.
+- Conjugate gradients (`conjugate_gradients.py`) start at what viscosity did in the last step, which is not far off:
+  half of the iterations that they take from rest, a quarter of Chebyshev's, where the fluid is thick
+  (docs/materials.md). Momentum is still exact; what is so stiff that it is turned (`rigid_guess.py`) keeps it to 1 %.
+- Solids hold the fluid back along their surface (no-slip) as half a rest lattice would that continues the
+  velocity linearly to its value at the wall (Takeda et al. 1994, 10.1143/ptp/92.5.939; Morris et al. 1997,
+  10.1006/jcph.1997.5776), from a table of the distance.
+- Viscosity acts before the constraint, so that what pressure adds to the motion is damped in the next step only. That
+  made honey flow a fifth too fast at any affordable step. A thick fluid therefore begins a step with the share w of
+  what pressed it in the last one, and only the change comes afterwards: the incremental projection of Goda 1979
+  (10.1016/0021-9991(79)90088-3; Guermond et al. 2006, 10.1016/j.cma.2005.10.010). w = `CARRIED` k / (`HALF` + k) of the
+  `thickness` k: thin water carries nothing here, it would keep its noise. docs/materials.md has the figures.
+"""
+
+import functools
+import math
+
+import numpy as np
+
+from wavetank.device.compiler import qd, upload
+from wavetank.device.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.params import Parameters
+from wavetank.physics.boundary import is_near
+from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE, solve
+from wavetank.physics.dynamic_viscosity.rigid_guess import FORGET, RIGID, SHEARED, STIFF, turn_along
+from wavetank.physics.friction import surface_velocity
+from wavetank.physics.integrate import accelerate, free_motion
+from wavetank.physics.mixture import Blend
+from wavetank.physics.neighbors import MAX_ENTRIES
+from wavetank.physics.pairs import keep_pairs, part_of, teams, turns
+from wavetank.physics.predicted_positions import predicted
+from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.solids.distance import SolidSet, lift, signed_distance, vec4
+
+STIFFER = 3.0  # times as stiff as the rest lattice: water in motion, and the drag of walls
+WORTH = 1e-5  # smallest kappa - 1 on the rest lattice for which a substep solves anything
+STIFFEST = 1e7  # eigenvalue beyond which single precision cannot tell what moves as a whole
+THICK = 1.0  # `thickness` in a usual step above which pressure is carried on; oil at centimetres has 0.06
+CARRIED, HALF = 0.83, 10.0  # largest share of the pressure that is carried on; `thickness` with half of it
+LARGEST = 5.0  # of gravity, that is carried on
+AGAIN = 6.0  # times the push of the same step, that is carried on; at rest it is `CARRIED` / (1 - `CARRIED`) = 4.9
+NEAREST = 0.25  # d: closer to a wall than this its drag grows no further
+
+
+def damper_scale(dim: int, ratio: float, d: float) -> float:
+    """Return B [1/m^2] for the support radius `ratio` * `d` and the spacing `d` [m]."""
+    distance = np.linalg.norm(rest_points(dim, ratio), axis=1)
+    return float(2.0 * dim * (dim + 2) / np.sum((1.0 - distance / ratio) * distance**2)) / d**2
+
+
+@functools.cache
+def stiffness(dim: int, ratio: float) -> float:
+    """Return a bound of the largest eigenvalue of dt M^-1 L over dt nu B on the rest lattice.
+
+    That is twice what a particle's own dampers do: the matrix of one damper is at most twice its diagonal blocks,
+    hence so is their sum.
+    """
+    distance = np.linalg.norm(rest_points(dim, ratio), axis=1)
+    return float(2.0 * np.sum(1.0 - distance / ratio) / dim)
+
+
+@functools.cache
+def drag_table(dim: int, ratio: float) -> np.ndarray:
+    """Sample T d^2 / (B d^2) of a flat wall at s / h from 0 to 1, float32 [TABLE_SIZE + 1].
+
+    T = sum f(q) (t^2 / r^2) (1 + depth / s) over half a lattice behind the wall, t along it, depth below its surface.
+    """
+    s = np.linspace(0.0, 1.0, TABLE_SIZE + 1) * ratio
+    depth = np.arange(int(ratio) + 2) + 0.5
+    plane = rest_points(dim, ratio)
+    plane = plane[np.abs(plane[:, 0]) < 1e-12][:, 1:]
+    along = np.sum(plane**2, axis=1)
+    square = (s[:, None, None] + depth[:, None]) ** 2 + along
+    f = np.maximum(1.0 - np.sqrt(square) / ratio, 0.0)
+    extrapolation = 1.0 + depth[:, None] / np.maximum(s, NEAREST)[:, None, None]
+    table: np.ndarray = np.sum(f * along / (dim - 1) / square * extrapolation, axis=(1, 2)).astype(np.float32)
+    return table
+
+
+@qd.func
+def damper(square, a, b, c: Coefficients):
+    """Return mu_ij f(q) / r^2, which does not change while the velocities are solved for."""
+    f = qd.max(1.0 - qd.sqrt(square) * c.inverse_h, 0.0)
+    mu = 2.0 * a[3] * b[3] / qd.max(a[3] + b[3], 1e-20)
+    return mu * f / qd.max(square, 1e-24)
+
+
+@qd.kernel(fastcache=True)
+def prepare(
+    packed: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles,
+    rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, count: qd.i32,
+    no_slip: qd.f32, most: qd.f32,
+):  # fmt: skip
+    """Pack velocities and viscosities [Pa s], `most` at most, and find how fast the walls hold every particle back.
+
+    That is over B dt / rho, with the normal along which they do not.
+    """
+    for i in range(count):
+        own = lift(particles.v[i])
+        row = vec4(own.x, own.y, own.z, qd.min(rows[particles.material[i]][1], most))
+        packed[i] = row
+        near = particles.near[i]
+        pull = vec4(0.0, 0.0, 0.0, 0.0)
+        free = vec4(0.0, 0.0, 0.0, 0.0)
+        if near != 0:
+            p = lift(predicted(particles, i))
+            last = table.shape[0] - 1
+            walls = 0
+            for k in range(solids.count):
+                if is_near(near, k) == 1:
+                    value = signed_distance(solids, k, p)
+                    if value.w < c.h:
+                        t = qd.min(qd.max(value.w / c.h, 0.0), 1.0) * last
+                        m = qd.min(qd.cast(t, qd.i32), last - 1)
+                        share = table[m] + (table[m + 1] - table[m]) * (t - m)
+                        v = surface_velocity(solids, k, p, c.dt) * share
+                        pull += vec4(v.x, v.y, v.z, share)
+                        free = vec4(value.x, value.y, value.z, 0.0)
+                        walls += 1
+            if walls > 1:  # in a corner the fluid is held in every direction
+                free = vec4(0.0, 0.0, 0.0, 0.0)
+            pull *= no_slip * row.w
+        drag[i] = pull
+        normal[i] = free
+
+
+@qd.kernel(fastcache=True)
+def join_pairs(
+    dampers: qd.types.ndarray(), packed: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients,
+    count: qd.i32, lanes: qd.template(),
+):  # fmt: skip
+    """Keep the dampers of all pairs."""
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
+        for team in range(part[0], part[1]):
+            keep_pairs(dampers, damper, team, particles, packed, grid, c, lanes)
+
+
+@qd.kernel(fastcache=True)
+def start(velocities: qd.types.ndarray(), particles: Particles, c: Coefficients, count: qd.i32):
+    """Start at the velocities that there are if viscosity does what it did in the last step; ice has none."""
+    for i in range(count):
+        for k in qd.static(range(particles.v[i].n)):
+            v = particles.v[i][k] + c.dt * particles.viscous[i][k]
+            velocities[i][k] = v * (1.0 - particles.frozen[i])
+
+
+@qd.kernel(fastcache=True)
+def take_velocities(particles: Particles, packed: qd.types.ndarray(), c: Coefficients, count: qd.i32):
+    """Adopt the velocities that were found, and move the predicted positions with them."""
+    for i in range(count):
+        before = particles.v[i]
+        v = before
+        for k in qd.static(range(v.n)):
+            v[k] = packed[i][k]
+        particles.viscous[i] = (v - before) * (1.0 - particles.frozen[i]) / c.dt
+        accelerate(particles, i, v, c)
+
+
+@qd.kernel(fastcache=True)
+def carry_pressure(
+    particles: Particles, rows: qd.types.ndarray(), c: Coefficients, count: qd.i32, most: qd.f32, half: qd.f32,
+    rate: qd.f32, largest: qd.f32, again: qd.f32,
+):  # fmt: skip
+    """Keep the share of what pressure and solids accelerated thick fluids by that the next prediction begins with.
+
+    It is called before velocities are read off. `rate` is the `thickness` of the heaviest fluid over its viscosity;
+    the share is `most`, half of that where the thickness is `half`, and no more than `largest` [m/s^2] is kept, nor
+    more than `again` times the push of this step: what has left the floor is not pushed any more.
+    """
+    for i in range(count):
+        row = rows[particles.material[i]]
+        pushed = predicted(particles, i) - free_motion(particles.x[i], particles.v[i], c)
+        a = particles.a[i] + pushed / (c.dt * c.dt)
+        thick = rate * row[0] * row[1]
+        share = most * thick / (half + thick)
+        limit = qd.min(largest, again * pushed.norm() / (c.dt * c.dt))
+        particles.a[i] = a * (share * qd.min(1.0, limit / qd.max(a.norm(), 1e-12)))
+
+
+def thickness(viscosity: float, params: Parameters, dt: float) -> float:
+    """Return what `viscosity` [m^2/s] does to the fastest mode within `dt` [s]: kappa - 1 on the rest lattice."""
+    return dt * viscosity * 4.0 * (params.dim + 2) / params.spacing**2  # dt nu 2 B sum f / dim, within a factor of two
+
+
+def usual_thickness(viscosity: float, params: Parameters) -> float:
+    """Return the `thickness` in a time step as long as calm water takes it."""
+    return thickness(viscosity, params, params.frame_time / params.substeps)
+
+
+def is_viscous(kinds: Blend, params: Parameters, dt: float) -> bool:
+    """Say whether the viscosity of any fluid matters in a substep of `dt` [s]."""
+    return thickness(kinds.kinematic_viscosity, params, dt) > WORTH
+
+
+def is_thick(kinds: Blend, params: Parameters) -> bool:
+    """Say whether viscosity rules the motion of any fluid from particle to particle, and gravity presses it."""
+    return usual_thickness(kinds.kinematic_viscosity, params) > THICK and any(params.gravity)
+
+
+def solve_viscosity(
+    particles: Particles, scratch: Scratch, fluids: Fluids, grid: Grid, solids: SolidSet, c: Coefficients,
+    kinds: Blend, count: int, ratio: float, no_slip: float, largest_number: int,
+) -> int:  # fmt: skip
+    """Make velocities and predicted positions those of viscous fluids; return the number of iterations it took.
+
+    `ratio` is h / d; at most `largest_number` iterations are taken.
+    """
+    dim = particles.x.element_shape[0]
+    d = c.h / ratio
+    if "drag table" not in fluids.arrays:
+        fluids.arrays["drag table"] = scalars(TABLE_SIZE + 1)
+        upload(fluids.arrays["drag table"], drag_table(dim, ratio))
+    packed, drag, normal = (fluids.array(name) for name in ("packed", "drag", "normal"))
+    rate = c.dt * damper_scale(dim, ratio, d) / kinds.largest_density
+    if 8 * grid.list.shape[0] > MAX_ENTRIES:
+        raise WavetankError(
+            f"{count:,} particles of viscous fluids are too many: what joins their pairs has at most {MAX_ENTRIES:,} "
+            f"places, enough for {MAX_ENTRIES // grid.room:,} particles; use a larger spacing, less fluid, or "
+            "viscosity = 0 in its materials and dynamic_viscosity = 0."
+        )
+    dampers = fluids.pairs(grid)
+    most = STIFFEST / (STIFFER * rate * stiffness(dim, ratio))
+    prepare(packed, drag, normal, particles, fluids.rows, solids, fluids.arrays["drag table"], c, count, no_slip, most)
+    join_pairs(dampers, packed, particles, grid, c, count, grid.lanes)
+    stiffest = 1.0 + STIFFER * rate * kinds.largest_density * kinds.kinematic_viscosity * stiffness(dim, ratio)
+    start(packed, particles, c, count)
+    if stiffest > STIFF:
+        turn_along(particles, packed, dampers, grid, c, count, RIGID / SHEARED[dim], FORGET, grid.lanes)
+        start(packed, particles, c, count)
+    number = solve(
+        packed, dampers, drag, normal, particles, scratch, fluids, grid, c, count, rate,
+        iterations(min(stiffest, STIFFEST), largest_number),
+    )  # fmt: skip
+    take_velocities(particles, packed, c, count)
+    return number
+
+
+def carry_on(
+    particles: Particles, fluids: Fluids, c: Coefficients, kinds: Blend, params: Parameters, count: int
+) -> None:  # fmt: skip
+    """Let thick fluids carry on a share of what pressed them in this step."""
+    rate, largest = thickness(1.0 / kinds.largest_density, params, c.dt), LARGEST * math.hypot(*params.gravity)
+    carry_pressure(particles, fluids.rows, c, count, CARRIED, HALF, rate, largest, AGAIN)
+
+
+def carried_share(kinds: Blend, params: Parameters) -> float:
+    """Return the share of what presses them in a frame that all fluids carry on, the thinnest of them included."""
+    if not is_thick(kinds, params):
+        return 0.0
+    thick = usual_thickness(min(fluid.viscosity / fluid.density for fluid in kinds.fluids.values()), params)
+    return CARRIED * thick / (HALF + thick)
+
+
+def iterations(stiffest: float, most: int) -> int:
+    """Return how many iterations bring every mode of 1 to `stiffest` within `TOLERANCE`, at most `most`."""
+    if stiffest <= 1.0 + 1e-9:
+        return 0
+    # In the energy norm no polynomial is better than theirs, and Chebyshev's is at most 1 / T_n(sigma) (Saad 2003,
+    # Theorem 6.25).
+    sigma = (stiffest + 1.0) / (stiffest - 1.0)
+    return min(most, math.ceil(math.acosh(1.0 / TOLERANCE) / math.acosh(sigma)))

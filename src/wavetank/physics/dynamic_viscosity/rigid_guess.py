@@ -1,0 +1,104 @@
+"""What viscosity did in the last step, turned as the fluid has turned since.
+
+Conjugate gradients start there (`implicit_viscosity.py`). What holds a spinning drop together points inwards; pointing
+where it did a step ago it has a torque. That a drop turns as a whole is the last thing that iterations come to where it
+is stiff, so the torques of all steps added up: a drop of 10^6 Pa s had 3 to 5 times its energy after two radians.
+Turned, it has what iterations from rest leave it, within 4 % (docs/materials.md).
+
+    code      symbol                       meaning                                                     unit
+    dv        v_i - v_j                    difference of the velocities that it has moved with since   m/s
+    m         r - dt dv / 2                between where neighbours were and where they are            m
+    sums      sum_j D m x dv               over the neighbours, D their dampers
+              sum_j D m m^T
+              sum_j D (m . dv)^2 / h^2     how it strains: nothing where it turns as a whole
+    omega                                  what turns m into dv best                                   rad/s
+
+With m in the middle of the way, omega dt / 2 is the tangent of half the angle, and the rotation that Cayley's formula
+makes of it is that of a solid body exactly, however far it turns in a step.
+
+Only what turns as a whole is turned. In simple shear half the motion is a rotation too, yet what viscosity does there
+stays where it is, and so it does where particles jostle: the angle falls with (strain rate / omega)^2, which is 1 in
+simple shear, and is nothing from 1 / `RIGID` on. What else it does to the body while it turns, the start does not know:
+it forgets what it has, by 1 / (1 + `FORGET` |omega| dt / 2). Without that the torques left over add up again, slower.
+"""
+
+from wavetank.device.compiler import qd
+from wavetank.device.state import Coefficients, Grid, Particles
+from wavetank.physics.pairs import add_kept, column, part_of, teams, turns
+from wavetank.solids.distance import lift, vec3
+
+STIFF = 5000.0  # largest eigenvalue from which on it is done: of what is less stiff, iterations come to all modes
+RIGID = 10.0
+FORGET = 5.0
+#: sum D (m . dv)^2 / (h^2 omega^2 sum D m^2) in simple shear: the mean of (2 omega n_x n_y)^2 over directions is
+#: omega^2 / 2 in the plane and 4 omega^2 / 15 in space; sum D m^4 / (h^2 sum D m^2) is 3/10 and 4/10.
+SHEARED = {2: 0.15, 3: 8 / 75}
+#: Where the elements of a symmetric matrix of 2 x 2 and 3 x 3 stand whose upper triangle is kept row by row.
+PLACES = {2: ((0, 1), (1, 2)), 3: ((0, 1, 2), (1, 3, 4), (2, 4, 5))}
+MOMENTS = {2: 1, 3: 3}  # numbers in the first of the sums, the others come behind
+SIZE = {2: 1 + 3 + 1, 3: 3 + 6 + 1}
+
+
+@qd.func
+def add_spin(sums: qd.template(), r, damper, a, b, c: Coefficients, method: qd.template()):
+    """Add neighbour j to the sums."""
+    dim = qd.static(r.n)
+    dv, m = r, r
+    along = 0.0
+    for k in qd.static(range(dim)):
+        dv[k] = a[k] - b[k]
+        m[k] = r[k] - 0.5 * c.dt * dv[k]
+        along += m[k] * dv[k]
+    for k in qd.static(range(dim)):
+        for n in qd.static(range(k, dim)):
+            sums[qd.static(MOMENTS[dim] + PLACES[dim][k][n])] += damper * m[k] * m[n]
+    sums[qd.static(SIZE[dim] - 1)] += damper * (along * c.inverse_h) ** 2
+    for axis in qd.static(range(2 if dim == 2 else 0, 3)):
+        k, n = qd.static((axis + 1) % 3, (axis + 2) % 3)
+        sums[qd.static(axis if dim == 3 else 0)] += damper * (m[k] * dv[n] - m[n] * dv[k])
+
+
+@qd.func
+def spin(sums, gate):
+    """Return omega as far as the fluid turns as a whole, of a particle's sums; `gate` is RIGID / SHEARED."""
+    omega = vec3(0.0, 0.0, 0.0)
+    dim = qd.static(2 if sums.n == SIZE[2] else 3)
+    trace = 0.0
+    for k in qd.static(range(dim)):
+        trace += sums[qd.static(MOMENTS[dim] + PLACES[dim][k][k])]
+    if trace > 0.0:
+        share = sums / trace
+        if qd.static(dim == 2):
+            omega[2] = share[0]
+        else:
+            inertia = qd.Matrix.zero(qd.f32, 3, 3)
+            for k in qd.static(range(3)):
+                for n in qd.static(range(3)):
+                    inertia[k, n] = -share[MOMENTS[3] + PLACES[3][k][n]]
+                inertia[k, k] += 1.0001  # neighbours on a line do not tell how it turns about itself
+            omega = inertia.inverse() @ vec3(share[0], share[1], share[2])
+        strain = share[qd.static(SIZE[dim] - 1)] / qd.max(omega.norm_sqr(), 1e-20)
+        omega *= qd.max(0.0, 1.0 - gate * strain)
+    return omega
+
+
+@qd.kernel(fastcache=True)
+def turn_along(
+    particles: Particles, velocities: qd.types.ndarray(), dampers: qd.types.ndarray(), grid: Grid, c: Coefficients,
+    count: qd.i32, gate: qd.f32, forget: qd.f32, lanes: qd.template(),
+):  # fmt: skip
+    """Turn what viscosity did in the last step with the `velocities` that particles have moved with since."""
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, qd.static(SIZE[particles.v[team].n]), lanes)
+            add_kept(sums, add_spin, team, particles, velocities, dampers, grid, c, 0)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                turned = particles.viscous[i]
+                own = lift(turned)
+                a = vec3(own.x, own.y, own.z)
+                half = 0.5 * c.dt * spin(column(sums, i - team * lanes), gate)
+                a += 2.0 / (1.0 + half.norm_sqr()) * half.cross(a + half.cross(a))
+                for k in qd.static(range(turned.n)):
+                    turned[k] = a[k] / (1.0 + forget * half.norm())
+                particles.viscous[i] = turned

@@ -1,0 +1,1 @@
+"""Pressure of the whole tank, on a grid."""

@@ -1,0 +1,107 @@
+"""Grids over the tank of about a support an edge, each half as fine as the one before.
+
+Nodes are the centres of cells, which divide the tank without remainder; a node's number is x + nx (y + ny z). A
+particle counts at the nodes around it with the weights of linear interpolation, "tents", and at a wall at the nearest
+node alone: that is what particle-in-cell methods do (Harlow 1964).
+"""
+
+import dataclasses
+import math
+
+from wavetank.device.compiler import LANES, lanes, qd, threads, worth_sharing
+from wavetank.device.state import CoarseGrid, integers, scalars
+from wavetank.solids.distance import lift, vec3
+
+EDGE = 1.0  # of a cell, over the support
+PARTS = 4  # of the particles that have sums of their own, where nodes are few
+MOST_PARTS = 16  # where they are many: one for each thread, but not more
+SMALLEST = 8  # cells along an axis that is not halved any more
+
+
+@qd.func
+def coordinates(grid: CoarseGrid, n):
+    """Whole coordinates of node `n`."""
+    return qd.Vector([n % grid.nx, n // grid.nx % grid.ny, n // (grid.nx * grid.ny)])
+
+
+@qd.func
+def in_cells(grid: CoarseGrid, p: qd.template()):
+    """The place `p` [m] in cells, whole at nodes; 0 along an axis that the world does not have."""
+    point = lift(p)
+    return vec3(
+        point.x / grid.dx - 0.5, point.y / grid.dy - 0.5, point.z / grid.dz - (0.5 if qd.static(p.n == 3) else 0.0)
+    )
+
+
+@qd.func
+def tents(share, dim: qd.template()):
+    """Weights of the corners of a cell, in the order of `corners`, for a place with the coordinates `share` in it."""
+    x = qd.Vector([1.0 - share.x, share.x])
+    y = qd.Vector([1.0 - share.y, share.y])
+    z = qd.Vector([1.0 - share.z, share.z])
+    return qd.Vector([x[k & 1] * y[k >> 1 & 1] * z[k >> 2] for k in qd.static(range(2**dim))])
+
+
+@qd.func
+def corners(grid: CoarseGrid, low, dim: qd.template()):
+    """Numbers of the nodes at the corners of the cell from the whole coordinates `low` on, or of the nearest."""
+    x = qd.Vector([qd.min(qd.max(low[0] + k, 0), grid.nx - 1) for k in qd.static(range(2))])
+    y = qd.Vector([qd.min(qd.max(low[1] + k, 0), grid.ny - 1) * grid.nx for k in qd.static(range(2))])
+    z = qd.Vector([qd.min(qd.max(low[2] + k, 0), grid.nz - 1) * grid.nx * grid.ny for k in qd.static(range(2))])
+    return qd.Vector([x[k & 1] + y[k >> 1 & 1] + z[k >> 2] for k in qd.static(range(2**dim))])
+
+
+@qd.func
+def nearest(grid: CoarseGrid, c):
+    """Number of the node with the whole coordinates `c`, or of the nearest."""
+    x = qd.min(qd.max(c[0], 0), grid.nx - 1)
+    y = qd.min(qd.max(c[1], 0), grid.ny - 1)
+    z = qd.min(qd.max(c[2], 0), grid.nz - 1)
+    return x + grid.nx * (y + grid.ny * z)
+
+
+def new_levels(size: tuple[float, ...], h: float) -> list[CoarseGrid]:
+    """Allocate the grid of a tank of that `size` [m] and its coarser levels, the finest first."""
+    shape = [_divided(edge / (EDGE * h)) for edge in size]
+    levels = [_new_level(shape, size)]
+    while any(_can_halve(n) for n in shape):
+        shape = [n // 2 if _can_halve(n) else n for n in shape]
+        levels.append(_new_level(shape, size))
+    return levels
+
+
+def piece_width() -> int:
+    """Return how many nodes of a row a thread takes at once: one of each colour at least (`poisson.py`)."""
+    return max(2, lanes())
+
+
+def sums_of(nodes: int) -> int:
+    """Return how many sums each of so many nodes has: on a processor some, so that no thread waits for another."""
+    if lanes() == 1:
+        return 1
+    return max(PARTS, min(threads(), MOST_PARTS)) if worth_sharing(nodes) else PARTS
+
+
+def _can_halve(n: int) -> bool:
+    return n % 2 == 0 and n > SMALLEST
+
+
+def _divided(cells: float) -> int:
+    """Return the number near `cells` that can be halved until `SMALLEST` or less is left."""
+    halvings = max(0, math.ceil(math.log2(max(cells, 1.0) / SMALLEST)))
+    return max(1, round(cells / 2**halvings)) * 2**halvings
+
+
+def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
+    nx, ny, nz = [*shape, 1][:3]
+    edges = [edge / n for edge, n in zip(size, shape, strict=True)]
+    dx, dy, dz = [*edges, 1.0][:3]
+    nodes = nx * ny * nz
+    rim = nodes + nx * ny + LANES  # what is beyond the last node is read, and counts nothing
+    kinds = {field.name: field.type for field in dataclasses.fields(CoarseGrid)}
+    parts = sums_of(nodes)
+    sums = {"sums": integers(parts * nodes), "mass_sums": integers(parts * nodes)}
+    fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in (qd.i32, qd.f32) and name not in sums}
+    return CoarseGrid(
+        **sums, **fields, nx=nx, ny=ny, nz=nz, pieces=-(-nx // piece_width()), dx=dx, dy=dy, dz=dz, parts=parts,
+    )  # fmt: skip

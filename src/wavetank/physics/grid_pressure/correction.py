@@ -1,0 +1,357 @@
+"""Pressure of the whole tank: a correction on a coarse grid before the iterations between particles.
+
+An iteration between particles carries pressure two supports far, so deep water needs many, or short time steps, or it
+gives way. Here the density errors of all particles are gathered on a grid of about the support, a Poisson equation is
+solved there (`poisson.py`), and the particles are moved by the gradient of its solution. What is left for the
+iterations is what the grid cannot see: errors of a few spacings, which they remove fast, whatever the depth.
+
+A field of multipliers lambda moves particles by M grad lambda (Eq. 6; M from the rest lattice, `stiffness`), and
+changes the density by -M laplace lambda. For the mean error C the equation is therefore M laplace lambda = C, with
+lambda <= 0, because water pushes and does not pull.
+
+Pressure from a grid, details from the particles: Zhu and Bridson 2005 (10.1145/1073204.1073298) in FLIP, Cornelis et
+al. 2014 (10.1111/cgf.12324) for SPH. Where we differ: the right side is the error of the particles' own densities, so
+that volume does not drift, and it is the positions that are moved. The sums are of whole numbers, so that runs repeat
+bit for bit. What was tried, and what it gives: docs/method.md.
+
+In time. A correction at the end of a step is implicit Euler, which damps waves by half of omega^2 dt. Each particle
+therefore carries what the grid accelerated it by, `a`, and a share w of it acts in the next prediction;
+the grid corrects what that leaves. What acts is then the sum of (1 - w) w^n times the acceleration that was found n
+steps ago, w / (1 - w) steps late on average. With w = 1/2 that is one step, and just what takes a velocity from half a
+step before a place to half a step behind it, as v = (p - x) / dt is: leapfrog, of second order, and waves keep their
+height. Below, the share (1 - 2 w) / (1 - w) of the damping stays: w is such that a step of any length damps as one of
+the share `DAMPING` of a frame would, and steps shorter than that carry nothing. It is stable for every omega dt, and
+modes that are much stiffer than a step are stopped at once, as without it. No more than `LARGEST_CARRIED` times gravity
+is carried, so that water that hits a wall does not bounce.
+
+At walls. Layers of a wall that move with a particle by half of its way (`smoothing.WALL_STIFFENING`) answer it with 3/4
+of the density that water would, so that the grid removed only 3/4 of what runs into a wall in a step, and water at rest
+made up for it by standing too close. The grid is told most of the rest: `MISSING` times what the way of this step has
+added. As it is the way that counts and not the place, it does not shift where water rests.
+
+Gaps. Particles in rows, near in one direction and far in the other, read the density of water at rest where there is
+less: the kernel is pointed and counts near ones most. The grid counts the room, so it knows. Where even the fullest
+cells around are less than `FULL`, the rows have gaps that the water around may close, and an error is less by
+`GAP_SHARE` times what is missing there. Near a free surface the cells below are full, so that water at rest is told
+nothing; of two cells in a row the mean counts, as a single one of four or eight particles is never quite even.
+"""
+
+from wavetank.device.compiler import qd
+from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls
+from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
+from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, in_cells, nearest, piece_width, tents
+from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
+from wavetank.physics.pairs import column, part_of, teams, turns
+from wavetank.physics.predicted_positions import predict_at, predicted
+from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, signed_distance, to_local, vec3, vec4
+
+UNIT = float(1 << 20)  # sums are whole multiples of its inverse
+LEAST_OPEN = 0.1  # a cell that is less open is solid
+INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
+REACH = 0.2  # of the support: the longest correction
+DAMPING = 0.44  # of a frame: the length of a step that damps as much, docs/method.md
+LARGEST_CARRIED = 1.2  # of gravity
+MISSING = 0.18  # of a wall's answer, over what it gives; 1/3 would be all, see docs/method.md
+FULL = 0.96  # fill that cells without gaps have at least, also where few rows of particles do not match them
+GAP_SHARE = 4.0  # by which errors are less, of what lacks there
+
+
+def carried(dt: float, frame_time: float) -> float:
+    """Return the share w of the grid's pressure that a step of `dt` [s] carries on."""
+    share = min(1.0, DAMPING * frame_time / dt)
+    return (1.0 - share) / (2.0 - share)
+
+
+@qd.func
+def add_whole(sums: qd.template(), at, amount, alone: qd.template()):
+    """Add a whole number; `alone` where no other thread adds to these sums."""
+    if qd.static(alone):
+        sums[at] = sums[at] + amount
+    else:
+        qd.atomic_add(sums[at], amount)
+
+
+@qd.func
+def add_fill(
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, team, part, unit, count, mixed: qd.template(),
+    lanes: qd.template(), alone: qd.template(),
+):  # fmt: skip
+    """Add the tents of a team's particles to the sums of a `part`, and those over their weights where `mixed`."""
+    first = team * lanes
+    dim = qd.static(particles.x[first].n)
+    at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
+    amounts = qd.Matrix.zero(qd.i32, 2**dim, lanes)
+    masses = qd.Matrix.zero(qd.i32, 2**dim if mixed else 1, lanes)
+    for lane in range(lanes):
+        s = in_cells(grid, predicted(particles, first + lane))
+        nodes = corners(grid, qd.floor(s, qd.i32), dim)
+        weights = tents(s - qd.floor(s), dim)
+        for k in qd.static(range(2**dim)):
+            w = unit * weights[k]
+            at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
+            amounts[k, lane] = qd.cast(qd.round(w), qd.i32)
+            if qd.static(mixed):
+                masses[k, lane] = qd.cast(qd.round(w / scratch.weight[first + lane]), qd.i32)
+    for lane in range(qd.min(lanes, count - first)):
+        for k in qd.static(range(2**dim)):
+            add_whole(grid.sums, at[k, lane], amounts[k, lane], alone)
+            if qd.static(mixed):
+                add_whole(grid.mass_sums, at[k, lane], masses[k, lane], alone)
+
+
+@qd.func
+def approached(x, p, near, solids: SolidSet, walls: Walls, c: Coefficients, searched: qd.template()):
+    """Relative density that the marked solids have added on the way from `x` to `p`, in their motion."""
+    added, free = 0.0, 1.0
+    k = next_near(near, -1, solids.count)
+    while k < (solids.count if qd.static(searched) else solids.tank_count):
+        value = vec4(0.0, 0.0, 0.0, 0.0)
+        way = p - x
+        if qd.static(searched):
+            value = signed_distance(solids, k, p)
+            if k >= solids.tank_count:
+                own = to_local(solids.old_position[k], solids.old_rotation[k], x)
+                way = p - solids.position[k] - rotate(solids.rotation[k], own)
+        else:
+            value = plane_distance(solids, k, p)
+        if value.w < c.h:
+            share = wall_share(walls, value.w, c.h) * c.wall_density
+            inward = -way.dot(vec3(value.x, value.y, value.z))
+            added = added * (1.0 - share[0]) + inward * free * share[1] / c.h
+            free *= 1.0 - share[0]
+        k = next_near(near, k, solids.count)
+    return added
+
+
+@qd.func
+def add_errors(
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, team,
+    part, unit, inner_from, inner_to, missing, gap_share, count, searched: qd.template(), lanes: qd.template(),
+    alone: qd.template(),
+):  # fmt: skip
+    """Add the tents of a team's particles, if inside of the water, times their errors (Eq. 2) to a `part`'s sums."""
+    first = team * lanes
+    dim = qd.static(particles.x[first].n)
+    at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
+    amounts = qd.Matrix.zero(qd.i32, 2**dim, lanes)
+    added = qd.Matrix.zero(qd.f32, 1, lanes)
+    for i in range(first, qd.min(first + lanes, count)):
+        near = particles.near[i]
+        if near != 0:
+            x = lift(particles.x[i])
+            added[0, i - first] = missing * approached(
+                x, lift(predicted(particles, i)), near, solids, walls, c, searched
+            )
+    for lane in range(lanes):
+        s = in_cells(grid, predicted(particles, first + lane))
+        nodes = corners(grid, qd.floor(s, qd.i32), dim)
+        weights = tents(s - qd.floor(s), dim)
+        filled = 0.0
+        for k in qd.static(range(2**dim)):
+            filled += weights[k] * grid.fill[nodes[k]]
+        inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
+        error = scratch.rho[first + lane] * scratch.weight[first + lane] - 1.0
+        error += added[0, lane] - gap_share * grid.gaps[nearest(grid, qd.floor(s + 0.5, qd.i32))]
+        error = unit * inside * qd.min(qd.max(error, -1.0), 1.0)
+        for k in qd.static(range(2**dim)):
+            at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
+            amounts[k, lane] = qd.cast(qd.round(error * weights[k]), qd.i32)
+    for lane in range(qd.min(lanes, count - first)):
+        for k in qd.static(range(2**dim)):
+            add_whole(grid.sums, at[k, lane], amounts[k, lane], alone)
+
+
+@qd.func
+def taken(sums: qd.template(), n, nodes, parts):
+    """Sum of all `parts` at node `n`, which are 0 afterwards."""
+    total = 0
+    for part in range(parts):
+        total += sums[part * nodes + n]
+        sums[part * nodes + n] = 0
+    return total
+
+
+@qd.func
+def gaps_at(grid: CoarseGrid, n, full):
+    """How far even the fullest two cells in a row are from `full`, of those around node `n`.
+
+    0 near solids, since what room these leave is known only roughly.
+    """
+    fullest, room = 0.0, grid.room[n]
+    for axis in qd.static(range(3)):
+        for side in qd.static((-1, 1)):
+            if grid.nz > 1 or axis < 2:
+                c = coordinates(grid, n)
+                before = grid.fill[n]
+                for _ in qd.static(range(2)):
+                    c[axis] += side
+                    at = nearest(grid, c)
+                    fullest = qd.max(fullest, 0.5 * (before + grid.fill[at]))
+                    room = qd.min(room, grid.room[at])
+                    before = grid.fill[at]
+    return qd.max(full - fullest, 0.0) if room >= 1.0 else 0.0
+
+
+@qd.func
+def open_share(grid: CoarseGrid, solids: SolidSet, n):
+    """Share of the cell of node `n` that no solid takes."""
+    c = coordinates(grid, n)
+    center = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
+    edge = qd.min(grid.dx, grid.dy)
+    if grid.nz > 1:
+        edge = qd.min(edge, grid.dz)
+    else:
+        center.z = 0.0
+    room = 1.0
+    for k in range(solids.count):
+        if k < solids.tank_count or (center - solids.position[k]).norm() < solids.reach[k] + 0.5 * edge:
+            if room > 0.0:
+                room = qd.min(room, 0.5 + signed_distance(solids, k, center).w / edge)
+    return qd.max(room, 0.0)
+
+
+@qd.kernel(fastcache=True)
+def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: qd.template()):
+    """Find which share of each cell is open where solids are `searched`; else the tank ends where the cells do."""
+    for n in range(grid.nx * grid.ny * grid.nz):
+        room = 1.0
+        if qd.static(searched):
+            room = open_share(grid, solids, n)
+        grid.room[n] = room if room >= least_open else 0.0
+
+
+@qd.kernel(fastcache=True)
+def gather(
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
+    unit: qd.f32, volume: qd.f32, scale: qd.f32, inner_from: qd.f32, inner_to: qd.f32, missing: qd.f32,
+    full: qd.f32, gap_share: qd.f32, least_open: qd.f32, least_theta: qd.f32, count: qd.i32, parts: qd.i32,
+    searched: qd.template(), mixed: qd.template(), alone: qd.template(), few: qd.template(), lanes: qd.template(),
+    width: qd.template(),
+):  # fmt: skip
+    """Sum the tents of all particles at the nodes, find gaps, sum density errors (Eq. 2), and set up the equation.
+
+    The sums are 0 before. `volume` is that of a particle over that of a cell and over the `unit`, `scale` the same over
+    the stiffness M. What solids answer to the way of a particle is increased by the share `missing`; there are only the
+    walls of the tank unless they are `searched`. Errors are less by `gap_share` times what cells lack of being `full`.
+    Where fluids are `mixed`, their densities are averaged.
+
+    Threads share the particles in `parts`. Where these are `alone`, each has sums of its own and waits for no other.
+    Where nodes are `few`, one thread is done with them before others have started.
+    """
+    for turn in range(turns(teams(count, lanes), parts, lanes)):
+        part = part_of(turn, teams(count, lanes), parts, lanes)
+        for team in range(part[0], part[1]):
+            add_fill(grid, particles, scratch, team, alone * (turn >> 9), unit, count, mixed, lanes, alone)
+    qd.loop_config(serialize=bool(few))
+    for n in range(grid.nx * grid.ny * grid.nz):
+        total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
+        grid.fill[n] = volume * total / qd.max(grid.room[n], least_open)
+        grid.density[n] = 1.0
+        if qd.static(mixed):
+            mass = taken(grid.mass_sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
+            grid.density[n] = qd.max(mass, 1) / qd.cast(qd.max(total, 1), qd.f32)
+    qd.loop_config(serialize=bool(few))
+    for n in range(grid.nx * grid.ny * grid.nz):
+        grid.gaps[n] = gaps_at(grid, n, full)
+    for turn in range(turns(teams(count, lanes), parts, lanes)):
+        part = part_of(turn, teams(count, lanes), parts, lanes)
+        for team in range(part[0], part[1]):
+            add_errors(
+                grid, particles, scratch, solids, walls, c, team, alone * (turn >> 9), unit, inner_from, inner_to,
+                missing, gap_share, count, searched, lanes, alone,
+            )  # fmt: skip
+    qd.loop_config(serialize=bool(few))
+    for n in range(grid.nx * grid.ny * grid.nz):
+        total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
+        grid.rhs[n] = scale * total / qd.max(grid.room[n], least_open)
+    qd.loop_config(serialize=bool(few))
+    for piece in range(grid.pieces * grid.ny * grid.nz):
+        couple_nodes(grid, piece, least_theta, width)
+
+
+@qd.func
+def slope_across(coupled, edge, difference):
+    """Derivative of lambda [m] across a face, told from 0 where the face leads into water."""
+    return coupled * edge * difference + (1e-30 if coupled > 0.0 else 0.0)
+
+
+@qd.func
+def slope_along(grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), dim: qd.template()):
+    """Derivative of lambda [m] along `axis` at the place `s` [cells], from the faces around that lead into water.
+
+    The `slope` of the others is 0.
+    """
+    place = s
+    place[axis] -= 0.5
+    at = corners(grid, qd.floor(place, qd.i32), dim)
+    weights = tents(place - qd.floor(place), dim)
+    total, weight = 0.0, 0.0
+    for k in qd.static(range(2**dim)):
+        own = slope[at[k]]
+        total += weights[k] * own
+        weight += weights[k] if own != 0.0 else 0.0
+    return total / qd.max(weight, 1e-9)
+
+
+@qd.kernel(fastcache=True)
+def move_particles(
+    grid: CoarseGrid, particles: Particles, cells: Grid, solids: SolidSet, c: Coefficients, stiffness: qd.f32,
+    reach: qd.f32, count: qd.i32, few: qd.template(), lanes: qd.template(),
+):  # fmt: skip
+    """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank, and carry it on.
+
+    One thread sees to the nodes where they are `few`.
+    """
+    qd.loop_config(serialize=bool(few))
+    for n in range(grid.nx * grid.ny * grid.nz):
+        lam = grid.lam[n]
+        grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
+        grid.slope_y[n] = slope_across(grid.wy[n], grid.dy, grid.lam[n + grid.nx] - lam)
+        grid.slope_z[n] = slope_across(grid.wz[n], grid.dz, grid.lam[n + grid.nx * grid.ny] - lam)
+    for turn in range(turns(teams(count, lanes), cells.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), cells.parts, lanes)
+        for team in range(part[0], part[1]):
+            first = team * lanes
+            dim = qd.static(particles.x[first].n)
+            slopes = qd.Matrix.zero(qd.f32, dim, lanes)
+            for lane in range(lanes):
+                s = in_cells(grid, predicted(particles, first + lane))
+                slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, dim)
+                slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, dim)
+                if qd.static(dim == 3):
+                    slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, dim)
+            for i in range(first, qd.min(first + lanes, count)):
+                p = predicted(particles, i)
+                dp = column(slopes, i - first) * stiffness
+                dp *= qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
+                p += dp
+                a = particles.a[i] + dp / (c.dt * c.dt)
+                particles.a[i] = a * qd.min(1.0, c.largest_carried / qd.max(a.norm(), 1e-12))
+                near = particles.near[i]
+                if near != 0:
+                    p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
+                predict_at(particles, i, p)
+
+
+def correct_pressure(
+    levels: list[CoarseGrid], particles: Particles, cells: Grid, scratch: Scratch, solids: SolidSet, walls: Walls,
+    c: Coefficients, stiffness: float, volume: float, count: int, share: float, *, searched: bool, mixed: bool,
+    moved: bool,
+) -> None:  # fmt: skip
+    """Move the predicted positions of `particles` so that the `share` of the mean errors of their densities vanishes.
+
+    `scratch.rho` holds the densities over that of the heaviest fluid there, `volume` [m^dim] is that of a particle.
+    Unless solids have `moved`, the room that they leave is what it was.
+    """
+    finest = levels[0]
+    if moved:
+        find_room(finest, solids, LEAST_OPEN, int(searched))
+    alone, few = finest.parts > 1, int(not is_shared(finest))
+    scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
+    gather(
+        finest, particles, scratch, solids, walls, c, UNIT, scale, share * scale / stiffness, *INNER, MISSING,
+        FULL, GAP_SHARE, LEAST_OPEN, LEAST_THETA, count, finest.parts if alone else cells.parts, int(searched),
+        int(mixed), int(alone), few, cells.lanes, piece_width(),
+    )  # fmt: skip
+    solve_levels(levels)
+    move_particles(finest, particles, cells, solids, c, stiffness, REACH * c.h, count, few, cells.lanes)

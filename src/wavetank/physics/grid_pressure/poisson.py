@@ -1,0 +1,306 @@
+"""The Poisson equation laplace lambda = rhs on the grids of a tank, with lambda <= 0.
+
+At the free surface lambda is 0, at the place between two nodes where the filling is one half (the ghost fluid method,
+Gibou et al. 2002, 10.1006/jcph.2001.6977), and nothing flows into solids. The solution on a grid starts from that of
+the next coarser one, so that a few sweeps of projected over-relaxation are enough on each. It does not start from the
+time step before: pressures that are carried over make water pulse (docs/method.md).
+
+    code    symbol     meaning                                                      unit
+    fill    f          water in the tent of a node, over the room that it has       1
+    theta              distance of the surface from the water's node, in edges      1
+    wx      w          coupling with the next node along x, 1 / (theta dx^2 rho)    1/m^2
+    lam     lambda     multiplier                                                   m^2
+"""
+
+import itertools
+import math
+
+from wavetank.device.compiler import current_backend, qd, worth_sharing
+from wavetank.device.state import CoarseGrid
+from wavetank.physics.grid_pressure.coarse_grid import coordinates, piece_width
+
+SWEEPS, MOST_SWEEPS = 8, 200  # of a level, and of the coarsest
+OVER_RELAXATION = 1.5
+LEAST_THETA = 0.1
+BLOCK_NODES = 8192  # at most, of a level that one block of a graphics processor sees to
+ZERO, FROM_COARSER, GO_ON = 0, 1, 2  # where a level starts
+
+
+@qd.func
+def coupling(grid: CoarseGrid, n, m, edge, least_theta):
+    """What the face between the nodes `n` and `m` couples them with [1/m^2]: 0 into solids and between air and air.
+
+    It is the inverse of the density, that of the heaviest fluid being 1, over the square of the distance.
+    """
+    a = qd.min(grid.fill[n], 1.0) - 0.5
+    b = qd.min(grid.fill[m], 1.0) - 0.5
+    crossed = qd.max(qd.max(a, b) / qd.max(qd.abs(a - b), 1e-6), least_theta)
+    theta = qd.select(a * b < 0.0, crossed, 1.0)
+    # Light fluid gives way more: the inverse of the mean density, and of that of the water where there is air.
+    mean = 0.5 * (grid.density[n] + grid.density[m])
+    density = qd.select(a <= 0.0, grid.density[m], qd.select(b <= 0.0, grid.density[n], mean))
+    is_open = qd.min(qd.max(a, b), qd.min(grid.room[n], grid.room[m])) > 0.0
+    return qd.select(is_open, 1.0 / qd.max(theta * edge * edge * density, 1e-12), 0.0)
+
+
+@qd.func
+def couple_nodes(grid: CoarseGrid, piece, least_theta, width: qd.template()):
+    """Set the couplings of `width` nodes of a row with the next ones along x, y and z, and what inverts their equation.
+
+    The rim of the arrays, where there is no room, stands for what is beyond the tank.
+    """
+    first = piece % grid.pieces * width
+    row = piece // grid.pieces
+    y = row % grid.ny
+    z = row // grid.ny
+    begin, layer, rim = grid.nx * row, grid.nx * grid.ny, grid.nx * grid.ny * grid.nz
+    after_y = begin + grid.nx if y + 1 < grid.ny else rim
+    before_y = begin - grid.nx if y > 0 else rim
+    after_z = begin + layer if z + 1 < grid.nz else rim
+    before_z = begin - layer if z > 0 else rim
+    found = qd.Matrix.zero(qd.f32, 4, width)
+    for lane in range(width):
+        x = first + lane
+        n = begin + x
+        wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, rim), grid.dx, least_theta)
+        wy = coupling(grid, n, after_y + x, grid.dy, least_theta)
+        wz = coupling(grid, n, after_z + x, grid.dz, least_theta)
+        diagonal = wx + wy + wz
+        diagonal += coupling(grid, n, qd.select(x > 0, n - 1, rim), grid.dx, least_theta)
+        diagonal += coupling(grid, n, before_y + x, grid.dy, least_theta)
+        diagonal += coupling(grid, n, before_z + x, grid.dz, least_theta)
+        is_water = qd.min(grid.fill[n] - 0.5, qd.min(grid.room[n], diagonal)) > 0.0
+        found[0, lane] = wx
+        found[1, lane] = wy
+        found[2, lane] = wz
+        found[3, lane] = qd.select(is_water, 1.0 / qd.max(diagonal, 1e-12), 0.0)
+    for lane in range(qd.min(width, grid.nx - first)):
+        n = begin + first + lane
+        grid.wx[n] = found[0, lane]
+        grid.wy[n] = found[1, lane]
+        grid.wz[n] = found[2, lane]
+        grid.inverse[n] = found[3, lane]
+
+
+@qd.func
+def start_nodes(grid: CoarseGrid, coarser: CoarseGrid, row, first, last, start):
+    """Set lambda of the nodes of a `row` from x = `first` to `last` to what `start` says; 0 outside of the water."""
+    halved = grid.nx // coarser.nx - 1  # 1, or 0 where the levels have as many nodes along x
+    y = row % grid.ny // (grid.ny // coarser.ny)
+    z = row // grid.ny // (grid.nz // coarser.nz)
+    below = coarser.nx * (y + coarser.ny * z)
+    for x in range(first, last):
+        n = grid.nx * row + x
+        lam = 0.0
+        if grid.inverse[n] > 0.0:
+            if start == 2:  # GO_ON
+                lam = grid.lam[n]
+            if start == 1:  # FROM_COARSER
+                lam = coarser.lam[below + (x >> halved)]
+        grid.lam[n] = lam
+
+
+@qd.func
+def relax_nodes(grid: CoarseGrid, row, first, last, over_relaxation):
+    """One step of projected over-relaxation, lambda <= 0, at every other node of a `row` from x = `first` to `last`.
+
+    What a node is coupled with beyond the tank stands in the rim of the arrays, and is 0.
+    """
+    begin, layer, rim = grid.nx * row, grid.nx * grid.ny, grid.nx * grid.ny * grid.nz
+    before_y = begin - grid.nx if row % grid.ny > 0 else rim
+    before_z = begin - layer if row >= grid.ny else rim
+    for k in range((last - first + 1) // 2):
+        x = first + 2 * k
+        n = begin + x
+        if grid.inverse[n] > 0.0:
+            total = grid.wx[n] * grid.lam[n + 1] - grid.rhs[n]
+            total += grid.wy[n] * grid.lam[n + grid.nx] + grid.wy[before_y + x] * grid.lam[before_y + x]
+            total += grid.wz[n] * grid.lam[n + layer] + grid.wz[before_z + x] * grid.lam[before_z + x]
+            if x > 0:
+                total += grid.wx[n - 1] * grid.lam[n - 1]
+            lam = grid.lam[n]
+            grid.lam[n] = qd.min(lam + over_relaxation * (total * grid.inverse[n] - lam), 0.0)
+
+
+@qd.func
+def start_piece(grid: CoarseGrid, coarser: CoarseGrid, piece, start, width: qd.template()):
+    """Set lambda of `width` nodes of a row to what `start` says."""
+    first = piece % grid.pieces * width
+    start_nodes(grid, coarser, piece // grid.pieces, first, qd.min(first + width, grid.nx), start)
+
+
+@qd.func
+def relax_piece(grid: CoarseGrid, piece, colour, over_relaxation, width: qd.template()):
+    """Relax those of `width` nodes of a row that have a `colour`."""
+    row = piece // grid.pieces
+    first = piece % grid.pieces * width
+    x = first + (row % grid.ny + row // grid.ny + colour) % 2
+    relax_nodes(grid, row, x, qd.min(first + width, grid.nx), over_relaxation)
+
+
+@qd.kernel(fastcache=True)
+def solve(
+    grid: CoarseGrid, coarser: CoarseGrid, start: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32,
+    shared: qd.template(), width: qd.template(),
+):  # fmt: skip
+    """Relax the equation of a level, whose couplings are set, in sweeps of two colours, starting as `start` says.
+
+    One thread does the `sweeps`, or all threads share as many as `shared` says, `width` nodes of a row at once.
+    """
+    if qd.static(shared):
+        for piece in range(grid.pieces * grid.ny * grid.nz):
+            start_piece(grid, coarser, piece, start, width)
+        for colour in qd.static(range(2 * shared)):
+            for piece in range(grid.pieces * grid.ny * grid.nz):
+                relax_piece(grid, piece, colour, over_relaxation, width)
+    else:
+        # A grid of some thousand nodes is done before other threads have started.
+        qd.loop_config(serialize=True)
+        for _ in range(1):
+            for row in range(grid.ny * grid.nz):
+                start_nodes(grid, coarser, row, 0, grid.nx, start)
+            for colour in range(2 * sweeps):
+                for row in range(grid.ny * grid.nz):
+                    relax_nodes(grid, row, (row % grid.ny + row // grid.ny + colour) % 2, grid.nx, over_relaxation)
+
+
+@qd.func
+def wait_for_block(fenced: qd.template()):
+    """Wait until all threads of the block are here; what they wrote is read from here on.
+
+    On CUDA that is what the barrier means, elsewhere it must be said, so that waits are `fenced`.
+    """
+    if qd.static(fenced):
+        qd.simt.grid.mem_fence()
+    qd.simt.block.sync()
+    if qd.static(fenced):
+        qd.simt.grid.mem_fence()
+
+
+@qd.kernel(fastcache=True)
+def solve_in_block(
+    grid: CoarseGrid, coarser: CoarseGrid, start: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32,
+    fenced: qd.template(), width: qd.template(),
+):  # fmt: skip
+    """Do what `solve` does, in one launch on a graphics processor: its threads wait for each other after each colour.
+
+    Only those of a block can, so that this is for levels of some thousand nodes.
+    """
+    qd.loop_config(block_dim=512)
+    for thread in range(512):
+        pieces = grid.pieces * grid.ny * grid.nz
+        piece = thread
+        while piece < pieces:
+            start_piece(grid, coarser, piece, start, width)
+            piece += 512
+        wait_for_block(fenced)
+        for colour in range(2 * sweeps):
+            piece = thread
+            while piece < pieces:
+                relax_piece(grid, piece, colour, over_relaxation, width)
+                piece += 512
+            wait_for_block(fenced)
+
+
+@qd.func
+def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
+    """Give node `n` of a coarser level the means of the finer nodes that it stands for."""
+    c = coordinates(coarse, n)
+    fx = fine.nx // coarse.nx
+    fy = fine.ny // coarse.ny
+    fz = fine.nz // coarse.nz
+    room, fill, rhs, density = 0.0, 0.0, 0.0, 0.0
+    for z in range(c[2] * fz, c[2] * fz + fz):
+        for y in range(c[1] * fy, c[1] * fy + fy):
+            row = fine.nx * (y + fine.ny * z)
+            for m in range(row + c[0] * fx, row + c[0] * fx + fx):
+                room += fine.room[m]
+                fill += fine.fill[m] * fine.room[m]
+                rhs += fine.rhs[m] * fine.room[m]
+                density += fine.density[m] * fine.fill[m] * fine.room[m]
+    coarse.room[n] = room / (fx * fy * fz)
+    coarse.density[n] = density / fill if fill > 0.0 else 1.0
+    coarse.fill[n] = fill / qd.max(room, 1e-6)
+    coarse.rhs[n] = rhs / qd.max(room, 1e-6)
+
+
+@qd.kernel(fastcache=True)
+def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: qd.template(), width: qd.template()):
+    """Set up the equation of a coarser level; `shared` by all threads, or done by one."""
+    qd.loop_config(serialize=not shared)
+    for n in range(coarse.nx * coarse.ny * coarse.nz):
+        average_node(coarse, fine, n)
+    qd.loop_config(serialize=not shared)
+    for piece in range(coarse.pieces * coarse.ny * coarse.nz):
+        couple_nodes(coarse, piece, least_theta, width)
+
+
+@qd.kernel(fastcache=True)
+def restrict_in_block(
+    coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, fenced: qd.template(), width: qd.template()
+):
+    """Do what `restrict` does, in one launch of one block on a graphics processor."""
+    qd.loop_config(block_dim=512)
+    for thread in range(512):
+        n = thread
+        while n < coarse.nx * coarse.ny * coarse.nz:
+            average_node(coarse, fine, n)
+            n += 512
+        wait_for_block(fenced)
+        piece = thread
+        while piece < coarse.pieces * coarse.ny * coarse.nz:
+            couple_nodes(coarse, piece, least_theta, width)
+            piece += 512
+
+
+def is_shared(level: CoarseGrid) -> bool:
+    """Whether all threads see to a `level`."""
+    return worth_sharing(level.nx * level.ny * level.nz)
+
+
+def in_block(level: CoarseGrid) -> bool:
+    """Whether one block of a graphics processor sees to a `level`: it is done before as many launches have begun."""
+    return current_backend() != "cpu" and level.nx * level.ny * level.nz <= BLOCK_NODES
+
+
+def coarsest_relaxation(level: CoarseGrid) -> tuple[int, float]:
+    """Return (sweeps, over-relaxation) that leave about a hundredth of the slowest mode; sweeps in whole `SWEEPS`.
+
+    That is a quarter of a wave along one axis, from a wall to a surface. Where cells are long, their short edges tie
+    them together and it takes many sweeps. (Young 1954, "Iterative methods for solving partial difference equations of
+    elliptic type", 10.1090/S0002-9947-1954-0059635-7.)
+    """
+    axes = [
+        (n, 1.0 / edge**2) for n, edge in ((level.nx, level.dx), (level.ny, level.dy), (level.nz, level.dz)) if n > 1
+    ]
+    total = sum(w for _, w in axes)
+    slowest = min((w / total * (1.0 - math.cos(0.5 * math.pi / n)) for n, w in axes), default=1.0)
+    radius = 1.0 - slowest  # of Jacobi's method
+    over_relaxation = 2.0 / (1.0 + math.sqrt(1.0 - radius**2))
+    sweeps = SWEEPS * math.ceil(5.0 / SWEEPS / -math.log(max(over_relaxation - 1.0, 0.1)))
+    return min(sweeps, MOST_SWEEPS), over_relaxation
+
+
+def solve_levels(levels: list[CoarseGrid]) -> None:
+    """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set."""
+    fenced, width = int(current_backend() != "cuda"), piece_width()
+    for fine, coarse in itertools.pairwise(levels):
+        if in_block(coarse):
+            restrict_in_block(coarse, fine, LEAST_THETA, fenced, width)
+        else:
+            restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)), width)
+    coarsest = coarser = levels[-1]
+    for level in reversed(levels):
+        start, sweeps, over_relaxation = FROM_COARSER, SWEEPS, OVER_RELAXATION
+        if level is coarsest:
+            start = ZERO
+            sweeps, over_relaxation = coarsest_relaxation(level)
+        if in_block(level):
+            solve_in_block(level, coarser, start, sweeps, over_relaxation, fenced, width)
+        elif is_shared(level):
+            for _ in range(sweeps // SWEEPS):
+                solve(level, coarser, start, sweeps, over_relaxation, SWEEPS, width)
+                start = GO_ON
+        else:
+            solve(level, coarser, start, sweeps, over_relaxation, 0, width)
+        coarser = level

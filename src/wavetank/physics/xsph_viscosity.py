@@ -1,0 +1,94 @@
+"""XSPH viscosity, velocities drawn towards the mean of the neighbours; and the vorticity, found in the same sweep.
+
+Schechter and Bridson 2012 (10.1145/2185520.2185557), Eq. 11 of the report; the vorticity is its Eq. 9. Both are of the
+velocities before either acts. Where we differ: the sum is a mean, with the volume of a particle, so that c has no unit;
+pairs are weighted alike from both sides, so momentum is kept exactly. Of two fluids the heavier follows less, by the
+ratio of the masses: m_i dv_i is antisymmetric, no share exceeds c.
+
+    code     symbol     meaning                                                       unit
+    sums                sum_j (v_j - v_i) w_ij, and behind it omega_i                 m/s, 1/s
+    omega    omega_i    vorticity; in a 2-D world it points along z                   1/s
+"""
+
+from wavetank.device.compiler import qd
+from wavetank.device.state import Coefficients, Grid, Particles, Scratch
+from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
+from wavetank.physics.smoothing import kernel
+from wavetank.solids.distance import vec3
+
+
+@qd.func
+def add_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
+    """Add neighbour j to sum_j (v_j - v_i) w_ij."""
+    dv = (b - a) * kernel(method, square * c.inverse_h2)[0]
+    for k in qd.static(range(r.n)):
+        sums[k] += dv[k]
+
+
+@qd.func
+def add_vorticity(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
+    """Add neighbour j to sum_j (v_j - v_i) w_ij and to omega_i = sum_j (v_j - v_i) x grad_j W (Eq. 9)."""
+    w = kernel(method, square * c.inverse_h2)
+    dv = b - a
+    for k in qd.static(range(r.n)):
+        sums[k] += dv[k] * w[0]
+    # grad_j W = -grad_i W, and a x b = -b x a.
+    turn = (r * (c.gradient_scale * w[1])).cross(dv)
+    if qd.static(r.n == 3):
+        for k in qd.static(range(3)):
+            sums[3 + k] += turn[k]
+    else:
+        sums[2] += turn
+
+
+#: By `turning`; append only, as `smoothing.KERNELS`.
+SUMS = (add_xsph, add_vorticity)
+
+
+@qd.func
+def add_mixed_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
+    """Add neighbour j to sum_j (v_j - v_i) w_ij min(1, m_j / m_i); the inverse masses w are in `data`, behind v."""
+    share = kernel(method, square * c.inverse_h2)[0] * qd.min(1.0, a[3] / b[3])
+    for k in qd.static(range(r.n)):
+        sums[k] += (b[k] - a[k]) * share
+
+
+@qd.kernel(fastcache=True)
+def apply_viscosity(
+    smoothed: Particles, particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32,
+    method: qd.template(), turning: qd.template(), lanes: qd.template(),
+):  # fmt: skip
+    """Smooth the velocities (Eq. 11); where `turning`, estimate the vorticity (Eq. 9)."""
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
+        for team in range(part[0], part[1]):
+            dim = qd.static(particles.v[team].n)
+            sums = qd.Matrix.zero(qd.f32, dim + turning * (2 * dim - 3), lanes)
+            add_neighbors(sums, qd.static(SUMS[turning]), team, particles, particles.v, grid, c, method)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                sum = column(sums, i - team * lanes)
+                v = particles.v[i]
+                for k in qd.static(range(dim)):
+                    v[k] += c.viscosity * c.density_scale * sum[k]
+                smoothed.v[i] = v
+                if qd.static(turning):
+                    if qd.static(dim == 3):
+                        scratch.omega[i] = vec3(sum[3], sum[4], sum[5])
+                    else:
+                        scratch.omega[i] = vec3(0.0, 0.0, sum[2])
+
+
+@qd.kernel(fastcache=True)
+def apply_mixed_viscosity(
+    smoothed: Particles, particles: Particles, packed: qd.types.ndarray(), grid: Grid, c: Coefficients, count: qd.i32,
+    method: qd.template(), lanes: qd.template(),
+):  # fmt: skip
+    """Smooth the velocities (Eq. 11) of fluids of different density; `packed` as `mixture.pack_weights` leaves it."""
+    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
+        for team in range(part[0], part[1]):
+            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
+            add_neighbors(sums, add_mixed_xsph, team, particles, packed, grid, c, method)
+            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+                dv = column(sums, i - team * lanes)
+                smoothed.v[i] = particles.v[i] + c.viscosity * c.density_scale * dv

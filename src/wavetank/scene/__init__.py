@@ -1,0 +1,1 @@
+"""A world as data: tank, fluids, solids, forces, goals, and the bundled scenes."""

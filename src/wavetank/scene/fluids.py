@@ -1,0 +1,158 @@
+"""Fluids as plain data: where a scene's particles start."""
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
+from typing_extensions import override
+
+from wavetank.foundation.model import Model, Positive, Vector, register_model
+
+
+class Fluid(Model):
+    """What every fluid has."""
+
+    velocity: Vector | None = None  # m/s, at the start; at rest where None
+    material: str | None = None  # one of the scene's materials; the scene's own parameters where None
+
+    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
+        """Name every vector of this fluid, to check that all live in one dimension."""
+        return [("velocity", self.velocity)] if self.velocity is not None else []
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner [m] of the fluid."""
+        raise NotImplementedError
+
+    def estimate(self, spacing: float) -> float:
+        """Number of particles to expect, without making them."""
+        lower, upper = self.bounds()
+        return float(np.prod(np.maximum((upper - lower) / spacing, 1.0)))
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        """Say for each of the points [n, dim] whether it lies in this fluid, bool [n]."""
+        raise NotImplementedError
+
+    def particles(self, spacing: float) -> np.ndarray:
+        """Positions [n, dim] of a cubic lattice that fills this fluid, half a spacing from its lower corner."""
+        lower, upper = self.bounds()
+        counts = np.floor((upper - lower) / spacing + 1e-6).astype(int)
+        axes = [low + (np.arange(n) + 0.5) * spacing for low, n in zip(lower, counts, strict=True)]
+        lattice = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
+        return lattice[self.contains(lattice)]
+
+
+class Block(Fluid):
+    """A rectangular block of fluid between two corners."""
+
+    shape: Literal["block"] = "block"
+    lower: Vector
+    upper: Vector
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Block":
+        if len(self.lower) != len(self.upper) or any(a >= b for a, b in zip(self.lower, self.upper, strict=True)):
+            raise ValueError(
+                f"fluid block lower = {self.lower}, upper = {self.upper} is not allowed; "
+                "every component of upper must be greater than that of lower."
+            )
+        return self
+
+    @override
+    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
+        return [("lower", self.lower), ("upper", self.upper), *super().vectors()]
+
+    @override
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(self.lower, float), np.array(self.upper, float)
+
+    @override
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        lower, upper = self.bounds()
+        return np.all((points > lower) & (points < upper), axis=1)
+
+
+class Ball(Fluid):
+    """A ball of fluid; in a 2-D world a disc."""
+
+    shape: Literal["ball"] = "ball"
+    center: Vector
+    radius: Positive
+
+    @override
+    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
+        return [("center", self.center), *super().vectors()]
+
+    @override
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        center = np.array(self.center, float)
+        return center - self.radius, center + self.radius
+
+    @override
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.sum((points - np.array(self.center)) ** 2, axis=1) < self.radius**2
+
+
+def _array(value: Any) -> np.ndarray:
+    try:
+        array = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        raise ValueError("positions and velocities must be arrays of numbers [n, 2] or [n, 3].") from None
+    if array.size == 0:
+        array = array.reshape(0, array.shape[1] if array.ndim == 2 else 3)
+    if array.ndim != 2 or array.shape[1] not in (2, 3):
+        raise ValueError(f"positions have shape {list(array.shape)}; they must be [n, 2] or [n, 3].")
+    bad = ~np.isfinite(array).all(axis=1)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise ValueError(f"positions[{row}] = {array[row].tolist()} is not finite; every number must be.")
+    return array
+
+
+Array = Annotated[
+    np.ndarray,
+    BeforeValidator(_array),
+    PlainSerializer(lambda array: array.tolist()),
+    WithJsonSchema({"type": "array", "items": {"type": "array", "items": {"type": "number"}}}),
+]
+
+
+class Points(Fluid):
+    """Fluid particles at given places, each of the mass that the scene's spacing gives."""
+
+    shape: Literal["points"] = "points"
+    positions: Array
+    velocities: Array | None = None
+
+    @model_validator(mode="after")
+    def _paired(self) -> "Points":
+        if self.velocities is not None and self.velocities.shape != self.positions.shape:
+            raise ValueError(
+                f"velocities have shape {list(self.velocities.shape)}; "
+                f"they must have that of positions, {list(self.positions.shape)}."
+            )
+        return self
+
+    @override
+    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
+        return [*([("positions", tuple(self.positions[0]))] if len(self.positions) else []), *super().vectors()]
+
+    @override
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.positions.min(axis=0), self.positions.max(axis=0)
+
+    @override
+    def estimate(self, spacing: float) -> float:
+        return float(len(self.positions))
+
+    @override
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros(len(points), bool)
+
+    @override
+    def particles(self, spacing: float) -> np.ndarray:
+        return self.positions
+
+
+AnyFluid = Annotated[Block | Ball | Points, Field(discriminator="shape")]
+for _fluid in (Block, Ball, Points):
+    register_model(_fluid.model_fields["shape"].default, _fluid)

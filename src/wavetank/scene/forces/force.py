@@ -1,0 +1,35 @@
+"""What every force has. A force of your own is a subclass with `apply`: see `examples/05_a_force_of_your_own.py`."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wavetank.device.state import Particles
+from wavetank.foundation.model import Model
+
+
+class Force(Model):
+    """Something beside gravity that accelerates particles."""
+
+    def apply(self, particles: Particles, count: int, dt: float, time: float) -> None:
+        """Change the velocities of `count` particles for a substep of `dt` [s] that begins at `time` [s] of water."""
+        raise NotImplementedError
+
+    def largest_acceleration(self) -> float:
+        """Return a bound of the acceleration [m/s^2]: time steps are chosen by it."""
+        return 0.0
+
+    def largest_speed(self) -> float:
+        """Return the speed [m/s] that this force can give to water; the world's speed limit makes room for it."""
+        return 0.0
+
+    def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
+        """Name every vector of this force, to check that all live in one dimension."""
+        return []
+
+
+def in_space(vector: Sequence[float]) -> np.ndarray:
+    """Return a vector of a 2-D or 3-D world as one in space, float32 [3]."""
+    point = np.zeros(3, np.float32)
+    point[: len(vector)] = vector
+    return point

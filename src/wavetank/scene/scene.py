@@ -1,0 +1,389 @@
+"""A scene: plain validated data that says what a world is made of, from Python or from a TOML file."""
+
+import difflib
+import functools
+import importlib.resources
+import json
+import math
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import tomli_w
+from pydantic import BeforeValidator, ValidationError, model_validator
+
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.materials import COLORS, Material, Properties
+from wavetank.foundation.model import Model, Size, sentence
+from wavetank.foundation.params import PRESETS, QUALITIES, Parameters
+from wavetank.foundation.replacing import replacing
+from wavetank.scene.fluids import AnyFluid, Points
+from wavetank.scene.forces import AnyForce
+from wavetank.scene.goal import Goal
+from wavetank.solids.shapes import AnySolid, HalfSpace
+from wavetank.solids.solid import Solid
+
+MAX_PARTICLES = 100_000_000
+_TOLERANCE = 1e-6  # of a spacing: how far a fluid may reach beyond a wall by rounding
+
+
+class Tank(Model):
+    """The container: its inner size [m], the lower corner at the origin. Two numbers make a 2-D world."""
+
+    size: Size
+
+    def walls(self) -> list[Solid]:
+        """Return the walls as half-spaces, lower and upper for each axis."""
+        result: list[Solid] = []
+        for axis, (name, edge) in enumerate(zip("xyz", self.size, strict=False)):
+            normal = tuple(float(k == axis) for k in range(len(self.size)))
+            point = tuple(edge * n for n in normal)
+            result.append(HalfSpace(name=f"tank {name} lower", point=tuple(0.0 for _ in normal), normal=normal))
+            result.append(HalfSpace(name=f"tank {name} upper", point=point, normal=tuple(-n for n in normal)))
+        return result
+
+
+def _tagged(values: Any, default: str) -> Any:
+    """Let a table without `shape` mean the usual one."""
+    if not isinstance(values, list | tuple):
+        return values
+    return [{"shape": default, **v} if isinstance(v, dict) and "shape" not in v else v for v in values]
+
+
+class Scene(Parameters):
+    """A world as data. Lengths in metres, y up; parameters of `params.py` are keys of the scene itself."""
+
+    title: str = ""
+    preset: Literal["standard", "paper"] = "standard"
+    quality: Literal["draft", "standard", "high"] = "standard"
+    tank: Tank | None = None
+    fluids: Annotated[list[AnyFluid], BeforeValidator(lambda v: _tagged(v, "block"))] = []
+    materials: list[Material] = []
+    solids: Annotated[list[AnySolid], BeforeValidator(lambda v: _tagged(v, "box"))] = []
+    forces: list[AnyForce] = []
+    goal: Goal | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_preset(cls, values: Any) -> Any:
+        return {**_chosen(values), **values} if isinstance(values, dict) else values
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Scene":
+        if "gravity" not in self.model_fields_set:
+            self.__dict__["gravity"] = self.gravity[: self._world_dim()]
+        dim = self._world_dim()
+        for number, solid in enumerate(self.solids):
+            if dim == 2 and solid.is_spatial:
+                raise ValueError(f"solids[{number}] is (or has) a mesh, and a mesh needs a 3-D world; this one is 2-D.")
+        for name, vector in self._vectors():
+            if len(vector) != dim:
+                raise ValueError(
+                    f"{name} = {tuple(vector)} has {len(vector)} components in a {dim}-D world; give {dim}."
+                )
+        self._check_count()
+        self._check_inside()
+        self._check_names()
+        return self
+
+    def assign(self, name: str, value: Any) -> None:
+        """Set one key in place, validated; raise `WavetankError` and change nothing where it is not allowed."""
+        before = dict(self.__dict__)
+        try:
+            setattr(self, name, value)
+        except ValidationError as report:
+            # A whole-scene check runs after the value is in place.
+            self.__dict__.update(before)
+            raise WavetankError(sentence(report, type(self))) from None
+
+    def _world_dim(self) -> int:
+        """Number of dimensions that the tank has, else the first fluid, else gravity."""
+        if self.tank is not None:
+            return len(self.tank.size)
+        first = next((vector for fluid in self.fluids for _, vector in fluid.vectors()), None)
+        return len(first if first is not None else self.gravity)
+
+    def _vectors(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        yield "gravity", self.gravity
+        for kind, members in (("fluids", self.fluids), ("solids", self.solids), ("forces", self.forces)):
+            for number, member in enumerate(members):
+                for name, vector in member.vectors():
+                    yield f"{kind}[{number}].{name}", tuple(vector)
+        for name, vector in self.goal.vectors() if self.goal else ():
+            yield f"goal.{name}", tuple(vector)
+
+    def _check_count(self) -> None:
+        count = sum(fluid.estimate(self.spacing) for fluid in self.fluids)
+        if count > MAX_PARTICLES:
+            raise ValueError(
+                f"spacing = {self.spacing} makes {count:.3g} particles; "
+                f"at most {MAX_PARTICLES:,} are allowed: use a larger spacing or less fluid."
+            )
+        if self.tank is not None and max(self.tank.size) / self.spacing > 1e6:
+            raise ValueError(
+                f"spacing = {self.spacing} divides the tank of {self.tank.size} m into more than 1e6 spacings; "
+                "single precision cannot tell such particles apart: use a larger spacing."
+            )
+
+    def _check_inside(self) -> None:
+        if self.tank is None:
+            return
+        slack = _TOLERANCE * self.spacing
+        for number, fluid in enumerate(self.fluids):
+            if isinstance(fluid, Points) and not len(fluid.positions):
+                continue
+            lower, upper = fluid.bounds()
+            if np.any(lower < -slack) or np.any(upper > np.array(self.tank.size) + slack):
+                raise ValueError(
+                    f"fluids[{number}] reaches from {_numbers(lower)} to {_numbers(upper)}, outside the tank; "
+                    f"it must lie between {_numbers(np.zeros(self.dim))} and {_numbers(self.tank.size)}."
+                )
+
+    def _check_names(self) -> None:
+        for kind, members in (("solids", self.solids), ("materials", self.materials)):
+            names = [member.name for member in members if member.name]
+            twice = next((name for name in names if names.count(name) > 1), None)
+            if twice is not None:
+                raise ValueError(f"{kind}: the name {twice!r} is used twice; a name must be unique.")
+        if any(not material.name for material in self.materials):
+            raise ValueError("materials: every material needs a name, so that a fluid can ask for it.")
+        known = [material.name for material in self.materials]
+        askers = [(f"fluids[{number}]", fluid.material) for number, fluid in enumerate(self.fluids)]
+        askers += [
+            (f"goal.aims[{k}]", aim.material or None) for k, aim in enumerate(self.goal.aims if self.goal else [])
+        ]
+        for where, material in askers:
+            if material is not None and material not in known:
+                raise ValueError(
+                    f"{where}.material = {material!r} is not one of the scene's materials; "
+                    f"they are: {', '.join(known) or 'none; add one under [[materials]]'}."
+                )
+
+    def palette(self) -> list[Material]:
+        """Return the materials by their numbers: 0 is the scene's own fluid, then `materials` in their order.
+
+        Every one has a colour.
+        """
+        own = Material(name="fluid")
+        return [
+            material if material.color else material.model_copy(update={"color": COLORS[number % len(COLORS)]})
+            for number, material in enumerate([own, *self.materials])
+        ]
+
+    def properties(self) -> list[Properties]:
+        """Return the properties of the materials by their numbers."""
+        return [material.properties(self) for material in self.palette()]
+
+    def materials_of(self, kinds: np.ndarray) -> dict[int, Material]:
+        """Return the materials with these numbers."""
+        palette = self.palette()
+        return {number: palette[number] for number in np.unique(kinds).tolist()}
+
+    def checked_kinds(self, numbers: Any, count: int) -> np.ndarray:
+        """Return the numbers of the materials of `count` particles, int32; those of the first fluid for None.
+
+        Raises `WavetankError` for numbers that are not in the palette.
+        """
+        if numbers is None:
+            first = self.fluids[0].material if self.fluids else None
+            usual = 0 if first is None else 1 + [material.name for material in self.materials].index(first)
+            return np.full(count, usual, np.int32)
+        kind = np.asarray(numbers, np.int32)
+        if kind.shape != (count,) or not np.isin(kind, np.arange(len(self.materials) + 1)).all():
+            raise WavetankError(
+                f"materials must be {count} numbers, from 0 for the scene's own fluid to {len(self.materials)}."
+            )
+        return kind
+
+    def kinds(self) -> np.ndarray:
+        """Return the number of the material of each particle, int32 [n], in the order of `particles`."""
+        names = [material.name for material in self.palette()[1:]]
+        parts = [
+            np.full(len(x), 0 if fluid.material is None else 1 + names.index(fluid.material), np.int32)
+            for fluid, (x, _) in zip(self.fluids, self._lattices(), strict=True)
+        ]
+        return np.concatenate([np.empty(0, np.int32), *parts])
+
+    def given(self) -> np.ndarray:
+        """Say of which particles the scene gives every place, bool [n], in the order of `particles`."""
+        parts = zip(self.fluids, self._lattices(), strict=True)
+        return np.concatenate([np.empty(0, bool), *(np.full(len(x), isinstance(f, Points)) for f, (x, _) in parts)])
+
+    def particles(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions [m] and velocities [m/s], float32 [n, dim], of the fluids; a simulation leaves out those in solids.
+
+        Where fluids overlap, the first one wins.
+        """
+        parts = self._lattices()
+        positions = np.concatenate([np.empty((0, self.dim)), *(x for x, _ in parts)])
+        if not len(positions) and any(not isinstance(fluid, Points) for fluid in self.fluids):
+            raise WavetankError(
+                f"the fluids of this scene hold no particle at spacing = {self.spacing:g} m; use a smaller spacing or "
+                "larger fluids."
+            )
+        velocities = np.concatenate([np.empty((0, self.dim)), *(v for _, v in parts)])
+        return positions.astype(np.float32), velocities.astype(np.float32)
+
+    def _lattices(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Positions and velocities of each fluid."""
+        parts = []
+        for number, fluid in enumerate(self.fluids):
+            x = fluid.particles(self.spacing)
+            v = np.zeros_like(x) if fluid.velocity is None else np.tile(np.array(fluid.velocity, float), (len(x), 1))
+            if isinstance(fluid, Points):
+                v = v if fluid.velocities is None else fluid.velocities
+            else:
+                taken = np.zeros(len(x), bool)
+                for other in self.fluids[:number]:
+                    taken |= other.contains(x)
+                x, v = x[~taken], v[~taken]
+            parts.append((x, v))
+        return parts
+
+    # --- files ---
+
+    @staticmethod
+    def checked(scene: Any) -> "Scene":
+        """Return `scene`, or say that it is none."""
+        if not isinstance(scene, Scene):
+            raise WavetankError(f"{scene!r} is no Scene; use wt.Scene.load(name) for a bundled one or a TOML file.")
+        return scene
+
+    @classmethod
+    def load(cls, name: str | Path) -> "Scene":
+        """Read a bundled scene by name, or a TOML file by path."""
+        text, origin, folder = _read(name)
+        return cls.from_text(text, origin, folder=folder)
+
+    @classmethod
+    def from_text(cls, text: str, origin: str = "scene", **context: Any) -> "Scene":
+        """Read the text of a TOML file; a mistake in it is told with `origin` in front; `context` as in `parse`."""
+        try:
+            table = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise WavetankError(f"{origin}: this is not TOML: {error}.") from None
+        scene: Scene = cls.parse(table, origin, **context)
+        return scene
+
+    def save(self, path: str | Path) -> None:
+        """Write this scene as TOML; a file of that name is replaced in one move."""
+        with replacing(path) as partial:
+            partial.write_text(self.text(), encoding="utf-8")
+
+    def text(self) -> str:
+        """Return this scene as TOML."""
+        return tomli_w.dumps(self.table())
+
+    def table(self) -> dict[str, Any]:
+        """Return what was set (not the defaults) as plain data that `parse` reads back to an equal scene."""
+        result = _set_values(self) | {name: getattr(self, name) for name in _chosen(self.__dict__)}
+        return {key: result[key] for key in sorted(result, key=lambda k: isinstance(result[k], list | dict))}
+
+    def changed(self, **values: Any) -> "Scene":
+        """Return a copy with these keys changed, validated as a whole; a new preset or quality replaces the old."""
+        table = self.table()
+        if values.keys() & {"preset", "quality"}:
+            table = {k: v for k, v in table.items() if (k, v) not in _chosen(self.__dict__).items()}
+        return type(self).parse({**table, **values})
+
+    def scaled(self, factor: float) -> "Scene":
+        """Return the same scene with every length multiplied by `factor` (velocities and gravity stay)."""
+        if not (math.isfinite(factor) and factor > 0):
+            raise WavetankError(f"factor = {factor} is not allowed; it must be a positive number.")
+        lengths = {
+            "spacing",
+            "size",
+            "lower",
+            "upper",
+            "center",
+            "radius",
+            "start",
+            "end",
+            "point",
+            "positions",
+            "thickness",
+        }
+
+        def walk(value: Any, key: str = "") -> Any:
+            if isinstance(value, dict):
+                return {k: walk(v, k) for k, v in value.items()}
+            if isinstance(value, list | tuple):
+                return [walk(v, key) for v in value]
+            return value * factor if key in lengths and isinstance(value, int | float) else value
+
+        return type(self).parse(walk(self.table()))
+
+
+def _chosen(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the parameters that the preset and the quality among `values` stand for."""
+    preset, quality = values.get("preset", "standard"), values.get("quality", "standard")
+    known = isinstance(preset, str) and isinstance(quality, str)
+    return {**PRESETS.get(preset, {}), **QUALITIES.get(quality, {})} if known else {}
+
+
+def _set_values(value: Any) -> Any:
+    """Reduce a model to plain data: the keys that differ from their defaults, and the shape that names a kind."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_set_values(member) for member in value]
+    if not isinstance(value, Model):
+        return value
+    result = {}
+    for name, field in type(value).model_fields.items():
+        member = getattr(value, name)
+        default = None if isinstance(member, np.ndarray) else field.default
+        if name in ("shape", "kind") or (member is not None and (isinstance(member, np.ndarray) or member != default)):
+            result[name] = _set_values(member)
+    return result
+
+
+def bundled_scenes() -> list[str]:
+    """Names of the scenes that come with the package, sorted; levels not among them."""
+    return _names("scenes")
+
+
+@functools.cache
+def bundled_levels() -> tuple[str, ...]:
+    """Names of the levels that come with the package, in the order in which they are played."""
+    goals = {name: Scene.load(name).goal for name in _names("levels")}
+    return tuple(sorted(goals, key=lambda name: (goal.number if (goal := goals[name]) else 0, name)))
+
+
+def _names(folder: str) -> list[str]:
+    entries = (importlib.resources.files("wavetank.scene") / folder).iterdir()
+    return sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml"))
+
+
+def scene_schema() -> str:
+    """JSON Schema of a scene file, for editors."""
+    return json.dumps(Scene.model_json_schema(), indent=2)
+
+
+def _read(name: str | Path) -> tuple[str, str, Path]:
+    """Return the text of a scene, its name and the folder of its files."""
+    for folder in ("scenes", "levels"):
+        if str(name) in _names(folder):
+            return (
+                (importlib.resources.files("wavetank.scene") / folder / f"{name}.toml").read_text("utf-8"),
+                str(name),
+                Path(),
+            )
+    path = Path(name)
+    if not path.is_file():
+        near = difflib.get_close_matches(str(name), [*_names("scenes"), *_names("levels")], 1)
+        raise WavetankError(
+            f"there is no file {str(name)!r}, and no bundled scene of that name; "
+            + (f"did you mean {near[0]!r}? B" if near else "b")
+            + f"undled are: {', '.join(_names('scenes'))}; levels: {', '.join(_names('levels'))}."
+        )
+    try:
+        return path.read_text("utf-8"), str(path), path.parent
+    except (OSError, UnicodeDecodeError) as error:
+        raise WavetankError(f"{path}: the scene cannot be read: {error}.") from None
+
+
+def _numbers(values: Any) -> str:
+    return "(" + ", ".join(f"{float(v):g}" for v in values) + ")"

@@ -1,0 +1,1 @@
+"""A world under a hand: commands, tools, time, game, recordings."""

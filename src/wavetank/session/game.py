@@ -1,0 +1,116 @@
+"""A game: a goal, the water as it is, and what has become of it."""
+
+from typing import Any
+
+from wavetank.foundation.errors import WavetankError
+from wavetank.scene.goal import Aim, Goal
+from wavetank.session import commands as c
+from wavetank.session.tools import TOOL_NAMES
+from wavetank.simulation.frame import Frame
+
+#: What would make a level another one; a reset with other parameters begins a level of one's own.
+CHEATS = (c.SetParameter, c.AddSolid, c.RemoveSolid, c.MoveSolid)
+HARMLESS = ("foam", "foam_lifetime")  # parameters that the water does not feel
+
+
+class Game:
+    """Watches one attempt at a goal. Raises `WavetankError` for a goal with tools that there are not."""
+
+    def __init__(self, goal: Goal, frame: Frame) -> None:
+        for name, options in (goal.tools or {}).items():
+            if name not in TOOL_NAMES:
+                raise WavetankError(f"goal.tools: {name!r} is not a tool; those are {', '.join(TOOL_NAMES)}.")
+            TOOL_NAMES[name].parse(options, f"goal.tools.{name}")
+        self.goal = goal
+        self.outcome = ""  # won or lost, at the end
+        self.elapsed = 0.0  # s of water that were computed; going back does not give them back
+        self.held = 0.0  # s since all aims are met
+        self.strokes = 0
+        self.worst = 0.0  # of the forbidden: the largest share of what is allowed so far
+        self.start = [int(aim.counted(frame).sum()) for aim in goal.aims]
+        self.values = [0.0] * len(goal.aims)
+        self._look(frame)
+
+    def allow(self, command: c.Command) -> c.Command:
+        """Return the command as it may be done; raises `WavetankError` for what the level does not allow."""
+        if isinstance(command, CHEATS) and getattr(command, "name", "") not in HARMLESS:
+            raise WavetankError(
+                "In a level the water and the solids stay as they are; use the tools, or another scene."
+            )
+        if not isinstance(command, c.ToolBegin):
+            return command
+        tools = self.goal.tools
+        if tools is not None and command.tool not in tools:
+            known = ", ".join(tools) or "none"
+            raise WavetankError(f"{command.tool!r} is not allowed in this level; its tools are: {known}.")
+        if self.goal.strokes is not None and self.strokes >= self.goal.strokes:
+            raise WavetankError(f"All {self.goal.strokes} strokes are used; wait for the water or start again.")
+        fixed = (tools or {}).get(command.tool)
+        return command.model_copy(update={"options": {**command.options, **fixed}}) if fixed else command
+
+    def done(self, command: c.Command) -> None:
+        """Take note of a command that took effect."""
+        self.strokes += isinstance(command, c.ToolBegin)
+
+    def watch(self, frame: Frame, duration: float) -> None:
+        """Judge the frame at the end of `duration` [s]; once the game is over nothing changes."""
+        if self.outcome:
+            return
+        self.elapsed += duration
+        self._look(frame)
+        goal = self.goal
+        met = all(aim.progress(value) >= 1.0 for aim, value in self._pairs())
+        self.held = self.held + duration if met else 0.0
+        if any(aim.forbids and value > aim.share for aim, value in self._pairs()):
+            self.outcome = "lost"
+        elif not goal.is_endured and met and self.held >= goal.hold:
+            self.outcome = "won"
+        elif self.elapsed >= goal.seconds - 1e-6:
+            self.outcome = "won" if goal.is_endured else "lost"
+
+    @property
+    def progress(self) -> float:
+        """How much is done, 0 to 1: the mean of the aims, or of the time where it only has to be endured."""
+        if self.outcome == "won":
+            return 1.0
+        if self.goal.is_endured:
+            return min(1.0, self.elapsed / self.goal.seconds)
+        reached = [aim.progress(value) for aim, value in self._pairs() if not aim.forbids]
+        return sum(reached) / len(reached)
+
+    @property
+    def mark(self) -> float:
+        """What the stars ask to be small: time [s], or the worst share where time has to be endured."""
+        return self.worst if self.goal.is_endured else self.elapsed
+
+    @property
+    def stars(self) -> int:
+        """Stars, 1 to 3, that a win now is worth: by time [s], or by how little of the allowed share got wet."""
+        first, second = self.goal.stars or ((0.4, 0.75) if self.goal.is_endured else self._thirds())
+        return 0 if self.outcome == "lost" else 3 if self.mark <= first else 2 if self.mark <= second else 1
+
+    def describe(self) -> dict[str, Any]:
+        """Return the goal and how it stands as plain data, for fronts."""
+        goal = self.goal
+        return {
+            "text": goal.text, "hint": goal.hint, "seconds": goal.seconds, "elapsed": self.elapsed, "hold": goal.hold,
+            "held": self.held, "progress": self.progress, "outcome": self.outcome, "stars": self.stars,
+            "endured": goal.is_endured, "tools": goal.tools,
+            "strokes": None if goal.strokes is None else goal.strokes - self.strokes,
+            "aims": [
+                {"kind": aim.kind, "name": aim.name, "value": value, "share": aim.share, "forbids": aim.forbids,
+                 "progress": aim.progress(value)}
+                for aim, value in self._pairs()
+            ],
+        }  # fmt: skip
+
+    def _look(self, frame: Frame) -> None:
+        self.values = [aim.measure(frame, start) for aim, start in zip(self.goal.aims, self.start, strict=True)]
+        self.worst = max([self.worst, *(value / aim.share for aim, value in self._pairs() if aim.forbids)])
+
+    def _pairs(self) -> list[tuple[Any, float]]:
+        aims: list[Aim] = [*self.goal.aims]
+        return list(zip(aims, self.values, strict=True))
+
+    def _thirds(self) -> tuple[float, float]:
+        return self.goal.seconds / 3.0, 2.0 * self.goal.seconds / 3.0

@@ -1,0 +1,120 @@
+"""Sessions on disk: the scene and the timed commands as TOML, and the way back to the same particles.
+
+A command stands with the number of frames that were computed before it. Physics repeats bit for bit on one machine, so
+the list is the whole session; the digest of the particles at the end tells whether it did.
+"""
+
+import hashlib
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tomli_w
+from pydantic import Field
+
+import wavetank
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.model import Model
+from wavetank.foundation.replacing import replacing
+from wavetank.scene.scene import Scene
+from wavetank.session.commands import Command, command_of, table_of
+from wavetank.session.session import MOST_PARTICLES, Session
+
+
+class Recording(Model):
+    """A session as plain data."""
+
+    format: Literal[1] = 1
+    version: str = ""  # of wavetank that recorded it
+    arch: str = "cpu"
+    most_particles: Annotated[int, Field(ge=0)] = MOST_PARTICLES
+    frames: Annotated[int, Field(ge=0, le=100_000_000)] = 0
+    digest: str = ""
+    scene: dict[str, Any]
+    commands: list[dict[str, Any]] = []
+
+    @classmethod
+    def of(cls, session: Session, start: Scene) -> "Recording":
+        """Return all that was done in `session`, which began with the scene `start`.
+
+        Raises `WavetankError` where a script added forces or took some away: what is no command cannot be repeated.
+        """
+        if session.uncommanded:
+            names = ", ".join(sorted(session.uncommanded))
+            raise WavetankError(
+                f"this session cannot be recorded: a script changed its forces ({names}); a recording has those of the "
+                "scene, [[forces]], and what is done by commands."
+            )
+        return cls(
+            version=wavetank.__version__,
+            arch=session.sim.arch,
+            most_particles=session.most_particles,
+            frames=session.ticks,
+            digest=digest(session),
+            scene=start.table(),
+            commands=[{"frame": frame, **table_of(command)} for frame, command in session.log],
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write this as TOML; a file of that name is replaced in one move."""
+        with replacing(path) as partial:
+            partial.write_text(self.text(), encoding="utf-8")
+
+    def text(self) -> str:
+        """Return this as TOML."""
+        return tomli_w.dumps(self.model_dump(exclude_none=True))
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Recording":
+        """Read a recording; raises `WavetankError` for what is none."""
+        try:
+            table = tomllib.loads(Path(path).read_text("utf-8"))
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            reason = (isinstance(error, OSError) and error.strerror) or error
+            raise WavetankError(f"{path}: this recording cannot be read: {reason}.") from None
+        recording: Recording = cls.parse(table, str(path))
+        return recording
+
+    def timed_commands(self, origin: str = "recording") -> list[tuple[int, Command]]:
+        """Return the commands with the frame before which each is carried out; raises `WavetankError`."""
+        result: list[tuple[int, Command]] = []
+        for number, table in enumerate(self.commands):
+            frame = table.get("frame")
+            earliest = result[-1][0] if result else 0
+            if isinstance(frame, bool) or not isinstance(frame, int) or not earliest <= frame <= self.frames:
+                raise WavetankError(
+                    f"{origin}: commands[{number}].frame = {frame!r} is not allowed; it must be a whole number from "
+                    f"that of the command before, {earliest}, to frames = {self.frames}."
+                )
+            try:
+                result.append((frame, command_of({key: value for key, value in table.items() if key != "frame"})))
+            except WavetankError as error:
+                raise WavetankError(f"{origin}: commands[{number}]: {error}") from None
+        return result
+
+
+def digest(session: Session) -> str:
+    """Return a digest of all particles: ids, positions, velocities, dyes, to the last bit."""
+    frame = session.sim.frame()
+    parts = (frame.ids, frame.positions, frame.velocities, frame.dyes)
+    return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
+
+
+def replay(recording: Recording, arch: str = "cpu", origin: str = "recording") -> Iterator[Session]:
+    """Do a session again; yield it at the start and after every frame.
+
+    Pauses take no time. Raises `WavetankError` for a recording that is not one.
+    """
+    commands = recording.timed_commands(origin)
+    session = Session(Scene.parse(recording.scene, origin), arch, most_particles=recording.most_particles)
+    yield session
+    for frame in range(recording.frames + 1):
+        while commands and commands[0][0] <= frame:
+            try:
+                session.apply(commands.pop(0)[1])
+            except WavetankError as error:
+                raise WavetankError(f"{origin}: a command before frame {frame} is refused: {error}") from None
+        if frame < recording.frames:
+            session.tick()
+            yield session

@@ -1,0 +1,29 @@
+"""Drain: a sink under the pointer."""
+
+from typing import ClassVar
+
+from typing_extensions import override
+
+from wavetank.scene.forces import Attract
+from wavetank.session.tools.hand import Hand
+from wavetank.session.tools.tool import Tool, option
+
+
+class Drain(Tool):
+    """A sink."""
+
+    name: ClassVar[str] = "drain"
+    label: ClassVar[str] = "Drain"
+    sentence: ClassVar[str] = "Hold to suck water away."
+    icon: ClassVar[str] = "M3 7c3-2 6-2 9 0s6 2 9 0M12 10v10m-4-4 4 4 4-4"
+    key: ClassVar[str] = "5"
+
+    radius: float = option(0.08, 0.01, 0.5, "L", "Radius of the sink.")
+    suction: float = option(3.0, 0.0, 20.0, "9.81 m/s²", "Acceleration towards it.")
+    keep: bool = option(False, None, None, "", "Goes on when you let go.")
+
+    @override
+    def hold(self, hand: Hand, duration: float) -> None:
+        place, radius = hand.look().point, hand.radius(self.radius)
+        hand.sim.remove_inside(place, place, 0.5 * radius)
+        hand.sim.push(Attract(center=hand.flat(place), radius=2.0 * radius, strength=9.81 * self.suction, drag=0.0))

@@ -1,0 +1,45 @@
+"""Dye: colours the water under the pointer; the colour goes with the water."""
+
+from typing import ClassVar
+
+import numpy as np
+from pydantic import PrivateAttr
+from typing_extensions import override
+
+from wavetank.session.tools.hand import Hand
+from wavetank.session.tools.tool import Color, Tool, dye_of, option
+
+
+class Dye(Tool):
+    """A brush."""
+
+    name: ClassVar[str] = "dye"
+    label: ClassVar[str] = "Dye"
+    sentence: ClassVar[str] = "Drag over the water to colour it; no colour washes it clear."
+    icon: ClassVar[str] = "M12 3c4 5 6 8 6 11a6 6 0 0 1-12 0c0-3 2-6 6-11zM9 14a3 3 0 0 0 3 3"
+    key: ClassVar[str] = "9"
+
+    radius: float = option(0.06, 0.01, 0.5, "L", "Radius of the brush.")
+    color: Color = option("#e0446a", None, None, "color", "Colour.")
+    strength: float = option(1.0, 0.05, 1.0, "", "How strong the colour is.")
+    _last: np.ndarray | None = PrivateAttr(None)
+
+    @override
+    def begin(self, hand: Hand) -> None:
+        self._touch(hand)
+
+    @override
+    def move(self, hand: Hand) -> None:
+        self._touch(hand)
+
+    @override
+    def hold(self, hand: Hand, duration: float) -> None:
+        self._touch(hand)
+
+    def _touch(self, hand: Hand) -> None:
+        place = hand.look().point
+        # A fast stroke leaves no gaps, unless it jumped from one wave to another.
+        near = self._last is not None and float(np.linalg.norm(place - self._last)) < 0.2 * hand.size
+        start = self._last if near and self._last is not None else place
+        hand.sim.paint_inside(start, place, hand.radius(self.radius), dye_of(self.color, self.strength))
+        self._last = place

@@ -1,0 +1,36 @@
+"""Explosion: the water is thrown away from a point just under the surface."""
+
+from typing import ClassVar
+
+import numpy as np
+from pydantic import PrivateAttr
+from typing_extensions import override
+
+from wavetank.scene.forces import Burst
+from wavetank.session.tools.hand import Hand
+from wavetank.session.tools.tool import Tool, option
+
+
+class Explode(Tool):
+    """A bang."""
+
+    name: ClassVar[str] = "explosion"
+    label: ClassVar[str] = "Explosion"
+    sentence: ClassVar[str] = "Click for a bang under the surface."
+    icon: ClassVar[str] = "M12 2l2 6 5-3-2 5 5 2-5 2 2 5-5-3-2 6-2-6-5 3 2-5-5-2 5-2-2-5 5 3z"
+    key: ClassVar[str] = "8"
+
+    radius: float = option(0.25, 0.02, 1.0, "L", "How far it is felt.")
+    speed: float = option(1.5, 0.1, 4.0, "√(gL)", "Speed it gives in the middle.")
+    _done: bool = PrivateAttr(False)
+
+    @override
+    def hold(self, hand: Hand, duration: float) -> None:
+        if self._done:
+            return
+        self._done = True
+        radius = hand.radius(self.radius)
+        place = hand.anchor + 0.4 * radius * (np.array([0.0, -1.0, 0.0]) if hand.sim.scene.dim == 2 else hand.normal)
+        hand.sim.push(Burst(
+            center=hand.flat(place), radius=radius, speed=self.speed * hand.speed, duration=duration,
+        ))  # fmt: skip

@@ -1,0 +1,48 @@
+"""Paddle: a wall across the tank that comes down where the pointer is and follows it."""
+
+from typing import ClassVar
+
+import numpy as np
+from pydantic import PrivateAttr
+from typing_extensions import override
+
+from wavetank.session.tools.carry import TOOL_SOLID, carry
+from wavetank.session.tools.hand import Hand
+from wavetank.session.tools.tool import Tool, option
+from wavetank.solids.shapes import Box
+
+
+class Paddle(Tool):
+    """A moving wall."""
+
+    name: ClassVar[str] = "paddle"
+    label: ClassVar[str] = "Paddle"
+    sentence: ClassVar[str] = "Hold to dip a wall into the water; drag it along the tank."
+    icon: ClassVar[str] = "M10 3h4v13h-4zM3 19c3-2 6-2 9 0s6 2 9 0M18 9l3 3-3 3M6 9l-3 3 3 3"
+    key: ClassVar[str] = "b"
+    cursor_radius: ClassVar[bool] = False
+
+    height: float = option(0.8, 0.1, 1.0, "tank", "Height of the wall.")
+    pace: float = option(0.5, 0.05, 2.0, "√(gL)", "Largest speed.")
+    _held: str = PrivateAttr("")
+
+    @override
+    def begin(self, hand: Hand) -> None:
+        size = hand.upper - hand.lower
+        plate = np.array([max(0.02 * hand.size, 2.0 * hand.spacing), self.height * size[1], size[2]])
+        start = np.array([hand.anchor[0], hand.upper[1] + 0.5 * plate[1], hand.lower[2] + 0.5 * size[2]])
+        box = Box(name=f"{TOOL_SOLID}paddle", center=hand.flat(start), size=hand.flat(plate))
+        self._held = hand.sim.add_solid(box)
+
+    @override
+    def hold(self, hand: Hand, duration: float) -> None:
+        if self._held not in hand.sim.solids.names:
+            return
+        where = hand.sim.solids.poses[hand.sim.solids.find(self._held)][0].copy()
+        goal = np.array([hand.point[0], hand.lower[1] + 0.5 * self.height * (hand.upper - hand.lower)[1], where[2]])
+        carry(hand.sim, self._held, goal, None, self.pace * hand.speed * duration, inside=False)
+
+    @override
+    def end(self, hand: Hand) -> None:
+        if self._held in hand.sim.solids.names:
+            hand.sim.remove_solid(self._held)

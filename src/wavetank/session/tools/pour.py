@@ -1,0 +1,91 @@
+"""Pour: a hose that fills in water where there is room for it."""
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import PrivateAttr
+from typing_extensions import override
+
+from wavetank.session.tools.hand import Hand
+from wavetank.session.tools.tool import Color, Tool, dye_of, option
+
+GAP, WALL = 0.9, 0.5  # d: room that new particles have from others and from walls
+MOST_LAYERS = 8  # in a frame
+
+
+class Pour(Tool):
+    """A hose."""
+
+    name: ClassVar[str] = "pour"
+    label: ClassVar[str] = "Pour"
+    sentence: ClassVar[str] = "Hold to pour water from above, or straight ahead like a fireman."
+    icon: ClassVar[str] = "M4 5h9a4 4 0 0 1 4 4v2M14 11h6M17 14v2M17 19v2M13 15v2M21 15v2"
+    key: ClassVar[str] = "4"
+
+    width: float = option(0.1, 0.01, 0.5, "L", "Width of the jet.")
+    speed: float = option(0.5, 0.05, 2.0, "√(gL)", "Speed of the jet.")
+    aim: Literal["down", "ahead"] = option("down", None, None, "", "Where the hose points.")
+    color: Color = option("", None, None, "color", "Dye in the water.")
+    keep: bool = option(False, None, None, "", "Goes on when you let go.")
+    _way: float = PrivateAttr(0.0)
+    _nozzle: np.ndarray | None = PrivateAttr(None)
+
+    @override
+    def begin(self, hand: Hand) -> None:
+        self._aim(hand)
+        self._way = hand.spacing
+
+    @override
+    def move(self, hand: Hand) -> None:
+        self._aim(hand)
+
+    def _aim(self, hand: Hand) -> None:
+        """Find the nozzle once a movement: water that rises under a resting pointer must not move it."""
+        half = 0.5 * max(self.width * hand.size, hand.spacing)
+        point = hand.look().point
+        if hand.sim.scene.dim == 3 and self.aim == "down":
+            point = point.copy()
+            point[1] = hand.upper[1]
+        elif hand.sim.scene.dim == 3:
+            point = point - 0.5 * hand.size * hand.direction
+        room = hand.spacing + np.array([half, 0.0 if self.aim == "down" else half, half])
+        low, high = hand.lower + room, hand.upper - room
+        self._nozzle = np.clip(point, np.minimum(low, high), np.maximum(low, high))
+        if hand.sim.scene.dim == 2:
+            self._nozzle[2] = 0.0
+
+    @override
+    def hold(self, hand: Hand, duration: float) -> None:
+        spacing, speed = hand.spacing, self.speed * hand.speed
+        self._way += speed * duration
+        layers = int(self._way / spacing)
+        self._way -= layers * spacing
+        if not layers or self._nozzle is None:
+            return
+        ahead = np.array([0.0, -1.0, 0.0])
+        if self.aim == "ahead":
+            ahead = np.array([1.0, 0.0, 0.0]) if hand.sim.scene.dim == 2 else hand.direction
+        disc = self._disc(hand, ahead)
+        steps = self._way + spacing * np.arange(min(layers, MOST_LAYERS))
+        places = (self._nozzle + disc[None] + steps[:, None, None] * ahead).reshape(-1, 3)[:, : hand.sim.scene.dim]
+        places = places.astype(np.float32)
+        places = places[hand.sim.free_places(places, GAP * spacing, WALL * spacing)]
+        if hand.sim.count + len(places) > hand.most_particles:
+            hand.notes.append(f"There are {hand.sim.count:,} particles; at most {hand.most_particles:,} are poured.")
+            return
+        velocity = (speed * ahead)[: hand.sim.scene.dim]
+        hand.sim.add(places, np.tile(velocity, (len(places), 1)), np.full(len(places), dye_of(self.color)))
+
+    def _disc(self, hand: Hand, ahead: np.ndarray) -> np.ndarray:
+        """Places of one layer around the nozzle, [n, 3]."""
+        side = np.cross(ahead, [0.0, 0.0, 1.0] if abs(ahead[2]) < 0.9 else [0.0, 1.0, 0.0])
+        side /= np.linalg.norm(side)
+        up = np.cross(side, ahead)
+        half = 0.5 * max(self.width * hand.size, hand.spacing)
+        n = int(half / hand.spacing)
+        row = hand.spacing * np.arange(-n, n + 1)
+        if hand.sim.scene.dim == 2:
+            return row[:, None] * side
+        a, b = (grid.reshape(-1) for grid in np.meshgrid(row, row))
+        round_ = a**2 + b**2 <= half**2
+        return a[round_, None] * side + b[round_, None] * up

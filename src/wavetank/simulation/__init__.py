@@ -1,0 +1,1 @@
+"""A running world, one instant of it, and its snapshots."""

@@ -1,0 +1,193 @@
+"""The solids of a running world: their names, where they are, where they are going, and their way to the device."""
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wavetank.device.compiler import upload
+from wavetank.device.state import Particles
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.rotations import interpolate, turned, unit_quaternion
+from wavetank.physics.population import free_places
+from wavetank.scene.fluids import Points
+from wavetank.scene.scene import Scene
+from wavetank.solids import shapes
+from wavetank.solids.solid import Solid
+
+Pose = tuple[np.ndarray, np.ndarray]  # position [m], shape [3], and rotation (w, x, y, z)
+SMALLEST = 0.02  # size at which a growing solid starts, of its full size
+_versions = itertools.count(1)
+
+
+class MovingSolids:
+    """Solids by name; the first `tank_count` are the walls of the tank."""
+
+    def __init__(self, walls: Sequence[Solid], others: Sequence[Solid], friction: float, spacing: float) -> None:
+        self.tank_count, self.friction, self.spacing = len(walls), friction, spacing
+        self.members = [*walls, *others]
+        self.names: list[str] = []
+        for solid in self.members:
+            self.names.append(self._free_name(solid.name))
+        self.poses: list[Pose] = [(solid.origin, solid.quaternion) for solid in self.members]
+        self.targets: dict[int, Pose] = {}  # at the end of the next frame
+        self.growing: dict[int, tuple[float, float]] = {}  # age and time to grow [s]
+        self.version = 0  # of what is on the device
+        self.rebuild()
+
+    def rebuild(self) -> None:
+        """Put all on the device anew, at rest where they are."""
+        self.device = shapes.build(self.members, self.tank_count, self.friction, self.spacing)
+        self.has_friction = self.friction > 0.0 or any(solid.friction for solid in self.members)
+        self.reaches = [solid.reach() for solid in self.members]
+        self.walls = [solid.program()[0] for solid in self.members[: self.tank_count]]
+        self._resize()
+        self._upload(0.0, 0.0)
+
+    def add(self, solid: Solid, grow: float) -> str:
+        """Add a solid that swells to its size within `grow` [s]; return its name."""
+        self.members.append(solid)
+        self.names.append(self._free_name(solid.name))
+        self.poses.append((solid.origin, solid.quaternion))
+        if grow > 0.0:
+            self.growing[len(self.members) - 1] = (0.0, grow)
+        self.rebuild()
+        return self.names[-1]
+
+    def remove(self, number: int) -> None:
+        """Take a solid away."""
+
+        def without(numbered: dict[int, Any]) -> dict[int, Any]:
+            return {k - (k > number): value for k, value in numbered.items() if k != number}
+
+        for column in (self.members, self.names, self.poses):
+            del column[number]
+        self.targets, self.growing = without(self.targets), without(self.growing)
+        self.rebuild()
+
+    def free_of(self, scene: Scene, places: np.ndarray, particles: Particles) -> np.ndarray:
+        """Say which `places` [n, dim] of a scene's fluids are outside of solids, bool [n]; those of `Points` stay.
+
+        Raises `WavetankError` where none is.
+        """
+        boxes = [fluid.bounds() for fluid in scene.fluids if not isinstance(fluid, Points)]
+        if not any(_meet(solid, *box) for solid in self.members[self.tank_count :] for box in boxes):
+            return np.ones(len(places), bool)
+        wall = scene.wall_gap * scene.spacing
+        free = free_places(places, particles, self.device, 0, 0.0, wall, self.tank_count) | scene.given()
+        if not free.any():
+            raise WavetankError("the fluids of this scene are inside of its solids; move them, or make them larger.")
+        return free
+
+    def find(self, name: str) -> int:
+        """Return the number of a solid; raise `WavetankError` for an unknown name."""
+        if name not in self.names:
+            known = ", ".join(sorted(self.names[self.tank_count :])) or "none"
+            raise WavetankError(f"there is no solid named {name!r}; named solids: {known}.")
+        return self.names.index(name)
+
+    def aim(self, name: str, position: Sequence[float] | None, rotation: Any, dim: int) -> None:
+        """Set the pose that a solid reaches at the end of the next frame; None keeps what is."""
+        number = self.find(name)
+        old_position, old_rotation = self.targets.get(number, self.poses[number])
+        point = np.array(old_position, float)
+        if position is not None:
+            values = np.asarray(position, float)
+            if values.shape != (dim,) or not np.isfinite(values).all():
+                raise WavetankError(f"position = {position} must be {dim} finite numbers.")
+            point[:dim] = values
+        self.targets[number] = (point, old_rotation if rotation is None else unit_quaternion(rotation))
+
+    def largest_speed(self, duration: float, tank_size: Sequence[float] | None) -> float:
+        """Return the largest speed [m/s] at which any solid moves through the tank in a frame of `duration` [s]."""
+        fastest = 0.0
+        for number, (position, rotation) in self.targets.items():
+            old_position, old_rotation = self.poses[number]
+            turn = 2.0 * math.acos(min(1.0, abs(float(old_rotation @ rotation))))
+            reach = self.reaches[number] if tank_size is None else float(np.linalg.norm(tank_size))
+            fastest = max(fastest, (float(np.linalg.norm(position - old_position)) + turn * reach) / duration)
+        for number, (_, time) in self.growing.items():
+            fastest = max(fastest, min(self.reaches[number], 1e3) / time)
+        return fastest
+
+    def move_to(self, begin: float, end: float) -> int:
+        """Put the poses at the shares `begin` and `end` of the frame on the device, and return the version of those.
+
+        No two versions of any world's solids have the same number.
+        """
+        if not self.targets:
+            return self.version
+        self._upload(begin, end)
+        resting = all(
+            np.array_equal(a, b)
+            for number, target in self.targets.items()
+            for a, b in zip(self.poses[number], target, strict=True)
+        )
+        if begin == 0.0 and resting:
+            self.targets = {}
+        return self.version
+
+    def arrive(self) -> None:
+        """End a frame: what was aimed at is where the solids are."""
+        for number, target in self.targets.items():
+            self.poses[number] = target
+
+    def grow(self, duration: float) -> None:
+        """Let new solids swell for `duration` [s]."""
+        if self.growing:
+            self.growing = {k: (age + duration, time) for k, (age, time) in self.growing.items()}
+            self._resize()
+            self.growing = {k: (age, time) for k, (age, time) in self.growing.items() if age < time}
+
+    def _resize(self) -> None:
+        self.version = next(_versions)
+        if self.growing:
+            scales = [1.0] * len(self.members)
+            for number, (age, time) in self.growing.items():
+                scales[number] = min(1.0, max(age / time, SMALLEST))
+            shapes.resize(self.device, self.members, scales)
+
+    def _upload(self, begin: float, end: float) -> None:
+        self.version = next(_versions)
+        if not self.poses:
+            return
+        where = [self.targets.get(number, pose) for number, pose in enumerate(self.poses)]
+        pairs = list(zip(self.poses, where, strict=True))
+        (old_at, old_turn), (at, turn) = (
+            (
+                np.array([a[0] + share * (b[0] - a[0]) for a, b in pairs]),
+                np.array([interpolate(a[1], b[1], share) for a, b in pairs]),
+            )
+            for share in (begin, end)
+        )
+        sweep = [np.linalg.norm(at - old_at, axis=1), 2.0 * np.linalg.norm(turn - old_turn, axis=1)]
+        device = self.device
+        for array, values in (
+            (device.old_position, old_at), (device.old_rotation, old_turn), (device.position, at),
+            (device.rotation, turn), (device.plane, self._planes(at, turn)), (device.sweep, np.stack(sweep, axis=1)),
+        ):  # fmt: skip
+            upload(array, values.astype(np.float32))
+
+    def _planes(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """Return (normal, offset) of the tank's walls at these poses, [tank_count, 4]: the distance is n x + b."""
+        planes = np.zeros((self.tank_count, 4))
+        for k, wall in enumerate(self.walls):
+            normal = turned(rotations[k], turned(wall.turn, np.array([0.0, 1.0, 0.0])))
+            point = positions[k] + turned(rotations[k], wall.offset)
+            planes[k] = *normal, -normal @ point
+        return planes
+
+    def _free_name(self, name: str) -> str:
+        """Return `name`, or the first free one of "solid 1", "solid 2" and so on."""
+        number = 1
+        while not name or name in self.names:
+            name, number = f"solid {number}", number + 1
+        return name
+
+
+def _meet(solid: Solid, lower: np.ndarray, upper: np.ndarray) -> bool:
+    """Say whether the ball around a solid reaches into a box [m]."""
+    center = solid.origin[: len(lower)]
+    return bool(np.linalg.norm(center - np.clip(center, lower, upper)) < solid.reach())

@@ -1,0 +1,1 @@
+"""Shapes as data, and their signed distances on the device."""

@@ -1,0 +1,284 @@
+"""Signed distances on the device: one function per shape, and the program that combines them.
+
+A solid is a small program in postfix order over `DISTANCES` and the operations union, intersection and difference;
+it runs with a stack of `STACK` values. Every value is (gradient, distance): distance [m] is negative inside, the
+gradient is the unit outward normal. Shapes are exact; set operations are exact outside of a union and inside of an
+intersection and a lower bound elsewhere, as usual for constructive distance fields.
+
+Two-dimensional worlds are the plane z = 0 of the same solids: a box without a third size is a prism without end.
+
+Distance functions after Inigo Quilez, "3D SDF functions" (2013); the gradients are worked out here.
+
+A mesh is a grid of distances (`meshes/grid.py`) between whose nodes they are trilinear; its gradient is theirs, of unit
+length. Beyond the grid no distance is overestimated: the nearest point of the grid lies between.
+
+    code      symbol   meaning                                  unit
+    p                  point in the frame of the shape          m
+    size      a        sizes of the shape, see each function    m
+    q                  signed excess over the half sizes        m
+"""
+
+import dataclasses
+
+from wavetank.device.compiler import qd
+
+# The numbers that `shapes.py` writes and `local_distance` reads; kernels spell them out, because the compiler's cache
+# does not see global constants.
+STACK = 8  # deepest nesting of set operations
+UNION, INTERSECTION, DIFFERENCE = -1, -2, -3
+
+vec2 = qd.types.vector(2, qd.f32)
+vec3 = qd.types.vector(3, qd.f32)
+vec4 = qd.types.vector(4, qd.f32)
+
+
+@qd.func
+def half_space_distance(p, size):
+    """Everything below y = 0."""
+    return vec4(0.0, 1.0, 0.0, p.y)
+
+
+@qd.func
+def sphere_distance(p, size):
+    """Ball of radius size.x around the origin."""
+    r = p.norm()
+    n = vec3(0.0, 1.0, 0.0)
+    if r > 1e-9:
+        n = p / r
+    return vec4(n.x, n.y, n.z, r - size.x)
+
+
+@qd.func
+def box_distance(p, size):
+    """Box of half sizes size.xyz around the origin."""
+    q = qd.abs(p) - vec3(size.x, size.y, size.z)
+    side = vec3(1.0, 1.0, 1.0)
+    for k in qd.static(range(3)):
+        if p[k] < 0.0:
+            side[k] = -1.0
+    n = vec3(0.0, 0.0, 0.0)
+    d = qd.max(q.x, q.y, q.z)
+    if d > 0.0:
+        outside = qd.max(q, 0.0)
+        d = outside.norm()
+        n = side * outside / d
+    elif q.x >= q.y and q.x >= q.z:
+        n.x = side.x
+    elif q.y >= q.z:
+        n.y = side.y
+    else:
+        n.z = side.z
+    return vec4(n.x, n.y, n.z, d)
+
+
+@qd.func
+def capsule_distance(p, size):
+    """Ball of radius size.x swept along y from -size.y to size.y."""
+    return sphere_distance(vec3(p.x, p.y - qd.min(qd.max(p.y, -size.y), size.y), p.z), size)
+
+
+@qd.func
+def cylinder_distance(p, size):
+    """Cylinder of radius size.x along y from -size.y to size.y."""
+    r = qd.sqrt(p.x * p.x + p.z * p.z)
+    radial = vec3(1.0, 0.0, 0.0)
+    if r > 1e-9:
+        radial = vec3(p.x / r, 0.0, p.z / r)
+    axial = vec3(0.0, 1.0, 0.0)
+    if p.y < 0.0:
+        axial = vec3(0.0, -1.0, 0.0)
+    q_r = r - size.x
+    q_y = qd.abs(p.y) - size.y
+    d = qd.max(q_r, q_y)
+    n = radial
+    if q_y > q_r:
+        n = axial
+    if q_r > 0.0 and q_y > 0.0:
+        d = qd.sqrt(q_r * q_r + q_y * q_y)
+        n = (radial * q_r + axial * q_y) / d
+    return vec4(n.x, n.y, n.z, d)
+
+
+#: The places of the shapes in `shape_distance`.
+DISTANCES = (half_space_distance, box_distance, sphere_distance, capsule_distance, cylinder_distance)
+
+
+@qd.func
+def shape_distance(shape, p, size):
+    """(gradient, distance) of the shape with that number in DISTANCES.
+
+    Spelled out: the compiler's cache sees this text, but not what the tuple holds.
+    """
+    value = vec4(0.0, 0.0, 0.0, 0.0)
+    if shape == 0:
+        value = half_space_distance(p, size)
+    elif shape == 1:
+        value = box_distance(p, size)
+    elif shape == 2:
+        value = sphere_distance(p, size)
+    elif shape == 3:
+        value = capsule_distance(p, size)
+    elif shape == 4:
+        value = cylinder_distance(p, size)
+    return value
+
+
+@qd.func
+def rotate(q, v):
+    """Turn vector `v` by the unit quaternion `q` = (w, x, y, z)."""
+    u = vec3(q[1], q[2], q[3])
+    return v + 2.0 * u.cross(u.cross(v) + q[0] * v)
+
+
+@qd.func
+def conjugate(q):
+    """Inverse of a unit quaternion."""
+    return vec4(q[0], -q[1], -q[2], -q[3])
+
+
+@qd.func
+def lift(x: qd.template()):
+    """A point of a 2-D or 3-D world as a point in space."""
+    point = vec3(0.0, 0.0, 0.0)
+    for k in qd.static(range(x.n)):
+        point[k] = x[k]
+    return point
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SolidSet:
+    """All solids of a world on the device. Shapes in `model.py` words, frames nested: node in solid in world."""
+
+    op: qd.types.ndarray()  # i32 [nodes]: index into DISTANCES, or a set operation below zero
+    size: qd.types.ndarray()  # vec4 [nodes], m
+    offset: qd.types.ndarray()  # vec3 [nodes], m: origin of the node in its solid
+    turn: qd.types.ndarray()  # vec4 [nodes]: quaternion, node to solid
+    first: qd.types.ndarray()  # i32 [solids + 1]: where each solid's program starts
+    reach: qd.types.ndarray()  # f32 [solids], m: radius around the solid's origin that holds all of it
+    friction: qd.types.ndarray()  # f32 [solids]: Coulomb coefficient
+    position: qd.types.ndarray()  # vec3 [solids], m, at the end of the substep
+    rotation: qd.types.ndarray()  # vec4 [solids], at the end of the substep
+    old_position: qd.types.ndarray()  # vec3 [solids], m, at its start
+    old_rotation: qd.types.ndarray()  # vec4 [solids], at its start
+    plane: qd.types.ndarray()  # vec4 [solids]: walls of the tank as planes (n, b) at the end, distance n x + b [1, m]
+    sweep: qd.types.ndarray()  # vec2 [solids]: way of the origin [m] and of a point 1 m away in the substep
+    grid: qd.types.ndarray()  # i32 vec4 [grids]: number of its first sample, numbers of nodes along x, y, z
+    samples: qd.types.ndarray()  # f32: for each grid its cell edge, then the distances at its nodes, x fastest; m
+    count: qd.i32
+    tank_count: qd.i32  # the first so many are the walls of the tank, all of them half-spaces
+
+
+@qd.func
+def grid_distance(solids: SolidSet, number, p, scale):
+    """(gradient, distance) of a grid of distances around the origin, enlarged by `scale`."""
+    first, nx, ny, nz = solids.grid[number][0], solids.grid[number][1], solids.grid[number][2], solids.grid[number][3]
+    cell = solids.samples[first]
+    last = vec3(nx - 1, ny - 1, nz - 1)
+    q = p / (cell * scale) + 0.5 * last
+    inside = qd.max(qd.min(q, last), 0.0)
+    low = qd.min(qd.floor(inside), last - 1.0)
+    f = inside - low
+    at = first + 1 + qd.cast(low.x, qd.i32) + nx * (qd.cast(low.y, qd.i32) + ny * qd.cast(low.z, qd.i32))
+    up, back = nx, nx * ny
+    a, b = solids.samples[at], solids.samples[at + 1]
+    c, d = solids.samples[at + up], solids.samples[at + up + 1]
+    e, g = solids.samples[at + back], solids.samples[at + back + 1]
+    h, k = solids.samples[at + back + up], solids.samples[at + back + up + 1]
+    ac, bd = a + (c - a) * f.y, b + (d - b) * f.y
+    eh, gk = e + (h - e) * f.y, g + (k - g) * f.y
+    near, far = ac + (bd - ac) * f.x, eh + (gk - eh) * f.x
+    value = (near + (far - near) * f.z) / cell
+    slope = vec3(
+        (bd - ac) + ((gk - eh) - (bd - ac)) * f.z,
+        ((c - a) + ((d - b) - (c - a)) * f.x) * (1.0 - f.z) + ((h - e) + ((k - g) - (h - e)) * f.x) * f.z,
+        far - near,
+    ) / cell  # fmt: skip
+    beyond = q - inside
+    if beyond.dot(beyond) > 0.0:
+        for axis in qd.static(range(3)):
+            if beyond[axis] != 0.0:
+                slope[axis] = 0.0
+        slope = beyond + value * slope
+        value = qd.sqrt(beyond.dot(beyond) + value * value)
+    n = vec3(0.0, 1.0, 0.0)
+    if slope.norm() > 1e-6:
+        n = slope.normalized()
+    return vec4(n.x, n.y, n.z, value * cell * scale)
+
+
+@qd.func
+def node_distance(solids: SolidSet, node, p):
+    """(gradient, distance) of one shape of a program, at the point `p` in the solid's frame."""
+    turn = solids.turn[node]
+    at = rotate(conjugate(turn), p - solids.offset[node])
+    op = solids.op[node]
+    value = vec4(0.0, 0.0, 0.0, 0.0)
+    if op >= 65536:  # GRIDS
+        value = grid_distance(solids, op - 65536, at, solids.size[node].x)
+    else:
+        value = shape_distance(op, at, solids.size[node])
+    n = rotate(turn, vec3(value.x, value.y, value.z))
+    return vec4(n.x, n.y, n.z, value.w)
+
+
+@qd.func
+def local_distance(solids: SolidSet, k, p):
+    """(gradient, distance) of solid `k` at the point `p` in its own frame."""
+    stack = qd.Matrix([[0.0] * 4 for _ in range(8)])  # STACK
+    depth = 0
+    # The top of the stack stays in registers: most solids are a single shape and never touch the rest.
+    top = vec4(0.0, 0.0, 0.0, 0.0)
+    for node in range(solids.first[k], solids.first[k + 1]):
+        op = solids.op[node]
+        if op >= 0:
+            if node > solids.first[k]:
+                for c in qd.static(range(4)):
+                    stack[depth, c] = top[c]
+                depth += 1
+            top = node_distance(solids, node, p)
+        else:
+            depth -= 1
+            below = vec4(stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3])
+            if op == -3:  # DIFFERENCE
+                top = -top
+            if (op == -1 and below.w < top.w) or (op != -1 and below.w > top.w):  # UNION
+                top = below
+    return top
+
+
+@qd.func
+def grain(solids: SolidSet, k):
+    """Largest cell edge [m] of the grids that solid `k` is made of; 0 where its distances are exact."""
+    largest = 0.0
+    for node in range(solids.first[k], solids.first[k + 1]):
+        if solids.op[node] >= 65536:  # GRIDS
+            cell = solids.samples[solids.grid[solids.op[node] - 65536][0]]
+            largest = qd.max(largest, cell * solids.size[node].x)
+    return largest
+
+
+@qd.func
+def to_local(position, rotation, x):
+    """World point `x` in the frame of a solid at that pose."""
+    return rotate(conjugate(rotation), x - position)
+
+
+@qd.func
+def plane_distance(solids: SolidSet, k, x):
+    """(gradient, distance) of wall `k` of the tank at the world point `x`, with the pose of the substep's end."""
+    plane = solids.plane[k]
+    return vec4(plane.x, plane.y, plane.z, plane.x * x.x + plane.y * x.y + plane.z * x.z + plane.w)
+
+
+@qd.func
+def signed_distance(solids: SolidSet, k, x):
+    """(gradient, distance) of solid `k` at the world point `x` (vec3), with the pose of the substep's end."""
+    value = vec4(0.0, 0.0, 0.0, 0.0)
+    if k < solids.tank_count:
+        value = plane_distance(solids, k, x)
+    else:
+        q = solids.rotation[k]
+        own = local_distance(solids, k, to_local(solids.position[k], q, x))
+        n = rotate(q, vec3(own.x, own.y, own.z))
+        value = vec4(n.x, n.y, n.z, own.w)
+    return value

@@ -1,0 +1,60 @@
+"""Mesh files, and the models that come with the package."""
+
+import importlib.resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wavetank.solids.meshes.triangles import Triangles
+
+SUFFIXES = (".obj", ".stl", ".ply", ".glb")
+LARGEST_FILE = 500_000_000  # bytes
+BUNDLED = "wavetank/"  # how the names of bundled models begin
+
+
+def bundled_models() -> list[str]:
+    """Names of the meshes that come with the package, sorted."""
+    return sorted(BUNDLED + entry.name for entry in _models().iterdir() if entry.name.endswith(SUFFIXES))
+
+
+def read_model(name: str) -> Triangles:
+    """Return the surface of a bundled model."""
+    with importlib.resources.as_file(_models() / name.removeprefix(BUNDLED)) as path:
+        return read_file(path)
+
+
+def read_file(path: Path) -> Triangles:
+    """Return the surface of a mesh file; raises `ValueError` with one sentence for what is none."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise ValueError(f"{path}: meshes are read from {', '.join(SUFFIXES)} files; convert this one.")
+    if not path.is_file():
+        raise ValueError(f"there is no mesh file {path}; bundled models are: {', '.join(bundled_models())}.")
+    if path.stat().st_size > LARGEST_FILE:
+        raise ValueError(f"{path} is larger than {LARGEST_FILE // 1_000_000} MB; simplify the mesh.")
+    return Triangles.of(*_arrays(path), str(path))
+
+
+def _arrays(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of all that is in a file, where its scene puts them."""
+    try:
+        import trimesh
+    except ModuleNotFoundError:
+        raise ValueError(f"{path}: mesh files are read by trimesh; install it: pip install 'wavetank[mesh]'.") from None
+    options: dict[str, Any] = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
+    try:
+        scene = trimesh.load_scene(path, process=False, **options)
+        parts = [part for part in scene.dump() if hasattr(part, "faces")]
+    except Exception as error:  # a damaged file fails in as many ways as there are formats
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        raise ValueError(f"{path}: this mesh cannot be read: {reason}.") from None
+    counts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    vertices = [np.asarray(part.vertices, np.float64).reshape(-1, 3) for part in parts]
+    faces = [
+        np.asarray(part.faces, np.int64).reshape(-1, 3) + first for part, first in zip(parts, counts, strict=False)
+    ]
+    return np.concatenate([np.zeros((0, 3)), *vertices]), np.concatenate([np.zeros((0, 3), np.int64), *faces])
+
+
+def _models() -> Any:
+    return importlib.resources.files("wavetank.solids") / "models"

@@ -1,0 +1,315 @@
+"""Solids as plain data: shapes, set operations between them, and their way to the device.
+
+A shape is one model here with its `program`, and one distance function in `distance.py`.
+"""
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+from typing_extensions import override
+
+from wavetank.device.compiler import qd, upload
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.model import Positive, Size, Vector, register_model
+from wavetank.foundation.rotations import turn_from_y, unit_quaternion
+from wavetank.solids.distance import (
+    DIFFERENCE,
+    DISTANCES,
+    INTERSECTION,
+    STACK,
+    UNION,
+    SolidSet,
+    box_distance,
+    capsule_distance,
+    cylinder_distance,
+    half_space_distance,
+    sphere_distance,
+    vec2,
+    vec3,
+    vec4,
+)  # fmt: skip
+from wavetank.solids.meshes.mesh import Mesh
+from wavetank.solids.meshes.on_device import put_grids
+from wavetank.solids.solid import ENDLESS, Node, Solid, point_in_space
+
+
+def moved(solid: Solid, position: np.ndarray, rotation: np.ndarray) -> Solid:
+    """Return the same solid with its frame at `position` [m], shape [3], turned by the quaternion `rotation`."""
+    shift = position - solid.origin
+    keys = [name for name in ("center", "start", "end", "point") if name in type(solid).model_fields]
+    places = {name: tuple(float(a + b) for a, b in zip(getattr(solid, name), shift, strict=False)) for name in keys}
+    result: Solid = type(solid).model_validate({
+        **{name: getattr(solid, name) for name in type(solid).model_fields}, **places,
+        "rotation": tuple(map(float, unit_quaternion([*rotation]))),
+    })  # fmt: skip
+    return result
+
+
+class Box(Solid):
+    """A box; in a 2-D world a rectangle."""
+
+    shape: Literal["box"] = "box"
+    center: Vector
+    size: Size
+
+    @property
+    @override
+    def origin(self) -> np.ndarray:
+        return point_in_space(self.center)
+
+    @override
+    def program(self) -> list[Node]:
+        half = [0.5 * edge for edge in self.size]
+        return [Node(DISTANCES.index(box_distance), half if len(half) == 3 else [*half, ENDLESS])]
+
+    @override
+    def reach(self) -> float:
+        return 0.5 * float(np.linalg.norm(self.size))
+
+    @override
+    def vectors(self) -> list[tuple[str, Sequence[float]]]:
+        return [("center", self.center), ("size", self.size)]
+
+
+class Sphere(Solid):
+    """A ball; in a 2-D world a disc."""
+
+    shape: Literal["sphere"] = "sphere"
+    center: Vector
+    radius: Positive
+
+    @property
+    @override
+    def origin(self) -> np.ndarray:
+        return point_in_space(self.center)
+
+    @override
+    def program(self) -> list[Node]:
+        return [Node(DISTANCES.index(sphere_distance), [self.radius])]
+
+    @override
+    def reach(self) -> float:
+        return self.radius
+
+    @override
+    def vectors(self) -> list[tuple[str, Sequence[float]]]:
+        return [("center", self.center)]
+
+
+class _Axial(Solid):
+    start: Vector
+    end: Vector
+    radius: Positive
+
+    @model_validator(mode="after")
+    def _has_length(self) -> "_Axial":
+        if len(self.start) != len(self.end):
+            raise ValueError(f"start = {self.start} and end = {self.end} must have the same number of components.")
+        return self
+
+    @property
+    def origin(self) -> np.ndarray:
+        return 0.5 * (point_in_space(self.start) + point_in_space(self.end))
+
+    def _node(self, op: int) -> Node:
+        axis = point_in_space(self.end) - point_in_space(self.start)
+        return Node(op, [self.radius, 0.5 * float(np.linalg.norm(axis))], turn=turn_from_y(axis))
+
+    def vectors(self) -> list[tuple[str, Sequence[float]]]:
+        return [("start", self.start), ("end", self.end)]
+
+
+class Capsule(_Axial):
+    """All points within `radius` of the segment from `start` to `end`."""
+
+    shape: Literal["capsule"] = "capsule"
+
+    @override
+    def program(self) -> list[Node]:
+        return [self._node(DISTANCES.index(capsule_distance))]
+
+    @override
+    def reach(self) -> float:
+        return 0.5 * float(np.linalg.norm(point_in_space(self.end) - point_in_space(self.start))) + self.radius
+
+
+class Cylinder(_Axial):
+    """A round cylinder between the centres `start` and `end` of its two faces."""
+
+    shape: Literal["cylinder"] = "cylinder"
+
+    @override
+    def program(self) -> list[Node]:
+        return [self._node(DISTANCES.index(cylinder_distance))]
+
+    @override
+    def reach(self) -> float:
+        return float(np.hypot(0.5 * np.linalg.norm(point_in_space(self.end) - point_in_space(self.start)), self.radius))
+
+
+class HalfSpace(Solid):
+    """Everything behind a plane through `point`; `normal` points out of the solid, into the water."""
+
+    shape: Literal["half-space"] = "half-space"
+    point: Vector
+    normal: Vector
+
+    @model_validator(mode="after")
+    def _has_direction(self) -> "HalfSpace":
+        if not any(self.normal):
+            raise ValueError(f"normal = {self.normal} has no direction; give a vector of any length but zero.")
+        return self
+
+    @property
+    @override
+    def origin(self) -> np.ndarray:
+        return point_in_space(self.point)
+
+    @override
+    def program(self) -> list[Node]:
+        return [Node(DISTANCES.index(half_space_distance), turn=turn_from_y(point_in_space(self.normal)))]
+
+    @override
+    def reach(self) -> float:
+        return ENDLESS
+
+    @override
+    def vectors(self) -> list[tuple[str, Sequence[float]]]:
+        return [("point", self.point), ("normal", self.normal)]
+
+
+class _SetOperation(Solid):
+    center: Vector = (0.0, 0.0, 0.0)
+    parts: Annotated[list["AnySolid"], Field(min_length=2)]
+
+    @property
+    def origin(self) -> np.ndarray:
+        return point_in_space(self.center)
+
+    @property
+    def is_spatial(self) -> bool:
+        return any(part.is_spatial for part in self.parts)
+
+    def _combine(self, op: int) -> list[Node]:
+        nodes: list[Node] = []
+        for number, part in enumerate(self.parts):
+            nodes += [node.placed(part.origin, part.quaternion) for node in part.program()]
+            if number:
+                nodes.append(Node(op))
+        return nodes
+
+    def reach(self) -> float:
+        return max(float(np.linalg.norm(part.origin)) + part.reach() for part in self.parts)
+
+    def vectors(self) -> list[tuple[str, Sequence[float]]]:
+        own = [("center", self.center)] if "center" in self.model_fields_set else []
+        return own + [
+            (f"parts[{number}].{name}", vector)
+            for number, part in enumerate(self.parts)
+            for name, vector in part.vectors()
+        ]
+
+
+class Union(_SetOperation):
+    """All points that are in any part. Parts are placed in the frame of the whole."""
+
+    shape: Literal["union"] = "union"
+
+    @override
+    def program(self) -> list[Node]:
+        return self._combine(UNION)
+
+
+class Intersection(_SetOperation):
+    """All points that are in every part."""
+
+    shape: Literal["intersection"] = "intersection"
+
+    @override
+    def program(self) -> list[Node]:
+        return self._combine(INTERSECTION)
+
+
+class Difference(_SetOperation):
+    """All points of the first part that are in none of the others."""
+
+    shape: Literal["difference"] = "difference"
+
+    @override
+    def program(self) -> list[Node]:
+        return self._combine(DIFFERENCE)
+
+    @override
+    def reach(self) -> float:
+        return float(np.linalg.norm(self.parts[0].origin)) + self.parts[0].reach()
+
+
+SHAPES: tuple[type[Solid], ...] = (
+    Box, Sphere, Capsule, Cylinder, HalfSpace, Union, Intersection, Difference, Mesh,
+)  # fmt: skip
+AnySolid = Annotated[
+    Box | Sphere | Capsule | Cylinder | HalfSpace | Union | Intersection | Difference | Mesh,
+    Field(discriminator="shape"),
+]
+for _shape in SHAPES:
+    _shape.model_rebuild()
+    register_model(_shape.model_fields["shape"].default, _shape)
+
+
+def build(solids: Sequence[Solid], tank_count: int, friction: float, spacing: float) -> SolidSet:
+    """Put `solids` on the device, for particles of that spacing [m]; the first `tank_count` are the tank's walls."""
+    programs = [solid.program() for solid in solids]
+    for solid, program in zip(solids, programs, strict=True):
+        depth = deepest = 0
+        for node in program:
+            depth += 1 if node.op >= 0 else -1
+            deepest = max(deepest, depth)
+        if deepest > STACK:
+            raise WavetankError(
+                f"solid {solid.name or type(solid).__name__!r} nests set operations {deepest} deep; "
+                f"at most {STACK} are allowed: build it from several solids."
+            )
+    nodes = [node for program in programs for node in program] or [Node(0)]
+    codes, grid, samples = put_grids(nodes, spacing)
+    count = max(len(solids), 1)
+    first = np.concatenate([[0], np.cumsum([len(program) for program in programs], dtype=int)])
+    position = np.array([s.origin for s in solids]).reshape(-1, 3)
+    rotation = np.array([s.quaternion for s in solids]).reshape(-1, 4)
+    frictions = [friction if s.friction is None else s.friction for s in solids]
+
+    def array(values: Any, kind: Any, length: int) -> Any:
+        result = qd.ndarray(kind, shape=(length,))
+        upload(result, values)
+        return result
+
+    return SolidSet(
+        op=array(codes, qd.i32, len(nodes)),
+        size=array([n.size for n in nodes], vec4, len(nodes)),
+        offset=array([n.offset for n in nodes], vec3, len(nodes)),
+        turn=array([n.turn for n in nodes], vec4, len(nodes)),
+        first=array(first, qd.i32, count + 1),
+        reach=array([s.reach() for s in solids], qd.f32, count),
+        friction=array(frictions, qd.f32, count),
+        position=array(position, vec3, count),
+        rotation=array(rotation, vec4, count),
+        old_position=array(position, vec3, count),
+        old_rotation=array(rotation, vec4, count),
+        plane=array([], vec4, count),
+        sweep=array([], vec2, count),
+        grid=grid,
+        samples=samples,
+        count=len(solids),
+        tank_count=tank_count,
+    )
+
+
+def resize(device: SolidSet, solids: Sequence[Solid], scales: Sequence[float]) -> None:
+    """Put the solids on the device at these shares of their sizes, around their origins."""
+    nodes = [(node, scale) for solid, scale in zip(solids, scales, strict=True) for node in solid.program()]
+    for array, values in (
+        (device.size, [scale * node.size for node, scale in nodes]),
+        (device.offset, [scale * node.offset for node, scale in nodes]),
+    ):
+        upload(array, values)

@@ -1,0 +1,71 @@
+"""What every solid has, and the nodes of the program that it becomes."""
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from wavetank.foundation.model import Model, Number, Quaternion
+from wavetank.foundation.rotations import product, turned, unit_quaternion
+
+Floats = Sequence[float] | np.ndarray
+ENDLESS = 1.0e5  # half size [m] of what has no end
+
+
+class Node:
+    """One step of a solid's program: a shape with its place, or a set operation; that of a mesh knows it."""
+
+    def __init__(self, op: int, size: Floats = (), offset: Floats = (), turn: Floats = (), mesh: Any = None) -> None:
+        self.op = op
+        self.mesh = mesh
+        self.size = np.zeros(4)
+        self.size[: len(size)] = size
+        self.offset = np.array(offset if len(offset) else (0.0, 0.0, 0.0), float)
+        self.turn = np.array(turn if len(turn) else (1.0, 0.0, 0.0, 0.0), float)
+
+    def placed(self, offset: np.ndarray, turn: np.ndarray) -> "Node":
+        """Return this node as seen from a frame in which its own frame has that offset and turn."""
+        return Node(self.op, self.size, offset + turned(turn, self.offset), product(turn, self.turn), self.mesh)
+
+
+class Solid(Model):
+    """What every solid has: a name to move it by, a pose and a surface."""
+
+    name: str = ""
+    rotation: Quaternion | Number = (1.0, 0.0, 0.0, 0.0)  # (w, x, y, z), or an angle about z [rad]
+    friction: Annotated[Number, Field(ge=0, le=1)] | None = None  # the scene's friction where None
+
+    @property
+    def origin(self) -> np.ndarray:
+        """Position of the solid's frame [m], shape [3]."""
+        raise NotImplementedError
+
+    @property
+    def quaternion(self) -> np.ndarray:
+        """Rotation of the solid's frame as a unit quaternion (w, x, y, z)."""
+        return unit_quaternion(self.rotation)
+
+    @property
+    def is_spatial(self) -> bool:
+        """Whether this needs a 3-D world."""
+        return False
+
+    def program(self) -> list[Node]:
+        """Return the nodes of this solid in postfix order, in its own frame."""
+        raise NotImplementedError
+
+    def reach(self) -> float:
+        """Radius [m] around the origin that holds the whole solid."""
+        raise NotImplementedError
+
+    def vectors(self) -> list[tuple[str, Sequence[float]]]:
+        """Name every point or size of this solid, to check that all live in one dimension."""
+        return []
+
+
+def point_in_space(vector: Sequence[float]) -> np.ndarray:
+    """Return a point of a 2-D or 3-D world as a point in space, shape [3]."""
+    point = np.zeros(3)
+    point[: len(vector)] = vector
+    return point

@@ -1,0 +1,161 @@
+"""Arguments of launches: the compiler reads what it is given, and is given what it knows."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from wavetank.device import compiler, launches
+from wavetank.device.compiler import qd
+from wavetank.device.state import Coefficients, exchanged, integers, new_particles, remembered
+
+
+@dataclasses.dataclass(frozen=True)
+class Numbers:
+    """As `state.Coefficients`."""
+
+    one: qd.i32
+    half: qd.f32
+
+
+@qd.kernel(fastcache=True)
+def write(x: qd.types.ndarray(), numbers: Numbers, place: qd.i32):
+    x[place] = numbers.one + qd.cast(2.0 * numbers.half, qd.i32)
+
+
+def test_a_launch_reads_the_numbers_that_it_is_given():
+    """Frozen objects of numbers come and go, and take the addresses of those that are gone."""
+    compiler.start("cpu")
+    x = integers(4)
+    read = []
+    for k in range(300):
+        numbers = Numbers(one=1000 * k, half=0.5 * k)
+        write(x, numbers, 3)
+        read.append(int(compiler.download(x)[3]))
+        del numbers
+    assert read == [1001 * k for k in range(300)]
+
+
+@pytest.fixture
+def prepared(monkeypatch) -> list:
+    """How many arguments the compiler has prepared for launches, by now and from now on."""
+    from quadrants.lang.kernel import Kernel
+
+    whole, seen = Kernel._recursive_set_args, []
+    monkeypatch.setattr(Kernel, "_recursive_set_args", staticmethod(lambda *args: seen.append(args[1]) or whole(*args)))
+    return seen
+
+
+def test_a_launch_that_is_known_is_not_prepared_again(prepared):
+    """Those of the same objects are, with any plain number, wherever it is kept."""
+    compiler.start("cpu")
+    x, y = integers(1004), integers(1004)
+    one, two = Numbers(one=1, half=0.0), Numbers(one=2, half=0.0)
+    for array, numbers, place in ((x, one, 1000), (x, one, 1001), (x, two, 1002), (y, two, 1003)):
+        write(array, numbers, place)
+    before = len(prepared)
+    for array, numbers, place in ((x, two, 2002), (y, two, 2003), (x, one, 2001)):
+        write(array, numbers, place - 1000)
+    assert len(prepared) == before == 3 * 3  # (x, one), (x, two) and (y, two)
+    assert compiler.download(x)[1000:].tolist() == [1, 1, 2, 0]
+    assert compiler.download(y)[1000:].tolist() == [0, 0, 0, 2]
+
+
+def test_a_launch_may_name_its_arguments():
+    compiler.start("cpu")
+    x, numbers = integers(2004), Numbers(one=5, half=1.0)
+    for place in range(2000, 2003):
+        write(x, place=place, numbers=numbers)
+    assert compiler.download(x)[2000:].tolist() == [7, 7, 7, 0]
+
+
+@dataclasses.dataclass(frozen=True)
+class More:
+    """Fields that only some variants of a kernel read: plain numbers come after those that are."""
+
+    first: qd.i32
+    second: qd.i32
+    third: qd.f32
+
+
+@qd.kernel(fastcache=True)
+def write_some(x: qd.types.ndarray(), more: More, place: qd.i32, share: qd.f32, whole: qd.template()):
+    if qd.static(whole):
+        x[place] = more.first + more.second + qd.cast(more.third + share, qd.i32)
+    else:
+        x[place] = more.second + qd.cast(share, qd.i32)
+
+
+def test_variants_of_a_kernel_have_their_numbers_in_places_of_their_own(prepared):
+    compiler.start("cpu")
+    x, more = integers(1000), More(first=100, second=10, third=1000.0)
+    for place in range(4):
+        for whole in (1, 0):
+            write_some(x, more, 500 + 2 * place + whole, 1.0 + place, whole)
+    assert len(prepared) == 2 * len(("x", "more", "place", "share"))  # once for each variant
+    assert compiler.download(x)[500:508].tolist() == [11, 1111, 12, 1112, 13, 1113, 14, 1114]
+
+
+def test_prepared_launches_go_with_their_arrays(prepared):
+    """A new array may take the address of one that is gone."""
+    compiler.start("cpu")
+    numbers, kept, seen = Numbers(one=7, half=0.0), [], []
+    for k in range(40):
+        x = integers(4 + k % 3)
+        write(x, numbers, 3)
+        seen.append(int(compiler.download(x)[3]))
+        if k % 5 == 0:
+            kept.append(x)
+        del x
+    assert seen == [7] * 40
+    assert all(int(compiler.download(x)[3]) == 7 for x in kept)
+
+
+def test_only_so_many_prepared_launches_are_kept():
+    compiler.start("cpu")
+    x, numbers = integers(1000), Numbers(one=5, half=0.0)
+    for place in range(1000):
+        write(x, numbers, place)
+    assert 0 < len(write._primal.launch_context_buffer_cache.launches.known) <= launches.MOST
+    assert (compiler.download(x) == 5).all()
+
+
+def test_the_same_arrays_and_numbers_are_the_same_object():
+    compiler.start("cpu")
+    a, b = new_particles(2, 4), new_particles(2, 4)
+    known: dict = {}
+    c, d = exchanged(known, a, b, "v")
+    assert c.v is b.v and d.v is a.v and c.x is a.x and d.x is b.x
+    assert a.v is not b.v, "the first two are as they were"
+    e, f = exchanged(known, c, d, "v")
+    assert e.v is a.v and f.v is b.v
+    g, h = exchanged(known, e, f, "v")
+    assert g is c and h is d
+    numbers = dict.fromkeys((field.name for field in dataclasses.fields(Coefficients)), 0.5)
+    assert remembered(Coefficients(**numbers)) is remembered(Coefficients(**numbers))
+    assert remembered(Coefficients(**{**numbers, "dt": 0.25})).dt == 0.25
+
+
+@qd.kernel  # not from the cache, which does not see how the compiler reads a product
+def products(a: qd.types.vector(3, qd.f32), b: qd.types.vector(3, qd.f32), out: qd.types.ndarray()):
+    out[0] = a.dot(b)
+    out[1] = a.norm()
+    out[2] = a.norm(eps=7.0)
+    out[3] = a.norm_sqr()
+    out[4] = a.sum()
+    for k in qd.static(range(3)):
+        out[5 + k] = a.cross(b)[k]
+        out[8 + k] = (a + b).normalized()[k]
+    flat = qd.Vector([a[0], a[1]])
+    out[11] = flat.cross(qd.Vector([b[0], b[1]]))
+    out[12] = qd.Matrix([[a[0], a[1]], [b[0], b[1]]]).norm_sqr()
+
+
+def test_products_of_vectors_are_what_they_are_called():
+    """Kernels read none of the compiler's own sources for these; matrices and other arguments take the long way."""
+    compiler.start("cpu")
+    a, b, out = np.float32([1.0, 2.0, 4.0]), np.float32([3.0, -1.0, 0.5]), qd.ndarray(qd.f32, 13)
+    products(a, b, out)
+    along = (a + b) / np.linalg.norm(a + b)
+    expected = [3.0, 21.0**0.5, 28.0**0.5, 21.0, 7.0, *np.cross(a, b), *along, -7.0, 15.0]
+    assert compiler.download(out) == pytest.approx(expected, rel=1e-6)

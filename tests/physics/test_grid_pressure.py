@@ -1,0 +1,283 @@
+"""Pressure on a grid before the iterations: its equation is solved, and water of any depth rests."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import wavetank as wt
+from wavetank.device import compiler
+from wavetank.device.compiler import qd
+from wavetank.device.state import CoarseGrid
+from wavetank.foundation.materials import Material
+from wavetank.lab.cases.energy import energies
+from wavetank.physics.grid_pressure import coarse_grid, poisson
+from wavetank.physics.grid_pressure import correction as coarse_pressure
+from wavetank.physics.grid_pressure.coarse_grid import new_levels
+from wavetank.physics.smoothing import NAMES, kernel_shape, rest_lattice
+from wavetank.physics.step import has_grid_pressure
+from wavetank.scene.fluids import Points
+from wavetank.simulation.simulation import Simulation
+
+
+@qd.kernel(fastcache=True)
+def couple(level: CoarseGrid, least_theta: qd.f32, width: qd.template()):
+    """Set the couplings of a finest level, as `gather` does."""
+    for piece in range(level.pieces * level.ny * level.nz):
+        poisson.couple_nodes(level, piece, least_theta, width)
+
+
+def filled(level, heights) -> None:
+    """Water up to `heights` [cells] in every column of a 2-D level, and no solid."""
+    rows = np.arange(level.ny)[:, None]
+    fill = np.clip(np.asarray(heights)[None, :] - rows, 0.0, 1.0)
+    for array, values in ((level.fill, fill), (level.room, np.ones_like(fill)), (level.density, np.ones_like(fill))):
+        whole = array.to_numpy()
+        whole[: values.size] = values.ravel()
+        array.from_numpy(whole)
+    couple(level, poisson.LEAST_THETA, coarse_grid.piece_width())
+
+
+def test_weight_at_the_bottom_becomes_hydrostatic_pressure():
+    """laplace lambda = C with C in the lowest cells alone: a straight line from the surface down to C H dy."""
+    level = new_levels((0.8, 1.6), 0.1)[0]
+    assert (level.nx, level.ny) == (8, 16)
+    surface = 12.75  # the filling of the 13th cell is 0.75: its surface is a quarter of a cell above its centre
+    filled(level, np.full(8, surface))
+    rhs = np.zeros(level.rhs.shape[0], np.float32)
+    rhs[: level.nx] = 1.0
+    level.rhs.from_numpy(rhs)
+    for _ in range(4):
+        poisson.solve(level, level, poisson.GO_ON, 200, 1.8, 0, coarse_grid.piece_width())
+    lam = level.lam.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
+    # Between the full cell below and the air above, the level set f - 1/2 is zero a third of the way up.
+    depth = level.dy * (12.0 + 0.25 / 0.75 - np.arange(13))
+    np.testing.assert_allclose(lam[:13], np.repeat(-depth[:, None] * level.dy, 8, axis=1), rtol=2e-3)
+    assert not lam[13:].any()
+
+
+def random_errors(level) -> None:
+    rng = np.random.default_rng(0)
+    rhs = np.zeros(level.rhs.shape[0], np.float32)
+    rhs[: level.nx * level.ny] = np.maximum(rng.normal(0.2, 1.0, level.nx * level.ny), -0.5)
+    level.rhs.from_numpy(rhs)
+
+
+def error_of(lam: np.ndarray, finest) -> float:
+    """Distance of multipliers from those of many sweeps, relative."""
+    for _ in range(20):
+        poisson.solve(finest, finest, poisson.GO_ON, 200, 1.95, 0, coarse_grid.piece_width())
+    exact = finest.lam.to_numpy()
+    return float(np.linalg.norm(lam - exact) / np.linalg.norm(exact))
+
+
+@pytest.mark.parametrize("size", [(1.6, 3.2), (0.25, 3.2), (6.0, 0.4)], ids=["wide", "narrow", "flat"])
+def test_few_sweeps_on_all_levels_come_close(size):
+    """The grids together reach within a twentieth what one grid needs hundreds of sweeps for."""
+    levels = new_levels(size, 0.05)
+    finest = levels[0]
+    filled(finest, 0.65 * finest.ny + 0.06 * finest.ny * np.sin(0.3 * np.arange(finest.nx)))
+    random_errors(finest)
+    poisson.solve_levels(levels)
+    assert error_of(finest.lam.to_numpy(), finest) < 0.05
+    poisson.solve(finest, finest, poisson.ZERO, 8, 1.5, 0, coarse_grid.piece_width())
+    assert error_of(finest.lam.to_numpy(), finest) > (0.02 if size[1] < 1.0 else 0.3), "one level alone does not"
+
+
+@pytest.mark.xfail(reason="0.16: levels see different surfaces, and the coarsest is solved now", strict=True)
+def test_few_sweeps_come_close_under_a_rough_surface():
+    """A surface that leaps by a cell or two from column to column is another one to each level."""
+    levels = new_levels((1.6, 3.2), 0.05)
+    finest = levels[0]
+    filled(finest, 40.0 + 4.0 * np.sin(np.arange(finest.nx)))
+    random_errors(finest)
+    poisson.solve_levels(levels)
+    assert error_of(finest.lam.to_numpy(), finest) < 0.12
+
+
+@pytest.mark.parametrize("kernel", ["spiky", "wendland"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_stiffness_is_what_a_field_of_multipliers_moves_by(dim, kernel):
+    """Eq. 6 on a lattice with lambda = b . x moves its particles by M b."""
+    support = 2.2
+    rest = rest_lattice(kernel, dim, support)
+    n = 3
+    axes = np.stack(np.meshgrid(*[np.arange(-n, n + 1)] * dim, indexing="ij"), -1).reshape(-1, dim)
+    r = -axes[(axes != 0).any(1)] / support  # p_i - p_j in units of h, particle i at the origin
+    distance = np.linalg.norm(r, axis=1)
+    slope = rest.gradient_scale * kernel_shape(NAMES[kernel][1], distance)[1]
+    b = np.arange(1.0, dim + 1)
+    moved = ((-r @ b) * slope / distance) @ r  # lambda_i = 0
+    np.testing.assert_allclose(moved, rest.stiffness * b, rtol=1e-6)
+
+
+def test_cells_divide_the_tank_and_are_halved_together():
+    levels = new_levels((2.1, 1.05, 0.33), 0.0475)
+    finest = levels[0]
+    assert finest.nx * finest.dx == pytest.approx(2.1) and finest.nz * finest.dz == pytest.approx(0.33)
+    assert max(finest.dx, finest.dy, finest.dz) < 1.35 * 0.0475 and min(finest.dx, finest.dy, finest.dz) > 0.7 * 0.0475
+    for fine, coarse in itertools.pairwise(levels):
+        for axis in "xyz":
+            assert getattr(fine, f"n{axis}") in (getattr(coarse, f"n{axis}"), 2 * getattr(coarse, f"n{axis}"))
+    assert max(levels[-1].nx, levels[-1].ny, levels[-1].nz) <= 8
+
+
+def rms_speed(sim: Simulation, seconds: float) -> float:
+    sim.advance(seconds)
+    return float(np.sqrt((sim.velocities.astype(float) ** 2).sum(1).mean()))
+
+
+@pytest.mark.parametrize(("steps", "error"), [(1, 1.5e-3), (2, 5e-4)])
+@pytest.mark.parametrize("wall", ["tank", "box"])
+def test_deep_water_rests_in_few_steps_a_frame(wall, steps, error):
+    """40 layers between walls of a tank, or of a box in the tank, are hardly pressed together, and far less in two."""
+    d = 0.025
+    solids = [wt.Box(center=(0.7, 0.75), size=(0.4, 1.5))] if wall == "box" else []
+    tank = wt.Tank(size=(0.9, 1.5) if wall == "box" else (0.5, 1.5))
+    block = wt.Block(lower=(0, 0), upper=(0.5, 1.0))
+    sim = Simulation(wt.Scene(spacing=d, tank=tank, solids=solids, fluids=[block], substeps=steps))
+    assert rms_speed(sim, 1.0) < 0.01
+    assert sim.time_steps == steps
+    assert sim.stats()["density_error_mean"] < error
+    assert 2.0 * sim.positions[:, 1].mean() == pytest.approx(1.0, abs=5e-3)
+
+
+def test_layers_of_different_density_rest():
+    d = 0.025
+    scene = wt.Scene(
+        spacing=d, tank=wt.Tank(size=(0.5, 1.2)), materials=[Material(name="heavy", density=3000.0)],
+        fluids=[
+            wt.Block(lower=(0, 0), upper=(0.5, 0.4), material="heavy"),
+            wt.Block(lower=(0, 0.4), upper=(0.5, 0.8)),
+        ],
+    )  # fmt: skip
+    sim = Simulation(scene)
+    assert has_grid_pressure(sim.world, sim.scene)
+    assert rms_speed(sim, 1.0) < 0.02
+    assert sim.time_steps == 1
+
+
+@pytest.mark.parametrize("height", [0.4, 0.41, 0.425, 0.45, 0.475])
+def test_water_at_rest_has_no_gaps(height):
+    """Wherever its surface lies between the nodes, and however well rows fit the tank."""
+    block = wt.Block(lower=(0, 0), upper=(1.03, height))
+    sim = Simulation(wt.Scene(spacing=0.025, tank=wt.Tank(size=(1.03, 0.9)), fluids=[block]))
+    sim.advance(1.0)
+    level = sim.world.levels[0]
+    nodes = level.nx * level.ny
+    gaps, fill = level.gaps.to_numpy()[:nodes], level.fill.to_numpy()[:nodes]
+    assert gaps[fill > 0.85].mean() < 1e-3
+    assert gaps[fill > 0.85].max() < 0.03
+    assert level.lam.to_numpy()[:nodes].any()
+
+
+def test_rows_that_are_drawn_apart_have_gaps():
+    """A lattice an eighth wider leaves 1 - 1 / 1.125 of the room free, most of which is told; none next to a solid."""
+    d = 0.025
+    places = np.stack(np.meshgrid((np.arange(40) + 0.5) * 1.125 * d, (np.arange(40) + 0.5) * d), -1).reshape(-1, 2)
+    scene = wt.Scene(
+        spacing=d, tank=wt.Tank(size=(1.125, 1.2)), fluids=[Points(positions=places)], gravity=(0.0, -1e-3),
+        solids=[wt.Box(center=(1.05, 0.05), size=(0.1, 0.1))],
+    )  # fmt: skip
+    sim = Simulation(scene)
+    sim.step()
+    level = sim.world.levels[0]
+    gaps = level.gaps.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
+    inner = gaps[3 : level.ny // 2, 2 : level.nx // 2]
+    free = coarse_pressure.FULL - 1.0 / 1.125
+    assert 0.5 * free < inner.mean() < 1.05 * free
+    room = level.room.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
+    assert (room < 1.0).any()
+    assert not gaps[room < 1.0].any()
+
+
+def energy_gained(*frames: int) -> np.ndarray:
+    """What a block of water that falls apart into a lower pool has of its energy after `frames`, over the start's."""
+    fluids = [wt.Block(lower=(0, 0), upper=(0.4, 0.6)), wt.Block(lower=(0.4, 0), upper=(1.2, 0.3))]
+    scene = wt.Scene(spacing=0.025, tank=wt.Tank(size=(1.2, 0.8)), fluids=fluids)
+    _, kinetic, potential = energies(scene, "cpu", max(frames) / 60.0)
+    total = kinetic + potential
+    return total[[*frames]] / total[0] - 1.0
+
+
+def test_a_block_that_runs_into_a_pool_does_not_gain_height(monkeypatch):
+    """Conservation of energy; docs/method.md, "Rows that are drawn apart"."""
+    early, late = energy_gained(24, 36)
+    assert early < 0.03
+    assert late < 0.0
+    monkeypatch.setattr(coarse_pressure, "FULL", 0.0)
+    assert energy_gained(24)[0] > 0.06
+
+
+def test_the_grid_is_for_gravity():
+    """No tank, ice, thick fluids and drops that tension holds: there the time steps follow the waves."""
+    pool = {"spacing": 0.05, "fluids": [wt.Block(lower=(0, 0), upper=(0.5, 0.5))]}
+    tank = wt.Tank(size=(1.0, 1.0))
+
+    def used(**more) -> bool:
+        sim = Simulation(wt.Scene(**{**pool, **more}))
+        return has_grid_pressure(sim.world, sim.scene)
+
+    assert used(tank=tank)
+    assert used(tank=tank, surface_tension=0.072)
+    assert not used()
+    assert not used(tank=tank, grid_pressure=0.0)
+    assert not used(tank=tank, dynamic_viscosity=100.0)
+    assert not used(tank=tank, surface_tension=0.072, gravity=(0.0, 0.0))
+    sim = Simulation(wt.Scene(**pool, tank=tank))
+    sim.freeze_inside(np.array([0.2, 0.2, 0.0]), np.array([0.3, 0.2, 0.0]), 0.1)
+    assert not has_grid_pressure(sim.world, sim.scene)
+
+
+def test_threads_together_solve_what_one_does(monkeypatch):
+    """Large worlds are sorted, and large grids relaxed, by all threads, with one set of sums: the same bits."""
+    found = []
+    for few, sums in ((10**9, 4), (0, 1)):
+        monkeypatch.setattr(compiler, "FEW", few)
+        monkeypatch.setattr(coarse_grid, "sums_of", lambda nodes, sums=sums: sums)
+        sim = Simulation(wt.Scene.load("dam-break-2d").changed(spacing=0.05))
+        for _ in range(3):
+            sim.step()
+        found.append(sim.positions)
+    np.testing.assert_array_equal(*found)
+
+
+def test_the_room_that_solids_leave_follows_them():
+    """It is found anew when solids move, swell, come and go, and not while they rest."""
+    water = wt.Block(lower=(0, 0, 0), upper=(1.0, 0.3, 0.6))
+    tank = wt.Tank(size=(1.0, 0.6, 0.6))
+    box = wt.Box(name="box", center=(0.3, 0.2, 0.3), size=(0.2, 0.2, 0.2))
+    sim = Simulation(wt.Scene(spacing=0.05, tank=tank, fluids=[water], solids=[box]))
+    assert has_grid_pressure(sim.world, sim.scene)
+
+    def room() -> np.ndarray:
+        with compiler.watched(lambda module, name, launch: (names.append(name), launch())[1]):
+            sim.step()
+        level = sim.world.levels[0]
+        kept = level.room.to_numpy()
+        coarse_pressure.find_room(level, sim.world.solids, coarse_pressure.LEAST_OPEN, int(sim.world.has_solids))
+        np.testing.assert_array_equal(level.room.to_numpy(), kept)
+        return kept
+
+    names: list[str] = []
+    first = room()
+    names.clear()
+    np.testing.assert_array_equal(room(), first)
+    assert "gather" in names and "find_room" not in names
+    sim.move("box", (0.5, 0.2, 0.3))
+    assert (room() != first).any()
+    sim.move("box", (0.3, 0.2, 0.3))
+    np.testing.assert_array_equal(room(), first)
+    ball = sim.add_solid(wt.Sphere(center=(0.75, 0.2, 0.3), radius=0.15), grow=0.1)
+    small = room()
+    for _ in range(12):
+        grown = room()
+    assert grown.sum() < small.sum() < first.sum()
+    sim.remove_solid(ball)
+    np.testing.assert_array_equal(room(), first)
+    before = sim.snapshot()
+    for x in (0.4, 0.5, 0.6):
+        sim.move("box", (x, 0.2, 0.3))
+        room()
+        sim.resume(before)
+        np.testing.assert_array_equal(room(), first)
