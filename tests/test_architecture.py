@@ -73,7 +73,7 @@ def room(path: Path) -> str:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_rooms_know_only_what_is_below(path):
-    for name in imports(path, top_only=path.name == "goal.py"):
+    for name in imports(path):
         if name.startswith("quadrants"):
             assert path.name == "compiler.py", "only compiler.py imports the kernel compiler"
         if name.startswith("wavetank.") and path.name not in FACES - {"__init__.py"}:
@@ -87,6 +87,35 @@ def test_the_rooms_are_those_of_the_plan():
     entries = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
     assert entries == {*FLOORS, *FACES}
     assert len(entries) <= MOST_ENTRIES
+
+
+def modules() -> dict[str, Path]:
+    """Every module of the package by its dotted name."""
+    names = {}
+    for path in FILES:
+        parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+        names[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return names
+
+
+def test_no_import_is_a_circle():
+    """Not even one for types only, or inside of a function."""
+    known = modules()
+    arrows = {
+        name: {entry if entry in known else entry.rpartition(".")[0] for entry in imports(path)} & set(known)
+        for name, path in known.items()
+    }
+    done: set[str] = set()
+
+    def visit(name: str, way: tuple[str, ...]) -> None:
+        assert name not in way, " -> ".join([*way[way.index(name) :], name])
+        if name not in done:
+            for other in sorted(arrows[name] - {name}):
+                visit(other, (*way, name))
+            done.add(name)
+
+    for name in known:
+        visit(name, ())
 
 
 #: the one room of an optional package: nothing but `play`, inside its functions, may import the window

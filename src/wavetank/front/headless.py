@@ -171,7 +171,7 @@ def replay_session(
 
     The video follows the recorded camera and shows one frame of the session in each of its own, so slow motion is slow.
     """
-    from wavetank.session.recording import Recording, digest, replay
+    from wavetank.session.recording import Recording, replay
     from wavetank.view.choices import options
 
     if not 1.0 <= fps <= 240.0:
@@ -194,9 +194,10 @@ def replay_session(
             if interrupted.is_set():
                 raise WavetankError(f"{path}: the replay was stopped after {session.ticks} frames.")
     assert session is not None
+    digest = session.sim.digest()
     return {
         "frames": session.ticks, "seconds_of_water": session.sim.time, "count": session.sim.count,
-        "arch": session.sim.arch, "same": digest(session) == recording.digest, "digest": digest(session),
+        "arch": session.sim.arch, "same": digest == recording.digest, "digest": digest,
     }  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from typing import Any
 from wavetank.foundation.errors import WavetankError
 from wavetank.scene.goal import Aim, Goal
 from wavetank.session import commands as c
+from wavetank.session.measures import counted, measure
 from wavetank.session.tools import TOOL_NAMES
 from wavetank.simulation.frame import Frame
 
@@ -27,7 +28,7 @@ class Game:
         self.held = 0.0  # s since all aims are met
         self.strokes = 0
         self.worst = 0.0  # of the forbidden: the largest share of what is allowed so far
-        self.start = [int(aim.counted(frame).sum()) for aim in goal.aims]
+        self.start = [int(counted(aim, frame).sum()) for aim in goal.aims]
         self.values = [0.0] * len(goal.aims)
         self._look(frame)
 
@@ -105,7 +106,7 @@ class Game:
         }  # fmt: skip
 
     def _look(self, frame: Frame) -> None:
-        self.values = [aim.measure(frame, start) for aim, start in zip(self.goal.aims, self.start, strict=True)]
+        self.values = [measure(aim, frame, start) for aim, start in zip(self.goal.aims, self.start, strict=True)]
         self.worst = max([self.worst, *(value / aim.share for aim, value in self._pairs() if aim.forbids)])
 
     def _pairs(self) -> list[tuple[Any, float]]:
