@@ -21,6 +21,7 @@ LOOK_TOOL = {
 PATIENCE = 0.6  # s for which a value set here is shown before what the simulation says
 LONGEST_SCENE = 2_000_000  # bytes of a dropped file
 KEPT = 600  # points of a curve
+FIRST_FRAMES = 2  # are compiled on the way; what they took would flatten every curve
 
 
 @dataclasses.dataclass
@@ -123,6 +124,8 @@ class Desk:
         shown = self.engine.shown
         if shown.measured != self._measured:
             self._measured = shown.measured
+            if shown.status["ticks"] <= FIRST_FRAMES:
+                return
             if self.curves.get("time") and shown.status["time"] < self.curves["time"][-1]:
                 self.curves.clear()  # rewound, or another scene
             for name, value in {
