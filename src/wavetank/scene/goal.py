@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, model_validator
 from typing_extensions import override
 
-from wavetank.foundation.model import Model, Positive, Vector, register_model
+from wavetank.foundation.model import Model, Place, Positive, register_model
 
 Share = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
 
@@ -19,8 +19,8 @@ class Aim(Model):
 
     forbids: ClassVar[bool] = False  # whether more than `share` loses the game at once
     name: str = ""  # shown beside the outline
-    lower: Vector  # m
-    upper: Vector  # m
+    lower: Place
+    upper: Place
     share: Share
     material: str = ""  # counts only this fluid of the scene's materials
     color: Annotated[str, Field(pattern=r"^(#[0-9a-fA-F]{6})?$")] = ""  # counts only what is dyed about like this
