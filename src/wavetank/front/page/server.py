@@ -27,6 +27,7 @@ from wavetank.front.loop import Loop, News
 from wavetank.front.page.gate import Gate
 from wavetank.front.page.viewers import Viewers
 from wavetank.front.picture import jpeg
+from wavetank.front.theme import style_sheet
 from wavetank.session.pace import share_interpreter
 from wavetank.session.recording import Recording
 from wavetank.session.session import Session
@@ -171,7 +172,8 @@ class WebFront:
         return _packaged("index.html")
 
     async def _file(self, request: Request) -> Response:
-        return _packaged(request.path_params["file"])
+        name = request.path_params["file"]
+        return Response(style_sheet(), media_type="text/css") if name == "theme.css" else _packaged(name)
 
     async def _recording(self, request: Request) -> Response:
         return await self._download("session.toml", lambda: Recording.of(self.session, self.start_scene).text())

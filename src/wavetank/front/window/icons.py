@@ -9,7 +9,6 @@ TURNS = 10  # pieces of a curve
 TOKEN = re.compile(r"[A-Za-z]|[-+]?(?:\d+\.\d*|\.\d+|\d+)")
 
 #: the icons that are nobody's tool
-LOOK = "M2 12c3-5 6.500-7 10-7s7 2 10 7c-3 5-6.500 7-10 7s-7-2-10-7zM12 9a3 3 0 1 1 0 6 3 3 0 0 1 0-6"
 PLAY, PAUSE = "M7 4l13 8-13 8z", "M8 5v14M16 5v14"
 STEP, BACK = "M6 6l9 6-9 6zM18 6v12", "M11 6l-7 6 7 6zM20 6l-7 6 7 6z"
 RESET, BOOKMARK = "M4 5v5h5M4.600 10a8 8 0 1 1-.4 4", "M7 3h10v18l-5-4-5 4z"

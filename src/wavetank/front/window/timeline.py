@@ -2,14 +2,15 @@
 
 from imgui_bundle import ImVec2, imgui
 
+from wavetank.front.keys import SPEEDS, nearest_speed
+from wavetank.front.theme import ACCENT, ACCENT_GROUND, HOVER, SOFT, TEXT
 from wavetank.front.window import keys
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.icons import BACK, BOOKMARK, DROP, PAUSE, PLAY, RESET, STEP
-from wavetank.front.window.look import ACCENT, ACCENT_GROUND, HOVER, SOFT, TEXT, chip, draw_icon, hint, ink, rgba
+from wavetank.front.window.look import chip, draw_icon, hint, ink, rgba
 from wavetank.session.commands import Bookmark, Rewind, Speed, Step
 
 BUTTON = 2.3  # em
-NAMES = ("1/16 ×", "1/8 ×", "1/4 ×", "1/2 ×", "1 ×", "2 ×")
 
 
 def header(desk: Desk, pictures_in_a_second: int) -> None:
@@ -82,10 +83,10 @@ def footer(desk: Desk) -> None:
         keys.bookmark(desk)
     imgui.set_cursor_pos(ImVec2(right + 8.5 * em, middle))
     imgui.set_next_item_width(6.0 * em)
-    near = min(range(len(NAMES)), key=lambda n: abs(keys.SPEEDS[n] - status["speed"]))
-    changed, number = imgui.combo("##speed", near, list(NAMES))
+    names = [name for _, name in SPEEDS]
+    changed, number = imgui.combo("##speed", nearest_speed(status["speed"]), names)
     if changed:
-        engine.do(Speed, factor=keys.SPEEDS[number])
+        engine.do(Speed, factor=SPEEDS[number][0])
     hint("Pace of time ([ and ])")
 
 
