@@ -17,6 +17,7 @@ CORE = {
     "typer",
     "rich",
     "PIL",
+    "platformdirs",
     "typing_extensions",
     "starlette",
     "uvicorn",

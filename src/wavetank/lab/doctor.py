@@ -11,6 +11,7 @@ from wavetank.device import compiler, patches
 
 _PACKAGES = {
     "quadrants": "", "numpy": "", "pydantic": "", "typer": "", "rich": "", "pillow": "", "av": "", "tomli-w": "",
+    "platformdirs": "",
     **dict.fromkeys(
         ("imgui-bundle", "moderngl", "glfw"), "the window of `wavetank play`: pip install wavetank[window]"
     ),
