@@ -120,7 +120,7 @@ def test_no_import_is_a_circle():
 
 
 #: the one room of an optional package: nothing but `play`, inside its functions, may import the window
-WINDOW = {"imgui_bundle", "moderngl", "glfw"}
+WINDOW = {"imgui_bundle", "moderngl", "glfw", "svg"}
 
 
 def test_window_and_page_do_not_know_each_other():

@@ -47,6 +47,7 @@ def why_no_window() -> str | None:
         import glfw
         import imgui_bundle  # noqa: F401
         import moderngl  # noqa: F401
+        import svg.path  # noqa: F401
     except ModuleNotFoundError as error:
         return f"the package {str(error.name).replace('_', '-')} is missing (pip install 'wavetank[window]')"
     except ImportError as error:

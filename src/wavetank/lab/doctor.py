@@ -13,7 +13,7 @@ _PACKAGES = {
     "quadrants": "", "numpy": "", "pydantic": "", "typer": "", "rich": "", "pillow": "", "av": "", "tomli-w": "",
     "platformdirs": "",
     **dict.fromkeys(
-        ("imgui-bundle", "moderngl", "glfw"), "the window of `wavetank play`: pip install wavetank[window]"
+        ("imgui-bundle", "moderngl", "glfw", "svg.path"), "the window of `wavetank play`: pip install wavetank[window]"
     ),
     "trimesh": "solids from OBJ, STL, PLY and GLB files: pip install wavetank[mesh]",
     "matplotlib": "plots of `wavetank converge` and `validate`: pip install wavetank[plot]",
