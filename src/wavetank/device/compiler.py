@@ -90,7 +90,7 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
     if came_up != wanted:
         raise WavetankError(f"arch = {arch!r} was asked for, but the compiler came up on {came_up!r}.")
     _current = wanted
-    _keep_apart(_thread_ids() - before)
+    _bind_threads(_thread_ids() - before)
     return wanted
 
 
@@ -120,7 +120,7 @@ def _thread_ids() -> set[int]:
         return set()
 
 
-def _keep_apart(made: set[int]) -> None:
+def _bind_threads(made: set[int]) -> None:
     """Give every thread that computes a core of its own, where Linux lets us and each can have one.
 
     They are the last of those that the compiler has `made`, its pool. The pool sleeps between loops. Woken, two of its

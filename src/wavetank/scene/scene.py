@@ -206,8 +206,8 @@ class Scene(Parameters):
         ]
         return np.concatenate([np.empty(0, np.int32), *parts])
 
-    def given(self) -> np.ndarray:
-        """Say of which particles the scene gives every place, bool [n], in the order of `particles`."""
+    def has_own_place(self) -> np.ndarray:
+        """Say which particles are placed one by one, as those of `Points`, bool [n], in the order of `particles`."""
         parts = zip(self.fluids, self._lattices(), strict=True)
         return np.concatenate([np.empty(0, bool), *(np.full(len(x), isinstance(f, Points)) for f, (x, _) in parts)])
 

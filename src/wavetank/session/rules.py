@@ -60,7 +60,7 @@ def tool_begin(state: SessionState, command: c.ToolBegin) -> None:
         state.lift(tool.name)
     hand = Hand(state.sim, command.origin, command.direction, state.most_particles, tool.through_water)
     state.hands[command.pointer] = (tool, hand)
-    state.guard(hand, tool.begin, hand)
+    state.let_act(hand, tool.begin, hand)
 
 
 def tool_move(state: SessionState, command: c.ToolMove) -> None:
@@ -68,7 +68,7 @@ def tool_move(state: SessionState, command: c.ToolMove) -> None:
     if command.pointer in state.hands:
         tool, hand = state.hands[command.pointer]
         hand.aim(command.origin, command.direction)
-        state.guard(hand, tool.move, hand)
+        state.let_act(hand, tool.move, hand)
 
 
 def tool_end(state: SessionState, command: c.ToolEnd) -> None:

@@ -92,7 +92,7 @@ class Session(SessionState):
     def frame_duration(self) -> float:
         """Seconds of water in a frame [s]; slow motion has shorter ones, as long as they hold a good time step."""
         longest = self.sim.scene.frame_time * min(1.0, max(self.speed, 1.0 / MOST_PARTS), 1.0 / self.frame_parts)
-        return self.sim.filled(longest) if self.fills_frames else longest
+        return self.sim.full_steps_time(longest) if self.fills_frames else longest
 
     def tick(self) -> float:
         """Compute one frame, with what the hands do to it, and return the seconds of water in it [s]."""
@@ -100,7 +100,7 @@ class Session(SessionState):
         self._note_uncommanded_forces()
         for tool, hand in [*self.hands.values(), *self.running.values()]:
             hand.pass_time(duration)
-            self.guard(hand, tool.hold, hand, duration)
+            self.let_act(hand, tool.hold, hand, duration)
         self.carry_solids(duration)
         self.sim.advance(duration)
         if not self.sim.pushed:  # else too little time has passed for a frame, and they still wait for it

@@ -72,7 +72,7 @@ class SessionState:
     def camera(self, camera: Camera | None) -> None:
         self.chosen_camera = camera
 
-    def guard(self, hand: Hand, act: Any, *arguments: Any) -> None:
+    def let_act(self, hand: Hand, act: Any, *arguments: Any) -> None:
         """Let a tool act; what it has to say, and what it may not do, becomes a note."""
         before = len(self.sim.pushed)
         try:
@@ -87,7 +87,7 @@ class SessionState:
     def lift(self, hand: int | str) -> None:
         """End the tool of a pointer (a number), or one that goes on by itself (a name)."""
         tool, held = self.hands.pop(hand) if isinstance(hand, int) else self.running.pop(hand)
-        self.guard(held, tool.end, held)
+        self.let_act(held, tool.end, held)
 
     def lift_all(self) -> None:
         """End all tools."""

@@ -26,7 +26,7 @@ class Newcomers:
         return largest_norm(self.v)
 
 
-def newcomers(scene: Scene, positions: Any, velocities: Any, dyes: Any, materials: Any) -> Newcomers:
+def check_newcomers(scene: Scene, positions: Any, velocities: Any, dyes: Any, materials: Any) -> Newcomers:
     """Return what `Simulation.add` was given as arrays; raises `WavetankError` for wrong shapes and numbers."""
     x = np.asarray(positions, np.float32)
     v = np.zeros_like(x) if velocities is None else np.asarray(velocities, np.float32)
@@ -42,7 +42,7 @@ def newcomers(scene: Scene, positions: Any, velocities: Any, dyes: Any, material
     return Newcomers(x, v, dye, material)
 
 
-def checked_rows(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
+def check_rows(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
     """Return `values` as float32 of that shape; raises `WavetankError` for another one and for what is not finite."""
     try:
         rows = np.asarray(values, np.float32)

@@ -8,7 +8,7 @@ from wavetank.device.state import KINDS
 from wavetank.physics import measure, population
 from wavetank.physics.step import World, neighbor_numbers, update_densities
 from wavetank.scene.scene import Scene
-from wavetank.simulation.arrays import checked_rows, largest_norm, put_by_id
+from wavetank.simulation.arrays import check_rows, largest_norm, put_by_id
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.ledger import Ledger
 
@@ -45,7 +45,7 @@ class Contents:
 
     @positions.setter
     def positions(self, values: Any) -> None:
-        x = checked_rows("positions", values, (self.count, self.scene.dim))
+        x = check_rows("positions", values, (self.count, self.scene.dim))
         if not np.array_equal(x, self.positions):
             population.clear_forces(self.world.particles, self.count)  # what pressed them was elsewhere
             put_by_id(self.world.particles, self.count, "x", x)
@@ -58,7 +58,7 @@ class Contents:
 
     @velocities.setter
     def velocities(self, values: Any) -> None:
-        v = checked_rows("velocities", values, (self.count, self.scene.dim))
+        v = check_rows("velocities", values, (self.count, self.scene.dim))
         put_by_id(self.world.particles, self.count, "v", v)
         self.ledger.fastest_start = max(self.ledger.fastest_start, largest_norm(v))
 

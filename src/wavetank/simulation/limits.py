@@ -13,7 +13,7 @@ from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids
 
 
-def steps_needed(
+def count_steps(
     world: World, scene: Scene, solids: MovingSolids, ledger: Ledger, forces: Sequence[Force], duration: float
 ) -> float:
     """Return how many time steps make up `duration` [s], no whole number."""
@@ -23,7 +23,7 @@ def steps_needed(
     return steps_in(world, scene, duration, speed, box, forced=bool(forces))
 
 
-def speed_limit(
+def find_speed_limit(
     world: World, scene: Scene, solids: MovingSolids, ledger: Ledger, forces: Sequence[Force], duration: float
 ) -> float:
     """Return the largest speed [m/s] that gravity, the start, solids and forces can have given to a particle.

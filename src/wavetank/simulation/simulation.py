@@ -26,7 +26,7 @@ from wavetank.scene.forces import Force
 from wavetank.scene.scene import MAX_PARTICLES, Scene
 from wavetank.simulation import limits
 from wavetank.simulation import snapshot as snapshots
-from wavetank.simulation.arrays import newcomers
+from wavetank.simulation.arrays import check_newcomers
 from wavetank.simulation.contents import Contents
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.ledger import Ledger
@@ -52,7 +52,7 @@ class Simulation(Contents):
         self.pushed: list[Force] = []  # these in the next one only
         self.ledger = Ledger()
         self._fill(len(positions))
-        free = self.solids.free_of(self.scene, positions, self.world.particles)
+        free = self.solids.find_free_places(self.scene, positions, self.world.particles)
         self.add(positions[free], velocities[free], materials=self.scene.kinds()[free])
         box = positions[free] if free.any() else np.zeros((1, self.scene.dim))
         self.ledger.start_box = (box.min(axis=0), box.max(axis=0))
@@ -112,7 +112,7 @@ class Simulation(Contents):
         """Load what a splash needs before there is one: a tenth of a second for each kernel, of water that stands."""
         load_kernels(self.world, self.scene)
 
-    def filled(self, duration: float) -> float:
+    def full_steps_time(self, duration: float) -> float:
         """Return the time [s] up to `duration` that time steps of full length fill; see `time_step.filled_share`."""
         return duration * filled_share(self._steps_in(duration))
 
@@ -157,10 +157,10 @@ class Simulation(Contents):
         return (*self.forces, *self.pushed)
 
     def _steps_in(self, duration: float) -> float:
-        return limits.steps_needed(self.world, self.scene, self.solids, self.ledger, self._acting, duration)
+        return limits.count_steps(self.world, self.scene, self.solids, self.ledger, self._acting, duration)
 
     def _speed_limit(self, duration: float) -> float:
-        return limits.speed_limit(self.world, self.scene, self.solids, self.ledger, self._acting, duration)
+        return limits.find_speed_limit(self.world, self.scene, self.solids, self.ledger, self._acting, duration)
 
     # --- solids ---
 
@@ -205,7 +205,7 @@ class Simulation(Contents):
         `materials` are numbers in `Scene.palette`, [n]; that of the scene's first fluid where None.
         Where there is room is for the caller to know: see `free_places`. Raises `WavetankError` for wrong shapes.
         """
-        ledger, new = self.ledger, newcomers(self.scene, positions, velocities, dyes, materials)
+        ledger, new = self.ledger, check_newcomers(self.scene, positions, velocities, dyes, materials)
         number = len(new.x)
         count = self.count + number
         if count > MAX_PARTICLES:
@@ -274,7 +274,7 @@ class Simulation(Contents):
     def resume(self, snapshot: Snapshot) -> None:
         """Go back (or on) to an instant; parameters and forces stay as they are now."""
         self.scene.assign("solids", snapshot.solids)
-        self.solids = snapshots.restored_solids(self.scene, self._walls(), snapshot)
+        self.solids = snapshots.restore_solids(self.scene, self._walls(), snapshot)
         if snapshot.ledger.capacity > self.ledger.capacity:
             self._fill(snapshot.ledger.capacity)
         self._renew_solids()

@@ -70,7 +70,7 @@ def take_snapshot(scene: Scene, world: World, solids: MovingSolids, ledger: Ledg
     )  # fmt: skip
 
 
-def restored_solids(scene: Scene, walls: list[Solid], snapshot: Snapshot) -> MovingSolids:
+def restore_solids(scene: Scene, walls: list[Solid], snapshot: Snapshot) -> MovingSolids:
     """Return the solids of an instant, where they were."""
     solids = MovingSolids(walls, snapshot.solids, scene.friction, scene.spacing)
     solids.names, solids.poses = [*snapshot.names], [*snapshot.poses]

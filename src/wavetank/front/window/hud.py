@@ -123,7 +123,7 @@ def _banner(desk: Desk, game: dict[str, Any], box: Box) -> None:
             imgui.same_line(start + n * (each + 0.6 * em))
             # What comes next in the game stands out: another try after a loss, the next level after a win.
             if button(text, on=name == ("next" if won and game["next"] else "retry"), wide=each):
-                keys.again(desk) if name == "retry" else desk.begin(name=game["next"])
+                keys.begin_again(desk) if name == "retry" else desk.begin(name=game["next"])
             low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
             desk.places[name] = (low.x, low.y, high.x, high.y)
     desk.banner_height = imgui.get_item_rect_size().y

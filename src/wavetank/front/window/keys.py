@@ -17,30 +17,30 @@ POINTER = (
 )  # fmt: skip
 
 
-def toggle(desk: Desk) -> None:
+def toggle_pause(desk: Desk) -> None:
     """Pause, or let time run."""
     desk.engine.do(Pause, on=not desk.status["paused"])
 
 
-def back(desk: Desk) -> None:
+def go_back(desk: Desk) -> None:
     """Go one second back."""
     desk.engine.do(Rewind, time=max(0.0, desk.status["time"] - 1.0))
 
 
-def again(desk: Desk) -> None:
+def begin_again(desk: Desk) -> None:
     """Begin the scene anew, with what waits for that."""
     desk.engine.do(Reset, parameters=dict(desk.pending))
     desk.pending.clear()
     desk.engine.do(Pause, on=False)
 
 
-def faster(desk: Desk, steps: int) -> None:
+def change_pace(desk: Desk, steps: int) -> None:
     """Change the pace of time by steps of its list."""
     place = nearest_speed(desk.status["speed"]) + steps
     desk.engine.do(Speed, factor=SPEEDS[min(len(SPEEDS) - 1, max(0, place))][0])
 
 
-def bookmark(desk: Desk) -> None:
+def set_bookmark(desk: Desk) -> None:
     """Bookmark this instant under its time."""
     desk.engine.do(Bookmark, name=f"{desk.status['time']:.2f} s")
 
@@ -56,8 +56,9 @@ def show_panel(desk: Desk) -> None:
 
 
 ACTIONS: dict[str, Callable[[Desk], None]] = {
-    "pause": toggle, "back": back, "again": again, "bookmark": bookmark, "panel": show_panel, "help": show_help,
-    "slower": lambda desk: faster(desk, -1), "faster": lambda desk: faster(desk, 1),
+    "pause": toggle_pause, "back": go_back, "again": begin_again, "bookmark": set_bookmark, "panel": show_panel,
+    "help": show_help,
+    "slower": lambda desk: change_pace(desk, -1), "faster": lambda desk: change_pace(desk, 1),
 }  # fmt: skip
 HERE = {key.key: key for key in KEYS if not key.page_only}
 

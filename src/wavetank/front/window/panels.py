@@ -62,7 +62,7 @@ def _water(desk: Desk) -> None:
         )
         imgui.pop_text_wrap_pos()
         if button("Start again with this", on=True, wide=-1):
-            keys.again(desk)
+            keys.begin_again(desk)
         low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
         desk.places["again"] = (low.x, low.y, high.x, high.y)
         imgui.separator()

@@ -59,13 +59,13 @@ def footer(desk: Desk) -> None:
     """Draw the buttons of time and the scrubber."""
     em, status, engine = imgui.get_font_size(), desk.status, desk.engine
     if icon_button("again", RESET, "Start again (R)"):
-        keys.again(desk)
+        keys.begin_again(desk)
     imgui.same_line()
     if icon_button("back", BACK, "One second back (,)"):
-        keys.back(desk)
+        keys.go_back(desk)
     imgui.same_line()
     if icon_button("play", PLAY if status["paused"] else PAUSE, "Pause, play (space)", big=True):
-        keys.toggle(desk)
+        keys.toggle_pause(desk)
     imgui.same_line()
     if icon_button("step", STEP, "One frame (.)"):
         engine.do(Step)
@@ -80,7 +80,7 @@ def footer(desk: Desk) -> None:
     imgui.text(f"{status['time']:.2f} s")
     imgui.set_cursor_pos(ImVec2(right + 5.5 * em, top))
     if icon_button("mark", BOOKMARK, "Bookmark this moment (M)"):
-        keys.bookmark(desk)
+        keys.set_bookmark(desk)
     imgui.set_cursor_pos(ImVec2(right + 8.5 * em, middle))
     imgui.set_next_item_width(6.0 * em)
     names = [name for _, name in SPEEDS]
