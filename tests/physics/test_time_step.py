@@ -69,7 +69,7 @@ def test_frames_that_are_filled_keep_the_courant_number():
     for fills in (False, True):
         world, steps[fills], lengths = Simulation(scene), 0, set()
         while world.time < 1.0:
-            duration = world.filled(scene.frame_time) if fills else scene.frame_time
+            duration = world.full_steps_time(scene.frame_time) if fills else scene.frame_time
             fastest = largest_speed(world.world.particles, world.count) + 9.81 * duration
             world.advance(duration)
             steps[fills] += world.time_steps
