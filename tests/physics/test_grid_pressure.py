@@ -201,7 +201,7 @@ def energy_gained(*frames: int) -> np.ndarray:
 
 
 def test_a_block_that_runs_into_a_pool_does_not_gain_height(monkeypatch):
-    """Conservation of energy; docs/method.md, "Rows that are drawn apart"."""
+    """Conservation of energy; docs/notebook/grid-pressure.md, "Rows that are drawn apart"."""
     early, late = energy_gained(24, 36)
     assert early < 0.03
     assert late < 0.0

@@ -11,7 +11,7 @@ one list, of all who are within h of any of the eight, itself included; `pairs.p
 as the list of one, so that lists of all take two fifths of the room.
 
 Building a list tests the candidates of a row without a branch, a block of them against eight places into the bits of
-one word, and then walks over the bits that are set. Measured: docs/performance.md.
+one word, and then walks over the bits that are set. Measured: docs/notebook/performance.md.
 
 Counting sort after Green 2010 ("Particle Simulation using CUDA"); Hoetzlein 2014 ("Fast Fixed-Radius Nearest
 Neighbors") for the counting by integer atomics. What there is little of is counted by one thread: waking the others

@@ -60,7 +60,7 @@ from wavetank.solids.distance import SolidSet
 
 LEAST_MIXING = 1e-6  # of S_0: a particle without neighbours has no gradient to divide by
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
-#: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; measured, docs/method.md.
+#: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; docs/notebook/solver.md.
 DISORDER = {2: 0.75, 3: 0.35}
 CALM = 0.1  # of sqrt(g / h), the rate of the shortest waves: water that turns slower counts as calm
 

@@ -21,7 +21,8 @@ Where we differ, and why:
   pole, and B makes its second moment on the rest lattice exact, averaged over directions.
 - Conjugate gradients (`conjugate_gradients.py`) start at what viscosity did in the last step, which is not far off:
   half of the iterations that they take from rest, a quarter of Chebyshev's, where the fluid is thick
-  (docs/materials.md). Momentum is still exact; what is so stiff that it is turned (`rigid_guess.py`) keeps it to 1 %.
+  (docs/notebook/viscosity.md). Momentum is still exact; what is so stiff that it is turned (`rigid_guess.py`) keeps it
+  to 1 %.
 - Solids hold the fluid back along their surface (no-slip) as half a rest lattice would that continues the
   velocity linearly to its value at the wall (Takeda et al. 1994, 10.1143/ptp/92.5.939; Morris et al. 1997,
   10.1006/jcph.1997.5776), from a table of the distance.
@@ -29,7 +30,7 @@ Where we differ, and why:
   made honey flow a fifth too fast at any affordable step. A thick fluid therefore begins a step with the share w of
   what pressed it in the last one, and only the change comes afterwards: the incremental projection of Goda 1979
   (10.1016/0021-9991(79)90088-3; Guermond et al. 2006, 10.1016/j.cma.2005.10.010). w = `CARRIED` k / (`HALF` + k) of the
-  `thickness` k: thin water carries nothing here, it would keep its noise. docs/materials.md has the figures.
+  `thickness` k: thin water carries nothing here, it would keep its noise. docs/notebook/viscosity.md has the figures.
 """
 
 import functools

@@ -12,7 +12,7 @@ lambda <= 0, because water pushes and does not pull.
 Pressure from a grid, details from the particles: Zhu and Bridson 2005 (10.1145/1073204.1073298) in FLIP, Cornelis et
 al. 2014 (10.1111/cgf.12324) for SPH. Where we differ: the right side is the error of the particles' own densities, so
 that volume does not drift, and it is the positions that are moved. The sums are of whole numbers, so that runs repeat
-bit for bit. What was tried, and what it gives: docs/method.md.
+bit for bit. What was tried, and what it gives: docs/notebook/grid-pressure.md.
 
 In time. A correction at the end of a step is implicit Euler, which damps waves by half of omega^2 dt. Each particle
 therefore carries what the grid accelerated it by, `a`, and a share w of it acts in the next prediction;
@@ -49,9 +49,9 @@ UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 LEAST_OPEN = 0.1  # a cell that is less open is solid
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 REACH = 0.2  # of the support: the longest correction
-DAMPING = 0.44  # of a frame: the length of a step that damps as much, docs/method.md
+DAMPING = 0.44  # of a frame: the length of a step that damps as much, docs/notebook/grid-pressure.md
 LARGEST_CARRIED = 1.2  # of gravity
-MISSING = 0.18  # of a wall's answer, over what it gives; 1/3 would be all, see docs/method.md
+MISSING = 0.18  # of a wall's answer, over what it gives; 1/3 would be all, see docs/notebook/grid-pressure.md
 FULL = 0.96  # fill that cells without gaps have at least, also where few rows of particles do not match them
 GAP_SHARE = 4.0  # by which errors are less, of what lacks there
 

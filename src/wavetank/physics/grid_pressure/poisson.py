@@ -3,7 +3,7 @@
 At the free surface lambda is 0, at the place between two nodes where the filling is one half (the ghost fluid method,
 Gibou et al. 2002, 10.1006/jcph.2001.6977), and nothing flows into solids. The solution on a grid starts from that of
 the next coarser one, so that a few sweeps of projected over-relaxation are enough on each. It does not start from the
-time step before: pressures that are carried over make water pulse (docs/method.md).
+time step before: pressures that are carried over make water pulse (docs/notebook/solver.md).
 
     code    symbol     meaning                                                      unit
     fill    f          water in the tent of a node, over the room that it has       1
