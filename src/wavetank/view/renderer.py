@@ -20,7 +20,7 @@ from wavetank.view.extent import Extent, extent_of
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
 from wavetank.view.look import Look, fluid_optics, paper, pool, studio, usual_depth
 from wavetank.view.passes import tonemap
-from wavetank.view.quantities import QUANTITIES, usual
+from wavetank.view.quantities import QUANTITIES, Coloring, usual
 from wavetank.view.shot import Shot
 from wavetank.view.style import QUALITIES, Style, quality_named
 from wavetank.view.views import Pass
@@ -93,6 +93,7 @@ class Renderer:
         if name != self._colors_name:
             upload(self._colors, colors)
             self._colors_name = name
+        coloring = Coloring(colors=self._colors, low=limits[0], scale=1.0 / (limits[1] - limits[0]))
         absorption, scattering, tint = fluid_optics(None if style.kind.coloured else style.color_by, extent)
         return Shot(
             frame=frame,
@@ -104,7 +105,7 @@ class Renderer:
             radius=style.particle_radius(extent),
             quantity=quantity,
             limits=limits,
-            colors=self._colors,
+            coloring=coloring,
             absorption=absorption,
             scattering=scattering,
             tint=tint,
@@ -120,7 +121,8 @@ class Renderer:
             shadows = style.kind.name, *_stands(shot)
             key = *shadows, *_looks(shot), id(self.buffers.water)
         if key is None or key != self._kept:
-            self.buffers.shadows_rest = shadows is not None and shadows == self._shadows
+            if shadows is None or shadows != self._shadows:
+                self._run(style.kind.shadows, shot, timings)
             self._run(style.kind.still, shot, timings)
             self._kept = key and (*key[:-1], id(self.buffers.water))
         self._shadows = shadows
@@ -169,7 +171,7 @@ class Renderer:
             self._total = qd.ndarray(vec3, shape=(self.buffers.rows, self.buffers.columns))
         for number in range(style.samples):
             self._take(style, self._moved(shot, number), timings)
-            tonemap.collect(self.buffers.color, self._total, 1.0 / (number + 1))
+            tonemap.collect(self.buffers.pixels.color, self._total, 1.0 / (number + 1))
         tonemap.draw_collected(self._total, self.buffers)
 
     def _moved(self, shot: Shot, number: int) -> Shot:
