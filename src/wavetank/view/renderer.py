@@ -153,7 +153,7 @@ class Renderer:
     def _moved(self, shot: Shot, number: int) -> Shot:
         """Return the shot of one sample: low-discrepancy points in a pixel and on the sun."""
         across, down, angle, reach = (_radical_inverse(number + 1, prime) for prime in (2, 3, 5, 7))
-        axes = basis(-shot.look.to_sun, np.array([0.0, 0.0, -1.0]))
+        axes = _sun_axes(shot.look.to_sun)
         wide, turn = shot.look.sun_size * math.sqrt(reach), 2.0 * math.pi * angle
         to_sun = shot.look.to_sun + wide * (math.cos(turn) * axes[0] + math.sin(turn) * axes[1])
         to_sun = vector(*(to_sun / np.linalg.norm(to_sun)))
@@ -196,9 +196,13 @@ def _look(dim: int, coloured: bool) -> Look:
     return studio() if coloured else pool()
 
 
+def _sun_axes(to_sun: Any) -> np.ndarray:
+    return basis(-to_sun, np.array([0.0, 0.0, -1.0]))
+
+
 def _sun_lens(extent: Extent, to_sun: Any, texels: int) -> Lens:
     """An orthographic view of the extent from the sun, with room for what splashes out of it."""
-    axes = basis(-to_sun, np.array([0.0, 0.0, -1.0]))
+    axes = _sun_axes(to_sun)
     reach = 1.15 * extent.radius
     eye = extent.middle - 10.0 * reach * axes[2]
     return lens_at(eye, axes, texels, texels, 0.5 * texels / reach, perspective=False, near=1e-6)

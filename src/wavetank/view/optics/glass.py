@@ -7,6 +7,7 @@ slack              depth by which a line wins against what it touches     m
 from wavetank.device.compiler import qd
 from wavetank.view.lens import Lens
 from wavetank.view.look import Look
+from wavetank.view.optics.marks import line_depth
 from wavetank.view.optics.rays import Box, box_interval
 from wavetank.view.shot import Shot
 
@@ -21,8 +22,7 @@ def line_cover(line, depth, slack):
     """Share of a pixel that a line covers, unless something at `depth` hides it."""
     cover = 0.0
     if line > 0:
-        z = qd.bit_cast((0x7FFFFF - (line & 0x7FFFFF)) << 8, qd.f32)
-        if z - slack < depth:
+        if line_depth(line) - slack < depth:
             cover = (line >> 23) / 255.0
     return cover
 

@@ -37,3 +37,10 @@ def picture_at(picture: qd.template(), place):
     top = picture[r, c] + u * (picture[r, c1] - picture[r, c])
     low = picture[r1, c] + u * (picture[r1, c1] - picture[r1, c])
     return top + v * (low - top)
+
+
+@qd.func
+def margins_inside(picture: qd.template(), place, wide):
+    """How far inside of a picture a place (column, row) lies, in margins of the width `wide` [picture heights]."""
+    rows, columns = picture.shape[0], picture.shape[1]
+    return qd.min(place.x, columns - place.x, place.y, rows - place.y) / (wide * rows)

@@ -18,7 +18,7 @@ from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, view_ray
 from wavetank.view.look import Look
 from wavetank.view.optics.fluid import Optics, dimmed, optics_of
-from wavetank.view.optics.maps import picture_at
+from wavetank.view.optics.maps import margins_inside, picture_at
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.radiance import environment, glint, smoothstep
 from wavetank.view.optics.rays import Box, box_interval
@@ -140,8 +140,7 @@ def through(depth: qd.template(), backdrop: Backdrop, lens: Lens, look: Look, op
         )
         if c.z > lens.near:
             there = to_pixel(lens, c)
-            rows, columns = depth.shape[0], depth.shape[1]
-            inside = qd.min(there.x, columns - there.x, there.y, rows - there.y) / (0.12 * rows)
+            inside = margins_inside(depth, there, 0.12)
             if inside > 0.0:
                 z = qd.bit_cast(depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32)
                 if qd.abs(z - c.z) < 0.1 * c.z:

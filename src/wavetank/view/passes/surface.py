@@ -21,7 +21,8 @@ from typing import Any
 from wavetank.device.compiler import qd, threads
 from wavetank.device.state import remembered
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, pixels_per_metre, to_view, vec2, vec3
+from wavetank.view.lens import Lens, pixels_between, pixels_per_metre, to_view, vec2, vec3
+from wavetank.view.optics.marks import rim_key, rim_mark
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
@@ -108,7 +109,7 @@ def splat(
         if qd.static(soft):
             for column in range(first, last):
                 if rim[row, column] > 0 and depth[row, column] == 0x7F000000:  # FARTHEST
-                    depth[row, column] = (0xFFFFFF - (rim[row, column] & 0xFFFFFF)) << 7
+                    depth[row, column] = rim_key(rim[row, column])
 
 
 @qd.func
@@ -171,8 +172,7 @@ def fill_ellipse(
     rows, columns = depth.shape[0], depth.shape[1]
     tall = qd.sqrt(yy * outer)
     per, lean, fall = 1.0 / pxx, -pxy / pxx, pyy - pxy * pxy / pxx
-    first = qd.max(qd.cast(qd.ceil(qd.max(middle.y - tall - 0.5, 0.0)), qd.i32), 0)
-    last = qd.min(qd.cast(qd.floor(qd.min(middle.y + tall - 0.5, rows - 1.0)), qd.i32), rows - 1)
+    first, last = pixels_between(middle.y - tall - 0.5, middle.y + tall - 0.5, rows)
     for row in range(first, last + 1):
         v = middle.y - row - 0.5
         reach = 1.0 - v * v * fall
@@ -181,8 +181,7 @@ def fill_ellipse(
             wide = qd.sqrt(room)
             at = middle.x + lean * v - 0.5
             base = c.z + (gx * lean + gy) * v
-            left = qd.max(qd.cast(qd.ceil(qd.max(at - wide, 0.0)), qd.i32), 0)
-            right = qd.min(qd.cast(qd.floor(qd.min(at + wide, columns - 1.0)), qd.i32), columns - 1)
+            left, right = pixels_between(at - wide, at + wide, columns)
             for column in range(left, right + 1):
                 u = column - at  # from the middle of the row
                 inside = reach - pxx * u * u
@@ -205,8 +204,7 @@ def fill_ellipse(
                         elif cover > 0.0 and qd.bit_cast(depth[row, column], qd.f32) > front + limits.gap:
                             left_over = 1
                             if qd.static(part == 2):
-                                share = qd.cast(127.0 * cover, qd.i32)
-                                qd.atomic_max(rim[row, column], (share << 24) | (0xFFFFFF - (key >> 7)))
+                                qd.atomic_max(rim[row, column], rim_mark(cover, key))
     return left_over
 
 

@@ -15,6 +15,7 @@ from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, view_ray
 from wavetank.view.look import Look
 from wavetank.view.optics.glass import slack, with_tank
+from wavetank.view.optics.marks import line_mark
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 
@@ -100,8 +101,7 @@ def mark_step(pixels: Pixels, lens: Lens, a, b, step, width, slack):
                 if along == 1:
                     row, column = pixel, other
                 if z - slack < qd.bit_cast(pixels.depth[row, column], qd.f32):
-                    place = 0x7FFFFF - (qd.bit_cast(z, qd.i32) >> 8)
-                    qd.atomic_max(pixels.lines[row, column], (qd.cast(255.0 * cover + 0.5, qd.i32) << 23) | place)
+                    qd.atomic_max(pixels.lines[row, column], line_mark(cover, z))
 
 
 @qd.kernel(fastcache=True)

@@ -17,7 +17,7 @@ from wavetank.device.compiler import qd, threads
 from wavetank.device.state import remembered
 from wavetank.view.buffers import Buffers
 from wavetank.view.cells import Cells
-from wavetank.view.lens import Lens, pixels_per_metre, to_pixel, to_view, vec2, vec3, vec4
+from wavetank.view.lens import Lens, pixels_between, pixels_per_metre, to_pixel, to_view, vec2, vec3, vec4
 from wavetank.view.optics.dyes import dyed
 from wavetank.view.optics.fluid import DISC, coarseness
 from wavetank.view.shot import Shot
@@ -79,10 +79,8 @@ def disc_of(lens: Lens, disc: Disc, x, peak, rows, columns):
             tall = peak * wide * wide / 0.5625
             wide = 0.75
         inverse = qd.min(1.0 / (wide * wide), 2.0)  # the bound keeps the compiler from dividing at every texel
-        box[0] = qd.max(qd.cast(qd.ceil(qd.max(place.y - wide - 0.5, 0.0)), qd.i32), 0)
-        box[1] = qd.min(qd.cast(qd.floor(qd.min(place.y + wide - 0.5, rows - 1.0)), qd.i32), rows - 1)
-        box[2] = qd.max(qd.cast(qd.ceil(qd.max(place.x - wide - 0.5, 0.0)), qd.i32), 0)
-        box[3] = qd.min(qd.cast(qd.floor(qd.min(place.x + wide - 0.5, columns - 1.0)), qd.i32), columns - 1)
+        box[0], box[1] = pixels_between(place.y - wide - 0.5, place.y + wide - 0.5, rows)
+        box[2], box[3] = pixels_between(place.x - wide - 0.5, place.x + wide - 0.5, columns)
     return vec4(place.x, place.y, inverse, tall), box
 
 

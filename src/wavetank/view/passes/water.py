@@ -33,7 +33,8 @@ from wavetank.view.look import Look
 from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, refracted
 from wavetank.view.optics.glass import line_cover, slack
-from wavetank.view.optics.maps import picture_at, thickness_at
+from wavetank.view.optics.maps import margins_inside, picture_at, thickness_at
+from wavetank.view.optics.marks import rim_cover, rim_key
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.panes import share_before_wall, share_behind, tank_interval
 from wavetank.view.optics.radiance import environment, glint, smoothstep
@@ -125,8 +126,8 @@ def lay(
                                 there = 1.0 - share_behind(z, ends[1], rise, vec2(turns.z, turns.w))
                     rim = surface.rim[row, column]
                     if rim > 0:
-                        edge = qd.bit_cast((0xFFFFFF - (rim & 0xFFFFFF)) << 7, qd.f32)
-                        cover = ((rim >> 24) + 0.5) / 127.0
+                        edge = qd.bit_cast(rim_key(rim), qd.f32)
+                        cover = rim_cover(rim)
                         if edge + optics.spacing > z:
                             there *= qd.select(wet < 1.0, cover, 1.0)
                             cover = 0.0
@@ -197,8 +198,7 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
     c = to_view(lens, start + way * direction)
     if c.z > lens.near:
         there = to_pixel(lens, c)
-        rows, columns = pixels.depth.shape[0], pixels.depth.shape[1]
-        inside = qd.min(there.x, columns - there.x, there.y, rows - there.y) / (0.1 * rows)
+        inside = margins_inside(pixels.depth, there, 0.1)
         if inside > 0.0:
             if qd.bit_cast(pixels.depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32) > z:
                 result += smoothstep(inside) * (picture_at(backdrop.behind, there) - result)
