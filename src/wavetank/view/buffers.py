@@ -27,7 +27,7 @@ class Pixels:
     surface: qd.types.ndarray()  # i32: place of the particle in device order, or NOTHING, SOLID, FLOOR
     normal: qd.types.ndarray()  # vec3, unit, in the world
     color: qd.types.ndarray()  # vec3, linear RGB: albedo until the shade pass, radiance from then on
-    lines: qd.types.ndarray()  # i32: share 0 to 255 that an edge of the tank covers, << 23, | 2^23 - 1 - depth >> 8
+    lines: qd.types.ndarray()  # i32: marks of the edges of the tank, see `optics/marks.py`; or 0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from wavetank.view.look import Look, fluid_optics, paper, pool, studio, usual_de
 from wavetank.view.passes import tonemap
 from wavetank.view.quantities import QUANTITIES, Coloring, usual
 from wavetank.view.shot import Shot
-from wavetank.view.stages import Stages, Sunlit, eye_and_style, sun_and_solids
+from wavetank.view.stages import Stages, Sunlight, eye_and_style, sun_and_solids
 from wavetank.view.style import QUALITIES, Style, quality_named
 from wavetank.view.views import Pass, View
 from wavetank.view.water_buffers import sun_texels, water_of
@@ -121,7 +121,7 @@ class Renderer:
         """Fill `color`; what does not change is kept from the picture before, and comes out as it would anew."""
         if kind.still:
             cast, water = sun_and_solids(shot), self.buffers.water
-            stages = {"shadows": cast, "still": (cast, eye_and_style(shot), water), "sunny": Sunlit(cast, water, lit)}
+            stages = {"shadows": cast, "still": (cast, eye_and_style(shot), water), "sunny": Sunlight(cast, water, lit)}
             for stage, of in stages.items():
                 self._renew(stage, of, kind, shot, timings)
         self._run(kind.passes, shot, timings)

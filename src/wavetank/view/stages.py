@@ -40,7 +40,7 @@ class Rest:
 
 
 @dataclasses.dataclass(frozen=True)
-class Sunlit:
+class Sunlight:
     """What the light in the water was found for."""
 
     cast: tuple[Any, ...]  # sun and solids

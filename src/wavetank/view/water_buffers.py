@@ -32,7 +32,7 @@ class WaterSurface:
     """The surface of the water as the eye sees it, [rows, columns], on the device."""
 
     depth: qd.types.ndarray()  # i32: bits of the depth [m], FARTHEST where there is none
-    rim: qd.types.ndarray()  # i32: share 0 to 127 that an outline covers, << 24, | 2^24 - 1 - depth >> 7; or 0
+    rim: qd.types.ndarray()  # i32: marks of its outlines, see `optics/marks.py`; or 0
     nearest: qd.types.ndarray()  # i32: bits of the depth [m] of what is seen, water or not; scratch before
 
 
@@ -103,9 +103,8 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
         return water
     rows, columns, texels = buffers.rows, buffers.columns, sun_texels(extent)
     stained = qd.ndarray(qd.i32, shape=(1,))
-    fields: dict[str, Any]
     if water is not None:  # only the particles or the scene changed
-        fields = {name: getattr(water, name) for name in ("surface", "backdrop", "light")}
+        fields: dict[str, Any] = {name: getattr(water, name) for name in ("surface", "backdrop", "light")}
         fields["thickness"] = dataclasses.replace(water.thickness, stained=stained)
     else:
         fields = {

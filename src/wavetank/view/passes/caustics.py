@@ -29,9 +29,7 @@ def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
 
 
 @qd.kernel(fastcache=True)
-def gather(
-    sunlit: SunlitWater, thickness: qd.types.ndarray(), sun: Lens, to_sun: vec3, unit: qd.f32, spacing: qd.f32
-):  # fmt: skip
+def gather(sunlit: SunlitWater, thickness: qd.types.ndarray(), sun: Lens, to_sun: vec3, unit: qd.f32, spacing: qd.f32):
     """Send four bundles of light through every texel of the sun's view and count where they land."""
     texels = sunlit.depth.shape[0]
     for row, column in qd.ndrange(texels, texels):

@@ -72,9 +72,7 @@ def shape(dim: int, d: float) -> Shape:
 
 
 @qd.kernel(fastcache=True)
-def fit(
-    ellipsoids: Ellipsoids, cells: Cells, walls: Box, shape: Shape, dim: qd.template(), count: qd.i32
-):  # fmt: skip
+def fit(ellipsoids: Ellipsoids, cells: Cells, walls: Box, shape: Shape, dim: qd.template(), count: qd.i32):
     """Fit an ellipsoid to the neighbourhood of every particle that may be seen."""
     for k in range(cells.cells):
         cells.fill[k] = 0

@@ -40,9 +40,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     frame, pixels, largest = shot.frame, buffers.pixels, max(LARGEST * buffers.rows, 1.0)
     splat(pixels.depth, frame.x, shot.lens, shot.radius, largest, frame.count)
     claim(pixels, frame.x, shot.lens, shot.radius, largest, frame.count)
-    paint(
-        pixels, frame.x, frame.v, frame.rho, frame.material, frame.dye, shot.lens, shot.coloring, shot.quantity
-    )  # fmt: skip
+    paint(pixels, frame.x, frame.v, frame.rho, frame.material, frame.dye, shot.lens, shot.coloring, shot.quantity)
 
 
 def draw_from_sun(shot: Shot, buffers: Buffers) -> None:

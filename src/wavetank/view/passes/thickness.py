@@ -53,9 +53,7 @@ def add_up(shot: Shot, water: WaterBuffers, thickness: Thickness, lens: Lens, co
     disc = remembered(Disc(radius=DISC[frame.dim] * shot.extent.spacing, peak=peak(frame.dim), coarse=coarse))
     rows, columns = thickness.water.shape
     parts = int(thickness.sums.shape[0]) // int(rows * columns)
-    add(
-        thickness, cells.x, strips_of(thickness.water), lens, disc, parts, int(threads() > 0), frame.count
-    )  # fmt: skip
+    add(thickness, cells.x, strips_of(thickness.water), lens, disc, parts, int(threads() > 0), frame.count)
     stain(thickness, cells, frame.dye, frame.material, water.stains, lens, disc, frame.count)
 
 
