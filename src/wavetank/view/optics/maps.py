@@ -44,3 +44,13 @@ def margins_inside(picture: qd.template(), place, wide):
     """How far inside of a picture a place (column, row) lies, in margins of the width `wide` [picture heights]."""
     rows, columns = picture.shape[0], picture.shape[1]
     return qd.min(place.x, columns - place.x, place.y, rows - place.y) / (wide * rows)
+
+
+@qd.func
+def gap_at(sun_depth: qd.template(), place, depth):
+    """Way [m] that a point at `depth` lies below what the sun sees first; negative outside of the map."""
+    row, column = qd.cast(qd.floor(place.y), qd.i32), qd.cast(qd.floor(place.x), qd.i32)
+    gap = -1e9
+    if row >= 0 and column >= 0 and row < sun_depth.shape[0] and column < sun_depth.shape[1]:
+        gap = depth - qd.bit_cast(sun_depth[row, column], qd.f32)
+    return gap

@@ -1,9 +1,9 @@
 """Where the surface of the water meets the walls of the tank.
 
-The surface is splatted and smoothed as if the water went on behind the panes (`ellipsoids.py`), so that it crosses
-them as smoothly as it is anywhere else. What of a line of sight lies outside of the tank is then left out here: where
-the surface is met before the tank is entered, the water begins at the pane; where it is met behind the tank, there is
-none. Both happen along a line in the picture, and a pixel on that line has a share of both.
+The surface is splatted and smoothed as if the water went on behind the panes (`passes/ellipsoids.py`), so that it
+crosses them as smoothly as it is anywhere else. What of a line of sight lies outside of the tank is then left out here:
+where the surface is met before the tank is entered, the water begins at the pane; where it is met behind the tank,
+there is none. Both happen along a line in the picture, and a pixel on that line has a share of both.
 
     code        symbol   meaning                                                             unit
     first, last          depths at which a ray enters and leaves the tank                    m

@@ -2,7 +2,7 @@
 
 Light from the whole sky reaches an eye under water through a circle of 48.6 degrees around the zenith (Snell's window,
 R. W. Wood 1911); beyond it the surface reflects all that is below. The surface is the one that the sun sees
-(`sunlight.py`): a ray is followed in even steps through the sun's map of depths until it comes out of the water, and
+(`SunlitWater`): a ray is followed in even steps through the sun's map of depths until it comes out of the water, and
 the place is then found by halving. What bulges beyond the sun's view is not known to the map.
 
     code      symbol   meaning                                                        unit

@@ -27,6 +27,7 @@ from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.colormaps import rgb_of, to_linear
 from wavetank.view.lens import Lens, pixels_per_metre, to_pixel, to_view, vec3, vector
 from wavetank.view.optics.glass import line_cover, slack
+from wavetank.view.optics.maps import gap_at
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import water_of
 
@@ -116,13 +117,7 @@ def size_and_strength(kind, share, number):
 def sunlit(sun: Lens, sun_depth: qd.template(), x, slack):
     """1 where the sun sees the point `x`, 0 where something is in the way."""
     c = to_view(sun, x)
-    place = to_pixel(sun, c)
-    row, column = qd.cast(qd.floor(place.y), qd.i32), qd.cast(qd.floor(place.x), qd.i32)
-    share = 1.0
-    if row >= 0 and column >= 0 and row < sun_depth.shape[0] and column < sun_depth.shape[1]:
-        if c.z - slack > qd.bit_cast(sun_depth[row, column], qd.f32):
-            share = 0.0
-    return share
+    return qd.select(gap_at(sun_depth, to_pixel(sun, c), c.z - slack) > 0.0, 0.0, 1.0)
 
 
 @qd.kernel(fastcache=True)

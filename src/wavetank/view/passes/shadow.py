@@ -15,6 +15,7 @@ smooth pass averages that pattern away.
 from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers, Light, Pixels
 from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec2, vec3
+from wavetank.view.optics.maps import gap_at
 from wavetank.view.optics.probes import pattern_turn, spiral, turned
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
@@ -48,16 +49,6 @@ def shine(light: Light):
     """Full sun everywhere."""
     for row, column in qd.ndrange(light.share.shape[0], light.share.shape[1]):
         light.share[row, column] = vec2(1.0, 1.0)
-
-
-@qd.func
-def gap_at(sun_depth: qd.template(), place, depth):
-    """Way [m] that a point at `depth` lies below what the sun sees first; negative outside of the map."""
-    row, column = qd.cast(qd.floor(place.y), qd.i32), qd.cast(qd.floor(place.x), qd.i32)
-    gap = -1e9
-    if row >= 0 and column >= 0 and row < sun_depth.shape[0] and column < sun_depth.shape[1]:
-        gap = depth - qd.bit_cast(sun_depth[row, column], qd.f32)
-    return gap
 
 
 @qd.kernel(fastcache=True)
