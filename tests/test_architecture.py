@@ -89,6 +89,12 @@ def test_the_rooms_are_those_of_the_plan():
     assert len(entries) <= MOST_ENTRIES
 
 
+@pytest.mark.parametrize("path", sorted((PACKAGE / "view" / "passes").glob("*.py")), ids=lambda p: p.stem)
+def test_a_pass_knows_no_other_pass(path):
+    """What passes share lies beside them; which pass comes after which is for `views.py` to say."""
+    assert not {name for name in imports(path) if name.startswith("wavetank.view.passes")}
+
+
 #: the one room of an optional package: nothing but `play`, inside its functions, may import the window
 WINDOW = {"imgui_bundle", "moderngl", "glfw"}
 
