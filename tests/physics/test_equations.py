@@ -146,7 +146,7 @@ def test_calm_water_is_not_pushed():
 def test_solid_rotation_has_twice_its_rate_as_vorticity():
     """curl of omega x r is 2 omega; inside a lattice Eq. 9 finds it up to the kernel's lattice error."""
     import wavetank as wt
-    from wavetank.physics.step import coefficients
+    from wavetank.physics.coefficients import coefficients
     from wavetank.simulation.simulation import Simulation
 
     axis = np.arange(-5, 6) * 0.1

@@ -14,8 +14,8 @@ from wavetank.lab.cases.energy import energies
 from wavetank.physics.grid_pressure import coarse_grid, poisson
 from wavetank.physics.grid_pressure import correction as coarse_pressure
 from wavetank.physics.grid_pressure.coarse_grid import new_levels
+from wavetank.physics.plan import has_grid_pressure
 from wavetank.physics.smoothing import NAMES, kernel_shape, rest_lattice
-from wavetank.physics.step import has_grid_pressure
 from wavetank.scene.fluids import Points
 from wavetank.simulation.simulation import Simulation
 

@@ -19,6 +19,7 @@ import numpy as np
 from wavetank.device.compiler import qd, upload
 
 Numbers = TypeVar("Numbers")
+Together = TypeVar("Together")
 NOWHERE = 1e6  # m, in every direction
 MARGIN = 32  # rows behind the last particle that loops over whole blocks and groups may read
 
@@ -183,6 +184,16 @@ class Fluids:
         if "pairs" not in self.arrays or self.arrays["pairs"].shape[0] != size:
             self.arrays["pairs"] = scalars(size)
         return self.arrays["pairs"]
+
+    def together(self, kind: type[Together], *arrays: Any) -> Together:
+        """Return these arrays as one object of that frozen `kind`, the same one each time."""
+        known = self.arrays.setdefault(kind.__name__, {})
+        asked = tuple(map(id, arrays))
+        if asked not in known:
+            known.clear()
+            known[asked] = kind(*arrays)
+        made: Together = known[asked]
+        return made
 
 
 @dataclasses.dataclass(frozen=True)

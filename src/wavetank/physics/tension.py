@@ -35,13 +35,15 @@ import math
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import MARGIN, Coefficients, Fluids, Grid, Particles, Scratch, remembered, scalars
+from wavetank.device.state import MARGIN, Coefficients, Grid, Particles, Scratch, remembered, scalars
+from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import is_near
 from wavetank.physics.integrate import accelerate
-from wavetank.physics.mixture import Blend
+from wavetank.physics.mixture import Blend, fill_table, weigh
 from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3, vec4
 
 COHESION = 0.2  # share of the bond that alone would give the tension
@@ -221,12 +223,21 @@ def take_pull(particles: Particles, pulled: qd.types.ndarray(), c: Coefficients,
         accelerate(particles, i, v, c)
 
 
-def apply_tension(
-    particles: Particles, scratch: Scratch, fluids: Fluids, grid: Grid, solids: SolidSet, c: Coefficients,
-    kinds: Blend, count: int, ratio: float,
-) -> None:  # fmt: skip
-    """Let surfaces and solids pull the fluid for one substep; `ratio` is h / d."""
-    dim, d = particles.x.element_shape[0], c.h / ratio
+def prepare_fluids(world: World, kinds: Blend, params: Parameters, dt: float) -> None:
+    """Write what the fluids are to the device, for a step of `dt` [s]; weigh the particles where densities differ."""
+    fill_table(world.fluids, kinds, limited_tensions(kinds, params.dim, params.support, params.spacing, dt))
+    if kinds.mixed:
+        weigh(world.scratch, world.particles, world.fluids.rows, world.count)
+    elif world.fluids.weighed:
+        world.scratch.weight.fill(1.0)
+    world.fluids.weighed = bool(kinds.mixed)
+
+
+def apply_tension(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
+    """Let surfaces and solids pull the fluid for one substep."""
+    particles, grid, fluids, count = world.particles, world.grid, world.fluids, world.count
+    dim, ratio = params.dim, params.support
+    d = c.h / ratio
     if "adhesion table" not in fluids.arrays:
         fluids.arrays["adhesion table"] = scalars(TABLE_SIZE + 1)
         upload(fluids.arrays["adhesion table"], adhesion_table(dim, ratio))
@@ -241,5 +252,8 @@ def apply_tension(
     find_tensions(tension, particles, fluids.rows, count)
     find_surface(surface, tension, particles, grid, c, count, flat.gradient_scale, flat.quiet, grid.lanes)
     rate = c.dt / (kinds.largest_density * d**dim)
-    attract(pulled, surface, particles, scratch, fluids.rows, grid, solids, table, c, count, rate, adhesion, grid.lanes)
+    attract(
+        pulled, surface, particles, world.scratch, fluids.rows, grid, world.solids, table, c, count, rate, adhesion,
+        grid.lanes,
+    )  # fmt: skip
     take_pull(particles, pulled, c, count)

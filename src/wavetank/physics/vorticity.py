@@ -10,8 +10,8 @@ Macklin and Müller 2013; Eq. 9 and 10 of the report. In a 2-D world the vortici
 Where we differ, and why: N has length one even where eta is noise, so that Eq. 10 stirs water at rest. Noise differs
 from particle to particle, a vortex does not: |sum w omega_j| / sum w |omega_j| is 1 in a vortex and about 1 / sqrt(n)
 for n neighbours that turn at random. Below `vorticity_coherence` of it there is no force, nor where the water turns
-slower than the smallest waves do (`CALM` in step.py); a coherence of 0 leaves Eq. 10 as it is. The vorticity itself,
-Eq. 9, is summed in the sweep of XSPH (`xsph_viscosity.py`).
+slower than the smallest waves do (`CALM` in coefficients.py); a coherence of 0 leaves Eq. 10 as it is. The vorticity
+itself, Eq. 9, is summed in the sweep of XSPH (`xsph_viscosity.py`).
 """
 
 from wavetank.device.compiler import qd

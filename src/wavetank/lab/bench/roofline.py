@@ -29,8 +29,8 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.lab.bench.counts import water_bytes
 from wavetank.lab.bench.machine import load, machine
 from wavetank.lab.bench.scenes import check, measured, sized, timed
+from wavetank.physics.coefficients import coefficients
 from wavetank.physics.pairs import add_neighbors, count_neighbors, part_of, teams, turns
-from wavetank.physics.step import coefficients
 from wavetank.scene.scene import Scene
 from wavetank.simulation.simulation import Simulation
 

@@ -38,11 +38,11 @@ import math
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars
+from wavetank.device.state import Coefficients, Fluids, Grid, Particles, scalars
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import is_near
-from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE, solve
+from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE, Damping, solve
 from wavetank.physics.dynamic_viscosity.rigid_guess import FORGET, RIGID, SHEARED, STIFF, turn_along
 from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate, free_motion
@@ -51,6 +51,7 @@ from wavetank.physics.neighbors import MAX_ENTRIES
 from wavetank.physics.pairs import keep_pairs, part_of, teams, turns
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec4
 
 STIFFER = 3.0  # times as stiff as the rest lattice: water in motion, and the drag of walls
@@ -219,40 +220,38 @@ def is_thick(kinds: Blend, params: Parameters) -> bool:
     return usual_thickness(kinds.kinematic_viscosity, params) > THICK and any(params.gravity)
 
 
-def solve_viscosity(
-    particles: Particles, scratch: Scratch, fluids: Fluids, grid: Grid, solids: SolidSet, c: Coefficients,
-    kinds: Blend, count: int, ratio: float, no_slip: float, largest_number: int,
-) -> int:  # fmt: skip
-    """Make velocities and predicted positions those of viscous fluids; return the number of iterations it took.
+def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficients, most: int) -> int:
+    """Make velocities and predicted positions those of viscous fluids; return the number of iterations, `most` at most.
 
-    `ratio` is h / d; at most `largest_number` iterations are taken.
+    Raises `WavetankError` for more pairs than there is room for.
     """
-    dim = particles.x.element_shape[0]
-    d = c.h / ratio
+    particles, grid, fluids, count = world.particles, world.grid, world.fluids, world.count
+    dim, ratio = params.dim, params.support
+    rate = c.dt * damper_scale(dim, ratio, c.h / ratio) / kinds.largest_density
+    stiffest = 1.0 + STIFFER * rate * kinds.largest_density * kinds.kinematic_viscosity * stiffness(dim, ratio)
+    largest = STIFFEST / (STIFFER * rate * stiffness(dim, ratio))
     if "drag table" not in fluids.arrays:
         fluids.arrays["drag table"] = scalars(TABLE_SIZE + 1)
         upload(fluids.arrays["drag table"], drag_table(dim, ratio))
-    packed, drag, normal = (fluids.array(name) for name in ("packed", "drag", "normal"))
-    rate = c.dt * damper_scale(dim, ratio, d) / kinds.largest_density
     if 8 * grid.list.shape[0] > MAX_ENTRIES:
         raise WavetankError(
             f"{count:,} particles of viscous fluids are too many: what joins their pairs has at most {MAX_ENTRIES:,} "
             f"places, enough for {MAX_ENTRIES // grid.room:,} particles; use a larger spacing, less fluid, or "
             "viscosity = 0 in its materials and dynamic_viscosity = 0."
         )
+    packed, drag, normal = (fluids.array(name) for name in ("packed", "drag", "normal"))
     dampers = fluids.pairs(grid)
-    most = STIFFEST / (STIFFER * rate * stiffness(dim, ratio))
-    prepare(packed, drag, normal, particles, fluids.rows, solids, fluids.arrays["drag table"], c, count, no_slip, most)
+    prepare(
+        packed, drag, normal, particles, fluids.rows, world.solids, fluids.arrays["drag table"], c, count,
+        params.no_slip, largest,
+    )  # fmt: skip
     join_pairs(dampers, packed, particles, grid, c, count, grid.lanes)
-    stiffest = 1.0 + STIFFER * rate * kinds.largest_density * kinds.kinematic_viscosity * stiffness(dim, ratio)
     start(packed, particles, c, count)
     if stiffest > STIFF:
         turn_along(particles, packed, dampers, grid, c, count, RIGID / SHEARED[dim], FORGET, grid.lanes)
         start(packed, particles, c, count)
-    number = solve(
-        packed, dampers, drag, normal, particles, scratch, fluids, grid, c, count, rate,
-        iterations(min(stiffest, STIFFEST), largest_number),
-    )  # fmt: skip
+    damping = fluids.together(Damping, dampers, drag, normal)
+    number = solve(world, damping, packed, c, rate, iterations(min(stiffest, STIFFEST), most))
     take_velocities(particles, packed, c, count)
     return number
 

@@ -8,12 +8,13 @@ from wavetank.device.compiler import current_backend
 from wavetank.device.state import Air, remembered
 from wavetank.foundation.materials import Material
 from wavetank.foundation.params import SURFACE_TENSION, Parameters
+from wavetank.physics.coefficients import coefficients, method_number
 from wavetank.physics.foam.motion import move
 from wavetank.physics.foam.pool import bear, new_pool
 from wavetank.physics.foam.potentials import count_births
 from wavetank.physics.smoothing import sigma
-from wavetank.physics.step import World, coefficients, method_number
 from wavetank.physics.time_step import largest_speed
+from wavetank.physics.world import World
 
 RATE = 24.0  # births of a most agitated water particle in the time L / U, at foam = 1
 SPRAY_DRAG = 0.25  # U / L: the terminal speed of spray is U / 0.25
