@@ -32,11 +32,10 @@ def solve(cloud: Cloud, mixed: int) -> np.ndarray:
         cloud.count,
         cloud.method,
         mixed,
-        world.grid.lanes,
     )
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, cloud.c, cloud.count,
-        cloud.method, 0, mixed, 0, world.grid.lanes,
+        cloud.method, 0, mixed, 0,
     )  # fmt: skip
     return cloud.predictions(world.spare) - cloud.x
 
@@ -77,7 +76,7 @@ def test_smoothing_keeps_momentum_and_is_eq_11_for_equal_masses(dim):
     packed = world.fluids.array("packed")
     pack_weights(packed, world.particles, world.scratch, cloud.count)
     grid = world.grid
-    apply_mixed_viscosity(world.spare, world.particles, packed, grid, cloud.c, cloud.count, cloud.method, grid.lanes)
+    apply_mixed_viscosity(world.spare, world.particles, packed, grid, cloud.c, cloud.count, cloud.method)
     smoothed = world.spare.v.to_numpy()[: cloud.count].astype(np.float64)
     momentum = (smoothed - cloud.v) / w[:, None]
     assert np.abs(momentum.sum(axis=0)).max() < 1e-6 * np.abs(cloud.v).sum()

@@ -12,7 +12,7 @@ the compiler then knows the arguments of a launch, which else cost more than a s
 """
 
 import dataclasses
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -71,7 +71,7 @@ class Grid:
     number: qd.types.ndarray()  # i32 [groups]: entries of each group's list
     list: qd.types.ndarray()  # i32 [groups * room]: who is a neighbour of any of a group's eight particles
     room: qd.i32  # places for each group, a multiple of 16
-    lanes: qd.i32  # particles that are computed together: a group's, or one
+    lanes: Final[int]  # particles that are computed together: a group's, or one
     parts: qd.i32  # in which threads share a pass over pairs
     nowhere: qd.i32  # index of a particle that is far from all others
     nx: qd.i32  # cells before the pattern moves on along y
@@ -102,11 +102,13 @@ class CoarseGrid:
     nx: qd.i32
     ny: qd.i32
     nz: qd.i32  # 1 in 2-D
-    pieces: qd.i32  # along x, of so many nodes as a thread takes at once
+    pieces: qd.i32  # along x, of `width` nodes
     dx: qd.f32  # m: edges of a cell
     dy: qd.f32
     dz: qd.f32  # 1 in 2-D
     parts: qd.i32  # of the particles that have sums of their own
+    alone: Final[int]  # 1 where there are several, so that no thread waits for another, else 0
+    width: Final[int]  # nodes of a row that a thread takes at once
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

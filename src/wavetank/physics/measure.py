@@ -16,14 +16,14 @@ from wavetank.physics.world import World
 def update_densities(world: World, params: Parameters) -> None:
     """Measure the densities [kg/m^3] of `world` as it stands. The order of particles changes, the motion does not."""
     c, count, kinds = coefficients(params, 0.0), world.count, blend(world.materials, params)
-    predict(world.particles, world.grid, world.solids, c, count, int(world.has_solids), world.grid.lanes)
+    predict(world.particles, world.grid, world.solids, c, count, int(world.has_solids))
     sort_particles(world.particles, world.spare, world.grid, count)
     world.swap()
     world.grid = find_neighbors(world.particles, world.grid, c, count)
     prepare_fluids(world, kinds, params, params.frame_time)
     measure_density(
         world.scratch, world.particles, world.grid, world.solids, world.walls, c, count, kinds.largest_density,
-        method_number(params), world.grid.lanes,
+        method_number(params),
     )  # fmt: skip
 
 

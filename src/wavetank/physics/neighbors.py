@@ -28,8 +28,8 @@ from wavetank.device.compiler import lanes, qd, threads, worth_sharing
 from wavetank.device.state import Coefficients, Grid, Particles, integers
 from wavetank.device.sums import blocks_of, share_of, sort_by
 from wavetank.foundation.errors import WavetankError
-from wavetank.physics.pairs import part_of, turns
 from wavetank.physics.predicted_positions import predict_at, predicted
+from wavetank.physics.teams import end_of_part, first_of_part, turns_over
 
 PARTS = 8  # of a pass for each thread: enough to even out what takes longer
 MAX_ENTRIES = 2**31 - 1  # of a device array: the compiler counts them, and computes places in them, with 32 bits
@@ -97,7 +97,7 @@ def copy_particle(target: Particles, to, source: Particles, i):
 
 
 @qd.func
-def list_group(group, particles: Particles, grid: Grid, h2, count, lanes: qd.template()):
+def list_group(group, particles: Particles, grid: Grid, h2, count):
     """Write the neighbours of a group and return their number, even if it had no room."""
     room = grid.room
     dim = qd.static(particles.x[group].n)
@@ -131,9 +131,9 @@ def list_group(group, particles: Particles, grid: Grid, h2, count, lanes: qd.tem
                     end = grid.start[over]
                 while begin < end:
                     length = qd.min(end - begin, block)
-                    hits = near_bits(particles, run, begin, length, h2, lanes > 1)
+                    hits = near_bits(particles, run, begin, length, h2, grid.lanes > 1)
                     if begin_run > first:
-                        hits &= ~near_bits(particles, earlier, begin, length, h2, lanes > 1)
+                        hits &= ~near_bits(particles, earlier, begin, length, h2, grid.lanes > 1)
                     while hits != qd.u32(0):
                         grid.list[group * room + qd.min(n, room - 1)] = begin + qd.math.ffs(hits) - 1
                         hits &= hits - qd.u32(1)
@@ -147,16 +147,16 @@ def list_group(group, particles: Particles, grid: Grid, h2, count, lanes: qd.tem
 
 
 @qd.kernel(fastcache=True)
-def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()) -> qd.i32:
+def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.i32) -> qd.i32:
     """Write the neighbours of every group and return the largest number found, even if it had no room."""
     most = 0
-    for turn in range(turns((count + 7) >> 3, grid.parts, lanes)):
-        part = part_of(turn, (count + 7) >> 3, grid.parts, lanes)
-        for group in range(part[0], part[1]):
-            found = list_group(group, particles, grid, c.h * c.h, count, lanes)
-            if qd.static(lanes > 1):
+    for turn in range(turns_over((count + 7) >> 3, grid.parts, grid.lanes)):
+        begin = first_of_part(turn, (count + 7) >> 3, grid.parts, grid.lanes)
+        for group in range(begin, end_of_part(turn, (count + 7) >> 3, grid.parts, grid.lanes)):
+            found = list_group(group, particles, grid, c.h * c.h, count)
+            if qd.static(grid.lanes > 1):
                 qd.atomic_max(most, found)
-    if qd.static(lanes == 1):
+    if qd.static(grid.lanes == 1):
         for thread in range(16384):
             found = 0
             for k in range(share_of(thread, (count + 7) >> 3)):
@@ -262,11 +262,11 @@ def sort_particles(particles: Particles, spare: Particles, grid: Grid, count: in
 
 def find_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> Grid:
     """List the neighbours of sorted particles; return the grid, with larger lists where there was too little room."""
-    most = int(list_neighbors(particles, grid, c, count, grid.lanes))
+    most = int(list_neighbors(particles, grid, c, count))
     if most >= grid.room:
         room = _rounded(most)
         grid = dataclasses.replace(grid, room=room, list=_new_list(grid.order.shape[0], room))
-        list_neighbors(particles, grid, c, count, grid.lanes)
+        list_neighbors(particles, grid, c, count)
     return grid
 
 

@@ -37,7 +37,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     c = coefficients(params, dt, speed_limit, carries=plan.carried)
     world.keep_viscosity(plan.is_viscous)
 
-    predict(world.particles, world.grid, world.solids, c, world.count, plan.searched, world.grid.lanes)  # 1-4
+    predict(world.particles, world.grid, world.solids, c, world.count, plan.searched)  # 1-4
 
     sort_particles(world.particles, world.spare, world.grid, world.count)  # 5-7
     world.swap()
@@ -79,7 +79,6 @@ def correct_on_grid(world: World, plan: Plan, params: Parameters, c: Coefficient
     grid, of_heaviest = world.grid, 1.0
     measure_density(
         world.scratch, world.particles, grid, world.solids, world.walls, c, world.count, of_heaviest, plan.method,
-        grid.lanes,
     )  # fmt: skip
     correct_pressure(world, plan.kinds, params, c)
 
@@ -89,16 +88,16 @@ def find_multipliers(world: World, plan: Plan, c: Coefficients, *, first: bool) 
     scratch, particles, grid = world.scratch, world.particles, world.grid
     solids, walls, count = world.solids, world.walls, world.count
     if first:
-        start_multipliers(scratch, particles, grid, solids, walls, c, count, plan.method, plan.kinds.mixed, grid.lanes)
+        start_multipliers(scratch, particles, grid, solids, walls, c, count, plan.method, plan.kinds.mixed)
     else:
-        solve_multipliers(scratch, particles, grid, solids, walls, c, count, plan.method, grid.lanes)
+        solve_multipliers(scratch, particles, grid, solids, walls, c, count, plan.method)
 
 
 def apply_corrections(world: World, plan: Plan, c: Coefficients) -> None:
     """Move the predicted positions by what the multipliers say, outside of solids; ice stays."""
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, c, world.count,
-        plan.method, plan.tensile, plan.kinds.mixed, plan.searched, world.grid.lanes,
+        plan.method, plan.tensile, plan.kinds.mixed, plan.searched,
     )  # fmt: skip
     world.exchange("px", "py", "pz")
     if world.frozen:
@@ -110,11 +109,11 @@ def smooth_and_confine(world: World, plan: Plan, c: Coefficients) -> None:
     particles, spare, scratch, grid, count = world.particles, world.spare, world.scratch, world.grid, world.count
     mixed = plan.kinds.mixed and plan.is_smoothed
     if plan.turning or not mixed:
-        apply_viscosity(spare, particles, scratch, grid, c, count, plan.method, plan.turning, grid.lanes)
+        apply_viscosity(spare, particles, scratch, grid, c, count, plan.method, plan.turning)
     if mixed:
         packed = world.fluids.array("packed")
         pack_weights(packed, particles, scratch, count)
-        apply_mixed_viscosity(spare, particles, packed, grid, c, count, plan.method, grid.lanes)
+        apply_mixed_viscosity(spare, particles, packed, grid, c, count, plan.method)
     world.exchange("v")
     if plan.turning:
-        confine_vorticity(world.particles, scratch, grid, c, count, plan.method, grid.lanes)
+        confine_vorticity(world.particles, scratch, grid, c, count, plan.method)

@@ -40,9 +40,10 @@ from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import is_near
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend, fill_table, weigh
-from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
+from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3, vec4
 
@@ -166,16 +167,15 @@ def find_tensions(tension: qd.types.ndarray(), particles: Particles, rows: qd.ty
 @qd.kernel(fastcache=True)
 def find_surface(
     surface: qd.types.ndarray(), tension: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients,
-    count: qd.i32, scale: qd.f32, quiet: qd.f32, lanes: qd.template(),
+    count: qd.i32, scale: qd.f32, quiet: qd.f32,
 ):  # fmt: skip
     """Find where the surface is and which way it faces: g, without what is noise."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, grid.lanes)
             add_neighbors(sums, add_gradient, team, particles, tension, grid, c, 0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                g = column(sums, i - team * lanes)
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                g = column(sums, i - team * grid.lanes)
                 size = scale * g.norm()
                 g3 = lift(g) * (scale * qd.max(size - quiet, 0.0) / qd.max(size, 1e-12))
                 surface[i] = vec4(g3.x, g3.y, g3.z, tension[i])
@@ -185,17 +185,16 @@ def find_surface(
 def attract(
     pulled: qd.types.ndarray(), surface: qd.types.ndarray(), particles: Particles, scratch: Scratch,
     rows: qd.types.ndarray(), grid: Grid, solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, count: qd.i32,
-    rate: qd.f32, adhesion: qd.f32, lanes: qd.template(),
+    rate: qd.f32, adhesion: qd.f32,
 ):  # fmt: skip
     """Find the velocities after the pull of neighbours and solids; `rate` is dt over the largest mass of a particle."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, grid.lanes)
             add_neighbors(sums, add_pull, team, particles, surface, grid, c, 0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
                 p = predicted(particles, i)
-                force = column(sums, i - team * lanes)
+                force = column(sums, i - team * grid.lanes)
                 if particles.near[i] != 0:
                     last = table.shape[0] - 1
                     wetting = adhesion * surface[i].w * rows[particles.material[i]][3]
@@ -250,10 +249,9 @@ def apply_tension(world: World, kinds: Blend, params: Parameters, c: Coefficient
     stretch = pull * (1.0 - COHESION) * d ** (dim - 2) / flat.stress
     c = remembered(dataclasses.replace(c, skin=stretch, cohesion=pull * COHESION * adhesion))
     find_tensions(tension, particles, fluids.rows, count)
-    find_surface(surface, tension, particles, grid, c, count, flat.gradient_scale, flat.quiet, grid.lanes)
+    find_surface(surface, tension, particles, grid, c, count, flat.gradient_scale, flat.quiet)
     rate = c.dt / (kinds.largest_density * d**dim)
     attract(
         pulled, surface, particles, world.scratch, fluids.rows, grid, world.solids, table, c, count, rate, adhesion,
-        grid.lanes,
     )  # fmt: skip
     take_pull(particles, pulled, c, count)

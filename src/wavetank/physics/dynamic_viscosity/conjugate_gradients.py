@@ -31,7 +31,8 @@ from typing import Any
 
 from wavetank.device.compiler import current_backend, download, qd
 from wavetank.device.state import Coefficients, Grid, Particles, Scratch
-from wavetank.physics.pairs import add_kept, column, part_of, teams, turns
+from wavetank.physics.pairs import add_kept, column
+from wavetank.physics.teams import end_of, end_team, first_team, teams, turns
 from wavetank.physics.world import World
 from wavetank.solids.distance import vec3, vec4
 
@@ -81,18 +82,17 @@ def along_walls(pull, normal):
 @qd.kernel(fastcache=True)
 def start_residual(
     state: Iterates, particles: Particles, scratch: Scratch, damping: Damping, grid: Grid, c: Coefficients,
-    rate: qd.f32, count: qd.i32, lanes: qd.template(),
+    rate: qd.f32, count: qd.i32,
 ):  # fmt: skip
     """Set r = b - A x, where b are the velocities as they are and what moving walls add."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, grid.lanes)
             add_kept(sums, add_damping, team, particles, state.x, damping.pairs, grid, c, 0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
                 v = particles.v[i]
                 own = state.x[i]
-                force = column(sums, i - team * lanes)
+                force = column(sums, i - team * grid.lanes)
                 if particles.near[i] != 0:
                     drag = damping.drag[i]
                     wall = vec3(drag.x, drag.y, drag.z) - vec3(own.x, own.y, own.z) * drag.w
@@ -108,18 +108,17 @@ def start_residual(
 @qd.kernel(fastcache=True)
 def pull(
     state: Iterates, particles: Particles, scratch: Scratch, damping: Damping, grid: Grid, c: Coefficients,
-    rate: qd.f32, count: qd.i32, lanes: qd.template(),
+    rate: qd.f32, count: qd.i32,
 ):  # fmt: skip
     """Set A r, and each team's share of (r, r), (r, A r) and (x - b, x - b)."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, grid.lanes)
             add_kept(sums, add_damping, team, particles, state.residual, damping.pairs, grid, c, 0)
             product = vec4(0.0, 0.0, 0.0, 0.0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
                 r = state.residual[i]
-                force = column(sums, i - team * lanes)
+                force = column(sums, i - team * grid.lanes)
                 if particles.near[i] != 0:
                     wall = along_walls(vec3(r.x, r.y, r.z) * -damping.drag[i].w, damping.normal[i])
                     for k in qd.static(range(force.n)):
@@ -135,7 +134,7 @@ def pull(
 
 
 @qd.kernel(fastcache=True)
-def go_on(state: Iterates, first: qd.i32, looked: qd.i32, count: qd.i32, lanes: qd.template(), shared: qd.template()):
+def go_on(state: Iterates, grid: Grid, first: qd.i32, looked: qd.i32, count: qd.i32, shared: qd.template()):
     """Go on to the next x. Threads share the sums where `shared`.
 
     `totals` has (gamma, alpha, beta, 0), then (what was gained since it was `looked` at, (x - b, x - b), 0, 0), then
@@ -143,9 +142,9 @@ def go_on(state: Iterates, first: qd.i32, looked: qd.i32, count: qd.i32, lanes: 
     """
     qd.loop_config(serialize=not shared)
     for b in range(256):
-        size = (teams(count, lanes) + 255) // 256
+        size = (teams(grid, count) + 255) // 256
         total = vec4(0.0, 0.0, 0.0, 0.0)
-        for team in range(b * size, qd.min(b * size + size, teams(count, lanes))):
+        for team in range(b * size, qd.min(b * size + size, teams(grid, count))):
             total += state.products[team]
         state.totals[2 + b] = total
     qd.loop_config(serialize=True)
@@ -186,10 +185,10 @@ def solve(world: World, damping: Damping, x: Any, c: Coefficients, rate: float, 
     names = ("residual", "pulled", "direction", "slope", "products")
     state = fluids.together(Iterates, x, *map(fluids.array, names), fluids.array("totals", 2 + SLICES))
     shared = int(current_backend() != "cpu")
-    start_residual(state, particles, scratch, damping, grid, c, rate, count, grid.lanes)
+    start_residual(state, particles, scratch, damping, grid, c, rate, count)
     for number in range(most):
-        pull(state, particles, scratch, damping, grid, c, rate, count, grid.lanes)
-        go_on(state, int(number == 0), int(number % LOOK == 0), count, grid.lanes, shared)
+        pull(state, particles, scratch, damping, grid, c, rate, count)
+        go_on(state, grid, int(number == 0), int(number % LOOK == 0), count, shared)
         if (number + 1) % LOOK == 0 and number + 1 < most:
             gained, change = map(float, download(state.totals)[1][:2])
             if gained <= TOLERANCE**2 * change:

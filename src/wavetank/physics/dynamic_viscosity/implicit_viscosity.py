@@ -48,9 +48,10 @@ from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate, free_motion
 from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import MAX_ENTRIES
-from wavetank.physics.pairs import keep_pairs, part_of, teams, turns
+from wavetank.physics.pairs import keep_pairs
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.physics.teams import end_team, first_team, turns
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec4
 
@@ -149,13 +150,12 @@ def prepare(
 @qd.kernel(fastcache=True)
 def join_pairs(
     dampers: qd.types.ndarray(), packed: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients,
-    count: qd.i32, lanes: qd.template(),
+    count: qd.i32,
 ):  # fmt: skip
     """Keep the dampers of all pairs."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            keep_pairs(dampers, damper, team, particles, packed, grid, c, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            keep_pairs(dampers, damper, team, particles, packed, grid, c)
 
 
 @qd.kernel(fastcache=True)
@@ -245,10 +245,10 @@ def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficie
         packed, drag, normal, particles, fluids.rows, world.solids, fluids.arrays["drag table"], c, count,
         params.no_slip, largest,
     )  # fmt: skip
-    join_pairs(dampers, packed, particles, grid, c, count, grid.lanes)
+    join_pairs(dampers, packed, particles, grid, c, count)
     start(packed, particles, c, count)
     if stiffest > STIFF:
-        turn_along(particles, packed, dampers, grid, c, count, RIGID / SHEARED[dim], FORGET, grid.lanes)
+        turn_along(particles, packed, dampers, grid, c, count, RIGID / SHEARED[dim], FORGET)
         start(packed, particles, c, count)
     damping = fluids.together(Damping, dampers, drag, normal)
     number = solve(world, damping, packed, c, rate, iterations(min(stiffest, STIFFEST), most))

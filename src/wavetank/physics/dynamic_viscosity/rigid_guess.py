@@ -24,7 +24,8 @@ it forgets what it has, by 1 / (1 + `FORGET` |omega| dt / 2). Without that the t
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles
-from wavetank.physics.pairs import add_kept, column, part_of, teams, turns
+from wavetank.physics.pairs import add_kept, column
+from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.solids.distance import lift, vec3
 
 STIFF = 5000.0  # largest eigenvalue from which on it is done: of what is less stiff, iterations come to all modes
@@ -85,19 +86,18 @@ def spin(sums, gate):
 @qd.kernel(fastcache=True)
 def turn_along(
     particles: Particles, velocities: qd.types.ndarray(), dampers: qd.types.ndarray(), grid: Grid, c: Coefficients,
-    count: qd.i32, gate: qd.f32, forget: qd.f32, lanes: qd.template(),
+    count: qd.i32, gate: qd.f32, forget: qd.f32,
 ):  # fmt: skip
     """Turn what viscosity did in the last step with the `velocities` that particles have moved with since."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, qd.static(SIZE[particles.v[team].n]), lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, qd.static(SIZE[particles.v[team].n]), grid.lanes)
             add_kept(sums, add_spin, team, particles, velocities, dampers, grid, c, 0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
                 turned = particles.viscous[i]
                 own = lift(turned)
                 a = vec3(own.x, own.y, own.z)
-                half = 0.5 * c.dt * spin(column(sums, i - team * lanes), gate)
+                half = 0.5 * c.dt * spin(column(sums, i - team * grid.lanes), gate)
                 a += 2.0 / (1.0 + half.norm_sqr()) * half.cross(a + half.cross(a))
                 for k in qd.static(range(turned.n)):
                     turned[k] = a[k] / (1.0 + forget * half.norm())

@@ -49,9 +49,7 @@ def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> N
         # A fuller pool takes less, evenly everywhere, rather than all of what comes first.
         room = min(1.0, 2.0 * (1.0 - pool.count / pool.capacity))
         pool.set_reluctance(reluctance(world.materials, params))
-        number = count_births(
-            pool.births, water, grid, solids, world.walls, c, a, count, room, frame, method, grid.lanes, shared
-        )
+        number = count_births(pool.births, water, grid, solids, world.walls, c, a, count, room, frame, method, shared)
         if number:
             bear(pool.now, pool.births, water, grid, solids, c, a, count, pool.count, pool.born, frame)
         pool.count, pool.born = min(pool.count + int(number), pool.capacity), (pool.born + int(number)) % 2**31
@@ -63,9 +61,7 @@ def load_kernels(world: World, params: Parameters) -> None:
         return
     pool, c, a = new_pool(params.dim, 1, 1), coefficients(params, params.frame_time), air(params, 1, params.frame_time)
     water, grid, solids, shared = world.particles, world.grid, world.solids, int(current_backend() != "cpu")
-    count_births(
-        pool.births, water, grid, solids, world.walls, c, a, 0, 0.0, 0, method_number(params), grid.lanes, shared
-    )
+    count_births(pool.births, water, grid, solids, world.walls, c, a, 0, 0.0, 0, method_number(params), shared)
     bear(pool.now, pool.births, water, grid, solids, c, a, 0, 0, 0, 0)
     move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, 0, 0, shared)
 

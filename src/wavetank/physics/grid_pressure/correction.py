@@ -42,12 +42,23 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls, remembered
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
-from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, in_cells, nearest, piece_width, tents
+from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, in_cells, nearest, tents
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
 from wavetank.physics.mixture import Blend
-from wavetank.physics.pairs import column, part_of, teams, turns
+from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.smoothing import rest_lattice
+from wavetank.physics.teams import (
+    end_of,
+    end_of_part,
+    end_team,
+    first_of_part,
+    first_team,
+    part_of,
+    teams,
+    turns,
+    turns_over,
+)  # fmt: skip
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, signed_distance, to_local, vec3, vec4
 
@@ -94,11 +105,18 @@ def add_whole(sums: qd.template(), at, amount, alone: qd.template()):
 
 
 @qd.func
+def parts_of(grid: CoarseGrid, cells: Grid):
+    """Parts in which threads share the particles."""
+    return grid.parts if qd.static(grid.alone) else cells.parts
+
+
+@qd.func
 def add_fill(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, team, part, unit, count, mixed: qd.template(),
-    lanes: qd.template(), alone: qd.template(),
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, team, part, unit, count,
+    mixed: qd.template(),
 ):  # fmt: skip
     """Add the tents of a team's particles to the sums of a `part`, and those over their weights where `mixed`."""
+    lanes = qd.static(cells.lanes)
     first = team * lanes
     dim = qd.static(particles.x[first].n)
     at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
@@ -116,9 +134,9 @@ def add_fill(
                 masses[k, lane] = qd.cast(qd.round(w / scratch.weight[first + lane]), qd.i32)
     for lane in range(qd.min(lanes, count - first)):
         for k in qd.static(range(2**dim)):
-            add_whole(grid.sums, at[k, lane], amounts[k, lane], alone)
+            add_whole(grid.sums, at[k, lane], amounts[k, lane], grid.alone)
             if qd.static(mixed):
-                add_whole(grid.mass_sums, at[k, lane], masses[k, lane], alone)
+                add_whole(grid.mass_sums, at[k, lane], masses[k, lane], grid.alone)
 
 
 @qd.func
@@ -148,9 +166,10 @@ def approached(x, p, near, solids: SolidSet, walls: Walls, c: Coefficients, sear
 @qd.func
 def add_errors(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
-    e: Errors, team, part, count, searched: qd.template(), lanes: qd.template(), alone: qd.template(),
+    e: Errors, cells: Grid, team, part, count, searched: qd.template(),
 ):  # fmt: skip
     """Add the tents of a team's particles, if inside of the water, times their errors (Eq. 2) to a `part`'s sums."""
+    lanes = qd.static(cells.lanes)
     first = team * lanes
     dim = qd.static(particles.x[first].n)
     at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
@@ -179,7 +198,7 @@ def add_errors(
             amounts[k, lane] = qd.cast(qd.round(error * weights[k]), qd.i32)
     for lane in range(qd.min(lanes, count - first)):
         for k in qd.static(range(2**dim)):
-            add_whole(grid.sums, at[k, lane], amounts[k, lane], alone)
+            add_whole(grid.sums, at[k, lane], amounts[k, lane], grid.alone)
 
 
 @qd.func
@@ -243,22 +262,21 @@ def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: 
 
 @qd.kernel(fastcache=True)
 def gather(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
-    e: Errors, count: qd.i32, parts: qd.i32, searched: qd.template(), mixed: qd.template(), alone: qd.template(),
-    few: qd.template(), lanes: qd.template(), width: qd.template(),
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, solids: SolidSet, walls: Walls,
+    c: Coefficients, e: Errors, count: qd.i32, searched: qd.template(), mixed: qd.template(), few: qd.template(),
 ):  # fmt: skip
     """Sum the tents of all particles at the nodes, find gaps, sum density errors (Eq. 2), and set up the equation.
 
     The sums are 0 before. There are only the walls of the tank unless solids are `searched`. Where fluids are `mixed`,
     their densities are averaged.
 
-    Threads share the particles in `parts`. Where these are `alone`, each has sums of its own and waits for no other.
+    Threads share the particles in parts. Where these are alone, each has sums of its own and waits for no other.
     Where nodes are `few`, one thread is done with them before others have started.
     """
-    for turn in range(turns(teams(count, lanes), parts, lanes)):
-        part = part_of(turn, teams(count, lanes), parts, lanes)
-        for team in range(part[0], part[1]):
-            add_fill(grid, particles, scratch, team, alone * (turn >> 9), e.unit, count, mixed, lanes, alone)
+    for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
+        begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
+        for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
+            add_fill(grid, particles, scratch, cells, team, grid.alone * part_of(turn), e.unit, count, mixed)
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
@@ -270,11 +288,11 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.gaps[n] = gaps_at(grid, n, e.full)
-    for turn in range(turns(teams(count, lanes), parts, lanes)):
-        part = part_of(turn, teams(count, lanes), parts, lanes)
-        for team in range(part[0], part[1]):
+    for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
+        begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
+        for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
             add_errors(
-                grid, particles, scratch, solids, walls, c, e, team, alone * (turn >> 9), count, searched, lanes, alone
+                grid, particles, scratch, solids, walls, c, e, cells, team, grid.alone * part_of(turn), count, searched
             )
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
@@ -282,7 +300,7 @@ def gather(
         grid.rhs[n] = e.scale * total / qd.max(grid.room[n], e.least_open)
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
-        couple_nodes(grid, piece, e.least_theta, width)
+        couple_nodes(grid, piece, e.least_theta)
 
 
 @qd.func
@@ -312,7 +330,7 @@ def slope_along(grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), 
 @qd.kernel(fastcache=True)
 def move_particles(
     grid: CoarseGrid, particles: Particles, cells: Grid, solids: SolidSet, c: Coefficients, stiffness: qd.f32,
-    reach: qd.f32, count: qd.i32, few: qd.template(), lanes: qd.template(),
+    reach: qd.f32, count: qd.i32, few: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank, and carry it on.
 
@@ -324,19 +342,18 @@ def move_particles(
         grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
         grid.slope_y[n] = slope_across(grid.wy[n], grid.dy, grid.lam[n + grid.nx] - lam)
         grid.slope_z[n] = slope_across(grid.wz[n], grid.dz, grid.lam[n + grid.nx * grid.ny] - lam)
-    for turn in range(turns(teams(count, lanes), cells.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), cells.parts, lanes)
-        for team in range(part[0], part[1]):
-            first = team * lanes
+    for turn in range(turns(cells, count)):
+        for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
+            first = team * cells.lanes
             dim = qd.static(particles.x[first].n)
-            slopes = qd.Matrix.zero(qd.f32, dim, lanes)
-            for lane in range(lanes):
+            slopes = qd.Matrix.zero(qd.f32, dim, cells.lanes)
+            for lane in range(cells.lanes):
                 s = in_cells(grid, predicted(particles, first + lane))
                 slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, dim)
                 slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, dim)
                 if qd.static(dim == 3):
                     slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, dim)
-            for i in range(first, qd.min(first + lanes, count)):
+            for i in range(first, end_of(team, cells, count)):
                 p = predicted(particles, i)
                 dp = column(slopes, i - first) * stiffness
                 dp *= qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
@@ -360,13 +377,13 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         find_room(finest, world.solids, LEAST_OPEN, searched)
         world.room_version = world.solids_version
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
-    alone, few = finest.parts > 1, int(not is_shared(finest))
+    few = int(not is_shared(finest))
     gather(
-        finest, world.particles, world.scratch, world.solids, world.walls, c, errors(finest, params, stiffness), count,
-        finest.parts if alone else cells.parts, searched, kinds.mixed, int(alone), few, cells.lanes, piece_width(),
+        finest, world.particles, world.scratch, cells, world.solids, world.walls, c, errors(finest, params, stiffness),
+        count, searched, kinds.mixed, few,
     )  # fmt: skip
     solve_levels(world.levels)
-    move_particles(finest, world.particles, cells, world.solids, c, stiffness, REACH * c.h, count, few, cells.lanes)
+    move_particles(finest, world.particles, cells, world.solids, c, stiffness, REACH * c.h, count, few)
 
 
 def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
