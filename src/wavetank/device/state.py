@@ -20,7 +20,6 @@ from wavetank.device.compiler import qd, upload
 
 Numbers = TypeVar("Numbers")
 Together = TypeVar("Together")
-NOWHERE = 1e6  # m, in every direction
 MARGIN = 32  # rows behind the last particle that loops over whole blocks and groups may read
 
 
@@ -44,6 +43,12 @@ class Particles:
     near: qd.types.ndarray()  # i32 [capacity]: bit k is set where solid k is near, bit 30 for all solids from 30 on
     dye: qd.types.ndarray()  # i32 [capacity]: 0 or strength << 24 | red << 16 | green << 8 | blue, strength 1 .. 127
     frozen: qd.types.ndarray()  # i32 [capacity]: 1 where a particle is ice and keeps its place
+
+
+#: Arrays of particles that say what these are from step to step: they are saved, and move to larger arrays. The others
+#: follow from them, but for `viscous`, which goes along where fluids are viscous. All of them are sorted
+#: (`neighbors.copy_particle`) and written for new particles (`population.append_rows`).
+LASTING: tuple[str, ...] = ("x", "v", "a", "id", "dye", "frozen", "material")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -269,6 +274,30 @@ def exchanged(
 KINDS = ("water", "spray", "foam", "bubble")
 
 
+@qd.func
+def spray():
+    """Number of spray in KINDS."""
+    return 1
+
+
+@qd.func
+def foam():
+    """Number of foam in KINDS."""
+    return 2
+
+
+@qd.func
+def bubble():
+    """Number of bubbles in KINDS."""
+    return 3
+
+
+@qd.func
+def nowhere():
+    """Where the particle is that is nowhere [m], in every direction."""
+    return 1e6
+
+
 def vectors(dim: int, capacity: int) -> Any:
     """Allocate a device array of `capacity` vectors with `dim` float32 components."""
     return qd.ndarray(qd.types.vector(dim, qd.f32), shape=(max(capacity, 1),))
@@ -289,7 +318,7 @@ def new_particles(dim: int, capacity: int) -> Particles:
     rows = capacity + MARGIN
     px, py, pz = (scalars(rows if k < dim else 1) for k in range(3))
     places = np.zeros(rows, np.float32)
-    places[capacity] = NOWHERE
+    places[capacity] = nowhere.fn()
     for component in (px, py, pz)[:dim]:
         upload(component, places)
     x, v, a = (vectors(dim, rows) for _ in range(3))

@@ -23,7 +23,7 @@ import numpy as np
 from wavetank.device.compiler import download, qd
 from wavetank.device.state import Coefficients, Grid, Particles, integers
 from wavetank.physics.predicted_positions import predicted
-from wavetank.physics.teams import end_of, end_team, first_team, turns
+from wavetank.physics.teams import end_of, end_team, first_team, group_of, place_in_group, turns
 
 
 @qd.func
@@ -62,9 +62,9 @@ def keep_pairs(
     lanes = qd.static(grid.lanes)
     first = team * lanes
     own = _own(data, first, lanes)
-    begin = (first >> 3) * grid.room
+    begin = group_of(first) * grid.room
     found = qd.Matrix.zero(qd.f32, 4, lanes)  # what was stored at once might be one of the arrays that are read
-    for turn in range((grid.number[first >> 3] + 3) // 4):  # as far as visits in twos and fours come
+    for turn in range((grid.number[group_of(first)] + 3) // 4):  # as far as visits in twos and fours come
         n = begin + 4 * turn
         for lane in range(lanes):
             for k in qd.static(range(4)):
@@ -85,8 +85,8 @@ def _add(
     lanes = qd.static(sums.m)
     first = team * lanes
     own = _own(data, first, lanes)
-    begin = (first >> 3) * grid.room
-    end = begin + grid.number[first >> 3]
+    begin = group_of(first) * grid.room
+    end = begin + grid.number[group_of(first)]
     # A short loop over lanes would be unrolled before it can be computed as vectors: its visits come in twos or fours.
     size, dim = qd.static(sums.n, particles.x[first].n)
     pace = qd.static(1 if size > 3 else 4 if dim == 2 and size == 1 else 2)
@@ -131,7 +131,7 @@ def _place(n, first, lanes: qd.template()):
     """Where what is kept of the entry `n` of a list begins, for the team that begins with particle `first`."""
     place = 8 * n
     if qd.static(lanes == 1):
-        place += first & 7
+        place += place_in_group(first)
     return place
 
 

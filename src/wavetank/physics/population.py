@@ -13,12 +13,10 @@ does it on threads, as every particle or place is judged by itself.
 import numpy as np
 
 from wavetank.device.compiler import download, qd, upload
-from wavetank.device.state import Grid, Particles, integers, new_particles, vectors, with_viscosity
+from wavetank.device.state import LASTING, Grid, Particles, integers, new_particles, vectors, with_viscosity
 from wavetank.physics.neighbors import copy_particle
 from wavetank.physics.predicted_positions import predict_at
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3
-
-_FIELDS: tuple[str, ...] = ("x", "v", "a", "id", "material", "near", "dye", "frozen")
 
 
 @qd.func
@@ -68,15 +66,27 @@ def hold_frozen(particles: Particles, count: qd.i32):
             predict_at(particles, i, particles.x[i])
 
 
+@qd.func
+def forget_viscosity(particles: Particles, i):
+    """Forget what viscosity did to particle `i`, where that is known."""
+    if particles.viscous.shape[0] > 1:
+        particles.viscous[i] *= 0.0
+
+
+@qd.func
+def forget_forces(particles: Particles, i):
+    """Forget what accelerated particle `i` in the last step."""
+    particles.a[i] *= 0.0
+    forget_viscosity(particles, i)
+
+
 @qd.kernel(fastcache=True)
 def stop_frozen(particles: Particles, count: qd.i32):
     """Take the velocity from ice."""
     for i in range(count):
         if particles.frozen[i] == 1:
             particles.v[i] *= 0.0
-            particles.a[i] *= 0.0
-            if particles.viscous.shape[0] > 1:
-                particles.viscous[i] *= 0.0
+            forget_forces(particles, i)
 
 
 @qd.kernel(fastcache=True)
@@ -106,17 +116,14 @@ def copy_chosen(target: Particles, particles: Particles, grid: Grid, count: qd.i
     """
     for n in range(count):
         copy_particle(target, n, particles, grid.order[n])
-        if target.viscous.shape[0] > 1:
-            target.viscous[n] *= 0.0
+        forget_viscosity(target, n)
 
 
 @qd.kernel(fastcache=True)
 def clear_forces(particles: Particles, count: qd.i32):
     """Forget what accelerated the particles in the last step."""
     for i in range(count):
-        particles.a[i] *= 0.0
-        if particles.viscous.shape[0] > 1:
-            particles.viscous[i] *= 0.0
+        forget_forces(particles, i)
 
 
 @qd.kernel(fastcache=True)
@@ -209,9 +216,9 @@ def keep_only(particles: Particles, spare: Particles, grid: Grid, keep: np.ndarr
 
 def at_capacity(particles: Particles, dim: int, capacity: int) -> Particles:
     """Return a copy with room for `capacity` particles; where they are predicted to go is left open."""
-    larger, fields = new_particles(dim, capacity), _FIELDS
+    larger, names = new_particles(dim, capacity), LASTING
     if particles.viscous.shape == particles.x.shape:
-        larger, fields = with_viscosity(larger), (*_FIELDS, "viscous")
-    for name in fields:
+        larger, names = with_viscosity(larger), (*LASTING, "viscous")
+    for name in names:
         upload(getattr(larger, name), download(getattr(particles, name))[: capacity + 1])
     return larger

@@ -7,8 +7,7 @@ a processor and one on a graphics card:
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
             for i in range(team * grid.lanes, end_of(team, grid, count)):
 
-The compiler gives a thread 512 turns at least, which are too many teams to share them out evenly. On a processor the
-first of every 512 turns therefore takes a whole part of them, and the others nothing.
+Particles that share a neighbour list (`neighbors.py`) are a group, eight of them everywhere.
 """
 
 from wavetank.device.compiler import qd
@@ -16,17 +15,26 @@ from wavetank.device.state import Grid
 
 
 @qd.func
+def idle_turns():
+    """Turns of a part on a processor, as a power of two: the first takes the whole part, the others nothing.
+
+    The compiler gives a thread 512 turns at least, which are too many teams to share them out evenly.
+    """
+    return 9
+
+
+@qd.func
 def turns_over(number, parts, lanes: qd.template()):
     """Turns of a loop over so many things in equal `parts`."""
     if qd.static(lanes == 1):
         return number
-    return 512 * parts
+    return parts << idle_turns()
 
 
 @qd.func
 def part_of(turn):
     """Number of the part that a turn takes, if any, on a processor."""
-    return turn >> 9
+    return turn >> idle_turns()
 
 
 @qd.func
@@ -43,9 +51,27 @@ def end_of_part(turn, number, parts, lanes: qd.template()):
     if qd.static(lanes == 1):
         return turn + 1
     end = part_of(turn) * ((number + parts - 1) // parts)
-    if turn & 511 == 0:
+    if turn & ((1 << idle_turns()) - 1) == 0:
         end = qd.min(end + (number + parts - 1) // parts, number)
     return end
+
+
+@qd.func
+def groups(count):
+    """Number of groups of so many particles."""
+    return (count + 7) >> 3
+
+
+@qd.func
+def group_of(i):
+    """Number of the group of particle `i`."""
+    return i >> 3
+
+
+@qd.func
+def place_in_group(i):
+    """Which of the eight of its group particle `i` is."""
+    return i & 7
 
 
 @qd.func

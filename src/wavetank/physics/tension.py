@@ -42,7 +42,7 @@ from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend, fill_table, weigh
 from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.predicted_positions import predicted
-from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.physics.smoothing import TABLE_SIZE, interpolated, rest_points
 from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3, vec4
@@ -196,16 +196,13 @@ def attract(
                 p = predicted(particles, i)
                 force = column(sums, i - team * grid.lanes)
                 if particles.near[i] != 0:
-                    last = table.shape[0] - 1
                     wetting = adhesion * surface[i].w * rows[particles.material[i]][3]
                     for k in range(solids.count):
                         if is_near(particles.near[i], k) == 1:
                             value = signed_distance(solids, k, lift(p))
                             if value.w < c.h:
-                                t = qd.min(qd.max(value.w / c.h, 0.0), 1.0) * last
-                                m = qd.min(qd.cast(t, qd.i32), last - 1)
                                 n = vec3(value.x, value.y, value.z)
-                                share = wetting * (table[m] + (table[m + 1] - table[m]) * (t - m))
+                                share = wetting * interpolated(table, value.w / c.h)
                                 for axis in qd.static(range(p.n)):
                                     force[axis] -= share * n[axis]
                 v = lift(particles.v[i] + force * (rate * scratch.weight[i]))

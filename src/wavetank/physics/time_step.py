@@ -21,7 +21,7 @@ import numpy as np
 
 from wavetank.device.compiler import lanes, qd
 from wavetank.device.state import Particles
-from wavetank.device.sums import share_of
+from wavetank.device.sums import many_threads, share_of
 from wavetank.foundation.params import Parameters
 
 ALONE = 2.0 / 3.0  # of `courant` where iterations alone carry the pressure
@@ -102,10 +102,10 @@ def largest_square(particles: Particles, count: qd.i32, lanes: qd.template()) ->
     """Return the bits of the largest squared speed; on a graphics processor, `lanes` = 1, by few threads."""
     most = 0
     if qd.static(lanes == 1):
-        for thread in range(16384):
+        for thread in range(many_threads()):
             own = 0
             for k in range(share_of(thread, count)):
-                own = qd.max(own, square_at(particles, thread + 16384 * k))
+                own = qd.max(own, square_at(particles, thread + many_threads() * k))
             qd.atomic_max(most, own)
     else:
         for i in range(count):
@@ -131,10 +131,10 @@ def summed_levels(
     """Sum the heights along `up` above `base`, each in whole steps of `step` [m]: whole numbers repeat in any order."""
     levels = 0
     if qd.static(lanes == 1):
-        for thread in range(16384):
+        for thread in range(many_threads()):
             own = 0
             for k in range(share_of(thread, count)):
-                own += level_at(particles, thread + 16384 * k, up, base, step)
+                own += level_at(particles, thread + many_threads() * k, up, base, step)
             qd.atomic_add(levels, own)
     else:
         for i in range(count):

@@ -38,7 +38,6 @@ from wavetank.solids.distance import vec3, vec4
 
 TOLERANCE = 0.02  # of what viscosity changes in a step
 LOOK = 8  # iterations between two looks at the error: over fewer, what is slow to come seems to be there
-SLICES = 256  # of the sums; the kernel spells it out
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -60,7 +59,13 @@ class Iterates:
     direction: qd.types.ndarray()
     slope: qd.types.ndarray()
     products: qd.types.ndarray()  # vec4 [teams]: of each team
-    totals: qd.types.ndarray()  # vec4 [2 + SLICES], see `go_on`
+    totals: qd.types.ndarray()  # vec4 [2 + slices], see `go_on`
+
+
+@qd.func
+def slices():
+    """Slices of the teams, whose sums are added up in order."""
+    return 256
 
 
 @qd.func
@@ -141,8 +146,8 @@ def go_on(state: Iterates, grid: Grid, first: qd.i32, looked: qd.i32, count: qd.
     the slices.
     """
     qd.loop_config(serialize=not shared)
-    for b in range(256):
-        size = (teams(grid, count) + 255) // 256
+    for b in range(slices()):
+        size = (teams(grid, count) + slices() - 1) // slices()
         total = vec4(0.0, 0.0, 0.0, 0.0)
         for team in range(b * size, qd.min(b * size + size, teams(grid, count))):
             total += state.products[team]
@@ -150,7 +155,7 @@ def go_on(state: Iterates, grid: Grid, first: qd.i32, looked: qd.i32, count: qd.
     qd.loop_config(serialize=True)
     for _ in range(1):
         total = vec4(0.0, 0.0, 0.0, 0.0)
-        for b in range(256):
+        for b in range(slices()):
             total += state.totals[2 + b]
         gamma, delta = total.x, total.y
         before = state.totals[0]
@@ -183,7 +188,7 @@ def solve(world: World, damping: Damping, x: Any, c: Coefficients, rate: float, 
     """Solve for the velocities `x`, which hold where to start; return the number of iterations, at most `most`."""
     particles, scratch, grid, fluids, count = world.particles, world.scratch, world.grid, world.fluids, world.count
     names = ("residual", "pulled", "direction", "slope", "products")
-    state = fluids.together(Iterates, x, *map(fluids.array, names), fluids.array("totals", 2 + SLICES))
+    state = fluids.together(Iterates, x, *map(fluids.array, names), fluids.array("totals", 2 + slices.fn()))
     shared = int(current_backend() != "cpu")
     start_residual(state, particles, scratch, damping, grid, c, rate, count)
     for number in range(most):

@@ -50,7 +50,7 @@ from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import MAX_ENTRIES
 from wavetank.physics.pairs import keep_pairs
 from wavetank.physics.predicted_positions import predicted
-from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.physics.smoothing import TABLE_SIZE, interpolated, rest_points
 from wavetank.physics.teams import end_team, first_team, turns
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec4
@@ -127,15 +127,12 @@ def prepare(
         free = vec4(0.0, 0.0, 0.0, 0.0)
         if near != 0:
             p = lift(predicted(particles, i))
-            last = table.shape[0] - 1
             walls = 0
             for k in range(solids.count):
                 if is_near(near, k) == 1:
                     value = signed_distance(solids, k, p)
                     if value.w < c.h:
-                        t = qd.min(qd.max(value.w / c.h, 0.0), 1.0) * last
-                        m = qd.min(qd.cast(t, qd.i32), last - 1)
-                        share = table[m] + (table[m + 1] - table[m]) * (t - m)
+                        share = interpolated(table, value.w / c.h)
                         v = surface_velocity(solids, k, p, c.dt) * share
                         pull += vec4(v.x, v.y, v.z, share)
                         free = vec4(value.x, value.y, value.z, 0.0)

@@ -23,7 +23,33 @@ SWEEPS, MOST_SWEEPS = 8, 200  # of a level, and of the coarsest
 OVER_RELAXATION = 1.5
 LEAST_THETA = 0.1
 BLOCK_NODES = 8192  # at most, of a level that one block of a graphics processor sees to
-ZERO, FROM_COARSER, GO_ON = 0, 1, 2  # where a level starts
+
+
+@qd.func
+def start_at_zero():
+    """A level starts at 0."""
+    return 0
+
+
+@qd.func
+def start_from_coarser():
+    """A level starts at what the coarser one has found."""
+    return 1
+
+
+@qd.func
+def start_where_it_was():
+    """A level goes on."""
+    return 2
+
+
+ZERO, FROM_COARSER, GO_ON = (start.fn() for start in (start_at_zero, start_from_coarser, start_where_it_was))
+
+
+@qd.func
+def block_threads():
+    """Threads of a block of a graphics processor that see to a level."""
+    return 512
 
 
 @qd.func
@@ -93,9 +119,9 @@ def start_nodes(grid: CoarseGrid, coarser: CoarseGrid, row, first, last, start):
         n = grid.nx * row + x
         lam = 0.0
         if grid.inverse[n] > 0.0:
-            if start == 2:  # GO_ON
+            if start == start_where_it_was():
                 lam = grid.lam[n]
-            if start == 1:  # FROM_COARSER
+            if start == start_from_coarser():
                 lam = coarser.lam[below + (x >> halved)]
         grid.lam[n] = lam
 
@@ -186,19 +212,19 @@ def solve_in_block(
 
     Only those of a block can, so that this is for levels of some thousand nodes.
     """
-    qd.loop_config(block_dim=512)
-    for thread in range(512):
+    qd.loop_config(block_dim=block_threads())
+    for thread in range(block_threads()):
         pieces = grid.pieces * grid.ny * grid.nz
         piece = thread
         while piece < pieces:
             start_piece(grid, coarser, piece, start)
-            piece += 512
+            piece += block_threads()
         wait_for_block(fenced)
         for colour in range(2 * sweeps):
             piece = thread
             while piece < pieces:
                 relax_piece(grid, piece, colour, over_relaxation)
-                piece += 512
+                piece += block_threads()
             wait_for_block(fenced)
 
 
@@ -238,17 +264,17 @@ def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: 
 @qd.kernel(fastcache=True)
 def restrict_in_block(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, fenced: qd.template()):
     """Do what `restrict` does, in one launch of one block on a graphics processor."""
-    qd.loop_config(block_dim=512)
-    for thread in range(512):
+    qd.loop_config(block_dim=block_threads())
+    for thread in range(block_threads()):
         n = thread
         while n < coarse.nx * coarse.ny * coarse.nz:
             average_node(coarse, fine, n)
-            n += 512
+            n += block_threads()
         wait_for_block(fenced)
         piece = thread
         while piece < coarse.pieces * coarse.ny * coarse.nz:
             couple_nodes(coarse, piece, least_theta)
-            piece += 512
+            piece += block_threads()
 
 
 def is_shared(level: CoarseGrid) -> bool:
