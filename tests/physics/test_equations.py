@@ -8,7 +8,7 @@ from clouds import Cloud
 
 from wavetank.physics.density_constraint import correct_positions, schedule, start_multipliers
 from wavetank.physics.vorticity import confine_vorticity
-from wavetank.physics.xsph_viscosity import apply_viscosity
+from wavetank.physics.xsph_viscosity import apply_xsph
 
 CASES = [(2, "spiky"), (3, "spiky"), (3, "poly6-spiky"), (2, "cubic"), (3, "wendland")]
 cases = pytest.mark.parametrize(("dim", "kernel"), CASES)
@@ -27,7 +27,7 @@ def solve(cloud: Cloud) -> None:
 
 def smooth(cloud: Cloud, turning: int) -> None:
     world, grid = cloud.world, cloud.world.grid
-    apply_viscosity(world.spare, world.particles, world.scratch, grid, cloud.c, cloud.count, cloud.method, turning)
+    apply_xsph(world.spare, world.particles, world.scratch, grid, cloud.c, cloud.count, cloud.method, turning)
 
 
 def multipliers(cloud: Cloud) -> np.ndarray:
@@ -153,7 +153,7 @@ def test_solid_rotation_has_twice_its_rate_as_vorticity():
     sim.frame()
     world = sim.world
     c = coefficients(sim.scene, 0.01)
-    apply_viscosity(world.spare, world.particles, world.scratch, world.grid, c, sim.count, 2, 1)
+    apply_xsph(world.spare, world.particles, world.scratch, world.grid, c, sim.count, 2, 1)
     middle = np.argmin(np.linalg.norm(world.particles.x.to_numpy()[: sim.count], axis=1))
     assert world.scratch.omega.to_numpy()[middle] == pytest.approx([0, 0, 6], rel=0.05, abs=1e-3)
 

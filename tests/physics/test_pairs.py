@@ -31,9 +31,9 @@ PASSES = {
     "solve_multipliers": 1,
     "correct_positions": 1,
     "measure_density": 1,
-    "apply_viscosity": 1,
+    "apply_xsph": 1,
     "confine_vorticity": 1,
-    "join_pairs": 1,
+    "find_dampers": 1,
 }
 
 

@@ -190,7 +190,7 @@ def correct_positions(
 @qd.kernel(fastcache=True)
 def measure_density(
     scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
-    count: qd.i32, largest_density: qd.f32, method: qd.template(),
+    largest_density: qd.f32, count: qd.i32, method: qd.template(),
 ):  # fmt: skip
     """Estimate the densities [kg/m^3] at the positions p (Eq. 1), walls included."""
     for turn in range(turns(grid, count)):

@@ -22,7 +22,7 @@ def update_densities(world: World, params: Parameters) -> None:
     world.grid = find_neighbors(world.particles, world.grid, c, count)
     prepare_fluids(world, kinds, params, params.frame_time)
     measure_density(
-        world.scratch, world.particles, world.grid, world.solids, world.walls, c, count, kinds.largest_density,
+        world.scratch, world.particles, world.grid, world.solids, world.walls, c, kinds.largest_density, count,
         method_number(params),
     )  # fmt: skip
 

@@ -28,7 +28,7 @@ from wavetank.physics.population import hold_frozen, stop_frozen
 from wavetank.physics.tension import apply_tension, prepare_fluids
 from wavetank.physics.vorticity import confine_vorticity
 from wavetank.physics.world import World
-from wavetank.physics.xsph_viscosity import apply_mixed_viscosity, apply_viscosity
+from wavetank.physics.xsph_viscosity import apply_mixed_xsph, apply_xsph
 
 
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
@@ -54,7 +54,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         apply_corrections(world, plan, c)  # 12-18
 
     if plan.is_thick:
-        carry_on(world.particles, world.fluids, c, plan.kinds, params, world.count)
+        carry_on(world, plan.kinds, params, c)
     update_velocities(world.particles, c, world.count)  # 21, 23
     if world.has_friction:
         apply_friction(world.particles, world.scratch, world.solids, world.walls, c, world.count)
@@ -78,7 +78,7 @@ def correct_on_grid(world: World, plan: Plan, params: Parameters, c: Coefficient
     """Remove what the densities of the whole tank are off, before the iterations between particles."""
     grid, of_heaviest = world.grid, 1.0
     measure_density(
-        world.scratch, world.particles, grid, world.solids, world.walls, c, world.count, of_heaviest, plan.method,
+        world.scratch, world.particles, grid, world.solids, world.walls, c, of_heaviest, world.count, plan.method,
     )  # fmt: skip
     correct_pressure(world, plan.kinds, params, c)
 
@@ -109,11 +109,11 @@ def smooth_and_confine(world: World, plan: Plan, c: Coefficients) -> None:
     particles, spare, scratch, grid, count = world.particles, world.spare, world.scratch, world.grid, world.count
     mixed = plan.kinds.mixed and plan.is_smoothed
     if plan.turning or not mixed:
-        apply_viscosity(spare, particles, scratch, grid, c, count, plan.method, plan.turning)
+        apply_xsph(spare, particles, scratch, grid, c, count, plan.method, plan.turning)
     if mixed:
         packed = world.fluids.array("packed")
         pack_weights(packed, particles, scratch, count)
-        apply_mixed_viscosity(spare, particles, packed, grid, c, count, plan.method)
+        apply_mixed_xsph(spare, particles, packed, grid, c, count, plan.method)
     world.exchange("v")
     if plan.turning:
         confine_vorticity(world.particles, scratch, grid, c, count, plan.method)

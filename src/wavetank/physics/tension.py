@@ -157,6 +157,16 @@ def add_pull(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.t
         sums[k] -= tension * force[k]
 
 
+@dataclasses.dataclass(frozen=True)
+class Pull:
+    """Numbers of surfaces and walls that pull; those of pairs are `skin` and `cohesion` of the `Coefficients`."""
+
+    scale: qd.f32  # |g| over the sum of `add_gradient`
+    quiet: qd.f32  # |g| below which there is no surface
+    rate: qd.f32  # s/kg: dt over the largest mass of a particle
+    adhesion: qd.f32  # m^(dim - 2): pull of a wall that is wetted, over the tension and the table
+
+
 @qd.kernel(fastcache=True)
 def find_tensions(tension: qd.types.ndarray(), particles: Particles, rows: qd.types.ndarray(), count: qd.i32):
     """Write the tension of every particle."""
@@ -167,7 +177,7 @@ def find_tensions(tension: qd.types.ndarray(), particles: Particles, rows: qd.ty
 @qd.kernel(fastcache=True)
 def find_surface(
     surface: qd.types.ndarray(), tension: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients,
-    count: qd.i32, scale: qd.f32, quiet: qd.f32,
+    pull: Pull, count: qd.i32,
 ):  # fmt: skip
     """Find where the surface is and which way it faces: g, without what is noise."""
     for turn in range(turns(grid, count)):
@@ -176,18 +186,18 @@ def find_surface(
             add_neighbors(sums, add_gradient, team, particles, tension, grid, c, 0)
             for i in range(team * grid.lanes, end_of(team, grid, count)):
                 g = column(sums, i - team * grid.lanes)
-                size = scale * g.norm()
-                g3 = lift(g) * (scale * qd.max(size - quiet, 0.0) / qd.max(size, 1e-12))
+                size = pull.scale * g.norm()
+                g3 = lift(g) * (pull.scale * qd.max(size - pull.quiet, 0.0) / qd.max(size, 1e-12))
                 surface[i] = vec4(g3.x, g3.y, g3.z, tension[i])
 
 
 @qd.kernel(fastcache=True)
 def attract(
     pulled: qd.types.ndarray(), surface: qd.types.ndarray(), particles: Particles, scratch: Scratch,
-    rows: qd.types.ndarray(), grid: Grid, solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, count: qd.i32,
-    rate: qd.f32, adhesion: qd.f32,
+    rows: qd.types.ndarray(), grid: Grid, solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, pull: Pull,
+    count: qd.i32,
 ):  # fmt: skip
-    """Find the velocities after the pull of neighbours and solids; `rate` is dt over the largest mass of a particle."""
+    """Find the velocities after the pull of neighbours and solids."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
             sums = qd.Matrix.zero(qd.f32, particles.x[team].n, grid.lanes)
@@ -196,7 +206,7 @@ def attract(
                 p = predicted(particles, i)
                 force = column(sums, i - team * grid.lanes)
                 if particles.near[i] != 0:
-                    wetting = adhesion * surface[i].w * rows[particles.material[i]][3]
+                    wetting = pull.adhesion * surface[i].w * rows[particles.material[i]][3]
                     for k in range(solids.count):
                         if is_near(particles.near[i], k) == 1:
                             value = signed_distance(solids, k, lift(p))
@@ -205,7 +215,7 @@ def attract(
                                 share = wetting * interpolated(table, value.w / c.h)
                                 for axis in qd.static(range(p.n)):
                                     force[axis] -= share * n[axis]
-                v = lift(particles.v[i] + force * (rate * scratch.weight[i]))
+                v = lift(particles.v[i] + force * (pull.rate * scratch.weight[i]))
                 pulled[i] = vec4(v.x, v.y, v.z, 0.0)
 
 
@@ -242,13 +252,11 @@ def apply_tension(world: World, kinds: Blend, params: Parameters, c: Coefficient
     tension, table = fluids.arrays["tension"], fluids.arrays["adhesion table"]
     flat = flat_surface(dim, ratio)
     adhesion = flat.bond * d ** (dim - 2) / ratio
-    pull = CALIBRATION[dim]
-    stretch = pull * (1.0 - COHESION) * d ** (dim - 2) / flat.stress
-    c = remembered(dataclasses.replace(c, skin=stretch, cohesion=pull * COHESION * adhesion))
-    find_tensions(tension, particles, fluids.rows, count)
-    find_surface(surface, tension, particles, grid, c, count, flat.gradient_scale, flat.quiet)
+    stretch = CALIBRATION[dim] * (1.0 - COHESION) * d ** (dim - 2) / flat.stress
+    c = remembered(dataclasses.replace(c, skin=stretch, cohesion=CALIBRATION[dim] * COHESION * adhesion))
     rate = c.dt / (kinds.largest_density * d**dim)
-    attract(
-        pulled, surface, particles, world.scratch, fluids.rows, grid, world.solids, table, c, count, rate, adhesion,
-    )  # fmt: skip
+    pull = remembered(Pull(scale=flat.gradient_scale, quiet=flat.quiet, rate=rate, adhesion=adhesion))
+    find_tensions(tension, particles, fluids.rows, count)
+    find_surface(surface, tension, particles, grid, c, pull, count)
+    attract(pulled, surface, particles, world.scratch, fluids.rows, grid, world.solids, table, c, pull, count)
     take_pull(particles, pulled, c, count)

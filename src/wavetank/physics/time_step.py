@@ -87,7 +87,7 @@ def pool_depth(
     if not height:
         return 0.0
     base, along = float(ends.min(axis=0).sum()), np.array([*up, 0.0][:3], np.float32)
-    total = summed_levels(particles, count, along, base, height / LEVELS, lanes())
+    total = summed_levels(particles, along, base, height / LEVELS, count, lanes())
     return max(0.0, 2.0 * height / LEVELS * total / count)
 
 
@@ -125,7 +125,7 @@ def level_at(particles: Particles, i, up, base, step):
 
 @qd.kernel(fastcache=True)
 def summed_levels(
-    particles: Particles, count: qd.i32, up: qd.types.vector(3, qd.f32), base: qd.f32, step: qd.f32,
+    particles: Particles, up: qd.types.vector(3, qd.f32), base: qd.f32, step: qd.f32, count: qd.i32,
     lanes: qd.template(),
 ) -> qd.i32:  # fmt: skip
     """Sum the heights along `up` above `base`, each in whole steps of `step` [m]: whole numbers repeat in any order."""

@@ -55,7 +55,7 @@ def add_mixed_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, method
 
 
 @qd.kernel(fastcache=True)
-def apply_viscosity(
+def apply_xsph(
     smoothed: Particles, particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32,
     method: qd.template(), turning: qd.template(),
 ):  # fmt: skip
@@ -79,7 +79,7 @@ def apply_viscosity(
 
 
 @qd.kernel(fastcache=True)
-def apply_mixed_viscosity(
+def apply_mixed_xsph(
     smoothed: Particles, particles: Particles, packed: qd.types.ndarray(), grid: Grid, c: Coefficients, count: qd.i32,
     method: qd.template(),
 ):  # fmt: skip

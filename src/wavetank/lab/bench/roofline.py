@@ -62,7 +62,7 @@ COSTS: dict[str, Cost] = {
     "solve_multipliers": Cost(vectors=1, words=6, pair_words=0.4, operations=12, pair_operations=14),
     "correct_positions": Cost(vectors=2, words=3, pair_words=0.4, operations=12, pair_operations=24),
     "update_velocities": Cost(vectors=5, operations=24),
-    "apply_viscosity": Cost(vectors=3, words=1, pair_words=0.4, operations=7, pair_operations=22),
+    "apply_xsph": Cost(vectors=3, words=1, pair_words=0.4, operations=7, pair_operations=22),
     "confine_vorticity": Cost(vectors=4, words=1, pair_words=0.4, operations=25, pair_operations=36),
 }
 

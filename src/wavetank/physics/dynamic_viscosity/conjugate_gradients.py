@@ -59,7 +59,7 @@ class Iterates:
     direction: qd.types.ndarray()
     slope: qd.types.ndarray()
     products: qd.types.ndarray()  # vec4 [teams]: of each team
-    totals: qd.types.ndarray()  # vec4 [2 + slices], see `go_on`
+    totals: qd.types.ndarray()  # vec4 [2 + slices], see `iterate`
 
 
 @qd.func
@@ -111,7 +111,7 @@ def start_residual(
 
 
 @qd.kernel(fastcache=True)
-def pull(
+def multiply(
     state: Iterates, particles: Particles, scratch: Scratch, damping: Damping, grid: Grid, c: Coefficients,
     rate: qd.f32, count: qd.i32,
 ):  # fmt: skip
@@ -139,7 +139,7 @@ def pull(
 
 
 @qd.kernel(fastcache=True)
-def go_on(state: Iterates, grid: Grid, first: qd.i32, looked: qd.i32, count: qd.i32, shared: qd.template()):
+def iterate(state: Iterates, grid: Grid, first: qd.i32, looked: qd.i32, count: qd.i32, shared: qd.template()):
     """Go on to the next x. Threads share the sums where `shared`.
 
     `totals` has (gamma, alpha, beta, 0), then (what was gained since it was `looked` at, (x - b, x - b), 0, 0), then
@@ -192,8 +192,8 @@ def solve(world: World, damping: Damping, x: Any, c: Coefficients, rate: float, 
     shared = int(current_backend() != "cpu")
     start_residual(state, particles, scratch, damping, grid, c, rate, count)
     for number in range(most):
-        pull(state, particles, scratch, damping, grid, c, rate, count)
-        go_on(state, grid, int(number == 0), int(number % LOOK == 0), count, shared)
+        multiply(state, particles, scratch, damping, grid, c, rate, count)
+        iterate(state, grid, int(number == 0), int(number % LOOK == 0), count, shared)
         if (number + 1) % LOOK == 0 and number + 1 < most:
             gained, change = map(float, download(state.totals)[1][:2])
             if gained <= TOLERANCE**2 * change:

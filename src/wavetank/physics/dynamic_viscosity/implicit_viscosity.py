@@ -32,18 +32,19 @@ Where we differ, and why:
   `thickness` k: thin water carries nothing here, it would keep its noise. docs/materials.md has the figures.
 """
 
+import dataclasses
 import functools
 import math
 
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import Coefficients, Fluids, Grid, Particles, scalars
+from wavetank.device.state import Coefficients, Grid, Particles, remembered, scalars
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import is_near
 from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE, Damping, solve
-from wavetank.physics.dynamic_viscosity.rigid_guess import FORGET, RIGID, SHEARED, STIFF, turn_along
+from wavetank.physics.dynamic_viscosity.rigid_guess import FORGET, RIGID, SHEARED, STIFF, rotate_guess
 from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate, free_motion
 from wavetank.physics.mixture import Blend
@@ -109,10 +110,10 @@ def damper(square, a, b, c: Coefficients):
 
 
 @qd.kernel(fastcache=True)
-def prepare(
+def find_drag(
     packed: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles,
-    rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, count: qd.i32,
-    no_slip: qd.f32, most: qd.f32,
+    rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients,
+    no_slip: qd.f32, most: qd.f32, count: qd.i32,
 ):  # fmt: skip
     """Pack velocities and viscosities [Pa s], `most` at most, and find how fast the walls hold every particle back.
 
@@ -145,7 +146,7 @@ def prepare(
 
 
 @qd.kernel(fastcache=True)
-def join_pairs(
+def find_dampers(
     dampers: qd.types.ndarray(), packed: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients,
     count: qd.i32,
 ):  # fmt: skip
@@ -156,7 +157,7 @@ def join_pairs(
 
 
 @qd.kernel(fastcache=True)
-def start(velocities: qd.types.ndarray(), particles: Particles, c: Coefficients, count: qd.i32):
+def guess_velocities(velocities: qd.types.ndarray(), particles: Particles, c: Coefficients, count: qd.i32):
     """Start at the velocities that there are if viscosity does what it did in the last step; ice has none."""
     for i in range(count):
         for k in qd.static(range(particles.v[i].n)):
@@ -176,24 +177,30 @@ def take_velocities(particles: Particles, packed: qd.types.ndarray(), c: Coeffic
         accelerate(particles, i, v, c)
 
 
+@dataclasses.dataclass(frozen=True)
+class Carrying:
+    """How much of what pressed them thick fluids carry on."""
+
+    rate: qd.f32  # 1/(Pa s): `thickness` of the heaviest fluid over its viscosity
+    most: qd.f32  # share of the thickest
+    half: qd.f32  # thickness with half of that share
+    largest: qd.f32  # m/s^2
+    again: qd.f32  # of the push of this step: what has left the floor is not pushed any more
+
+
 @qd.kernel(fastcache=True)
-def carry_pressure(
-    particles: Particles, rows: qd.types.ndarray(), c: Coefficients, count: qd.i32, most: qd.f32, half: qd.f32,
-    rate: qd.f32, largest: qd.f32, again: qd.f32,
-):  # fmt: skip
+def carry_pressure(particles: Particles, rows: qd.types.ndarray(), c: Coefficients, carrying: Carrying, count: qd.i32):
     """Keep the share of what pressure and solids accelerated thick fluids by that the next prediction begins with.
 
-    It is called before velocities are read off. `rate` is the `thickness` of the heaviest fluid over its viscosity;
-    the share is `most`, half of that where the thickness is `half`, and no more than `largest` [m/s^2] is kept, nor
-    more than `again` times the push of this step: what has left the floor is not pushed any more.
+    It is called before velocities are read off.
     """
     for i in range(count):
         row = rows[particles.material[i]]
         pushed = predicted(particles, i) - free_motion(particles.x[i], particles.v[i], c)
         a = particles.a[i] + pushed / (c.dt * c.dt)
-        thick = rate * row[0] * row[1]
-        share = most * thick / (half + thick)
-        limit = qd.min(largest, again * pushed.norm() / (c.dt * c.dt))
+        thick = carrying.rate * row[0] * row[1]
+        share = carrying.most * thick / (carrying.half + thick)
+        limit = qd.min(carrying.largest, carrying.again * pushed.norm() / (c.dt * c.dt))
         particles.a[i] = a * (share * qd.min(1.0, limit / qd.max(a.norm(), 1e-12)))
 
 
@@ -238,27 +245,26 @@ def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficie
         )
     packed, drag, normal = (fluids.array(name) for name in ("packed", "drag", "normal"))
     dampers = fluids.pairs(grid)
-    prepare(
-        packed, drag, normal, particles, fluids.rows, world.solids, fluids.arrays["drag table"], c, count,
-        params.no_slip, largest,
+    find_drag(
+        packed, drag, normal, particles, fluids.rows, world.solids, fluids.arrays["drag table"], c,
+        params.no_slip, largest, count,
     )  # fmt: skip
-    join_pairs(dampers, packed, particles, grid, c, count)
-    start(packed, particles, c, count)
+    find_dampers(dampers, packed, particles, grid, c, count)
+    guess_velocities(packed, particles, c, count)
     if stiffest > STIFF:
-        turn_along(particles, packed, dampers, grid, c, count, RIGID / SHEARED[dim], FORGET)
-        start(packed, particles, c, count)
+        rotate_guess(particles, packed, dampers, grid, c, RIGID / SHEARED[dim], FORGET, count)
+        guess_velocities(packed, particles, c, count)
     damping = fluids.together(Damping, dampers, drag, normal)
     number = solve(world, damping, packed, c, rate, iterations(min(stiffest, STIFFEST), most))
     take_velocities(particles, packed, c, count)
     return number
 
 
-def carry_on(
-    particles: Particles, fluids: Fluids, c: Coefficients, kinds: Blend, params: Parameters, count: int
-) -> None:  # fmt: skip
+def carry_on(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
     """Let thick fluids carry on a share of what pressed them in this step."""
     rate, largest = thickness(1.0 / kinds.largest_density, params, c.dt), LARGEST * math.hypot(*params.gravity)
-    carry_pressure(particles, fluids.rows, c, count, CARRIED, HALF, rate, largest, AGAIN)
+    carrying = remembered(Carrying(rate=rate, most=CARRIED, half=HALF, largest=largest, again=AGAIN))
+    carry_pressure(world.particles, world.fluids.rows, c, carrying, world.count)
 
 
 def carried_share(kinds: Blend, params: Parameters) -> float:

@@ -1,9 +1,9 @@
-"""What viscosity did in the last step, turned as the fluid has turned since.
+"""The guess that conjugate gradients start at: what viscosity did in the last step, turned with the rotation since.
 
-Conjugate gradients start there (`implicit_viscosity.py`). What holds a spinning drop together points inwards; pointing
-where it did a step ago it has a torque. That a drop turns as a whole is the last thing that iterations come to where it
-is stiff, so the torques of all steps added up: a drop of 10^6 Pa s had 3 to 5 times its energy after two radians.
-Turned, it has what iterations from rest leave it, within 4 % (docs/materials.md).
+What holds a spinning drop together points inwards; pointing where it did a step ago it has a torque. That a drop turns
+as a whole is the last thing that iterations come to where it is stiff, so the torques of all steps added up: a drop of
+10^6 Pa s had 3 to 5 times its energy after two radians. Turned, it has what iterations from rest leave it, within 4 %
+(docs/materials.md).
 
     code      symbol                       meaning                                                     unit
     dv        v_i - v_j                    difference of the velocities that it has moved with since   m/s
@@ -41,8 +41,8 @@ SHEARED = {2: 0.15, 3: 8 / 75}
 
 
 @qd.func
-def add_spin(sums: qd.template(), r, damper, a, b, c: Coefficients, method: qd.template()):
-    """Add neighbour j to the sums."""
+def add_rotation(sums: qd.template(), r, damper, a, b, c: Coefficients, method: qd.template()):
+    """Add neighbour j to the sums that tell the rigid rotation."""
     dim = qd.static(r.n)
     dv, m = r, r
     along = 0.0
@@ -60,7 +60,7 @@ def add_spin(sums: qd.template(), r, damper, a, b, c: Coefficients, method: qd.t
 
 
 @qd.func
-def spin(sums, gate):
+def angular_velocity(sums, gate):
     """Return omega as far as the fluid turns as a whole, of a particle's sums; `gate` is RIGID / SHEARED."""
     omega = vec3(0.0, 0.0, 0.0)
     dim = qd.static(2 if sums.n == 5 else 3)
@@ -85,20 +85,20 @@ def spin(sums, gate):
 
 
 @qd.kernel(fastcache=True)
-def turn_along(
+def rotate_guess(
     particles: Particles, velocities: qd.types.ndarray(), dampers: qd.types.ndarray(), grid: Grid, c: Coefficients,
-    count: qd.i32, gate: qd.f32, forget: qd.f32,
+    gate: qd.f32, forget: qd.f32, count: qd.i32,
 ):  # fmt: skip
     """Turn what viscosity did in the last step with the `velocities` that particles have moved with since."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
             sums = qd.Matrix.zero(qd.f32, qd.static(5 if particles.v[team].n == 2 else 10), grid.lanes)
-            add_kept(sums, add_spin, team, particles, velocities, dampers, grid, c, 0)
+            add_kept(sums, add_rotation, team, particles, velocities, dampers, grid, c, 0)
             for i in range(team * grid.lanes, end_of(team, grid, count)):
                 turned = particles.viscous[i]
                 own = lift(turned)
                 a = vec3(own.x, own.y, own.z)
-                half = 0.5 * c.dt * spin(column(sums, i - team * grid.lanes), gate)
+                half = 0.5 * c.dt * angular_velocity(column(sums, i - team * grid.lanes), gate)
                 a += 2.0 / (1.0 + half.norm_sqr()) * half.cross(a + half.cross(a))
                 for k in qd.static(range(turned.n)):
                     turned[k] = a[k] / (1.0 + forget * half.norm())

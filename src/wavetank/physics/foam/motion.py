@@ -97,7 +97,7 @@ def kind_in(share):
 @qd.kernel(fastcache=True)
 def move(
     packed: Diffuse, diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients,
-    a: Air, count: qd.i32, frame: qd.i32, shared: qd.template(),
+    a: Air, frame: qd.i32, count: qd.i32, shared: qd.template(),
 ) -> qd.i32:  # fmt: skip
     """Move everything by one frame, and copy those who live on to the front, in their order.
 

@@ -140,7 +140,7 @@ def add_potentials(
 @qd.kernel(fastcache=True)
 def count_births(
     births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
-    count: qd.i32, room: qd.f32, frame: qd.i32, method: qd.template(), shared: qd.template(),
+    room: qd.f32, frame: qd.i32, count: qd.i32, method: qd.template(), shared: qd.template(),
 ) -> qd.i32:  # fmt: skip
     """Draw how many each water particle bears in an interval, of which the share `room` is wanted; return their sum.
 
