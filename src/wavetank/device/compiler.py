@@ -53,6 +53,8 @@ with contextlib.redirect_stdout(io.StringIO()), _short_frames():
     from quadrants.lang import (
         _func_base,
         _kernel_impl_dataclass,
+        _template_mapper,
+        _template_mapper_hotpath,
         _wrap_inspect,
         expr,
         impl,
@@ -120,6 +122,14 @@ if hasattr(expr, "_check_in_range"):
 _place_in_lines: Any = getattr(ast_transformer_utils.ASTTransformerFuncContext, "_build_pos_info", None)
 if _place_in_lines:
     ast_transformer_utils.ASTTransformerFuncContext._build_pos_info = _place_in_source
+# Where numbers of a frozen object are compiled into a kernel (`Final`), the compiler reads it anew in each launch, lest
+# their class has changed meanwhile: ours are plain integers.
+for _module, _asks in (
+    (_func_base, "subtree_has_final_fields"), (_template_mapper_hotpath, "subtree_has_final_fields"),
+    (_template_mapper, "annotation_has_final_subtree"),
+):  # fmt: skip
+    if hasattr(_module, _asks):
+        setattr(_module, _asks, lambda _: False)
 if hasattr(_kernel_impl_dataclass, "FlattenAttributeNameTransformer"):
     _kernel_impl_dataclass.unpack_ast_struct_expressions = _flatten_fields
 

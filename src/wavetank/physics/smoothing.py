@@ -98,6 +98,15 @@ def kernel(method: qd.template(), square):
     return qd.static(KERNELS[method])(square)
 
 
+@qd.func
+def interpolated(table: qd.template(), share):
+    """What a table of numbers says at that `share` of its length, 0 to 1, linear between its entries."""
+    last = table.shape[0] - 1
+    t = qd.min(qd.max(share, 0.0), 1.0) * last
+    k = qd.min(qd.cast(t, qd.i32), last - 1)
+    return table[k] + (table[k + 1] - table[k]) * (t - k)
+
+
 # --- on the host, in double precision ---
 
 

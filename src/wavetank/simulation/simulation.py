@@ -12,14 +12,15 @@ from wavetank.device import compiler
 from wavetank.device.state import KINDS, Fluids, Walls, new_particles, new_scratch, vectors
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import LIVE, refuse_assignment
-from wavetank.physics import measure, population
+from wavetank.physics import measure, plan, population
 from wavetank.physics.foam.pool import pool_from, pool_rows
-from wavetank.physics.foam.update import load_kernels, update_diffuse
+from wavetank.physics.foam.update import load_kernels, update_foam
 from wavetank.physics.grid_pressure.coarse_grid import new_levels
 from wavetank.physics.neighbors import list_room, new_grid
 from wavetank.physics.smoothing import half_space_table
-from wavetank.physics.step import World, capillary_speed, neighbor_numbers, step, steps_in, update_densities
+from wavetank.physics.step import step
 from wavetank.physics.time_step import filled_share, largest_speed, whole
+from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import MAX_PARTICLES, Scene
 from wavetank.simulation.frame import Frame
@@ -135,7 +136,7 @@ class Simulation:
                     force.apply(self.world.particles, self.count, duration / parts, self.time + duration * part / parts)
                 step(self.world, self.scene, duration / parts, limit)
         self.solids.move_to(0.0, 1.0)
-        update_diffuse(self.world, self.scene, duration, self.frame_number)
+        update_foam(self.world, self.scene, duration, self.frame_number)
         self.pushed = []
         self.solids.arrive()
         compiler.synchronize()
@@ -150,7 +151,7 @@ class Simulation:
         box = (np.zeros(scene.dim), np.array(scene.tank.size)) if scene.tank else self._start_box
         speed = max(self._solid_speed(duration), largest_speed(self.world.particles, self.count))
         speed += duration * sum(force.largest_acceleration() for force in forces)
-        return steps_in(self.world, scene, duration, speed, box, forced=bool(forces))
+        return plan.steps_in(self.world, scene, duration, speed, box, forced=bool(forces))
 
     def _solid_speed(self, duration: float) -> float:
         """Return the largest speed [m/s] at which any solid moves through the tank in this frame."""
@@ -168,7 +169,7 @@ class Simulation:
         pushes = sum(force.largest_speed() for force in (*self.forces, *self.pushed))
         self._fastest_force = max(self._fastest_force, pushes)
         given = math.sqrt(fall + self._fastest_start**2) + 2.0 * self._fastest_solid + self._fastest_force
-        return self.scene.speed_limit * max(given + capillary_speed(self.world, self.scene), 1e-6)
+        return self.scene.speed_limit * max(given + plan.capillary_speed(self.world, self.scene), 1e-6)
 
     # --- solids ---
 
@@ -340,15 +341,14 @@ class Simulation:
         return Frame(
             scene=self.scene, number=self.frame_number, time=self.time, count=world.count, x=world.particles.x,
             v=world.particles.v, rho=world.scratch.rho, id=world.particles.id, material=world.particles.material,
-            solids=world.solids,
+            solids=world.solids, dye=world.particles.dye,
             diffuse=world.pool.now if world.pool else None, foam_count=world.pool.count if world.pool else 0,
-            dye=world.particles.dye,
         )  # fmt: skip
 
     def stats(self) -> dict[str, float]:
         """Measure this instant; see `physics.measure.statistics` for the keys, and foam in numbers of particles."""
         frame = self.frame()
-        numbers = neighbor_numbers(self.world, self.scene)
+        numbers = measure.neighbor_numbers(self.world, self.scene)
         figures = measure.statistics(
             frame.positions, frame.velocities, frame.densities, numbers, self.scene, frame.rest_densities
         )
@@ -365,7 +365,7 @@ class Simulation:
     def _measure(self) -> None:
         """Renew neighbours and densities for the positions as they are."""
         if self._outdated and self.count:
-            update_densities(self.world, self.scene)
+            measure.update_densities(self.world, self.scene)
         self._outdated = False
 
     # --- parameters ---

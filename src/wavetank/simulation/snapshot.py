@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wavetank.device.compiler import download, upload
+from wavetank.device.state import LASTING
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.replacing import replacing
 from wavetank.physics.foam.pool import pool_from, pool_rows
@@ -19,7 +20,7 @@ from wavetank.solids.solid import Solid
 if TYPE_CHECKING:
     from wavetank.simulation.simulation import Simulation
 
-ARRAYS = ("x", "v", "a", "id", "dye", "frozen", "material")  # of the particles, in device order
+ARRAYS = LASTING  # of the particles, in device order
 VISCOUS = "viscous"  # the same, where there are viscous fluids
 NUMBERS = (
     "time", "frame_number", "owed", "next_id", "frozen_count", "fastest_start", "fastest_solid", "fastest_force",
