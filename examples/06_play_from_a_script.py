@@ -3,8 +3,7 @@
 from PIL import Image
 
 import wavetank as wt
-from wavetank.session import commands as do
-from wavetank.session.recording import Recording, digest, replay
+from wavetank import commands as do
 
 
 def down(x, y):
@@ -26,9 +25,9 @@ for frame in range(60):
     session.tick()
 session.apply(do.ToolEnd())
 
-recording = Recording.of(session, scene)
+recording = wt.Recording.of(session, scene)
 recording.save("session.toml")
-*_, again = replay(Recording.load("session.toml"))
-assert digest(again) == digest(session)
+*_, again = wt.replay(wt.Recording.load("session.toml"))
+assert again.sim.digest() == session.sim.digest()
 Image.fromarray(wt.render(again.sim, width=1200, height=700)).save("session.png")
 print(f"{session.sim.count:,} particles, {len(recording.commands)} commands, twice the same: session.toml, session.png")

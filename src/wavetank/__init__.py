@@ -7,11 +7,12 @@ sim.advance(0.5)
 image = wt.render(sim)
 """
 
-from importlib.metadata import version as _version
+import importlib
 from typing import TYPE_CHECKING, Any
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import PARAMETERS, PRESETS
+from wavetank.foundation.version import VERSION
 from wavetank.scene.fluids import Ball, Block, Points
 from wavetank.scene.scene import Scene, Tank, bundled_scenes
 from wavetank.solids.meshes.mesh import Mesh
@@ -19,40 +20,42 @@ from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace
 
 if TYPE_CHECKING:
     from wavetank.front.notebook import show
+    from wavetank.session import commands
+    from wavetank.session.recording import Recording, replay
     from wavetank.session.session import Session
     from wavetank.simulation.simulation import Simulation
     from wavetank.view.camera import Camera
     from wavetank.view.renderer import render
 
-__version__ = _version("wavetank")
+__version__ = VERSION
 
 __all__ = [
     "PARAMETERS", "PRESETS", "Ball", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference", "HalfSpace",
-    "Intersection", "Mesh", "Points", "Scene", "Session", "Simulation", "Sphere", "Tank", "Union", "WavetankError",
-    "bundled_scenes", "render", "show",
+    "Intersection", "Mesh", "Points", "Recording", "Scene", "Session", "Simulation", "Sphere", "Tank", "Union",
+    "WavetankError", "__version__", "bundled_scenes", "commands", "render", "replay", "show",
 ]  # fmt: skip
+
+#: what needs the kernels' sources is imported when it is first used: data alone should load fast
+LATER = {
+    "Camera": "wavetank.view.camera",
+    "Recording": "wavetank.session.recording",
+    "Session": "wavetank.session.session",
+    "Simulation": "wavetank.simulation.simulation",
+    "commands": "wavetank.session.commands",
+    "render": "wavetank.view.renderer",
+    "replay": "wavetank.session.recording",
+    "show": "wavetank.front.notebook",
+}
 
 
 def __getattr__(name: str) -> Any:
-    """Import what needs the kernels' sources only when it is first used: data alone should load fast."""
-    if name == "Simulation":
-        from wavetank.simulation.simulation import Simulation
+    """Import a name of `LATER`."""
+    if name not in LATER:
+        raise AttributeError(f"module 'wavetank' has no attribute {name!r}")
+    module = importlib.import_module(LATER[name])
+    return module if name == "commands" else getattr(module, name)
 
-        return Simulation
-    if name == "Session":
-        from wavetank.session.session import Session
 
-        return Session
-    if name == "show":
-        from wavetank.front.notebook import show
-
-        return show
-    if name == "Camera":
-        from wavetank.view.camera import Camera
-
-        return Camera
-    if name == "render":
-        from wavetank.view.renderer import render
-
-        return render
-    raise AttributeError(f"module 'wavetank' has no attribute {name!r}")
+def __dir__() -> list[str]:
+    """Name what there is, imported or not yet."""
+    return sorted({*globals(), *LATER})

@@ -88,15 +88,15 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Simulate a scene and write video, pictures, particles and figures."""
-    from wavetank.front.headless import record
+    from wavetank.front.headless import Order, record
     from wavetank.simulation.simulation import Simulation
 
     world = _configured(scene, settings)
-    figures = record(
-        Simulation(world, arch=arch), out, seconds=seconds, fps=fps, size=_size(size), name=name or Path(scene).stem,
-        video=video, gif=gif, frames=frames, exports=export, console=console, quality=quality, view=view,
-        color_by=color_by, cut=cut,
+    order = Order(
+        out, seconds, fps, _size(size), name or Path(scene).stem, video=video, gif=gif, frames=frames,
+        exports=tuple(export), quality=quality, look={"view": view, "color_by": color_by, "cut": cut},
     )  # fmt: skip
+    figures = record(Simulation(world, arch=arch), order, console)
     if as_json:
         print(json.dumps(figures))
     else:

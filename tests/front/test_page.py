@@ -153,7 +153,7 @@ def test_it_comes_back(open_page, browser):
     """A socket that breaks is opened again; the page goes on."""
     world = open_page()
     viewer = world.front.viewers.all[0]
-    asyncio.run_coroutine_threadsafe(viewer.socket.close(), world.front._loop).result(10)
+    asyncio.run_coroutine_threadsafe(viewer.socket.close(), world.front._events).result(10)
     until(lambda: world.front.viewers.all and world.front.viewers.all[0] is not viewer)
     browser.wait_for("document.title === 'wavetank' && document.querySelector('#veil.gone') !== null")
     first = browser.run(PICTURE)

@@ -195,7 +195,7 @@ def test_a_tool_pushes_the_water_and_ends(person):
 
 def test_buttons_wheel_and_keys_move_the_camera(person):
     person.key("h")
-    person.until(lambda: person.session._camera is None)
+    person.until(lambda: person.session.chosen_camera is None)
     before = person.session.camera
     person.move(*person.water(0.5, 0.6))
     person.press(3)

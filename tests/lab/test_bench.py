@@ -4,14 +4,16 @@ import io
 import json
 import math
 import platform
+import re
 import time
+from pathlib import Path
 
 import pytest
 from rich.console import Console
 
 from wavetank import Scene, WavetankError, cli
 from wavetank.device import compiler
-from wavetank.lab.bench import machine, roofline, startup
+from wavetank.lab.bench import machine, roofline, stages, startup
 from wavetank.lab.bench import run as bench_run
 from wavetank.lab.bench import scenes as room
 from wavetank.lab.bench import tables as bench_tables
@@ -76,12 +78,32 @@ def test_the_clock_accounts_for_all_of_the_time():
     assert sum(clock.launches.values()) == seen  # it stopped
 
 
-def test_every_kernel_of_the_physics_has_a_stage():
+def modules_with_kernels() -> list[str]:
+    source = Path(stages.__file__).parents[3]
+    files = [path for path in source.rglob("*.py") if "\n@qd.kernel" in path.read_text()]
+    return [".".join(path.relative_to(source).with_suffix("").parts) for path in files]
+
+
+def test_every_kernel_has_a_stage():
     assert stage_of("wavetank.physics.neighbors") == "neighbours"
     assert stage_of("wavetank.physics.foam.pool") == "foam"
-    assert stage_of("wavetank.physics.a_new_force") == "velocities"
     assert stage_of("wavetank.view.passes.shade") == "render"
     assert stage_of("quadrants._kernels") == "other"
+    homes = modules_with_kernels()
+    assert len(homes) > 40
+    for module in homes:
+        assert stage_of(module) in (*STAGE_NAMES, "render"), module
+    for declared in (home for several in stages.STAGES.values() for home in several if home != "quadrants"):
+        assert any(f"{module}.".startswith(f"{declared}.") for module in homes), f"{declared} has no kernel"
+
+
+@pytest.mark.parametrize("module", ["wavetank.physics.a_new_term", "wavetank.physics.foamy", "__main__", "wavetank"])
+def test_a_kernel_without_a_stage_is_an_error(module):
+    """A kernel that has moved must not count as something else unnoticed."""
+    with pytest.raises(
+        LookupError, match=rf"kernels of {re.escape(module)} belong to no stage; .* STAGES of .*stages.py"
+    ):
+        stage_of(module)
 
 
 def test_watching_ends_with_its_context_even_after_an_error():

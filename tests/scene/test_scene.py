@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank.scene.scene import scene_schema
+from wavetank.foundation import model
+from wavetank.scene.scene import Tank, scene_schema
 
 TANK = {"size": (1.0, 1.0, 1.0)}
 BLOCK = {"lower": (0, 0, 0), "upper": (0.5, 0.5, 0.5)}
@@ -145,3 +146,40 @@ def test_scaling_scales_lengths_alone():
     assert big.tank.size == pytest.approx((14, 7, 7))
     assert big.gravity == (0, -9.81, 0)
     assert len(big.particles()[0]) == 21952
+
+
+def test_scaling_leaves_shares_alone():
+    """A tool's radius is a share of the world's length, whatever it is called."""
+    goal = {
+        "text": "Fill it.", "seconds": 5, "tools": {"push": {"radius": 0.1}},
+        "aims": {"kind": "fill", "lower": (0, 0), "upper": (0.5, 0.5), "share": 0.5},
+    }  # fmt: skip
+    ball = wt.Ball(center=(0.5, 0.5), radius=0.2, velocity=(1, 2))
+    gust = {"kind": "wind", "velocity": (3, 0), "center": (0.5, 0.25)}
+    holes = wt.Union(parts=[wt.Sphere(center=(0.1, 0.2), radius=0.1), wt.Box(center=(0.5, 0.1), size=(0.1, 0.2))])
+    points = wt.Points(positions=[[0.75, 0.25]], velocities=[[0.5, 0.5]])
+    small = wt.Scene(
+        spacing=0.05, tank=wt.Tank(size=(1, 1)), fluids=[ball, points], solids=[holes], forces=[gust], goal=goal
+    )
+    big = small.scaled(2)
+    assert big.goal.tools == {"push": {"radius": 0.1}}
+    assert (big.goal.aims[0].upper, big.goal.aims[0].share) == ((1, 1), 0.5)
+    assert (big.fluids[0].radius, big.fluids[0].velocity) == (0.4, (1, 2))
+    assert (big.fluids[1].positions.tolist(), big.fluids[1].velocities.tolist()) == ([[1.5, 0.5]], [[0.5, 0.5]])
+    assert (big.solids[0].parts[0].radius, big.solids[0].parts[1].size) == (0.2, (0.2, 0.4))
+    assert (big.forces[0].center, big.forces[0].velocity) == ((1, 0.5), (3, 0))
+    assert big.scaled(0.5).table() == small.table()
+
+
+def test_every_number_of_a_scene_is_a_length_or_known_not_to_be():
+    """Who adds a field says which: see `model.METRES`."""
+    others = {
+        "velocity", "velocities", "rotation", "friction", "normal", "share", "drag", "strength", "speed", "axis",
+        "duration", "acceleration", "frequency", "phase",
+    }  # fmt: skip
+    models = {Tank, *model._MODEL_OF_TAG.values()}
+    assert len(models) > 20
+    for kind in models:
+        for name, field in kind.model_fields.items():
+            has_numbers = "float" in str(field.annotation) or "ndarray" in str(field.annotation)
+            assert not has_numbers or model.is_length(field) != (name in others), f"{kind.__name__}.{name}"

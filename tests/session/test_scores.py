@@ -6,7 +6,7 @@ import pytest
 
 import wavetank as wt
 from wavetank.scene.scene import bundled_levels
-from wavetank.session.scores import data_folder, keep_score, key_of, scores
+from wavetank.session.scores import keep_score, key_of, scores
 
 
 @pytest.fixture(autouse=True)
@@ -43,12 +43,3 @@ def test_a_changed_level_is_another_one():
     assert key_of(level) == "spill"
     assert key_of(level.changed(viscosity=0.5)) != "spill"
     assert len({key_of(wt.Scene.load(name)) for name in bundled_levels()}) == len(bundled_levels())
-
-
-def test_the_folder_is_the_users(monkeypatch, tmp_path):
-    monkeypatch.delenv("WAVETANK_DATA")
-    monkeypatch.setattr("sys.platform", "linux")
-    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
-    assert data_folder() == tmp_path / "wavetank"
-    monkeypatch.setenv("XDG_DATA_HOME", "relative")
-    assert data_folder().parts[-3:] == (".local", "share", "wavetank")

@@ -6,64 +6,26 @@ is an error while arrays of the first are alive.
 """
 
 import contextlib
-import functools
-import inspect
 import io
-import linecache
 import os
 import pathlib
-import sys
-import textwrap
-import types
 import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 
-from wavetank.device.launches import keep_prepared_launches
+from wavetank.device import patches
 from wavetank.foundation.errors import WavetankError
 
 os.environ.setdefault("QD_LOG_LEVEL", "error")
 os.environ.setdefault("QD_ENABLE_PYBUF", "0")  # no kernel prints, and none needs to be asked whether it has
 
-
-@contextlib.contextmanager
-def _short_frames() -> Iterator[None]:
-    """Let `inspect` tell a frame's line without a walk over all modules, which the compiler asks for hundreds of times.
-
-    It wants to know whether a function that it decorates, one of its own, stands in the body of a class.
-    """
-    whole = inspect.getframeinfo
-
-    def line_only(frame: Any, context: int = 1) -> inspect.Traceback:
-        name, line = frame.f_code.co_filename, frame.f_lineno
-        return inspect.Traceback(name, line, frame.f_code.co_name, [linecache.getline(name, line)] * context, 0)
-
-    inspect.getframeinfo = line_only
-    try:
-        yield
-    finally:
-        inspect.getframeinfo = whole
-
-
 # The compiler prints a banner on import; a library should be silent.
-with contextlib.redirect_stdout(io.StringIO()), _short_frames():
+with contextlib.redirect_stdout(io.StringIO()), patches.short_frames():
     import quadrants as qd
-    from quadrants.lang import (
-        _func_base,
-        _kernel_impl_dataclass,
-        _template_mapper,
-        _template_mapper_hotpath,
-        _wrap_inspect,
-        expr,
-        impl,
-        kernel_impl,
-        matrix,
-        matrix_ops,
-    )
-    from quadrants.lang._fast_caching import function_hasher
-    from quadrants.lang.ast import ast_transformer_utils
+
+patches.apply_all()
 
 __all__ = [
     "BACKENDS", "LANES", "available_backends", "current_backend", "download", "lanes", "qd", "start", "synchronize",
@@ -76,137 +38,6 @@ _GPU_ORDER = ("cuda", "metal", "amdgpu", "vulkan")
 LANES = 8
 FEW = 50_000
 _current: str | None = None
-
-
-def _is_in_class_body(level_of_class_stackframe: int) -> bool:
-    """Say whether the frame below that level is the body of a class: only there a namespace has a qualified name."""
-    return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
-
-
-def _place_in_source(context: Any, node: Any) -> str:
-    """Return what error messages show of a node: its line, and marks below it. One line needs no wrapping."""
-    line = context.src[node.lineno - 1] if node.lineno == node.end_lineno <= len(context.src) else ""
-    if not 0 < len(line) <= 120 or not line.isprintable():
-        return str(_place_in_lines(context, node))
-    first, last = context.indent + node.col_offset, context.indent + node.end_col_offset
-    where = f'File "{context.file}", line {node.lineno + context.lineno_offset}, in {context.func.func.__name__}:'
-    return f"{where}\n{line.rstrip()}\n{' ' * first}{'^' * (last - first)}\n"
-
-
-def _flatten_fields(tree: Any, struct_locals: set[str]) -> Any:
-    """Do what the compiler's function of that place does, less a walk for places that are all there.
-
-    Most functions have no fields to flatten.
-    """
-    if not struct_locals:
-        return tree
-    return _kernel_impl_dataclass.FlattenAttributeNameTransformer(struct_locals=struct_locals).visit(tree)
-
-
-# The compiler asks Python's `inspect` for the source of a function each time it inlines it, and for the module of each
-# decorated one; wraps every line of it as text, for error messages; asks for the range of a type with each number; and
-# reads the same functions again for each kernel, to see whether they have changed. A third of a cold start went there,
-# and half a second of a warm one (docs/performance.md). The answers stay the same.
-for _name_of_lookup in ("getsourcelines", "getsourcefile"):
-    if hasattr(_wrap_inspect, _name_of_lookup):
-        setattr(_wrap_inspect, _name_of_lookup, functools.cache(getattr(_wrap_inspect, _name_of_lookup)))
-if hasattr(kernel_impl, "_inside_class"):
-    kernel_impl._inside_class = _is_in_class_body
-if hasattr(function_hasher, "_hash_function"):
-    function_hasher._hash_function = functools.cache(function_hasher._hash_function)
-if getattr(_func_base, "textwrap", None) is textwrap:
-    _func_base.textwrap = types.ModuleType("textwrap")
-    _func_base.textwrap.__dict__.update(vars(textwrap), fill=functools.cache(textwrap.fill))
-if hasattr(expr, "_check_in_range"):
-    expr._check_in_range = functools.cache(expr._check_in_range)
-_place_in_lines: Any = getattr(ast_transformer_utils.ASTTransformerFuncContext, "_build_pos_info", None)
-if _place_in_lines:
-    ast_transformer_utils.ASTTransformerFuncContext._build_pos_info = _place_in_source
-# Where numbers of a frozen object are compiled into a kernel (`Final`), the compiler reads it anew in each launch, lest
-# their class has changed meanwhile: ours are plain integers.
-for _module, _asks in (
-    (_func_base, "subtree_has_final_fields"), (_template_mapper_hotpath, "subtree_has_final_fields"),
-    (_template_mapper, "annotation_has_final_subtree"),
-):  # fmt: skip
-    if hasattr(_module, _asks):
-        setattr(_module, _asks, lambda _: False)
-if hasattr(_kernel_impl_dataclass, "FlattenAttributeNameTransformer"):
-    _kernel_impl_dataclass.unpack_ast_struct_expressions = _flatten_fields
-
-
-def _shape(value: Any) -> tuple[int, ...]:
-    return tuple(value.get_shape()) if isinstance(value, expr.Expr) and value.is_tensor() else ()
-
-
-def _in_kernels(name: str, *lengths: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Put a function in the place of the compiler's of that name, where a kernel gives it vectors of those `lengths`.
-
-    The compiler reads the source of its own `dot`, and of the functions that this calls, each time that a kernel has a
-    dot product in it, and makes variables of their arguments: a quarter of the time it took to read kernels. The same
-    sums without the reading:
-    """
-
-    def replaced(of_vectors: Callable[..., Any]) -> Callable[..., Any]:
-        of_anything = getattr(matrix_ops, name, None)
-        if of_anything is None:
-            return of_vectors
-
-        @functools.wraps(of_anything)
-        def chosen(*args: Any, **kwargs: Any) -> Any:
-            shapes = {_shape(value) for value in args} if impl.inside_kernel() and not kwargs else set()
-            known = len(shapes) == 1 and shapes <= {(length,) for length in lengths}
-            return (of_vectors if known else of_anything)(*args, **kwargs)
-
-        setattr(matrix_ops, name, chosen)
-        return of_vectors
-
-    return replaced
-
-
-def _components(vector: Any) -> list[Any]:
-    """Return the components of a vector that is computed once."""
-    value = impl.expr_init(vector)
-    return [impl.subscript(None, value, k) for k in range(value.n)]
-
-
-@_in_kernels("sum", 2, 3, 4)
-def _sum(vector: Any) -> Any:
-    return functools.reduce(lambda total, x: impl.expr_init(total + x), _components(vector))
-
-
-@_in_kernels("dot", 2, 3, 4)
-def _dot(a: Any, b: Any) -> Any:
-    return _sum(a * b)
-
-
-@_in_kernels("norm_sqr", 2, 3, 4)
-def _norm_sqr(vector: Any) -> Any:
-    value = impl.expr_init(vector)
-    return _sum(value * value)
-
-
-@_in_kernels("norm", 2, 3, 4)
-def _norm(vector: Any) -> Any:
-    return qd.sqrt(_norm_sqr(vector))
-
-
-@_in_kernels("normalized", 2, 3, 4)
-def _normalized(vector: Any) -> Any:
-    value = impl.expr_init(vector)
-    return impl.expr_init(1 / _norm(value)) * value
-
-
-@_in_kernels("cross", 3)
-def _cross(a: Any, b: Any) -> Any:
-    ax, ay, az = _components(a)
-    bx, by, bz = _components(b)
-    return matrix.make_matrix([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
-
-
-_kernels = sys.modules["quadrants.lang.kernel"]
-if not keep_prepared_launches(_kernels, impl.get_runtime) and hasattr(_kernels, "LaunchContextBufferCache"):
-    # What the compiler itself keeps may be stale (`launches.py`): it shall keep nothing.
-    _kernels.LaunchContextBufferCache.cache = lambda *_: None
 
 
 def available_backends() -> list[str]:
@@ -259,7 +90,7 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
     if came_up != wanted:
         raise WavetankError(f"arch = {arch!r} was asked for, but the compiler came up on {came_up!r}.")
     _current = wanted
-    _keep_apart(_thread_ids() - before)
+    _bind_threads(_thread_ids() - before)
     return wanted
 
 
@@ -289,7 +120,7 @@ def _thread_ids() -> set[int]:
         return set()
 
 
-def _keep_apart(made: set[int]) -> None:
+def _bind_threads(made: set[int]) -> None:
     """Give every thread that computes a core of its own, where Linux lets us and each can have one.
 
     They are the last of those that the compiler has `made`, its pool. The pool sleeps between loops. Woken, two of its

@@ -6,6 +6,7 @@ from typing import Annotated, Any, cast
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic._internal._model_construction import ModelMetaclass
+from pydantic.fields import FieldInfo
 
 from wavetank.foundation.errors import WavetankError
 
@@ -14,6 +15,11 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Vector = tuple[Number, Number] | tuple[Number, Number, Number]
 Size = tuple[Positive, Positive] | tuple[Positive, Positive, Positive]
 Quaternion = tuple[Number, Number, Number, Number]
+
+METRES = "m"  # marks the fields of a scene that are lengths: `Scene.scaled` multiplies these and nothing else
+Length = Annotated[Positive, METRES]
+Place = Annotated[Vector, METRES]
+Edges = Annotated[Size, METRES]
 
 
 class _OneSentence(ModelMetaclass):
@@ -45,6 +51,11 @@ class Model(BaseModel, metaclass=_OneSentence):
             return cls.model_validate(table, context=context)
         except ValidationError as report:
             raise WavetankError((f"{origin}: " if origin else "") + sentence(report, cls)) from None
+
+
+def is_length(field: FieldInfo) -> bool:
+    """Say whether a field holds lengths [m]."""
+    return METRES in field.metadata or any(METRES in getattr(t, "__metadata__", ()) for t in _types(field.annotation))
 
 
 def sentence(report: ValidationError, model: type[BaseModel]) -> str:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.model import Model, Vector
+from wavetank.foundation.model import METRES, Model, Vector
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,7 +56,7 @@ KernelName = Literal["spiky", "poly6", "cubic", "wendland", "poly6-spiky"]
 class Parameters(Model):
     """All parameters. Lengths that scale with the resolution are given in particle spacings, d."""
 
-    spacing: Annotated[float, Field(gt=0, allow_inf_nan=False, description="Distance of particles at rest.", json_schema_extra={"unit": "m", "symbol": "d", "live": False})]
+    spacing: Annotated[float, Field(gt=0, allow_inf_nan=False, description="Distance of particles at rest.", json_schema_extra={"unit": "m", "symbol": "d", "live": False}), METRES]
     gravity: Annotated[Vector, Field(description="Acceleration of everything.", json_schema_extra={"unit": "m/s^2", "symbol": "g", "live": True})] = (0.0, -9.81, 0.0)
     rest_density: float = parameter(1000.0, 1e-3, 1e5, "kg/m^3", "rho_0", "Density that the water keeps.", live=False)
     support: float = parameter(1.9, 1.2, 3.0, "d", "h/d", "Support radius of the smoothing kernel.", live=False)

@@ -1,5 +1,6 @@
 """What page and window draw their controls from: taken from the declarations, so that nothing is said twice."""
 
+import dataclasses
 import functools
 import math
 from typing import Any
@@ -7,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from wavetank.foundation.params import PARAMETERS, Parameters
+from wavetank.front.keys import KEYS, LOOK, SPEEDS
 from wavetank.front.picture import Painter
+from wavetank.front.theme import PAINTS
 from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
 from wavetank.session.session import Session
@@ -23,10 +26,13 @@ def everything(session: Session) -> dict[str, Any]:
     return {
         "type": "hello",
         "parameters": [_parameter(p) for p in PARAMETERS],
-        "tools": [describe(tool) for tool in TOOLS],
+        "tools": [LOOK, *(describe(tool) for tool in TOOLS)],
         "scenes": scenes(),
         "views": views(),
         "colorings": colorings(),
+        "paints": PAINTS,
+        "keys": [dataclasses.asdict(key) for key in KEYS],
+        "speeds": SPEEDS,
         **world(session),
     }
 

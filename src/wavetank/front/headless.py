@@ -1,5 +1,6 @@
 """Run a scene without a screen: video, pictures, particle files and figures into a folder."""
 
+import dataclasses
 import itertools
 import json
 import math
@@ -40,93 +41,117 @@ class _Figures(ProgressColumn):
         )
 
 
-def record(
-    sim: Simulation,
-    out: Path,
-    *,
-    seconds: float,
-    fps: float = 30.0,
-    size: tuple[int, int] = (1280, 720),
-    name: str = "run",
-    video: bool = True,
-    gif: bool = False,
-    quality: str = "draft",
-    frames: bool = False,
-    exports: Sequence[str] = (),
-    console: Console | None = None,
-    **look: Any,
-) -> dict[str, Any]:
-    """Advance `sim` by `seconds` [s], write what was asked for into `out` and return the figures of the run.
+@dataclasses.dataclass(frozen=True)
+class Order:
+    """What is to be written of a run. Raises `WavetankError` for what is not allowed."""
+
+    out: Path  # folder
+    seconds: float  # of water
+    fps: float = 30.0  # frames per second of water in video and files
+    size: tuple[int, int] = (1280, 720)  # px, of pictures
+    name: str = "run"  # front part of the files' names
+    video: bool = False
+    gif: bool = False
+    frames: bool = False  # a picture each
+    exports: tuple[str, ...] = ()  # formats of particles
+    quality: str = "draft"
+    look: dict[str, Any] = dataclasses.field(default_factory=dict)  # options of a picture: see `Style`
+
+    def __post_init__(self) -> None:
+        """Check what needs no world to be checked."""
+        if not (math.isfinite(self.seconds) and 0 <= self.seconds <= 86400):
+            raise WavetankError(f"--seconds = {self.seconds} is not allowed; it must be a number from 0 to 86400.")
+        if not 1.0 <= self.fps <= 240.0:
+            raise WavetankError(f"--fps = {self.fps} is not allowed; it must be a number from 1 to 240.")
+        if self.gif and self.fps > LARGEST_RATE:
+            raise WavetankError(f"--fps = {self.fps} is too fast for --gif; at most {LARGEST_RATE:g}.")
+        if not self.name or Path(self.name).name != self.name:
+            raise WavetankError(
+                f"--name = {self.name!r} is not allowed; it is the front part of file names, --out the folder."
+            )
+        quality_named(self.quality)
+
+    @property
+    def has_pictures(self) -> bool:
+        """Whether every frame needs a picture."""
+        return self.video or self.gif or self.frames
+
+    @property
+    def style(self) -> dict[str, Any]:
+        """Options of every picture."""
+        return {**self.look, "samples": QUALITIES[self.quality][1]}
+
+    def path(self, suffix: str) -> Path:
+        """Return the file of that suffix."""
+        return self.out / f"{self.name}{suffix}"
+
+
+def record(sim: Simulation, order: Order, console: Console | None = None) -> dict[str, Any]:
+    """Advance `sim`, write what is ordered and return the figures of the run.
 
     Ctrl-C ends the run early; every file is complete then, and the figures say `interrupted`.
     """
-    if not (math.isfinite(seconds) and 0 <= seconds <= 86400):
-        raise WavetankError(f"--seconds = {seconds} is not allowed; it must be a number from 0 to 86400.")
-    if not 1.0 <= fps <= 240.0:
-        raise WavetankError(f"--fps = {fps} is not allowed; it must be a number from 1 to 240.")
-    if gif and fps > LARGEST_RATE:
-        raise WavetankError(f"--fps = {fps} is too fast for --gif; at most {LARGEST_RATE:g}.")
-    if not name or Path(name).name != name:
-        raise WavetankError(f"--name = {name!r} is not allowed; it is the front part of file names, --out the folder.")
-    writers = [exporter_named(format_) for format_ in exports]
+    writers = [exporter_named(format_) for format_ in order.exports]
     for writer in writers:
         if hasattr(writer, "check"):
             writer.check(sim.scene)
-    supersample, samples = QUALITIES[quality_named(quality)]
-    look = {**look, "samples": samples}
-    renderer = Renderer(*size, supersample)
-    renderer.render(sim.frame(), **look)  # what is wrong with the look shows before anything is written
-    make_folder(out)
-    files: list[str] = []
-    summary = _Summary(sim, seconds)
+    supersample = QUALITIES[order.quality][0]
+    renderer = Renderer(*order.size, supersample)
+    renderer.render(sim.frame(), **order.style)  # what is wrong with the look shows before anything is written
+    make_folder(order.out)
     with ExitStack() as stack:
-        sinks: list[Sink] = []
-        if video:
-            film = stack.enter_context(VideoWriter(out / f"{name}.mp4", *size, fps))
-            sinks.append(lambda number, frame, image: film.write(image))
-            files.append(str(out / f"{name}.mp4"))
-        if gif:
-            loop = stack.enter_context(GifWriter(out / f"{name}.gif", *size, fps))
-            sinks.append(lambda number, frame, image: loop.write(image))
-            files.append(str(out / f"{name}.gif"))
-        if frames:
-            sinks.append(lambda number, frame, image: write_png(out / f"{name}-{number:05d}.png", image))
-            files.append(str(out / f"{name}-#####.png"))
-        for writer in writers:
-            sinks.append(_particle_sink(writer, out, name))
-            files.append(str(out / f"{name}-#####{writer.SUFFIXES[0]}"))
-        _loop(sim, seconds, fps, renderer if video or gif or frames else None, sinks, summary, console, look)
-    still = out / f"{name}.png"
-    image = Renderer(*size, 2 if quality == "draft" else supersample).render(sim.frame(), **look)
+        sinks = _open_sinks(order, writers, stack)
+        summary = _run(sim, order, renderer if order.has_pictures else None, [*sinks.values()], console)
+    still = order.path(".png")
+    image = Renderer(*order.size, 2 if order.quality == "draft" else supersample).render(sim.frame(), **order.style)
     write_png(still, image, {"scene": sim.scene.title, "time": f"{sim.time:.4f} s"})
-    figures = summary.figures() | {"files": [*files, str(still)]}
-    stats = out / "stats.json"
-    figures["files"].append(str(stats))
+    stats = order.out / "stats.json"
+    figures = summary.figures() | {"files": [*sinks, str(still), str(stats)]}
     stats.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
     return figures
 
 
-def _particle_sink(writer: ModuleType, out: Path, name: str) -> Sink:
+def _open_sinks(order: Order, writers: Sequence[ModuleType], stack: ExitStack) -> dict[str, Sink]:
+    """Open what frames go into, by the files' names; the `stack` closes it."""
+    sinks: dict[str, Sink] = {}
+    if order.video:
+        film = stack.enter_context(VideoWriter(order.path(".mp4"), *order.size, order.fps))
+        sinks[str(order.path(".mp4"))] = lambda number, frame, image: film.write(image)
+    if order.gif:
+        loop = stack.enter_context(GifWriter(order.path(".gif"), *order.size, order.fps))
+        sinks[str(order.path(".gif"))] = lambda number, frame, image: loop.write(image)
+    if order.frames:
+        sinks[str(order.path("-#####.png"))] = lambda number, frame, image: write_png(
+            order.path(f"-{number:05d}.png"), image
+        )
+    for writer in writers:
+        sinks[str(order.path(f"-#####{writer.SUFFIXES[0]}"))] = _particle_sink(writer, order)
+    return sinks
+
+
+def _particle_sink(writer: ModuleType, order: Order) -> Sink:
     def write(number: int, frame: Frame, image: Any) -> None:
-        writer.write(out / f"{name}-{number:05d}{writer.SUFFIXES[0]}", frame)
+        writer.write(order.path(f"-{number:05d}{writer.SUFFIXES[0]}"), frame)
 
     return write
 
 
-def _loop(
-    sim: Simulation, seconds: float, fps: float, renderer: Renderer | None, sinks: list[Sink], summary: "_Summary",
-    console: Console | None, look: dict[str, Any],
-) -> None:  # fmt: skip
+def _run(
+    sim: Simulation, order: Order, renderer: Renderer | None, sinks: Sequence[Sink], console: Console | None
+) -> "_Summary":
+    """Let the water move and every sink have each frame, with its picture where there is a renderer."""
+    summary = _Summary(sim)
     progress = Progress(
         TextColumn("{task.description}"), BarColumn(), _Figures(), TimeRemainingColumn(),
         console=console or Console(stderr=True), transient=False,
     )  # fmt: skip
     with progress:
-        task = progress.add_task("wavetank", total=seconds or 1.0, time=sim.time, fps=0.0, count=sim.count, error=0.0)
+        total = order.seconds or 1.0
+        task = progress.add_task("wavetank", total=total, time=sim.time, fps=0.0, count=sim.count, error=0.0)
         first = 0.0  # s until the first frame was done, with the kernels that it compiled
         with _interruptible() as interrupted:
-            for number, frame in enumerate(sim.frames(seconds, fps)):
-                image = renderer.render(frame, **look) if renderer is not None else None
+            for number, frame in enumerate(sim.frames(order.seconds, order.fps)):
+                image = renderer.render(frame, **order.style) if renderer is not None else None
                 for sink in sinks:
                     sink(number, frame, image)
                 summary.add()
@@ -140,6 +165,7 @@ def _loop(
                 if interrupted.is_set():
                     summary.interrupted = True
                     break
+    return summary
 
 
 @contextmanager
@@ -171,7 +197,7 @@ def replay_session(
 
     The video follows the recorded camera and shows one frame of the session in each of its own, so slow motion is slow.
     """
-    from wavetank.session.recording import Recording, digest, replay
+    from wavetank.session.recording import Recording, replay
     from wavetank.view.choices import options
 
     if not 1.0 <= fps <= 240.0:
@@ -194,17 +220,18 @@ def replay_session(
             if interrupted.is_set():
                 raise WavetankError(f"{path}: the replay was stopped after {session.ticks} frames.")
     assert session is not None
+    digest = session.sim.digest()
     return {
         "frames": session.ticks, "seconds_of_water": session.sim.time, "count": session.sim.count,
-        "arch": session.sim.arch, "same": digest(session) == recording.digest, "digest": digest(session),
+        "arch": session.sim.arch, "same": digest == recording.digest, "digest": digest,
     }  # fmt: skip
 
 
 class _Summary:
     """Collects the figures of a run."""
 
-    def __init__(self, sim: Simulation, seconds: float) -> None:
-        self.sim, self.begin, self.seconds = sim, sim.time, seconds
+    def __init__(self, sim: Simulation) -> None:
+        self.sim, self.begin = sim, sim.time
         self.history: list[dict[str, float]] = []
         self.interrupted = False
 

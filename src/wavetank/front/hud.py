@@ -33,7 +33,7 @@ class Hud:
             return None
         if game.outcome == "won" and not self._kept:
             self._kept = True
-            self._keep(game)
+            self._keep_score(game)
         levels = bundled_levels()
         place = levels.index(self._level) + 1 if self._level in levels else 0
         told = game.describe()
@@ -45,7 +45,7 @@ class Hud:
             "headline": _headline(game, place == len(levels)), "verdict": self._verdict(game),
         }  # fmt: skip
 
-    def _keep(self, game: Game) -> None:
+    def _keep_score(self, game: Game) -> None:
         try:
             self._is_best = keep_score(self._level, game.stars, game.mark)
         except OSError as error:
@@ -101,12 +101,12 @@ def _hull(points: list[Place]) -> list[Place]:
     for order in (sorted(points), sorted(points, reverse=True)):
         chain: list[Place] = []
         for p in order:
-            while len(chain) > 1 and _turn(chain[-2], chain[-1], p) <= 0:
+            while len(chain) > 1 and _cross(chain[-2], chain[-1], p) <= 0:
                 chain.pop()
             chain.append(p)
         ends += chain[:-1]
     return ends
 
 
-def _turn(a: Place, b: Place, c: Place) -> float:
+def _cross(a: Place, b: Place, c: Place) -> float:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -2,7 +2,7 @@
 
 import concurrent.futures
 import queue
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 
@@ -20,12 +20,11 @@ class Jobs:
         self._wake()
         return future
 
-    def do_all(self) -> Iterator[Exception]:
-        """Do what waits; a failure belongs to who asked, and is told here too: the water goes on."""
+    def do_all(self) -> None:
+        """Do what waits; a failure belongs to who asked: the water goes on."""
         while not self._waiting.empty():
             job, future = self._waiting.get()
             try:
                 future.set_result(job())
             except Exception as error:
-                yield error
                 future.set_exception(error)

@@ -47,6 +47,7 @@ def why_no_window() -> str | None:
         import glfw
         import imgui_bundle  # noqa: F401
         import moderngl  # noqa: F401
+        import svg.path  # noqa: F401
     except ModuleNotFoundError as error:
         return f"the package {str(error.name).replace('_', '-')} is missing (pip install 'wavetank[window]')"
     except ImportError as error:
@@ -55,20 +56,20 @@ def why_no_window() -> str | None:
     glfw.ERROR_REPORTING = "ignore"
     try:
         if not glfw.init():
-            return f"the display cannot be opened ({_complaint(glfw)})"
+            return f"the display cannot be opened ({_reason(glfw)})"
         glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
         glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
         glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
         trial = glfw.create_window(16, 16, "wavetank", None, None)
         if not trial:
-            return f"there is no OpenGL 3.3 (on Debian and Ubuntu: apt-get install libgl1-mesa-dri; {_complaint(glfw)})"
+            return f"there is no OpenGL 3.3 (on Debian and Ubuntu: apt-get install libgl1-mesa-dri; {_reason(glfw)})"
         glfw.destroy_window(trial)
     finally:
         glfw.terminate()
     return None
 
 
-def _complaint(glfw: Any) -> str:
+def _reason(glfw: Any) -> str:
     text = glfw.get_error()[1]
     return (text.decode(errors="replace") if isinstance(text, bytes) else str(text)).rstrip(".")
 
@@ -79,13 +80,13 @@ def play_in_window(scene: Scene, arch: str, *, record: Path | None = None, most:
 
     _check_folder(record)
     window = Window(Session(scene, arch, most_particles=most))
-    with _ends_with(window.stop):
+    with _stop_on_signal(window.stop):
         try:
             window.open()
             window.run()
         finally:
             window.close()
-            _keep(record, window.engine.session, scene)
+            _save_recording(record, window.engine.session, scene)
 
 
 def _check_folder(record: Path | None) -> None:
@@ -103,7 +104,7 @@ def _check_folder(record: Path | None) -> None:
         raise WavetankError(f"--record {record}: the file cannot be written: {error.strerror or error}.") from None
 
 
-def _keep(record: Path | None, session: Session, start: Scene) -> None:
+def _save_recording(record: Path | None, session: Session, start: Scene) -> None:
     if record is not None:
         Recording.of(session, start).save(record)
         print(f"session written to {record}", flush=True)
@@ -119,7 +120,7 @@ def play_in_browser(
     _check_folder(record)
     session = Session(scene, arch, most_particles=most)
     front = WebFront(session, host, port)
-    with _ends_with(front.stop):
+    with _stop_on_signal(front.stop):
         front.start()
         where = "" if is_loopback(host) else " (anyone with this link can steer; it is not encrypted)"
         print(f"wavetank plays at {front.url}{where} (Ctrl-C ends it)", flush=True)
@@ -129,7 +130,7 @@ def play_in_browser(
             front.run()
         finally:
             front.stop()
-            _keep(record, session, scene)
+            _save_recording(record, session, scene)
 
 
 def with_particles(scene: Scene, wanted: int) -> Scene:
@@ -141,7 +142,7 @@ def with_particles(scene: Scene, wanted: int) -> Scene:
 
 
 @contextlib.contextmanager
-def _ends_with(stop: Any) -> Iterator[None]:
+def _stop_on_signal(stop: Any) -> Iterator[None]:
     """Turn the first Ctrl-C, and being asked to end, into a call of `stop`; a second Ctrl-C ends at once."""
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -4,10 +4,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from wavetank import __version__
 from wavetank.formats import exporter_for
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.replacing import partial_path
+from wavetank.foundation.version import VERSION
 from wavetank.scene.scene import Scene
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.simulation import Simulation
@@ -50,7 +50,7 @@ def take(
         figures["milliseconds"] = measured
         renderer.render(frame, camera, timings=measured, **style)
     about = {"scene": sim.scene.title, "time": f"{sim.time:.4f} s", "view": view.name, "particles": sim.count}
-    writer.write(path, image, about | {"Software": f"wavetank {__version__}"})
+    writer.write(path, image, about | {"Software": f"wavetank {VERSION}"})
     return figures
 
 

@@ -7,12 +7,13 @@ import shutil
 import sys
 from typing import Any
 
-from wavetank.device import compiler
+from wavetank.device import compiler, patches
 
 _PACKAGES = {
     "quadrants": "", "numpy": "", "pydantic": "", "typer": "", "rich": "", "pillow": "", "av": "", "tomli-w": "",
+    "platformdirs": "",
     **dict.fromkeys(
-        ("imgui-bundle", "moderngl", "glfw"), "the window of `wavetank play`: pip install wavetank[window]"
+        ("imgui-bundle", "moderngl", "glfw", "svg.path"), "the window of `wavetank play`: pip install wavetank[window]"
     ),
     "trimesh": "solids from OBJ, STL, PLY and GLB files: pip install wavetank[mesh]",
     "matplotlib": "plots of `wavetank converge` and `validate`: pip install wavetank[plot]",
@@ -41,6 +42,10 @@ def examine() -> dict[str, Any]:
         checks.append(_check(f"back end {name}", found, _BACKEND_NOTES.get(name, "") if found == "not here" else ""))
     best = next(iter(available))
     checks.append(_check("--arch gpu", best if best != "cpu" else "not here", "the best graphics processor there is"))
+    checks += [
+        _check(f"patch: {patch.name}", "does not fit" if patch.misfit else "in force", _about(patch))
+        for patch in patches.PATCHES
+    ]
     checks.append(_check("terminal", str(shutil.get_terminal_size()[0]), "columns"))
     return {"ok": not [name for name in missing if not _PACKAGES[name]], "checks": checks}
 
@@ -51,6 +56,12 @@ _BACKEND_NOTES = {
     "metal": "needs macOS",
     "amdgpu": "needs an AMD card and ROCm",
 }
+
+
+def _about(patch: patches.Patch) -> str:
+    if patch.misfit is None:
+        return patch.sentence
+    return f"{patch.misfit}; made for Quadrants {' and '.join(patch.versions)}: kernels work, and start slower"
 
 
 def _runs() -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 from typing_extensions import override
 
-from wavetank.foundation.model import Model, Positive, Vector, register_model
+from wavetank.foundation.model import METRES, Length, Model, Place, Vector, register_model
 
 
 class Fluid(Model):
@@ -45,8 +45,8 @@ class Block(Fluid):
     """A rectangular block of fluid between two corners."""
 
     shape: Literal["block"] = "block"
-    lower: Vector
-    upper: Vector
+    lower: Place
+    upper: Place
 
     @model_validator(mode="after")
     def _ordered(self) -> "Block":
@@ -75,8 +75,8 @@ class Ball(Fluid):
     """A ball of fluid; in a 2-D world a disc."""
 
     shape: Literal["ball"] = "ball"
-    center: Vector
-    radius: Positive
+    center: Place
+    radius: Length
 
     @override
     def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
@@ -120,7 +120,7 @@ class Points(Fluid):
     """Fluid particles at given places, each of the mass that the scene's spacing gives."""
 
     shape: Literal["points"] = "points"
-    positions: Array
+    positions: Annotated[Array, METRES]
     velocities: Array | None = None
 
     @model_validator(mode="after")

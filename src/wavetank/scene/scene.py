@@ -16,7 +16,7 @@ from pydantic import BeforeValidator, ValidationError, model_validator
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.materials import COLORS, Material, Properties
-from wavetank.foundation.model import Model, Size, sentence
+from wavetank.foundation.model import Edges, Model, is_length, sentence
 from wavetank.foundation.params import PRESETS, QUALITIES, Parameters
 from wavetank.foundation.replacing import replacing
 from wavetank.scene.fluids import AnyFluid, Points
@@ -32,7 +32,7 @@ _TOLERANCE = 1e-6  # of a spacing: how far a fluid may reach beyond a wall by ro
 class Tank(Model):
     """The container: its inner size [m], the lower corner at the origin. Two numbers make a 2-D world."""
 
-    size: Size
+    size: Edges
 
     def walls(self) -> list[Solid]:
         """Return the walls as half-spaces, lower and upper for each axis."""
@@ -206,8 +206,8 @@ class Scene(Parameters):
         ]
         return np.concatenate([np.empty(0, np.int32), *parts])
 
-    def given(self) -> np.ndarray:
-        """Say of which particles the scene gives every place, bool [n], in the order of `particles`."""
+    def has_own_place(self) -> np.ndarray:
+        """Say which particles are placed one by one, as those of `Points`, bool [n], in the order of `particles`."""
         parts = zip(self.fluids, self._lattices(), strict=True)
         return np.concatenate([np.empty(0, bool), *(np.full(len(x), isinstance(f, Points)) for f, (x, _) in parts)])
 
@@ -278,7 +278,11 @@ class Scene(Parameters):
 
     def table(self) -> dict[str, Any]:
         """Return what was set (not the defaults) as plain data that `parse` reads back to an equal scene."""
-        result = _set_values(self) | {name: getattr(self, name) for name in _chosen(self.__dict__)}
+        return self._table(1.0)
+
+    def _table(self, scale: float) -> dict[str, Any]:
+        """Return `table` with every length multiplied by `scale`."""
+        result = _set_values(self, scale) | {name: getattr(self, name) for name in _chosen(self.__dict__)}
         return {key: result[key] for key in sorted(result, key=lambda k: isinstance(result[k], list | dict))}
 
     def changed(self, **values: Any) -> "Scene":
@@ -292,28 +296,7 @@ class Scene(Parameters):
         """Return the same scene with every length multiplied by `factor` (velocities and gravity stay)."""
         if not (math.isfinite(factor) and factor > 0):
             raise WavetankError(f"factor = {factor} is not allowed; it must be a positive number.")
-        lengths = {
-            "spacing",
-            "size",
-            "lower",
-            "upper",
-            "center",
-            "radius",
-            "start",
-            "end",
-            "point",
-            "positions",
-            "thickness",
-        }
-
-        def walk(value: Any, key: str = "") -> Any:
-            if isinstance(value, dict):
-                return {k: walk(v, k) for k, v in value.items()}
-            if isinstance(value, list | tuple):
-                return [walk(v, key) for v in value]
-            return value * factor if key in lengths and isinstance(value, int | float) else value
-
-        return type(self).parse(walk(self.table()))
+        return type(self).parse(self._table(factor))
 
 
 def _chosen(values: dict[str, Any]) -> dict[str, Any]:
@@ -323,12 +306,15 @@ def _chosen(values: dict[str, Any]) -> dict[str, Any]:
     return {**PRESETS.get(preset, {}), **QUALITIES.get(quality, {})} if known else {}
 
 
-def _set_values(value: Any) -> Any:
-    """Reduce a model to plain data: the keys that differ from their defaults, and the shape that names a kind."""
+def _set_values(value: Any, scale: float = 1.0) -> Any:
+    """Reduce a model to plain data: the keys that differ from their defaults, and the shape that names a kind.
+
+    Lengths are multiplied by `scale`.
+    """
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, list | tuple):
-        return [_set_values(member) for member in value]
+        return [_set_values(member, scale) for member in value]
     if not isinstance(value, Model):
         return value
     result = {}
@@ -336,8 +322,13 @@ def _set_values(value: Any) -> Any:
         member = getattr(value, name)
         default = None if isinstance(member, np.ndarray) else field.default
         if name in ("shape", "kind") or (member is not None and (isinstance(member, np.ndarray) or member != default)):
-            result[name] = _set_values(member)
+            plain = _set_values(member, scale)
+            result[name] = _multiplied(plain, scale) if scale != 1.0 and is_length(field) else plain
     return result
+
+
+def _multiplied(lengths: Any, scale: float) -> Any:
+    return [_multiplied(part, scale) for part in lengths] if isinstance(lengths, list) else lengths * scale
 
 
 def bundled_scenes() -> list[str]:

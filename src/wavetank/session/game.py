@@ -5,6 +5,7 @@ from typing import Any
 from wavetank.foundation.errors import WavetankError
 from wavetank.scene.goal import Aim, Goal
 from wavetank.session import commands as c
+from wavetank.session.measures import counted, measure
 from wavetank.session.tools import TOOL_NAMES
 from wavetank.simulation.frame import Frame
 
@@ -27,9 +28,9 @@ class Game:
         self.held = 0.0  # s since all aims are met
         self.strokes = 0
         self.worst = 0.0  # of the forbidden: the largest share of what is allowed so far
-        self.start = [int(aim.counted(frame).sum()) for aim in goal.aims]
+        self.start = [int(counted(aim, frame).sum()) for aim in goal.aims]
         self.values = [0.0] * len(goal.aims)
-        self._look(frame)
+        self._measure(frame)
 
     def allow(self, command: c.Command) -> c.Command:
         """Return the command as it may be done; raises `WavetankError` for what the level does not allow."""
@@ -57,11 +58,11 @@ class Game:
         if self.outcome:
             return
         self.elapsed += duration
-        self._look(frame)
+        self._measure(frame)
         goal = self.goal
-        met = all(aim.progress(value) >= 1.0 for aim, value in self._pairs())
+        met = all(aim.progress(value) >= 1.0 for aim, value in self._measured_aims())
         self.held = self.held + duration if met else 0.0
-        if any(aim.forbids and value > aim.share for aim, value in self._pairs()):
+        if any(aim.forbids and value > aim.share for aim, value in self._measured_aims()):
             self.outcome = "lost"
         elif not goal.is_endured and met and self.held >= goal.hold:
             self.outcome = "won"
@@ -75,7 +76,7 @@ class Game:
             return 1.0
         if self.goal.is_endured:
             return min(1.0, self.elapsed / self.goal.seconds)
-        reached = [aim.progress(value) for aim, value in self._pairs() if not aim.forbids]
+        reached = [aim.progress(value) for aim, value in self._measured_aims() if not aim.forbids]
         return sum(reached) / len(reached)
 
     @property
@@ -86,7 +87,7 @@ class Game:
     @property
     def stars(self) -> int:
         """Stars, 1 to 3, that a win now is worth: by time [s], or by how little of the allowed share got wet."""
-        first, second = self.goal.stars or ((0.4, 0.75) if self.goal.is_endured else self._thirds())
+        first, second = self.goal.stars or ((0.4, 0.75) if self.goal.is_endured else self._divide_time())
         return 0 if self.outcome == "lost" else 3 if self.mark <= first else 2 if self.mark <= second else 1
 
     def describe(self) -> dict[str, Any]:
@@ -100,17 +101,17 @@ class Game:
             "aims": [
                 {"kind": aim.kind, "name": aim.name, "value": value, "share": aim.share, "forbids": aim.forbids,
                  "progress": aim.progress(value)}
-                for aim, value in self._pairs()
+                for aim, value in self._measured_aims()
             ],
         }  # fmt: skip
 
-    def _look(self, frame: Frame) -> None:
-        self.values = [aim.measure(frame, start) for aim, start in zip(self.goal.aims, self.start, strict=True)]
-        self.worst = max([self.worst, *(value / aim.share for aim, value in self._pairs() if aim.forbids)])
+    def _measure(self, frame: Frame) -> None:
+        self.values = [measure(aim, frame, start) for aim, start in zip(self.goal.aims, self.start, strict=True)]
+        self.worst = max([self.worst, *(value / aim.share for aim, value in self._measured_aims() if aim.forbids)])
 
-    def _pairs(self) -> list[tuple[Any, float]]:
+    def _measured_aims(self) -> list[tuple[Any, float]]:
         aims: list[Aim] = [*self.goal.aims]
         return list(zip(aims, self.values, strict=True))
 
-    def _thirds(self) -> tuple[float, float]:
+    def _divide_time(self) -> tuple[float, float]:
         return self.goal.seconds / 3.0, 2.0 * self.goal.seconds / 3.0

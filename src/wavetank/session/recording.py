@@ -4,7 +4,6 @@ A command stands with the number of frames that were computed before it. Physics
 the list is the whole session; the digest of the particles at the end tells whether it did.
 """
 
-import hashlib
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,10 +12,10 @@ from typing import Annotated, Any, Literal
 import tomli_w
 from pydantic import Field
 
-import wavetank
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import Model
 from wavetank.foundation.replacing import replacing
+from wavetank.foundation.version import VERSION
 from wavetank.scene.scene import Scene
 from wavetank.session.commands import Command, command_of, table_of
 from wavetank.session.session import MOST_PARTICLES, Session
@@ -47,11 +46,11 @@ class Recording(Model):
                 "scene, [[forces]], and what is done by commands."
             )
         return cls(
-            version=wavetank.__version__,
+            version=VERSION,
             arch=session.sim.arch,
             most_particles=session.most_particles,
             frames=session.ticks,
-            digest=digest(session),
+            digest=session.sim.digest(),
             scene=start.table(),
             commands=[{"frame": frame, **table_of(command)} for frame, command in session.log],
         )
@@ -92,13 +91,6 @@ class Recording(Model):
             except WavetankError as error:
                 raise WavetankError(f"{origin}: commands[{number}]: {error}") from None
         return result
-
-
-def digest(session: Session) -> str:
-    """Return a digest of all particles: ids, positions, velocities, dyes, to the last bit."""
-    frame = session.sim.frame()
-    parts = (frame.ids, frame.positions, frame.velocities, frame.dyes)
-    return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
 
 
 def replay(recording: Recording, arch: str = "cpu", origin: str = "recording") -> Iterator[Session]:

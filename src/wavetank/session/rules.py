@@ -1,23 +1,21 @@
-"""What each command does to a session: one small function each, listed in `RULES`."""
+"""What each command does to the state of a session: one small function each, listed in `RULES`."""
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import LIVE, Parameters
 from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
 from wavetank.session import commands as c
 from wavetank.session.history import BOOKMARKS
+from wavetank.session.state import SessionState
 from wavetank.session.tools import Hand
 from wavetank.simulation.snapshot import Packed
 from wavetank.view.camera import Camera
 
-if TYPE_CHECKING:
-    from wavetank.session.session import Session
 
-
-def set_parameter(session: "Session", command: c.SetParameter) -> None:
+def set_parameter(state: SessionState, command: c.SetParameter) -> None:
     """Set a live parameter."""
     name, value = command.name, command.value
     if name not in LIVE:
@@ -26,21 +24,21 @@ def set_parameter(session: "Session", command: c.SetParameter) -> None:
         raise WavetankError(f"{name!r} is not a parameter.")
     if name == "gravity" and isinstance(value, tuple) and math.hypot(*value) > c.STRONGEST:
         raise WavetankError(f"gravity = {value} is too strong; its length must be at most {c.STRONGEST:g} m/s^2.")
-    setattr(session.sim, name, value)
+    setattr(state.sim, name, value)
 
 
-def reset(session: "Session", command: c.Reset) -> None:
+def reset(state: SessionState, command: c.Reset) -> None:
     """Begin the scene anew."""
     unknown = next((name for name in command.parameters if name not in Parameters.model_fields), None)
     if unknown is not None:
         raise WavetankError(f"{unknown!r} is not a parameter.")
-    session.lift_all()
-    scene, camera = session.changed_scene(command.parameters), session._camera
-    session.begin(scene)
-    session.camera = camera
+    state.lift_all()
+    scene, camera = state.changed_scene(command.parameters), state.chosen_camera
+    state.begin(scene)
+    state.camera = camera
 
 
-def load(session: "Session", command: c.LoadScene) -> None:
+def load(state: SessionState, command: c.LoadScene) -> None:
     """Begin another scene. Only bundled names: a command may come from afar, and must not open files."""
     if command.text:
         scene = Scene.from_text(command.text, "scene", files=False)
@@ -49,158 +47,158 @@ def load(session: "Session", command: c.LoadScene) -> None:
     else:
         known = ", ".join((*bundled_scenes(), *bundled_levels()))
         raise WavetankError(f"{command.name!r} is not a bundled scene; those are {known}.")
-    session.lift_all()
-    session.begin(scene)
+    state.lift_all()
+    state.begin(scene)
 
 
-def tool_begin(session: "Session", command: c.ToolBegin) -> None:
+def tool_begin(state: SessionState, command: c.ToolBegin) -> None:
     """Put a tool down."""
-    tool = session.tool_named(command.tool, command.options)
-    if command.pointer in session.hands:
-        session.lift(command.pointer)
-    if tool.name in session.running:
-        session.lift(tool.name)
-    hand = Hand(session.sim, command.origin, command.direction, session.most_particles, tool.through_water)
-    session.hands[command.pointer] = (tool, hand)
-    session.guard(hand, tool.begin, hand)
+    tool = state.tool_named(command.tool, command.options)
+    if command.pointer in state.hands:
+        state.lift(command.pointer)
+    if tool.name in state.running:
+        state.lift(tool.name)
+    hand = Hand(state.sim, command.origin, command.direction, state.most_particles, tool.through_water)
+    state.hands[command.pointer] = (tool, hand)
+    state.let_act(hand, tool.begin, hand)
 
 
-def tool_move(session: "Session", command: c.ToolMove) -> None:
+def tool_move(state: SessionState, command: c.ToolMove) -> None:
     """Move a tool; one that is not down has nothing to move."""
-    if command.pointer in session.hands:
-        tool, hand = session.hands[command.pointer]
+    if command.pointer in state.hands:
+        tool, hand = state.hands[command.pointer]
         hand.aim(command.origin, command.direction)
-        session.guard(hand, tool.move, hand)
+        state.let_act(hand, tool.move, hand)
 
 
-def tool_end(session: "Session", command: c.ToolEnd) -> None:
+def tool_end(state: SessionState, command: c.ToolEnd) -> None:
     """Lift a tool; one that lasts goes on."""
-    if command.pointer in session.hands:
-        tool, hand = session.hands[command.pointer]
+    if command.pointer in state.hands:
+        tool, hand = state.hands[command.pointer]
         if tool.lasting:
-            del session.hands[command.pointer]
-            session.running[tool.name] = (tool, hand)
+            del state.hands[command.pointer]
+            state.running[tool.name] = (tool, hand)
         else:
-            session.lift(command.pointer)
+            state.lift(command.pointer)
 
 
-def tool_stop(session: "Session", command: c.ToolStop) -> None:
+def tool_stop(state: SessionState, command: c.ToolStop) -> None:
     """Stop what goes on by itself."""
-    for name in [name for name in session.running if command.tool in ("", name)]:
-        session.lift(name)
+    for name in [name for name in state.running if command.tool in ("", name)]:
+        state.lift(name)
 
 
-def move_solid(session: "Session", command: c.MoveSolid) -> None:
+def move_solid(state: SessionState, command: c.MoveSolid) -> None:
     """Carry a solid to a pose."""
-    number = session.sim.solids.find(command.name)
-    if number < session.sim.solids.tank_count:
+    number = state.sim.solids.find(command.name)
+    if number < state.sim.solids.tank_count:
         raise WavetankError(f"{command.name!r} is a wall of the tank, which stays.")
-    if command.position is not None and len(command.position) != session.sim.scene.dim:
-        raise WavetankError(f"position = {command.position} must be {session.sim.scene.dim} numbers.")
+    if command.position is not None and len(command.position) != state.sim.scene.dim:
+        raise WavetankError(f"position = {command.position} must be {state.sim.scene.dim} numbers.")
     if isinstance(command.rotation, tuple) and sum(part * part for part in command.rotation) < 1e-12:
         raise WavetankError(f"rotation = {command.rotation} is not a quaternion of non-zero length.")
-    session.moving[command.name] = (command.position, command.rotation)
+    state.moving[command.name] = (command.position, command.rotation)
 
 
-def add_solid(session: "Session", command: c.AddSolid) -> None:
+def add_solid(state: SessionState, command: c.AddSolid) -> None:
     """Put a solid into the world; it swells, so that the water has time to make way."""
-    session.sim.add_solid(command.solid, 0.35)
+    state.sim.add_solid(command.solid, 0.35)
 
 
-def remove_solid(session: "Session", command: c.RemoveSolid) -> None:
+def remove_solid(state: SessionState, command: c.RemoveSolid) -> None:
     """Take a solid away."""
-    session.sim.remove_solid(command.name)
+    state.sim.remove_solid(command.name)
 
 
-def pause(session: "Session", command: c.Pause) -> None:
+def pause(state: SessionState, command: c.Pause) -> None:
     """Stop time, or let it run."""
-    session.paused, session.steps_left = command.on, 0
+    state.paused, state.steps_left = command.on, 0
 
 
-def step(session: "Session", command: c.Step) -> None:
+def step(state: SessionState, command: c.Step) -> None:
     """Stop time and compute a few frames."""
-    session.paused = True
-    session.steps_left += command.frames
+    state.paused = True
+    state.steps_left += command.frames
 
 
-def speed(session: "Session", command: c.Speed) -> None:
+def speed(state: SessionState, command: c.Speed) -> None:
     """Set the pace of time."""
-    session.speed = command.factor
-    session.pace.stop()
+    state.speed = command.factor
+    state.pace.stop()
 
 
-def frame_length(session: "Session", command: c.FrameLength) -> None:
+def frame_length(state: SessionState, command: c.FrameLength) -> None:
     """Set how long a frame is."""
-    session.frame_parts, session.fills_frames = command.parts, command.filled
+    state.frame_parts, state.fills_frames = command.parts, command.filled
 
 
-def rewind(session: "Session", command: c.Rewind) -> None:
+def rewind(state: SessionState, command: c.Rewind) -> None:
     """Go back."""
-    snapshot = session.history.before(command.time)
+    snapshot = state.history.before(command.time)
     if snapshot is not None:
-        session.go_to(snapshot)
+        state.go_to(snapshot)
 
 
-def bookmark(session: "Session", command: c.Bookmark) -> None:
+def bookmark(state: SessionState, command: c.Bookmark) -> None:
     """Keep, go to or forget an instant."""
-    bookmarks = session.history.bookmarks
+    bookmarks = state.history.bookmarks
     if command.action == "set":
         if len(bookmarks) >= BOOKMARKS and command.name not in bookmarks:
             raise WavetankError(f"there are {BOOKMARKS} bookmarks already; forget one first.")
-        bookmarks[command.name] = Packed(session.sim.snapshot())
+        bookmarks[command.name] = Packed(state.sim.snapshot())
         return
     if command.name not in bookmarks:
         raise WavetankError(f"there is no bookmark {command.name!r}; there are: {', '.join(bookmarks) or 'none'}.")
     if command.action == "go":
-        session.go_to(bookmarks[command.name].unpack())
+        state.go_to(bookmarks[command.name].unpack())
     else:
         del bookmarks[command.name]
 
 
-def camera(session: "Session", command: c.SetCamera) -> None:
+def camera(state: SessionState, command: c.SetCamera) -> None:
     """Put the camera somewhere."""
-    session.camera = Camera(command.eye, command.target, command.up, command.field_of_view, height=command.height)
+    state.camera = Camera(command.eye, command.target, command.up, command.field_of_view, height=command.height)
 
 
-def orbit(session: "Session", command: c.Orbit) -> None:
+def orbit(state: SessionState, command: c.Orbit) -> None:
     """Turn the camera; a 2-D world is looked at straight."""
-    if session.sim.scene.dim == 3:
-        session.camera = session.camera.orbit(command.azimuth, command.elevation)
+    if state.sim.scene.dim == 3:
+        state.camera = state.camera.orbit(command.azimuth, command.elevation)
 
 
-def pan(session: "Session", command: c.Pan) -> None:
+def pan(state: SessionState, command: c.Pan) -> None:
     """Move the camera, not out of sight of all."""
-    moved = session.camera.pan(command.right, command.up, command.ahead)
+    moved = state.camera.pan(command.right, command.up, command.ahead)
     if max(abs(part) for part in moved.eye) < c.FARTHEST:
-        session.camera = moved
+        state.camera = moved
 
 
-def zoom(session: "Session", command: c.Zoom) -> None:
+def zoom(state: SessionState, command: c.Zoom) -> None:
     """Come closer or go away."""
-    session.camera = session.camera.zoom(command.factor)
+    state.camera = state.camera.zoom(command.factor)
 
 
-def home(session: "Session", command: c.Home) -> None:
+def home(state: SessionState, command: c.Home) -> None:
     """Frame the whole world."""
-    session.camera = None
+    state.camera = None
 
 
-def view(session: "Session", command: c.SetView) -> None:
+def view(state: SessionState, command: c.SetView) -> None:
     """Choose what is drawn."""
     from wavetank.view.choices import colorings, views
 
     for what, value, allowed in (("view", command.view, views()), ("color_by", command.color_by, colorings())):
         if value and value not in allowed and not (what == "color_by" and _is_color(value)):
             raise WavetankError(f"{what} = {value!r} is not known; it must be one of {', '.join(allowed)}.")
-    session.view = command.view or session.view
-    session.color_by = command.color_by or session.color_by
+    state.view = command.view or state.view
+    state.color_by = command.color_by or state.color_by
 
 
 def _is_color(value: str) -> bool:
     return len(value) == 7 and value[0] == "#" and all(digit in "0123456789abcdefABCDEF" for digit in value[1:])
 
 
-Rule = Callable[["Session", Any], None]
+Rule = Callable[[SessionState, Any], None]
 RULES: dict[type[c.Command], Rule] = {
     c.SetParameter: set_parameter, c.Reset: reset, c.LoadScene: load, c.ToolBegin: tool_begin,
     c.ToolMove: tool_move, c.ToolEnd: tool_end, c.ToolStop: tool_stop, c.MoveSolid: move_solid,

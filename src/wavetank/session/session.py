@@ -8,33 +8,21 @@ import threading
 import time
 from typing import Any
 
-import numpy as np
-
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.params import LIVE
-from wavetank.scene.fluids import Points
-from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
 from wavetank.session.commands import Command, FrameLength
-from wavetank.session.game import HARMLESS, Game
 from wavetank.session.history import History
-from wavetank.session.pace import Pace
 from wavetank.session.rules import RULES
-from wavetank.session.tools import TOOL_NAMES, Hand, Tool
-from wavetank.session.tools.carry import TOOL_SOLID, carry
-from wavetank.simulation.simulation import Simulation
-from wavetank.solids.shapes import moved
-from wavetank.view.camera import Camera
+from wavetank.session.state import SessionState
 
 MOST_PARTICLES = 200_000
 SLUGGISH, SWIFT = 0.045, 0.025  # s: a frame that takes longer is made shorter, one that takes less longer again
 MOST_PARTS = 8  # of a frame; shorter time steps would turn density errors into velocity
 WORTH = 1.0  # a frame takes no less than so many times its picture, or pictures would eat the time
 MOST_WAITING = 4096  # commands in the queue; what comes on top is dropped
-CARRY_PACE = 0.8  # of sqrt(g L): how fast a command carries a solid
 
 
-class Session:
+class Session(SessionState):
     """One running world and all that is done to it.
 
     `log` lists every command that took effect, with the number of frames computed before it: `recording` writes it.
@@ -43,46 +31,16 @@ class Session:
     def __init__(
         self, scene: Scene, arch: str = "cpu", *, most_particles: int = MOST_PARTICLES, history: History | None = None
     ) -> None:
-        self.most_particles, self.arch = most_particles, arch
-        self.history = history or History()
-        self.pace = Pace()
+        super().__init__(scene, arch, most_particles, history or History())
         self.ticks = 0  # frames computed since the session began, whatever was rewound
         self.log: list[tuple[int, Command]] = []
-        self.notes: list[str] = []  # for the person, one sentence each
-        self.paused, self.speed, self.steps_left = False, 1.0, 0
-        self.frame_parts = 1  # into which a frame is divided
-        self.fills_frames = False  # whether frames end with a time step of full length
         self.smooth = False  # whether frames are made shorter on a slow machine
         self.picture_seconds = 0.0  # that the front takes for a picture, for that choice
-        self.view, self.color_by = "", "speed"
-        self.aspect = 16 / 9  # of the picture, set by the front
         self.changes = 0  # grows whenever a picture would look different
-        self.hands: dict[int, tuple[Tool, Hand]] = {}
-        self.running: dict[str, tuple[Tool, Hand]] = {}
-        self.moving: dict[str, tuple[Any, Any]] = {}
         self.uncommanded: set[str] = set()  # forces that came or went without a command: no recording has them
-        self._commanded: list[Force] = []  # forces that tools push with in the next frame
         self._waiting: list[Command] = []
         self._latest: dict[Any, int] = {}
         self._lock, self._wake = threading.Lock(), threading.Event()
-        self.begin(scene)
-
-    def begin(self, scene: Scene) -> None:
-        """Start a scene; raises `WavetankError` and changes nothing where it is too large."""
-        count = sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
-        if count > self.most_particles:
-            raise WavetankError(
-                f"spacing = {scene.spacing} makes about {count:,.0f} particles; at most {self.most_particles:,} are "
-                "allowed in a session: use a larger spacing or less fluid."
-            )
-        sim = Simulation(scene, self.arch)
-        sim.load_kernels()
-        game = Game(scene.goal, sim.frame(measured=False)) if scene.goal else None
-        self.scene, self.sim, self.game = scene, sim, game
-        self.hands, self.running, self.moving = {}, {}, {}
-        self._camera: Camera | None = None
-        self.history.clear()
-        self.history.keep(sim.snapshot())
 
     # --- commands ---
 
@@ -128,32 +86,25 @@ class Session:
         self.log.append((self.ticks, command))
         self.changes += 1
 
-    def note(self, sentence: str) -> None:
-        """Keep a sentence for the person; fronts show it and take it away."""
-        if sentence not in self.notes[-3:]:
-            self.notes.append(sentence)
-            del self.notes[:-20]
-
     # --- time ---
 
     @property
     def frame_duration(self) -> float:
         """Seconds of water in a frame [s]; slow motion has shorter ones, as long as they hold a good time step."""
         longest = self.sim.scene.frame_time * min(1.0, max(self.speed, 1.0 / MOST_PARTS), 1.0 / self.frame_parts)
-        return self.sim.filled(longest) if self.fills_frames else longest
+        return self.sim.full_steps_time(longest) if self.fills_frames else longest
 
     def tick(self) -> float:
         """Compute one frame, with what the hands do to it, and return the seconds of water in it [s]."""
         duration = self.frame_duration
-        self._look_for_strangers()
+        self._note_uncommanded_forces()
         for tool, hand in [*self.hands.values(), *self.running.values()]:
             hand.pass_time(duration)
-            self.guard(hand, tool.hold, hand, duration)
-        for name, (position, rotation) in list(self.moving.items()):
-            self._carry(name, position, rotation, duration)
+            self.let_act(hand, tool.hold, hand, duration)
+        self.carry_solids(duration)
         self.sim.advance(duration)
         if not self.sim.pushed:  # else too little time has passed for a frame, and they still wait for it
-            self._commanded = []
+            self.commanded = []
         self.ticks += 1
         self.changes += 1
         if self.game is not None:
@@ -179,11 +130,12 @@ class Session:
             self._fit_frame(time.perf_counter() - now)
         return True
 
-    def _look_for_strangers(self) -> None:
+    def _note_uncommanded_forces(self) -> None:
         """Take note of forces that a script added or took away itself."""
-        now, declared, mine = self.sim.forces, self.sim.scene.forces, {id(force) for force in self._commanded}
+        now, declared = self.sim.forces, self.sim.scene.forces
+        commanded = {id(force) for force in self.commanded}
         changed = [force for force in now if force not in declared] + [force for force in declared if force not in now]
-        changed += [force for force in self.sim.pushed if id(force) not in mine]
+        changed += [force for force in self.sim.pushed if id(force) not in commanded]
         self.uncommanded.update(type(force).__name__ for force in changed)
 
     def _fit_frame(self, took: float) -> None:
@@ -209,86 +161,3 @@ class Session:
         if wait > 0.0:
             self._wake.wait(wait)
         self._wake.clear()
-
-    # --- for the rules ---
-
-    @property
-    def camera(self) -> Camera:
-        """Where pictures are taken from."""
-        return self._camera or Camera.framing(self.sim.scene, self.aspect)
-
-    @camera.setter
-    def camera(self, camera: Camera | None) -> None:
-        self._camera = camera
-
-    def guard(self, hand: Hand, act: Any, *arguments: Any) -> None:
-        """Let a tool act; what it has to say, and what it may not do, becomes a note."""
-        before = len(self.sim.pushed)
-        try:
-            act(*arguments)
-        except WavetankError as error:
-            hand.notes.append(str(error))
-        self._commanded += self.sim.pushed[before:]
-        for sentence in hand.notes:
-            self.note(sentence)
-        hand.notes.clear()
-
-    def lift(self, hand: int | str) -> None:
-        """End the tool of a pointer (a number), or one that goes on by itself (a name)."""
-        tool, held = self.hands.pop(hand) if isinstance(hand, int) else self.running.pop(hand)
-        self.guard(held, tool.end, held)
-
-    def lift_all(self) -> None:
-        """End all tools."""
-        for pointer in [*self.hands]:
-            self.lift(pointer)
-        for name in [*self.running]:
-            self.lift(name)
-        self.moving = {}
-
-    def go_to(self, snapshot: Any) -> None:
-        """Make an instant of the past the present."""
-        self.lift_all()
-        self.sim.resume(snapshot)
-        for name in [name for name in self.sim.solids.names if name.startswith(TOOL_SOLID)]:
-            self.sim.remove_solid(name)
-
-    def tool_named(self, name: str, options: dict[str, Any]) -> Tool:
-        """Return a tool with its options; raises `WavetankError` for what it does not have."""
-        if name not in TOOL_NAMES:
-            raise WavetankError(f"tool = {name!r} is not known; it must be one of {', '.join(TOOL_NAMES)}.")
-        tool: Tool = TOOL_NAMES[name].parse(options, name)
-        return tool
-
-    def changed_scene(self, parameters: dict[str, Any]) -> Scene:
-        """Return the scene as it began, with the live parameters as they are now and `parameters` as given.
-
-        A level keeps none that its water feels: a tank that was left tilted stands upright again.
-        """
-        now = {name: getattr(self.sim.scene, name) for name in LIVE}
-        start = {name: getattr(self.scene, name) for name in LIVE}
-        free = LIVE if self.game is None else HARMLESS
-        kept = {name: value for name, value in now.items() if value != start[name] and name in free}
-        return self.scene.changed(**{**kept, **parameters}) if kept or parameters else self.scene
-
-    def present_scene(self) -> Scene:
-        """Return what there is now as a scene: the water as points, the solids where they are; without tools' own."""
-        sim, frame = self.sim, self.sim.frame()
-        pairs = list(zip(sim.solids.members, sim.solids.names, sim.solids.poses, strict=True))[sim.solids.tank_count :]
-        solids = [
-            moved(solid, *pose).model_copy(update={"name": name})
-            for solid, name, pose in pairs
-            if not name.startswith(TOOL_SOLID)
-        ]
-        fluids = [Points(positions=frame.positions, velocities=frame.velocities)] if sim.count else []
-        return sim.scene.changed(fluids=fluids, solids=solids)
-
-    def _carry(self, name: str, position: Any, rotation: Any, duration: float) -> None:
-        if name not in self.sim.solids.names:
-            del self.moving[name]
-            return
-        where = self.sim.solids.poses[self.sim.solids.find(name)][0]
-        goal = np.array([*(where if position is None else position), 0.0][:3])
-        size = max(self.sim.scene.tank.size) if self.sim.scene.tank else 1.0
-        if carry(self.sim, name, goal, rotation, CARRY_PACE * (9.81 * size) ** 0.5 * duration):
-            del self.moving[name]

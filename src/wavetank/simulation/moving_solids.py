@@ -67,16 +67,16 @@ class MovingSolids:
         self.targets, self.growing = without(self.targets), without(self.growing)
         self.rebuild()
 
-    def free_of(self, scene: Scene, places: np.ndarray, particles: Particles) -> np.ndarray:
+    def find_free_places(self, scene: Scene, places: np.ndarray, particles: Particles) -> np.ndarray:
         """Say which `places` [n, dim] of a scene's fluids are outside of solids, bool [n]; those of `Points` stay.
 
         Raises `WavetankError` where none is.
         """
         boxes = [fluid.bounds() for fluid in scene.fluids if not isinstance(fluid, Points)]
-        if not any(_meet(solid, *box) for solid in self.members[self.tank_count :] for box in boxes):
+        if not any(_touch(solid, *box) for solid in self.members[self.tank_count :] for box in boxes):
             return np.ones(len(places), bool)
         wall = scene.wall_gap * scene.spacing
-        free = free_places(places, particles, self.device, 0, 0.0, wall, self.tank_count) | scene.given()
+        free = free_places(places, particles, self.device, 0, 0.0, wall, self.tank_count) | scene.has_own_place()
         if not free.any():
             raise WavetankError("the fluids of this scene are inside of its solids; move them, or make them larger.")
         return free
@@ -187,7 +187,7 @@ class MovingSolids:
         return name
 
 
-def _meet(solid: Solid, lower: np.ndarray, upper: np.ndarray) -> bool:
+def _touch(solid: Solid, lower: np.ndarray, upper: np.ndarray) -> bool:
     """Say whether the ball around a solid reaches into a box [m]."""
     center = solid.origin[: len(lower)]
     return bool(np.linalg.norm(center - np.clip(center, lower, upper)) < solid.reach())

@@ -1,35 +1,42 @@
 """A running world: the public face of the solver."""
 
+import dataclasses
 import math
 import time
 from collections.abc import Iterator, Sequence
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wavetank.device import compiler
-from wavetank.device.state import KINDS, Fluids, Walls, new_particles, new_scratch, vectors
+from wavetank.device.state import Fluids, Walls, new_particles, new_scratch, vectors
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import LIVE, refuse_assignment
-from wavetank.physics import measure, plan, population
+from wavetank.physics import population
 from wavetank.physics.foam.pool import pool_from, pool_rows
 from wavetank.physics.foam.update import load_kernels, update_foam
 from wavetank.physics.grid_pressure.coarse_grid import new_levels
 from wavetank.physics.neighbors import list_room, new_grid
 from wavetank.physics.smoothing import half_space_table
 from wavetank.physics.step import step
-from wavetank.physics.time_step import filled_share, largest_speed, whole
+from wavetank.physics.time_step import filled_share, whole
 from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import MAX_PARTICLES, Scene
+from wavetank.simulation import limits
+from wavetank.simulation import snapshot as snapshots
+from wavetank.simulation.arrays import check_newcomers
+from wavetank.simulation.contents import Contents
 from wavetank.simulation.frame import Frame
+from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids
-from wavetank.simulation.snapshot import Snapshot, put_snapshot, read_snapshot, take_snapshot, write_snapshot
+from wavetank.simulation.snapshot import Snapshot
 from wavetank.solids.solid import Solid
 
 
-class Simulation:
+class Simulation(Contents):
     """Water that moves. See `Scene` for what it is made of."""
 
     def __init__(self, scene: Scene, arch: str = "cpu") -> None:
@@ -44,13 +51,13 @@ class Simulation:
         self.solids = MovingSolids(self._walls(), self.scene.solids, self.scene.friction, self.scene.spacing)
         self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
         self.pushed: list[Force] = []  # these in the next one only
-        self._next_id, self._fastest_start, self._fastest_solid, self._fastest_force = 0, 0.0, 0.0, 0.0
+        self.ledger = Ledger()
         self._fill(len(positions))
-        free = self.solids.free_of(self.scene, positions, self.world.particles)
+        free = self.solids.find_free_places(self.scene, positions, self.world.particles)
         self.add(positions[free], velocities[free], materials=self.scene.kinds()[free])
         box = positions[free] if free.any() else np.zeros((1, self.scene.dim))
-        self._start_box = (box.min(axis=0), box.max(axis=0))
-        self.time, self.frame_number, self._owed, self.seconds_per_frame = 0.0, 0, 0.0, math.nan
+        self.ledger.start_box = (box.min(axis=0), box.max(axis=0))
+        self.seconds_per_frame = math.nan  # that the last frame took to compute
         self.time_steps = 1  # of the last frame
 
     def _fill(self, capacity: int) -> None:
@@ -74,7 +81,7 @@ class Simulation:
             has_friction=self.solids.has_friction,
             levels=new_levels(size, h) if size else [],
         )
-        self._capacity, self._outdated = capacity, True
+        self.ledger.capacity, self._outdated = capacity, True
 
     def _walls(self) -> list[Solid]:
         return self.scene.tank.walls() if self.scene.tank else []
@@ -93,12 +100,12 @@ class Simulation:
         """
         if not (math.isfinite(seconds) and seconds >= 0):
             raise WavetankError(f"seconds = {seconds} is not allowed; it must be a finite number of at least 0.")
-        self._owed += seconds
-        frame = self.scene.frame_time
-        if self._owed < 0.2 * frame / self.scene.substeps:
+        frame, ledger = self.scene.frame_time, self.ledger
+        ledger.owed += seconds
+        if ledger.owed < 0.2 * frame / self.scene.substeps:
             return
-        count = max(1, math.ceil(self._owed / frame - 1e-3))
-        duration, self._owed = self._owed / count, 0.0
+        count = max(1, math.ceil(ledger.owed / frame - 1e-3))
+        duration, ledger.owed = ledger.owed / count, 0.0
         for _ in range(count):
             self._advance_frame(duration)
 
@@ -106,7 +113,7 @@ class Simulation:
         """Load what a splash needs before there is one: a tenth of a second for each kernel, of water that stands."""
         load_kernels(self.world, self.scene)
 
-    def filled(self, duration: float) -> float:
+    def full_steps_time(self, duration: float) -> float:
         """Return the time [s] up to `duration` that time steps of full length fill; see `time_step.filled_share`."""
         return duration * filled_share(self._steps_in(duration))
 
@@ -117,7 +124,7 @@ class Simulation:
         start = self.time
         yield self.frame()
         for number in range(1, round(seconds * fps) + 1):
-            self.advance(max(0.0, start + number / fps - self.time - self._owed))
+            self.advance(max(0.0, start + number / fps - self.time - self.ledger.owed))
             yield self.frame()
 
     def push(self, force: Force) -> None:
@@ -132,7 +139,7 @@ class Simulation:
         for part in range(parts):
             self.world.solids_version = self.solids.move_to(part / parts, (part + 1) / parts)
             if self.count:
-                for force in (*self.forces, *self.pushed):
+                for force in self._acting:
                     force.apply(self.world.particles, self.count, duration / parts, self.time + duration * part / parts)
                 step(self.world, self.scene, duration / parts, limit)
         self.solids.move_to(0.0, 1.0)
@@ -141,35 +148,20 @@ class Simulation:
         self.solids.arrive()
         compiler.synchronize()
         self.seconds_per_frame = time.perf_counter() - began
-        self.time += duration
-        self.frame_number += 1
+        self.ledger.time += duration
+        self.ledger.frame_number += 1
         self._outdated = True
 
-    def _steps_in(self, duration: float) -> float:
-        """Return how many time steps make up `duration` [s], no whole number."""
-        scene, forces = self.scene, (*self.forces, *self.pushed)
-        box = (np.zeros(scene.dim), np.array(scene.tank.size)) if scene.tank else self._start_box
-        speed = max(self._solid_speed(duration), largest_speed(self.world.particles, self.count))
-        speed += duration * sum(force.largest_acceleration() for force in forces)
-        return plan.steps_in(self.world, scene, duration, speed, box, forced=bool(forces))
+    @property
+    def _acting(self) -> tuple[Force, ...]:
+        """The forces of the next frame."""
+        return (*self.forces, *self.pushed)
 
-    def _solid_speed(self, duration: float) -> float:
-        """Return the largest speed [m/s] at which any solid moves through the tank in this frame."""
-        return self.solids.largest_speed(duration, self.scene.tank.size if self.scene.tank else None)
+    def _steps_in(self, duration: float) -> float:
+        return limits.count_steps(self.world, self.scene, self.solids, self.ledger, self._acting, duration)
 
     def _speed_limit(self, duration: float) -> float:
-        """Return the largest speed [m/s] that gravity, the start, solids and forces can have given to a particle.
-
-        Gravity gives that of a free fall through the tank. Without one a fall has no end, and neither has the limit.
-        """
-        if self.scene.tank is None:
-            return math.inf
-        self._fastest_solid = max(self._fastest_solid, self._solid_speed(duration))
-        fall = sum(2.0 * abs(g) * edge for g, edge in zip(self.scene.gravity, self.scene.tank.size, strict=True))
-        pushes = sum(force.largest_speed() for force in (*self.forces, *self.pushed))
-        self._fastest_force = max(self._fastest_force, pushes)
-        given = math.sqrt(fall + self._fastest_start**2) + 2.0 * self._fastest_solid + self._fastest_force
-        return self.scene.speed_limit * max(given + plan.capillary_speed(self.world, self.scene), 1e-6)
+        return limits.find_speed_limit(self.world, self.scene, self.solids, self.ledger, self._acting, duration)
 
     # --- solids ---
 
@@ -214,29 +206,20 @@ class Simulation:
         `materials` are numbers in `Scene.palette`, [n]; that of the scene's first fluid where None.
         Where there is room is for the caller to know: see `free_places`. Raises `WavetankError` for wrong shapes.
         """
-        x = np.asarray(positions, np.float32)
-        v = np.zeros_like(x) if velocities is None else np.asarray(velocities, np.float32)
-        dye = np.zeros(len(x), np.int32) if dyes is None else np.asarray(dyes, np.int32)
-        material = self.scene.checked_kinds(materials, len(x))
-        shape = (len(x), self.scene.dim)
-        if x.shape != shape or v.shape != shape or dye.shape != shape[:1]:
-            raise WavetankError(
-                f"positions have shape {list(x.shape)}, velocities {list(v.shape)}; both must be [n, {self.scene.dim}]."
-            )
-        if not (np.isfinite(x).all() and np.isfinite(v).all()):
-            raise WavetankError("positions and velocities of new particles must be finite numbers.")
-        count = self.count + len(x)
+        ledger, new = self.ledger, check_newcomers(self.scene, positions, velocities, dyes, materials)
+        number = len(new.x)
+        count = self.count + number
         if count > MAX_PARTICLES:
             raise WavetankError(f"{count:,} particles are more than the {MAX_PARTICLES:,} that are allowed.")
-        if count > self._capacity:
+        if count > ledger.capacity:
             # Half as much again, so that a hose does not make a new world in every frame.
-            self._make_room(max(count, self._capacity * 3 // 2))
-        if len(x):
-            population.append(self.world.particles, self.count, x, v, dye, material, self._next_id)
-            self.world.materials |= self.scene.materials_of(material)
-        ids = np.arange(self._next_id, self._next_id + len(x))
-        self.world.count, self._next_id, self._outdated = count, self._next_id + len(x), True
-        self._fastest_start = max(self._fastest_start, float(np.linalg.norm(v, axis=1).max(initial=0.0)))
+            self._make_room(max(count, ledger.capacity * 3 // 2))
+        if number:
+            population.append(self.world.particles, self.count, new.x, new.v, new.dye, new.material, ledger.next_id)
+            self.world.materials |= self.scene.materials_of(new.material)
+        ids = np.arange(ledger.next_id, ledger.next_id + number)
+        self.world.count, ledger.next_id, self._outdated = count, ledger.next_id + number, True
+        ledger.fastest_start = max(ledger.fastest_start, new.fastest)
         return ids
 
     def remove(self, ids: Any) -> int:
@@ -287,86 +270,32 @@ class Simulation:
 
     def snapshot(self) -> Snapshot:
         """Return this instant as host arrays, for `resume`."""
-        return take_snapshot(self)
+        return snapshots.take_snapshot(self.scene, self.world, self.solids, self.ledger)
 
     def resume(self, snapshot: Snapshot) -> None:
         """Go back (or on) to an instant; parameters and forces stay as they are now."""
-        put_snapshot(self, snapshot)
+        self.scene.assign("solids", snapshot.solids)
+        self.solids = snapshots.restore_solids(self.scene, self._walls(), snapshot)
+        if snapshot.ledger.capacity > self.ledger.capacity:
+            self._fill(snapshot.ledger.capacity)
+        self._renew_solids()
+        before, self.ledger, self.pushed = self.ledger, snapshot.ledger.copy(), []
+        self.ledger.capacity = before.capacity
+        self.ledger.next_id = max(self.ledger.next_id, before.next_id)
+        snapshots.put_particles(snapshot, self.scene, self.world, self.ledger.capacity)
 
-    # --- what is there ---
+    def clone(self) -> "Simulation":
+        """Return a world of its own that goes on from here to the same bits, with the same forces and parameters."""
+        empty = self.scene.model_copy(update={"fluids": [], "solids": []})
+        copy = type(self)(empty, self.arch or "cpu")
+        copy.scene = self.scene.model_copy(deep=True)
+        copy.resume(dataclasses.replace(self.snapshot(), solids=[*copy.scene.solids]))
+        copy.forces, copy.pushed = deepcopy((self.forces, self.pushed))
+        return copy
 
-    @property
-    def count(self) -> int:
-        """Number of particles."""
-        return self.world.count
-
-    @property
-    def positions(self) -> np.ndarray:
-        """Positions [m], float32 [count, dim], ordered by particle id."""
-        return self.frame().positions
-
-    @property
-    def velocities(self) -> np.ndarray:
-        """Velocities [m/s], float32 [count, dim], ordered by particle id."""
-        return self.frame().velocities
-
-    @property
-    def densities(self) -> np.ndarray:
-        """Densities [kg/m^3], float32 [count], ordered by particle id; walls count as water of rest density."""
-        return self.frame().densities
-
-    @property
-    def foam_positions(self) -> np.ndarray:
-        """Positions [m] of spray, foam and bubbles, float32 [n, dim], in the order of their birth."""
-        return self.frame().foam_positions
-
-    @property
-    def foam_kinds(self) -> np.ndarray:
-        """What they are, int32 [n]: 1 spray, 2 foam, 3 bubble."""
-        return self.frame().foam_kinds
-
-    @property
-    def foam_ages(self) -> np.ndarray:
-        """Time since their birth [s], float32 [n]."""
-        return self.frame().foam_ages
-
-    def frame(self, measured: bool = True) -> Frame:
-        """Return this instant for a viewer or an exporter; valid until the water moves on.
-
-        Without `measured` its densities are those of some moment before, and no time is spent on them.
-        """
-        if measured:
-            self._measure()
-        world = self.world
-        return Frame(
-            scene=self.scene, number=self.frame_number, time=self.time, count=world.count, x=world.particles.x,
-            v=world.particles.v, rho=world.scratch.rho, id=world.particles.id, material=world.particles.material,
-            solids=world.solids, dye=world.particles.dye,
-            diffuse=world.pool.now if world.pool else None, foam_count=world.pool.count if world.pool else 0,
-        )  # fmt: skip
-
-    def stats(self) -> dict[str, float]:
-        """Measure this instant; see `physics.measure.statistics` for the keys, and foam in numbers of particles."""
-        frame = self.frame()
-        numbers = measure.neighbor_numbers(self.world, self.scene)
-        figures = measure.statistics(
-            frame.positions, frame.velocities, frame.densities, numbers, self.scene, frame.rest_densities
-        )
-        return {
-            "time": self.time,
-            "frame": self.frame_number,
-            **figures,
-            **{KINDS[kind]: int(np.sum(frame.foam_kinds == kind)) for kind in (1, 2, 3)},
-            "foaming": int(frame.foaming.sum()),
-            "substeps": self.time_steps,
-            "milliseconds_per_frame": 1e3 * self.seconds_per_frame,
-        }
-
-    def _measure(self) -> None:
-        """Renew neighbours and densities for the positions as they are."""
-        if self._outdated and self.count:
-            measure.update_densities(self.world, self.scene)
-        self._outdated = False
+    def digest(self) -> str:
+        """Return the hex SHA-256 of the state: time, particles by id, foam, poses of the solids, to the last bit."""
+        return snapshots.digest(self.snapshot())
 
     # --- parameters ---
 
@@ -381,7 +310,7 @@ class Simulation:
         if name in LIVE:
             self.scene.assign(name, value)
         else:
-            if name not in self.__dict__:
+            if name not in self.__dict__ and not hasattr(type(self), name):
                 refuse_assignment(name)
             super().__setattr__(name, value)
 
@@ -389,12 +318,12 @@ class Simulation:
 
     def save(self, path: str | Path) -> None:
         """Write the whole state to an .npz file, replaced in one move; `restore` continues from it exactly."""
-        write_snapshot(path, self.snapshot(), self.scene.model_dump_json(exclude={"fluids"}))
+        snapshots.write_snapshot(path, self.snapshot(), self.scene.model_dump_json(exclude={"fluids"}))
 
     @classmethod
     def restore(cls, path: str | Path, arch: str = "cpu") -> "Simulation":
         """Continue from a file that `save` wrote, bit for bit on the same back end."""
-        snapshot, text = read_snapshot(path, lambda text: Scene.model_validate_json(text).solids)
+        snapshot, text = snapshots.read_snapshot(path, lambda text: Scene.model_validate_json(text).solids)
         self = cls(Scene.model_validate_json(text), arch)
         self.resume(snapshot)
         return self

@@ -1,11 +1,12 @@
 """A whole running world as plain arrays: what saving, rewinding and bookmarks keep, to the last bit."""
 
 import dataclasses
+import hashlib
 import json
 import zipfile
 import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,26 +15,33 @@ from wavetank.device.state import LASTING
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.replacing import replacing
 from wavetank.physics.foam.pool import pool_from, pool_rows
+from wavetank.physics.world import World
+from wavetank.scene.scene import Scene
+from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids, Pose
 from wavetank.solids.solid import Solid
 
-if TYPE_CHECKING:
-    from wavetank.simulation.simulation import Simulation
-
 ARRAYS = LASTING  # of the particles, in device order
 VISCOUS = "viscous"  # the same, where there are viscous fluids
-NUMBERS = (
-    "time", "frame_number", "owed", "next_id", "frozen_count", "fastest_start", "fastest_solid", "fastest_force",
-    "capacity", "start_box", "foam_born", "foam_capacity",
-)  # fmt: skip
+TOLD = ("id", "x", "v", "dye", "frozen", "material")  # of these, what a digest tells
 SAMPLE, WORTH = 1024, 0.8  # bytes; the share of these that must be left for packing to be worth it
+
+
+@dataclasses.dataclass(frozen=True)
+class Numbers:
+    """How much there is."""
+
+    frozen_count: int  # particles that are ice
+    foam_born: int  # since the start; -1 where there was no foam yet
+    foam_capacity: int
 
 
 @dataclasses.dataclass(frozen=True)
 class Snapshot:
     """One instant of a world, on the host."""
 
-    numbers: dict[str, Any]  # see NUMBERS
+    ledger: Ledger
+    numbers: Numbers
     arrays: dict[str, np.ndarray]  # of the particles, see ARRAYS and VISCOUS, and of foam, names begin with foam_
     solids: list[Solid]  # but for the walls of the tank
     names: list[str]
@@ -44,58 +52,56 @@ class Snapshot:
     @property
     def time(self) -> float:
         """Seconds of water since the start [s]."""
-        return float(self.numbers["time"])
-
-    @property
-    def frame_number(self) -> int:
-        """Frames since the start."""
-        return int(self.numbers["frame_number"])
+        return float(self.ledger.time)
 
 
-def take_snapshot(sim: "Simulation") -> Snapshot:
+def take_snapshot(scene: Scene, world: World, solids: MovingSolids, ledger: Ledger) -> Snapshot:
     """Return this instant of a running world."""
-    particles, moving, pool = sim.world.particles, sim.solids, sim.world.pool
-    names = (*ARRAYS, VISCOUS) if sim.world.remembers_viscosity else ARRAYS
+    particles, pool = world.particles, world.pool
+    names = (*ARRAYS, VISCOUS) if world.remembers_viscosity else ARRAYS
     return Snapshot(
-        numbers={
-            "time": sim.time, "frame_number": sim.frame_number, "owed": sim._owed, "next_id": sim._next_id,
-            "frozen_count": sim.world.frozen, "fastest_start": sim._fastest_start,
-            "fastest_solid": sim._fastest_solid, "fastest_force": sim._fastest_force, "capacity": sim._capacity,
-            "start_box": [end.tolist() for end in sim._start_box], "foam_born": pool.born if pool else -1,
-            "foam_capacity": pool.capacity if pool else 0,
-        },
-        arrays={name: download(getattr(particles, name))[: sim.count].copy() for name in names}
-        | pool_rows(pool, sim.scene.dim),
-        solids=[*sim.scene.solids], names=[*moving.names], poses=[*moving.poses], targets={**moving.targets},
-        growing={**moving.growing},
+        ledger=ledger.copy(),
+        numbers=Numbers(
+            frozen_count=world.frozen, foam_born=pool.born if pool else -1, foam_capacity=pool.capacity if pool else 0
+        ),
+        arrays={name: download(getattr(particles, name))[: world.count].copy() for name in names}
+        | pool_rows(pool, scene.dim),
+        solids=[*scene.solids], names=[*solids.names], poses=[*solids.poses], targets={**solids.targets},
+        growing={**solids.growing},
     )  # fmt: skip
 
 
-def put_snapshot(sim: "Simulation", snapshot: Snapshot) -> None:
-    """Make an instant the present of a running world; its parameters and forces stay as they are now."""
-    numbers = snapshot.numbers
-    sim.scene.assign("solids", snapshot.solids)
-    sim.solids = MovingSolids(sim._walls(), snapshot.solids, sim.scene.friction, sim.scene.spacing)
-    sim.solids.names, sim.solids.poses = [*snapshot.names], [*snapshot.poses]
-    sim.solids.targets, sim.solids.growing = {**snapshot.targets}, {**snapshot.growing}
-    sim.solids.rebuild()
-    if numbers["capacity"] > sim._capacity:
-        sim._fill(int(numbers["capacity"]))
-    sim._renew_solids()
+def restore_solids(scene: Scene, walls: list[Solid], snapshot: Snapshot) -> MovingSolids:
+    """Return the solids of an instant, where they were."""
+    solids = MovingSolids(walls, snapshot.solids, scene.friction, scene.spacing)
+    solids.names, solids.poses = [*snapshot.names], [*snapshot.poses]
+    solids.targets, solids.growing = {**snapshot.targets}, {**snapshot.growing}
+    solids.rebuild()
+    return solids
+
+
+def put_particles(snapshot: Snapshot, scene: Scene, world: World, capacity: int) -> None:
+    """Put the particles and the foam of an instant into a world that has room for `capacity` particles."""
     for name in ARRAYS:
-        upload(getattr(sim.world.particles, name), snapshot.arrays[name])
-    if VISCOUS in snapshot.arrays or sim.world.remembers_viscosity:
-        sim.world.remember_viscosity(snapshot.arrays.get(VISCOUS, np.zeros(0)))
-    sim.world.materials = sim.scene.materials_of(snapshot.arrays["material"])
-    sim.world.count, sim.world.frozen = len(snapshot.arrays["id"]), int(numbers["frozen_count"])
-    sim.world.pool = pool_from(
-        snapshot.arrays, numbers["foam_born"], numbers["foam_capacity"], sim.scene.dim, sim._capacity
-    )
-    sim.time, sim.frame_number, sim._owed = numbers["time"], snapshot.frame_number, numbers["owed"]
-    sim._next_id, sim.pushed = max(sim._next_id, int(numbers["next_id"])), []
-    sim._fastest_start, sim._fastest_solid = numbers["fastest_start"], numbers["fastest_solid"]
-    sim._fastest_force = numbers["fastest_force"]
-    sim._start_box = (np.array(numbers["start_box"][0]), np.array(numbers["start_box"][1]))
+        upload(getattr(world.particles, name), snapshot.arrays[name])
+    if VISCOUS in snapshot.arrays or world.remembers_viscosity:
+        world.remember_viscosity(snapshot.arrays.get(VISCOUS, np.zeros(0)))
+    world.materials = scene.materials_of(snapshot.arrays["material"])
+    numbers = snapshot.numbers
+    world.count, world.frozen = len(snapshot.arrays["id"]), numbers.frozen_count
+    world.pool = pool_from(snapshot.arrays, numbers.foam_born, numbers.foam_capacity, scene.dim, capacity)
+
+
+def digest(snapshot: Snapshot) -> str:
+    """Return the hex SHA-256 of an instant: time, particles ordered by id, foam, poses of solids, to the last bit."""
+    order = np.argsort(snapshot.arrays["id"], kind="stable")
+    particles = {name: snapshot.arrays[name][order] for name in TOLD}
+    foam = {name: rows for name, rows in sorted(snapshot.arrays.items()) if name.startswith("foam_")}
+    poses = {f"pose {number}": np.concatenate(pose) for number, pose in enumerate(snapshot.poses)}
+    whole = hashlib.sha256()
+    for name, values in ({"time": np.float64(snapshot.time)} | particles | foam | poses).items():
+        whole.update(f"{name} {values.shape}".encode() + values.tobytes())
+    return whole.hexdigest()
 
 
 class Packed:
@@ -141,7 +147,7 @@ def _packed(plane: np.ndarray) -> tuple[bool, bytes]:
 def write_snapshot(path: str | Path, snapshot: Snapshot, scene: str) -> None:
     """Write a snapshot and the JSON of its scene to an .npz file, replaced in one move."""
     about = {
-        "numbers": snapshot.numbers,
+        "numbers": snapshot.ledger.plain() | dataclasses.asdict(snapshot.numbers),
         "names": snapshot.names,
         "poses": [_pose_list(pose) for pose in snapshot.poses],
         "targets": {k: _pose_list(pose) for k, pose in snapshot.targets.items()},
@@ -159,9 +165,10 @@ def read_snapshot(path: str | Path, solids: Any) -> tuple[Snapshot, str]:
         data.setdefault("a", np.zeros_like(data["v"]))  # earlier states carry no pressure on
         scene = str(data["scene"])
         about = json.loads(str(data["about"]))
-        members = solids(scene)
+        members, numbers = solids(scene), about["numbers"]
         snapshot = Snapshot(
-            numbers={name: about["numbers"][name] for name in NUMBERS},
+            ledger=Ledger.read(numbers),
+            numbers=Numbers(**{field.name: int(numbers[field.name]) for field in dataclasses.fields(Numbers)}),
             arrays={
                 name: data[name]
                 for name in (*ARRAYS, *(name for name in data if name == VISCOUS or name.startswith("foam_")))

@@ -12,7 +12,7 @@ from typing_extensions import override
 
 from wavetank.device.compiler import qd, upload
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.model import Positive, Size, Vector, register_model
+from wavetank.foundation.model import Edges, Length, Place, Vector, register_model
 from wavetank.foundation.rotations import turn_from_y, unit_quaternion
 from wavetank.solids.distance import (
     DIFFERENCE,
@@ -51,8 +51,8 @@ class Box(Solid):
     """A box; in a 2-D world a rectangle."""
 
     shape: Literal["box"] = "box"
-    center: Vector
-    size: Size
+    center: Place
+    size: Edges
 
     @property
     @override
@@ -77,8 +77,8 @@ class Sphere(Solid):
     """A ball; in a 2-D world a disc."""
 
     shape: Literal["sphere"] = "sphere"
-    center: Vector
-    radius: Positive
+    center: Place
+    radius: Length
 
     @property
     @override
@@ -99,9 +99,9 @@ class Sphere(Solid):
 
 
 class _Axial(Solid):
-    start: Vector
-    end: Vector
-    radius: Positive
+    start: Place
+    end: Place
+    radius: Length
 
     @model_validator(mode="after")
     def _has_length(self) -> "_Axial":
@@ -153,7 +153,7 @@ class HalfSpace(Solid):
     """Everything behind a plane through `point`; `normal` points out of the solid, into the water."""
 
     shape: Literal["half-space"] = "half-space"
-    point: Vector
+    point: Place
     normal: Vector
 
     @model_validator(mode="after")
@@ -181,7 +181,7 @@ class HalfSpace(Solid):
 
 
 class _SetOperation(Solid):
-    center: Vector = (0.0, 0.0, 0.0)
+    center: Place = (0.0, 0.0, 0.0)
     parts: Annotated[list["AnySolid"], Field(min_length=2)]
 
     @property

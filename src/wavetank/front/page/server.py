@@ -11,10 +11,10 @@ import math
 import mimetypes
 import socket
 import threading
-import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
@@ -22,20 +22,18 @@ from starlette.responses import Response
 from starlette.routing import Route, WebSocketRoute
 
 from wavetank.foundation.errors import WavetankError
-from wavetank.front.about import everything, figures, status, world
-from wavetank.front.hud import Hud
-from wavetank.front.jobs import Jobs
+from wavetank.front.about import everything
+from wavetank.front.loop import Loop, News
 from wavetank.front.page.gate import Gate
 from wavetank.front.page.viewers import Viewers
-from wavetank.front.picture import Painter, jpeg
+from wavetank.front.picture import jpeg
+from wavetank.front.theme import style_sheet
 from wavetank.session.pace import share_interpreter
 from wavetank.session.recording import Recording
 from wavetank.session.session import Session
 
 PORT = 8420  # the first one tried where none is asked for
 LONGEST_MESSAGE = 2_500_000  # bytes: a dropped scene file
-STATUS_EVERY, FIGURES_EVERY = 0.1, 2.0  # s
-CALM = 0.25  # s without a change after which a sharp picture is worth it
 
 
 class WebFront:
@@ -43,11 +41,10 @@ class WebFront:
 
     def __init__(self, session: Session, host: str = "127.0.0.1", port: int | None = None) -> None:
         self.session, self.start_scene = session, session.scene
-        session.smooth = True
-        self.painter = Painter(session)
-        self.hud = Hud(session)
         self.viewers = Viewers(session.submit, self._ray, lambda: self._hello)
         self.viewers.wake = session.wake
+        self.loop = Loop(session, self)
+        self.painter, self.ask = self.loop.painter, self.loop.ask
         self._socket = _listen(host, port)
         self.port = self._socket.getsockname()[1]
         everywhere = host in ("0.0.0.0", "::")
@@ -63,20 +60,13 @@ class WebFront:
             self.gate, log_level="error", access_log=False, lifespan="off", ws="websockets-sansio",
             ws_max_size=LONGEST_MESSAGE, ws_per_message_deflate=False, timeout_graceful_shutdown=1,
         ))  # fmt: skip
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._events: asyncio.AbstractEventLoop | None = None
         self._thread = threading.Thread(target=self._serve, name="wavetank web", daemon=True)
         self._packer = concurrent.futures.ThreadPoolExecutor(1, "wavetank jpeg")
-        self._jobs = Jobs(session.wake)
-        self.ask = self._jobs.ask  # have something done between two frames
-        self._stopped = threading.Event()
-        self._told: dict[str, Any] = {}
-        self._heard: Any = None  # the last status, and who was there
-        self._outlined: dict[str, Any] = {}
-        self._figures: dict[str, float] = {}
-        self._measured = (-1, 0)  # frames and particles when that was
-        self._next_status = self._next_figures = 0.0
-        self._shown, self._shown_at, self._sharp = -1, 0.0, False
         self._packing: concurrent.futures.Future[None] | None = None
+        self._told_world: dict[str, Any] = {}
+        self._told: Any = None  # the last status, and who was there
+        self._told_regions: dict[str, Any] = {}
         self._hello = everything(session)
 
     # --- the simulation's thread ---
@@ -89,101 +79,89 @@ class WebFront:
     def run(self) -> None:
         """Let the water move until `stop`."""
         try:
-            while not self._stopped.is_set():
-                self.turn()
-                self.session.rest(0.05, asleep=not self.viewers.all)
+            self.loop.run()
         finally:
             self._packer.shutdown()
 
-    def turn(self) -> None:
-        """Do what is due: jobs, commands, a frame, a picture, a status."""
-        for error in self._jobs.do_all():
-            if isinstance(error, WavetankError):
-                self.session.note(str(error))
-        driver = self.viewers.driver
-        self.painter.detail = self.viewers.detail
-        if driver is not None and driver.size != self.painter.asked:
-            self.painter.want(*driver.size)
-        if self.viewers.all:
-            self.session.turn()
-        else:  # time stands still while nobody is there: who opens the page sees the beginning
-            self.session.drain()
-            self.session.pace.stop()
-        now = time.perf_counter()
-        self._show(now)
-        if now >= self._next_status and self.viewers.all:
-            self._next_status = now + STATUS_EVERY
-            self._tell(now)
-
     def stop(self) -> None:
         """Close the doors and end `run`."""
-        self._stopped.set()
-        self.session.wake()
+        self.loop.stop()
         self._server.should_exit = True
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
             self._thread.join(5.0)
 
-    def _show(self, now: float) -> None:
-        """Send a picture where something has changed and someone waits for it."""
-        if not self.viewers.anyone_ready or (self._packing is not None and not self._packing.done()):
-            return
-        changed = self.session.changes != self._shown
-        calm = not changed and not self._sharp and self.painter.is_reduced and now - self._shown_at > CALM
-        new = any(viewer.is_new for viewer in self.viewers.all)
-        if not (new or ((changed or calm) and self.painter.is_due(now))):
-            return
-        self._shown, self._shown_at, self._sharp = self.session.changes, now, calm
+    # --- for the loop, in the simulation's thread: see `loop.Audience` ---
+
+    @property
+    def looks(self) -> bool:
+        """Whether anyone is there."""
+        return bool(self.viewers.all)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether someone waits for a picture, and none is being packed."""
+        return self.viewers.anyone_ready and (self._packing is None or self._packing.done())
+
+    @property
+    def is_new(self) -> bool:
+        """Whether someone has just come."""
+        return any(viewer.is_new for viewer in self.viewers.all)
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """Of the place for the picture, where the driver sits [px]."""
+        driver = self.viewers.driver
+        return driver.size if driver is not None else None
+
+    @property
+    def detail(self) -> str:
+        """How fine pictures are."""
+        return self.viewers.detail
+
+    def show(self, image: np.ndarray, regions: list[dict[str, Any]]) -> None:
+        """Send a picture to everyone, and the regions where they have changed."""
+        outlines = {"type": "regions", "regions": regions}
+        if self.is_new or outlines != self._told_regions:
+            self._told_regions = outlines
+            self._call(lambda: self.viewers.broadcast(outlines))
         for viewer in self.viewers.all:
             viewer.is_new = False
-        image = self.painter.paint(sharp=calm)
-        outlines = {"type": "regions", "regions": self.hud.regions(self.painter.wanted)}
-        if new or outlines != self._outlined:
-            self._outlined = outlines
-            self._call(lambda: self.viewers.broadcast(outlines))
         self._packing = self._packer.submit(self._pack, image)
 
-    def _pack(self, image: Any) -> None:
+    def _pack(self, image: np.ndarray) -> None:
         picture = jpeg(image)
         self._call(lambda: self.viewers.show(picture))
         self.session.wake()
 
-    def _tell(self, now: float) -> None:
-        session = self.session
-        if now >= self._next_figures and self._measured != (session.ticks, session.sim.count):
-            self._next_figures, self._measured = now + FIGURES_EVERY, (session.ticks, session.sim.count)
-            self._figures = figures(session)
-        # The game first: a score that cannot be kept is one more note.
-        game = self.hud.status()
-        notes, session.notes = session.notes, []
-        told_now = {
-            "type": "status", **status(session, self.painter), "notes": notes, **self._figures, "game": game,
-            "scores": self.hud.scores,
+    def tell(self, news: News, notes: list[str]) -> None:
+        """Send how things stand to everyone, if anything has changed."""
+        status = {
+            "type": "status", **news.status, "notes": notes, **news.figures, "game": news.game, "scores": news.scores
         }  # fmt: skip
-        about = world(session)
-        if about != self._told:
-            self._told = about
-            self._hello = {**self._hello, **about}
-            told_now["world"] = about
+        if news.world != self._told_world:
+            self._told_world = news.world
+            self._hello = {**self._hello, **news.world}
+            status["world"] = news.world
         # JSON has no word for what is no number, such as the time of a frame before there was one.
-        told = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in told_now.items()}
-        heard = (told, [*self.viewers.all])
-        if heard != self._heard:  # what stands still says nothing
-            self._heard = heard
-            self._call(lambda: self.viewers.broadcast(told))
+        plain = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in status.items()}
+        told = (plain, [*self.viewers.all])
+        if told != self._told:  # what stands still says nothing
+            self._told = told
+            self._call(lambda: self.viewers.broadcast(plain))
 
     # --- the server's thread ---
 
     def _serve(self) -> None:
         async def main() -> None:
-            self._loop = asyncio.get_running_loop()
+            self._events = asyncio.get_running_loop()
             await self._server.serve(sockets=[self._socket])
 
         asyncio.run(main())
 
     def _call(self, act: Callable[[], None]) -> None:
-        loop = self._loop
-        if loop is not None and not loop.is_closed():
-            loop.call_soon_threadsafe(act)
+        events = self._events
+        if events is not None and not events.is_closed():
+            events.call_soon_threadsafe(act)
 
     def _ray(self, u: float, v: float) -> dict[str, Any]:
         width, height = self.painter.wanted
@@ -194,7 +172,8 @@ class WebFront:
         return _packaged("index.html")
 
     async def _file(self, request: Request) -> Response:
-        return _packaged(request.path_params["file"])
+        name = request.path_params["file"]
+        return Response(style_sheet(), media_type="text/css") if name == "theme.css" else _packaged(name)
 
     async def _recording(self, request: Request) -> Response:
         return await self._download("session.toml", lambda: Recording.of(self.session, self.start_scene).text())
@@ -204,7 +183,15 @@ class WebFront:
 
     async def _download(self, name: str, make: Callable[[], str]) -> Response:
         """Return a text that the simulation's thread makes, as a file."""
-        future = self.ask(make)
+
+        def made() -> str:
+            try:
+                return make()
+            except WavetankError as error:
+                self.session.note(str(error))
+                raise
+
+        future = self.ask(made)
         headers = {"content-disposition": f"attachment; filename={name}"}
         try:
             return Response(await asyncio.wrap_future(future), media_type="application/toml", headers=headers)

@@ -4,8 +4,9 @@ from typing import Any
 
 from imgui_bundle import imgui
 
+from wavetank.front.theme import ACCENT, DYE, SOFT, TEXT, WARM
 from wavetank.front.window.desk import Desk
-from wavetank.front.window.look import ACCENT, SOFT, TEXT, WARM, hint, rgba
+from wavetank.front.window.look import hint, rgba
 
 LABEL = 0.44  # share of the width
 
@@ -70,7 +71,7 @@ def _color(label: str, value: str) -> str | None:
     """A switch and, where it is on, a colour; an empty text is none."""
     changed, on = imgui.checkbox(label, bool(value))
     if changed:
-        return "#2f9fe8" if on else ""
+        return DYE if on else ""
     if not value:
         imgui.same_line()
         imgui.text_colored(rgba(SOFT), "none")

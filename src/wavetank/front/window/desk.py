@@ -8,19 +8,20 @@ from typing import Any
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.front.about import everything
+from wavetank.front.keys import LOOK
 from wavetank.front.window.engine import Engine
-from wavetank.front.window.icons import LOOK
 from wavetank.scene.scene import Scene
 from wavetank.session.tools import TOOLS, describe
 
 LOOK_TOOL = {
-    "name": "look", "label": "Look", "key": "l", "icon": LOOK, "options": [], "cursor": False,
+    **LOOK,
     "sentence": "Drag to turn the view. With any tool: the right button turns, the wheel zooms, the middle button or "
     "Shift moves; W A S D Q E fly while the right button is down.",
-}  # fmt: skip
+}
 PATIENCE = 0.6  # s for which a value set here is shown before what the simulation says
 LONGEST_SCENE = 2_000_000  # bytes of a dropped file
 KEPT = 600  # points of a curve
+FIRST_FRAMES = 2  # are compiled on the way; what they took would flatten every curve
 
 
 @dataclasses.dataclass
@@ -123,6 +124,8 @@ class Desk:
         shown = self.engine.shown
         if shown.measured != self._measured:
             self._measured = shown.measured
+            if shown.status["ticks"] <= FIRST_FRAMES:
+                return
             if self.curves.get("time") and shown.status["time"] < self.curves["time"][-1]:
                 self.curves.clear()  # rewound, or another scene
             for name, value in {

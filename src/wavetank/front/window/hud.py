@@ -4,25 +4,12 @@ from typing import Any
 
 from imgui_bundle import ImVec2, imgui
 
+from wavetank.front.theme import FORBIDDEN, GOLD, GOOD, MET, RAISED, SOFT, TEXT, UNLIT, WANTED, WARM
 from wavetank.front.window import keys
 from wavetank.front.window.desk import Desk
-from wavetank.front.window.look import (
-    GOLD,
-    GOOD,
-    RAISED,
-    SOFT,
-    TEXT,
-    WARM,
-    button,
-    draw_star,
-    floating,
-    heading,
-    ink,
-    rgba,
-)
+from wavetank.front.window.look import button, draw_star, floating, heading, ink, rgba
 
 EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-WANTED, MET, FORBIDDEN = "#e0930f", "#1f9d57", "#d8434e"
 WIDE, MARGIN = 21.0, 12.0  # em, px: of the card
 HURRY = 5.0  # s before the end
 
@@ -45,7 +32,7 @@ def stars(count: int, at: ImVec2, size: float) -> None:
     draw = imgui.get_window_draw_list()
     for k in range(3):
         middle = ImVec2(at.x + (1.15 * k + 0.5) * size, at.y + 0.5 * size)
-        draw_star(draw, middle, 0.5 * size, ink(GOLD if k < count else "#4a5a66"))
+        draw_star(draw, middle, 0.5 * size, ink(GOLD if k < count else UNLIT))
 
 
 def _regions(desk: Desk, game: dict[str, Any], box: Box) -> None:
@@ -136,7 +123,7 @@ def _banner(desk: Desk, game: dict[str, Any], box: Box) -> None:
             imgui.same_line(start + n * (each + 0.6 * em))
             # What comes next in the game stands out: another try after a loss, the next level after a win.
             if button(text, on=name == ("next" if won and game["next"] else "retry"), wide=each):
-                keys.again(desk) if name == "retry" else desk.begin(name=game["next"])
+                keys.begin_again(desk) if name == "retry" else desk.begin(name=game["next"])
             low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
             desk.places[name] = (low.x, low.y, high.x, high.y)
     desk.banner_height = imgui.get_item_rect_size().y

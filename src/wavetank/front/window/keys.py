@@ -1,19 +1,15 @@
-"""Keys: what they do, and the list that `?` shows."""
+"""Keys: what their actions do here, and the list that `?` shows. Which there are is in `front/keys.py`."""
 
 from collections.abc import Callable
 
 from imgui_bundle import ImVec2, imgui
 
+from wavetank.front.keys import KEYS, SPEEDS, Key, nearest_speed
+from wavetank.front.theme import ACCENT, RAISED, SOFT
 from wavetank.front.window.desk import Desk
-from wavetank.front.window.look import ACCENT, RAISED, SOFT, ink, rgba
-from wavetank.session.commands import Bookmark, Home, Orbit, Pause, Reset, Rewind, Speed, Step, ToolStop, Zoom
+from wavetank.front.window.look import ink, rgba
+from wavetank.session.commands import Bookmark, Pause, Reset, Rewind, Speed, command_of
 
-SPEEDS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0)
-SHOWN = (
-    ("Space", "Pause, play"), (".", "One frame"), (",", "One second back"), ("R", "Start again"),
-    ("[ ]", "Slower, faster"), ("M", "Bookmark"), ("H", "See all"), ("Esc", "Stop all tools"), ("Tab", "Panel"),
-    ("+ −", "Closer, farther"), ("Arrows", "Turn"), ("?", "This list"),
-)  # fmt: skip
 POINTER = (
     ("left button", "Use the tool"), ("right button", "Turn the view"), ("right, W A S D Q E", "Fly"),
     ("middle, Shift", "Move the view"), ("wheel", "Zoom"), ("double click a slider", "Its default"),
@@ -21,68 +17,80 @@ POINTER = (
 )  # fmt: skip
 
 
-def toggle(desk: Desk) -> None:
+def toggle_pause(desk: Desk) -> None:
     """Pause, or let time run."""
     desk.engine.do(Pause, on=not desk.status["paused"])
 
 
-def back(desk: Desk) -> None:
+def go_back(desk: Desk) -> None:
     """Go one second back."""
     desk.engine.do(Rewind, time=max(0.0, desk.status["time"] - 1.0))
 
 
-def again(desk: Desk) -> None:
+def begin_again(desk: Desk) -> None:
     """Begin the scene anew, with what waits for that."""
     desk.engine.do(Reset, parameters=dict(desk.pending))
     desk.pending.clear()
     desk.engine.do(Pause, on=False)
 
 
-def faster(desk: Desk, steps: int) -> None:
+def change_pace(desk: Desk, steps: int) -> None:
     """Change the pace of time by steps of its list."""
-    near = min(range(len(SPEEDS)), key=lambda n: abs(SPEEDS[n] - desk.status["speed"]))
-    desk.engine.do(Speed, factor=SPEEDS[min(len(SPEEDS) - 1, max(0, near + steps))])
+    place = nearest_speed(desk.status["speed"]) + steps
+    desk.engine.do(Speed, factor=SPEEDS[min(len(SPEEDS) - 1, max(0, place))][0])
 
 
-def bookmark(desk: Desk) -> None:
+def set_bookmark(desk: Desk) -> None:
     """Bookmark this instant under its time."""
     desk.engine.do(Bookmark, name=f"{desk.status['time']:.2f} s")
 
 
-def typed(desk: Desk) -> None:
+def show_help(desk: Desk) -> None:
+    """Show the list of keys, or take it away."""
+    desk.help = not desk.help
+
+
+def show_panel(desk: Desk) -> None:
+    """Show the panel, or take it away."""
+    desk.panel = not desk.panel
+
+
+ACTIONS: dict[str, Callable[[Desk], None]] = {
+    "pause": toggle_pause, "back": go_back, "again": begin_again, "bookmark": set_bookmark, "panel": show_panel,
+    "help": show_help,
+    "slower": lambda desk: change_pace(desk, -1), "faster": lambda desk: change_pace(desk, 1),
+}  # fmt: skip
+HERE = {key.key: key for key in KEYS if not key.page_only}
+
+
+def press(desk: Desk, key: Key) -> None:
+    """Do what a key does."""
+    if key.command is not None:
+        desk.engine.session.submit(command_of(key.command))
+    else:
+        ACTIONS[key.action](desk)
+
+
+def read_keys(desk: Desk) -> None:
     """Act on the keys of this frame. Signs are read as characters, because they lie elsewhere on each keyboard."""
-    io, key = imgui.get_io(), imgui.Key
-    if io.want_text_input:
+    io, name = imgui.get_io(), imgui.Key
+    if io.want_text_input or imgui.is_mouse_down(1):  # letters fly while the right button is down
         return
-    signs: dict[str, Callable[[], None]] = {
-        " ": lambda: toggle(desk), ".": lambda: desk.engine.do(Step), ",": lambda: back(desk), "r": lambda: again(desk),
-        "[": lambda: faster(desk, -1), "]": lambda: faster(desk, 1), "m": lambda: bookmark(desk),
-        "h": lambda: desk.engine.do(Home), "+": lambda: desk.engine.do(Zoom, factor=0.85),
-        "-": lambda: desk.engine.do(Zoom, factor=1.18), "?": lambda: setattr(desk, "help", not desk.help),
-    }  # fmt: skip
-    if imgui.is_mouse_down(1):
-        return  # letters fly
     for code in io.input_queue_characters:
         sign = chr(code).lower()
         tool = next((tool["name"] for tool in desk.rail if tool["key"] and tool["key"] == sign), None)
-        if sign in signs:
-            signs[sign]()
+        if sign in HERE:
+            press(desk, HERE[sign])
         elif tool is not None:
             desk.tool = tool
-    if imgui.is_key_pressed(key.escape):
+    if imgui.is_key_pressed(name.escape):
         desk.help = False
-        desk.engine.do(ToolStop)
-    if imgui.is_key_pressed(key.tab, False):
-        desk.panel = not desk.panel
-    turns = (
-        (key.left_arrow, -0.12, 0.0),
-        (key.right_arrow, 0.12, 0.0),
-        (key.up_arrow, 0.0, 0.08),
-        (key.down_arrow, 0.0, -0.08),
-    )
-    for which, azimuth, elevation in turns:
-        if imgui.is_key_pressed(which):
-            desk.engine.do(Orbit, azimuth=azimuth, elevation=elevation)
+    for key, which, repeats in (
+        ("Escape", name.escape, True), ("Tab", name.tab, False), ("ArrowLeft", name.left_arrow, True),
+        ("ArrowRight", name.right_arrow, True), ("ArrowUp", name.up_arrow, True), ("ArrowDown", name.down_arrow, True),
+    ):  # fmt: skip
+        if imgui.is_key_pressed(which, repeats):
+            press(desk, HERE[key])
 
 
 def draw_help(desk: Desk) -> None:
@@ -90,6 +98,7 @@ def draw_help(desk: Desk) -> None:
     if not desk.help:
         return
     em, io = imgui.get_font_size(), imgui.get_io()
+    signs = [(key.label, key.text) for key in HERE.values() if key.label]
     tools = [(tool["key"].upper(), tool["label"]) for tool in desk.rail if tool["key"]]
     imgui.set_next_window_pos(ImVec2(0.5 * io.display_size.x, 0.5 * io.display_size.y), 0, ImVec2(0.5, 0.5))
     imgui.set_next_window_focus()
@@ -98,7 +107,7 @@ def draw_help(desk: Desk) -> None:
         imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_saved_settings
     )
     imgui.begin("keys", None, int(flags))
-    for n, (heading, rows) in enumerate((("Keys", SHOWN), ("Tools", tools), ("Pointer", POINTER))):
+    for n, (heading, rows) in enumerate((("Keys", signs), ("Tools", tools), ("Pointer", POINTER))):
         if n:
             imgui.same_line(0, 2.5 * em)
         imgui.begin_group()

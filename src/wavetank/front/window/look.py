@@ -7,13 +7,25 @@ from typing import Any
 
 from imgui_bundle import ImVec2, ImVec4, hello_imgui, imgui, implot
 
+from wavetank.front.theme import (
+    ACCENT,
+    ACCENT_BRIGHT,
+    ACCENT_GROUND,
+    CARD,
+    GRIP,
+    GROUND,
+    HOVER,
+    LINE,
+    PANEL,
+    RAISED,
+    SOFT,
+    TEXT,
+    WARM,
+    WARM_GROUND,
+)
 from wavetank.front.window.icons import lines
 
 FONT = 15.0  # px at usual density
-GROUND, PANEL, RAISED, HOVER, LINE = "#0c1115", "#131a20", "#1b242c", "#25313b", "#24303a"
-TEXT, SOFT, ACCENT, ACCENT_GROUND = "#e3ebf0", "#8fa3b0", "#59c8ff", "#123447"
-WARM, WARM_GROUND = "#ffb866", "#3a2a14"
-GOOD, GOLD = "#3fcf7f", "#ffd257"
 
 _fonts: dict[str, Any] = {}  # belong to the one context that imgui has
 
@@ -54,12 +66,12 @@ def set_style() -> None:
     style.grab_min_size, style.scrollbar_size, style.scrollbar_rounding = 5.0, 9.0, 6.0
     for which, color, alpha in (
         (c.text, TEXT, 1), (c.text_disabled, SOFT, 1), (c.window_bg, PANEL, 1), (c.child_bg, PANEL, 0),
-        (c.popup_bg, "#10171d", 0.97), (c.border, LINE, 1), (c.frame_bg, RAISED, 1), (c.frame_bg_hovered, HOVER, 1),
+        (c.popup_bg, CARD, 0.97), (c.border, LINE, 1), (c.frame_bg, RAISED, 1), (c.frame_bg_hovered, HOVER, 1),
         (c.frame_bg_active, HOVER, 1), (c.button, RAISED, 1), (c.button_hovered, HOVER, 1),
-        (c.button_active, ACCENT_GROUND, 1), (c.slider_grab, ACCENT, 0.65), (c.slider_grab_active, "#86d8ff", 1),
+        (c.button_active, ACCENT_GROUND, 1), (c.slider_grab, ACCENT, 0.65), (c.slider_grab_active, ACCENT_BRIGHT, 1),
         (c.check_mark, ACCENT, 1), (c.header, ACCENT_GROUND, 1), (c.header_hovered, HOVER, 1),
         (c.header_active, ACCENT_GROUND, 1), (c.tab, PANEL, 0), (c.tab_hovered, HOVER, 1), (c.tab_selected, RAISED, 1),
-        (c.tab_selected_overline, ACCENT, 0), (c.scrollbar_bg, PANEL, 0), (c.scrollbar_grab, "#33424e", 1),
+        (c.tab_selected_overline, ACCENT, 0), (c.scrollbar_bg, PANEL, 0), (c.scrollbar_grab, GRIP, 1),
         (c.separator, LINE, 1), (c.text_selected_bg, ACCENT, 0.35), (c.modal_window_dim_bg, GROUND, 0.6),
         (c.nav_cursor, ACCENT, 0),
     ):  # fmt: skip
@@ -94,7 +106,7 @@ def draw_star(draw: Any, middle: ImVec2, radius: float, color: int) -> None:
 def floating(name: str, at: ImVec2, wide: float, *, padding: float = 12.0, opaque: bool = False) -> Iterator[None]:
     """Draw a card over the picture whose upper left corner is `at`, as high as what is in it."""
     imgui.set_cursor_screen_pos(at)
-    imgui.push_style_color(imgui.Col_.child_bg, ink("#10171d", 0.96 if opaque else 0.87))
+    imgui.push_style_color(imgui.Col_.child_bg, ink(CARD, 0.96 if opaque else 0.87))
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(padding, max(10.0, 0.8 * padding)))
     flags = imgui.ChildFlags_.always_use_window_padding | imgui.ChildFlags_.auto_resize_y | imgui.ChildFlags_.borders
     imgui.begin_child(name, ImVec2(wide, 0), int(flags))

@@ -10,15 +10,15 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui, implot
 
 from wavetank.formats import exporter_for
+from wavetank.front.theme import ACCENT, GROUND, PAINTS, SOFT, WARM
 from wavetank.front.window import keys, scenes
 from wavetank.front.window.controls import control, words
 from wavetank.front.window.desk import Desk
-from wavetank.front.window.look import ACCENT, GROUND, SOFT, WARM, button, hint, ink, pills, rgba, title
+from wavetank.front.window.look import button, hint, ink, pills, rgba, title
 from wavetank.session.commands import SetView
 from wavetank.session.recording import Recording
 
 DETAILS = (("auto", "Automatic"), ("full", "Sharp"), ("half", "Fast"))
-COLOURS = (("#3f99da", "Blue"), ("#e8eef2", "Milk"))
 GRAVITIES = (("None", 0.0), ("Moon", 1.62), ("Earth", 9.81), ("Jupiter", 24.8))  # m/s^2
 CURVES: tuple[tuple[str, str, tuple[tuple[str, str, float], ...]], ...] = (
     ("Density error [%]", "density", (("density_error_mean", "mean", 100.0), ("density_error_max", "largest", 100.0))),
@@ -62,7 +62,7 @@ def _water(desk: Desk) -> None:
         )
         imgui.pop_text_wrap_pos()
         if button("Start again with this", on=True, wide=-1):
-            keys.again(desk)
+            keys.begin_again(desk)
         low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
         desk.places["again"] = (low.x, low.y, high.x, high.y)
         imgui.separator()
@@ -138,7 +138,7 @@ def _look(desk: Desk) -> None:
     if view:
         desk.engine.do(SetView, view=view)
     title("Colour by")
-    color = pills([*((name, words(name)) for name in about["colorings"]), *COLOURS], world["color_by"])
+    color = pills([*((name, words(name)) for name in about["colorings"]), *PAINTS], world["color_by"])
     if color:
         from wavetank.view.views import VIEWS
 

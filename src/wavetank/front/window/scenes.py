@@ -4,11 +4,14 @@ from typing import Any
 
 from imgui_bundle import ImVec2, imgui
 
+from wavetank.front import theme
+from wavetank.front.theme import ACCENT, GROUND, HOVER, LINE, SOFT, TEXT
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.hud import stars
-from wavetank.front.window.look import ACCENT, GROUND, HOVER, LINE, SOFT, TEXT, hint, ink, title
+from wavetank.front.window.look import hint, ink, title
 
-WATER, SOLID = ("#2a92d4", "#6cc7f6", "#1d70a8"), ("#c99a73", "#e6c19f", "#a27852")  # front, top, side
+WATER = (theme.WATER_FRONT, theme.WATER_TOP, theme.WATER_SIDE)
+SOLID = (theme.SOLID_FRONT, theme.SOLID_TOP, theme.SOLID_SIDE)
 EDGES = ((0, 1), (1, 5), (5, 4), (4, 0), (2, 3), (3, 7), (7, 6), (6, 2), (0, 2), (1, 3), (5, 7), (4, 6))
 COLUMNS = 2
 
@@ -84,7 +87,7 @@ def _outline(draw: Any, scene: dict[str, Any], left: float, top: float, width: f
             draw.add_convex_poly_filled([to(corners[k]) for k in numbers], ink(color))
     corners = _corners(scene)
     for a, b in ((0, 1), (1, 3), (3, 2), (2, 0)) if flat else EDGES:
-        draw.add_line(to(corners[a]), to(corners[b]), ink("#7d93a1"), 1.2)
+        draw.add_line(to(corners[a]), to(corners[b]), ink(theme.EDGE), 1.2)
 
 
 def _corners(box: dict[str, Any]) -> list[list[float]]:

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from wavetank.front.theme import ACCENT, GROUND, LINE, NOTE, SOFT, TEXT
 from wavetank.front.window.controls import control, words
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.hud import draw_game
-from wavetank.front.window.look import ACCENT, GROUND, LINE, SOFT, TEXT, button, floating, heading, ink
+from wavetank.front.window.look import button, floating, heading, ink
 from wavetank.session.commands import Orbit, Pan, ToolBegin, ToolEnd, ToolMove, Zoom
 
 TURN = 3.2  # rad for a drag over the height of the picture
@@ -175,7 +176,7 @@ class Stage:
         for text, _ in reversed(self.desk.notes):
             wide = imgui.calc_text_size(text, wrap_width=min(560.0, 0.9 * size.x))
             left, top = at.x + 0.5 * (size.x - wide.x), bottom - wide.y - em
-            draw.add_rect_filled(ImVec2(left - em, top), ImVec2(left + wide.x + em, bottom), ink("#0d1419", 0.94), 10.0)
+            draw.add_rect_filled(ImVec2(left - em, top), ImVec2(left + wide.x + em, bottom), ink(NOTE, 0.94), 10.0)
             draw.add_rect(ImVec2(left - em, top), ImVec2(left + wide.x + em, bottom), ink(ACCENT, 0.25), 10.0)
             draw.add_text(imgui.get_font(), em, ImVec2(left, top + 0.5 * em), ink(TEXT), text, min(560.0, 0.9 * size.x))
             bottom = top - 6

@@ -2,14 +2,15 @@
 
 from imgui_bundle import ImVec2, imgui
 
+from wavetank.front.keys import SPEEDS, nearest_speed
+from wavetank.front.theme import ACCENT, ACCENT_GROUND, HOVER, SOFT, TEXT
 from wavetank.front.window import keys
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.icons import BACK, BOOKMARK, DROP, PAUSE, PLAY, RESET, STEP
-from wavetank.front.window.look import ACCENT, ACCENT_GROUND, HOVER, SOFT, TEXT, chip, draw_icon, hint, ink, rgba
+from wavetank.front.window.look import chip, draw_icon, hint, ink, rgba
 from wavetank.session.commands import Bookmark, Rewind, Speed, Step
 
 BUTTON = 2.3  # em
-NAMES = ("1/16 ×", "1/8 ×", "1/4 ×", "1/2 ×", "1 ×", "2 ×")
 
 
 def header(desk: Desk, pictures_in_a_second: int) -> None:
@@ -58,13 +59,13 @@ def footer(desk: Desk) -> None:
     """Draw the buttons of time and the scrubber."""
     em, status, engine = imgui.get_font_size(), desk.status, desk.engine
     if icon_button("again", RESET, "Start again (R)"):
-        keys.again(desk)
+        keys.begin_again(desk)
     imgui.same_line()
     if icon_button("back", BACK, "One second back (,)"):
-        keys.back(desk)
+        keys.go_back(desk)
     imgui.same_line()
     if icon_button("play", PLAY if status["paused"] else PAUSE, "Pause, play (space)", big=True):
-        keys.toggle(desk)
+        keys.toggle_pause(desk)
     imgui.same_line()
     if icon_button("step", STEP, "One frame (.)"):
         engine.do(Step)
@@ -79,13 +80,13 @@ def footer(desk: Desk) -> None:
     imgui.text(f"{status['time']:.2f} s")
     imgui.set_cursor_pos(ImVec2(right + 5.5 * em, top))
     if icon_button("mark", BOOKMARK, "Bookmark this moment (M)"):
-        keys.bookmark(desk)
+        keys.set_bookmark(desk)
     imgui.set_cursor_pos(ImVec2(right + 8.5 * em, middle))
     imgui.set_next_item_width(6.0 * em)
-    near = min(range(len(NAMES)), key=lambda n: abs(keys.SPEEDS[n] - status["speed"]))
-    changed, number = imgui.combo("##speed", near, list(NAMES))
+    names = [name for _, name in SPEEDS]
+    changed, number = imgui.combo("##speed", nearest_speed(status["speed"]), names)
     if changed:
-        engine.do(Speed, factor=keys.SPEEDS[number])
+        engine.do(Speed, factor=SPEEDS[number][0])
     hint("Pace of time ([ and ])")
 
 

@@ -9,22 +9,11 @@ import glfw
 import moderngl
 from imgui_bundle import ImVec2, glfw_utils, hello_imgui, imgui, implot
 
+from wavetank.front.theme import ACCENT, ACCENT_GROUND, GROUND, RAISED, SOFT
 from wavetank.front.window import keys, timeline
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.engine import Engine
-from wavetank.front.window.look import (
-    ACCENT,
-    ACCENT_GROUND,
-    GROUND,
-    RAISED,
-    SOFT,
-    draw_icon,
-    hint,
-    ink,
-    load_fonts,
-    rgba,
-    set_style,
-)
+from wavetank.front.window.look import draw_icon, hint, ink, load_fonts, rgba, set_style
 from wavetank.front.window.panels import panel
 from wavetank.front.window.plate import Plate
 from wavetank.front.window.stage import Stage
@@ -145,7 +134,7 @@ class Window:
                 panel(self.desk)
             imgui.end()
         keys.draw_help(self.desk)
-        keys.typed(self.desk)
+        keys.read_keys(self.desk)
 
     def _part(self, name: str, at: ImVec2, size: ImVec2, *, bare: bool = False) -> bool:
         imgui.set_next_window_pos(at)

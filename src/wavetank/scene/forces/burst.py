@@ -12,7 +12,7 @@ from typing_extensions import override
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Particles
-from wavetank.foundation.model import Number, Positive, Vector
+from wavetank.foundation.model import Length, Number, Place, Positive
 from wavetank.scene.forces.force import Force, in_space
 from wavetank.scene.forces.regions import add_to, soft_share
 from wavetank.solids.distance import lift, vec3
@@ -35,8 +35,8 @@ class Burst(Force):
     """An explosion."""
 
     kind: Literal["burst"] = "burst"
-    center: Vector  # m
-    radius: Positive  # m
+    center: Place
+    radius: Length
     speed: Number  # m/s
     duration: Positive = 1 / 60  # s
 

@@ -14,7 +14,7 @@ from typing_extensions import override
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Particles
-from wavetank.foundation.model import Number, Positive, Vector
+from wavetank.foundation.model import Length, Number, Place, Vector
 from wavetank.scene.forces.force import Force, in_space
 from wavetank.scene.forces.regions import add_to, soft_share
 from wavetank.solids.distance import lift, vec3
@@ -33,8 +33,8 @@ class Drag(Force):
     """A hand that takes water along."""
 
     kind: Literal["drag"] = "drag"
-    center: Vector  # m
-    radius: Positive  # m
+    center: Place
+    radius: Length
     velocity: Vector  # m/s
     drag: Annotated[Number, Field(ge=0, le=1e4)] = 20.0  # 1/s
 

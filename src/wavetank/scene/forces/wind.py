@@ -17,7 +17,7 @@ from typing_extensions import override
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Particles
-from wavetank.foundation.model import Number, Vector
+from wavetank.foundation.model import METRES, Number, Place, Vector
 from wavetank.scene.forces.force import Force, in_space
 from wavetank.scene.forces.regions import add_to, away_from_line, soft_share
 from wavetank.solids.distance import lift, vec3
@@ -40,8 +40,8 @@ class Wind(Force):
     kind: Literal["wind"] = "wind"
     velocity: Vector  # m/s
     drag: Annotated[Number, Field(ge=0, le=1e4)] = 1.0  # 1/s
-    center: Vector | None = None  # m
-    radius: Annotated[Number, Field(ge=0)] = 0.0  # m
+    center: Place | None = None
+    radius: Annotated[Number, Field(ge=0), METRES] = 0.0
 
     @override
     def apply(self, particles: Particles, count: int, dt: float, time: float) -> None:

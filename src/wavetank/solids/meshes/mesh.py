@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from typing_extensions import override
 
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.model import Number, Positive
+from wavetank.foundation.model import METRES, Length, Number
 from wavetank.solids.distance import GRIDS
 from wavetank.solids.meshes.files import bundled_models, read_file, read_model
 from wavetank.solids.meshes.grid import DistanceGrid
@@ -31,12 +31,12 @@ class Mesh(Solid):
     """
 
     shape: Literal["mesh"] = "mesh"
-    center: tuple[Number, Number, Number]
-    size: Positive | tuple[Positive, Positive, Positive]  # m: the longest edge of the box around it, or its three edges
+    center: Annotated[tuple[Number, Number, Number], METRES]
+    size: Length | tuple[Length, Length, Length]  # the longest edge of the box around it, or its three edges
     path: str = ""  # OBJ, STL, PLY or GLB, from the scene file's folder; or a bundled model, as in wavetank/boat.obj
     data: Annotated[str, Field(repr=False)] = ""  # the mesh itself, made from the file; where given, no file is read
     up: Literal["x", "y", "z"] = "y"  # axis of the file that points up; STL files often have z
-    thickness: Positive | None = None  # m: make walls of the faces, for a surface that is not closed
+    thickness: Length | None = None  # make walls of the faces, for a surface that is not closed
 
     @classmethod
     def of(cls, vertices: Any, faces: Any, **fields: Any) -> "Mesh":

@@ -5,11 +5,11 @@ import { make, pretty, svg } from "./make.js";
 const EARTH = 9.81, MOST = 20;
 
 export function dial(change) {
-  const needle = svg("line", { x1: 0, y1: 0, x2: 0, y2: 24, stroke: "#59c8ff", "stroke-width": 3 });
-  const knob = svg("circle", { r: 6, fill: "#f3f8fb", stroke: "none" });
+  const needle = svg("line", { x1: 0, y1: 0, x2: 0, y2: 24, stroke: "var(--accent)", "stroke-width": 3 });
+  const knob = svg("circle", { r: 6, fill: "var(--knob)", stroke: "none" });
   const face = svg("svg", { viewBox: "-46 -46 92 92", role: "slider", "aria-label": "gravity" },
-    svg("circle", { r: 44, fill: "#0c1115", stroke: "#24303a" }), svg("circle", { r: 22, stroke: "#24303a", "stroke-dasharray": "2 4" }),
-    svg("circle", { r: 2.5, fill: "#8fa3b0", stroke: "none" }), needle, knob);
+    svg("circle", { r: 44, fill: "var(--ground)", stroke: "var(--line)" }), svg("circle", { r: 22, stroke: "var(--line)", "stroke-dasharray": "2 4" }),
+    svg("circle", { r: 2.5, fill: "var(--soft)", stroke: "none" }), needle, knob);
   const text = make("p", {});
   const preset = (label, ...xy) => make("button", { textContent: label, onclick: () => set(...xy) });
   const element = make("div", { className: "dial" }, face, make("div", {}, make("div", {}, "Gravity"), text,

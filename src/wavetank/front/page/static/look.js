@@ -1,13 +1,12 @@
 // How it looks, and what is measured.
 
-import { find, make, note, pretty, say, words } from "./make.js";
+import { colour, find, make, note, pretty, say, words } from "./make.js";
 import { link, on, send } from "./link.js";
 import { seen, snapshot } from "./stage.js";
 
-const COLOURS = { "#3f99da": "Blue", "#e8eef2": "Milk" };
 const rows = {};
 const past = {};
-let about = { views: [], colorings: [] };
+let about = { views: [], colorings: [], paints: [] };
 
 function pills(title, choices, current, act) {
   return [make("h3", { textContent: title }), make("div", { className: "pills" }, ...choices.map(([value, text]) =>
@@ -16,7 +15,7 @@ function pills(title, choices, current, act) {
 
 let detail = "auto";
 function build() {
-  const colours = [...about.colorings.map((name) => [name, words(name)]), ...Object.entries(COLOURS)];
+  const colours = [...about.colorings.map((name) => [name, words(name)]), ...about.paints];
   const figures = make("div", { id: "figures" });
   find("look").replaceChildren(
     ...(about.views.length > 1 ? pills("View", about.views.map((v) => [v, words(v)]), about.view, (view) => send({ do: "view", view })) : []),
@@ -54,9 +53,9 @@ function plot(key, value, text) {
   g.clearRect(0, 0, canvas.width, canvas.height);
   g.beginPath();
   list.forEach((v, k) => g[k ? "lineTo" : "moveTo"](canvas.width - 2 * (list.length - 1 - k) - 1, canvas.height - 2 - (canvas.height - 5) * v / top));
-  g.strokeStyle = "#59c8ff"; g.lineWidth = 1.5; g.stroke();
+  g.strokeStyle = colour("accent"); g.lineWidth = 1.5; g.stroke();
   g.lineTo(canvas.width - 1, canvas.height); g.lineTo(canvas.width - 2 * list.length + 1, canvas.height);
-  g.fillStyle = "#59c8ff1c"; g.fill();
+  g.fillStyle = `${colour("accent")}1c`; g.fill();
 }
 
 const stats = { count: make("b"), rate: make("b"), error: make("b") };

@@ -1,6 +1,6 @@
 // The page: tabs, keys, help. Everything else is in the file of its name.
 
-import { find, make } from "./make.js";
+import { colour, find, make } from "./make.js";
 import { connect, on, send } from "./link.js";
 import { allows, choose, tools } from "./tools.js";
 import { time } from "./timeline.js";
@@ -10,6 +10,7 @@ import "./scenes.js";
 import "./look.js";
 import "./hud.js";
 
+document.head.append(make("meta", { name: "theme-color", content: colour("ground") }));
 const narrow = matchMedia("(max-width: 760px)");
 
 function show(tab) {
@@ -25,24 +26,20 @@ find("title").onclick = () => { const shown = !document.body.classList.contains(
 panel(!narrow.matches);
 find("picture").addEventListener("pointerdown", () => { if (narrow.matches) panel(false); });
 
-const KEYS = [
-  [" ", "Space", "Pause, play", time.toggle], [".", ".", "One frame", time.step], [",", ",", "One second back", time.back],
-  ["r", "R", "Start again", time.reset], ["[", "[", "Slower", () => time.faster(-1)], ["]", "]", "Faster", () => time.faster(1)],
-  ["m", "M", "Bookmark", time.bookmark], ["h", "H", "See all", () => send({ do: "home" })],
-  ["Escape", "Esc", "Stop all tools", () => send({ do: "tool-stop" })],
-  ["f", "F", "Full screen", () => (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen())],
-  ["Tab", "Tab", "Panel", () => panel()], ["+", "+", "Closer", () => send({ do: "zoom", factor: 0.85 })], ["-", "−", "Farther", () => send({ do: "zoom", factor: 1.18 })],
-  ["ArrowLeft", "← → ↑ ↓", "Turn", () => send({ do: "orbit", azimuth: -0.12 })], ["ArrowRight", "", "", () => send({ do: "orbit", azimuth: 0.12 })],
-  ["ArrowUp", "", "", () => send({ do: "orbit", elevation: 0.08 })], ["ArrowDown", "", "", () => send({ do: "orbit", elevation: -0.08 })],
-  ["?", "?", "This list", () => help()],
-];
+let keys = [];
+on("hello", (hello) => { keys = hello.keys; });
+const ACTIONS = {
+  pause: time.toggle, back: time.back, again: time.reset, slower: () => time.faster(-1), faster: () => time.faster(1), bookmark: time.bookmark,
+  "full-screen": () => (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()),
+  panel: () => panel(), help: () => help(),
+};
 
 function help() {
   const dialog = find("help");
   if (dialog.open) { dialog.close(); return; }
   const row = (key, text) => make("div", {}, make("span", { textContent: text }), make("kbd", { textContent: key }));
   dialog.replaceChildren(make("h2", { textContent: "Keys" }), make("div", { className: "keys" },
-    ...KEYS.filter(([, label]) => label).map(([, label, text]) => row(label, text)),
+    ...keys.filter(({ label }) => label).map(({ label, text }) => row(label, text)),
     ...tools.filter((tool) => tool.key).map((tool) => row(tool.key.toUpperCase(), tool.label))),
   make("h2", { className: "second", textContent: "Pointer" }), make("div", { className: "keys" },
     row("left, one finger", "Use the tool"), row("right, two fingers", "Turn the view"), row("wheel, pinch", "Zoom"), row("middle, Shift", "Move the view"), row("double click a slider", "Its default")));
@@ -56,11 +53,11 @@ addEventListener("keydown", (event) => {
   if (find("help").open && event.key === "?") { find("help").close(); return; }
   if (find("help").open || event.target.matches("input.number, select, dialog *")) return;
   if (event.target.matches("input[type=range]") && event.key.startsWith("Arrow")) return;
-  const key = KEYS.find(([code]) => code === event.key || code === event.key.toLowerCase());
+  const key = keys.find((other) => other.key === event.key || other.key === event.key.toLowerCase());
   const tool = tools.find((other) => other.key && other.key === event.key.toLowerCase());
   if (!key && !tool) return;
   event.preventDefault();
-  if (key) key[3](); else if (allows(tool.name)) choose(tool.name);
+  if (key) (key.command ? send(key.command) : ACTIONS[key.action]()); else if (allows(tool.name)) choose(tool.name);
 });
 
 on("closed", () => { document.title = "wavetank (not connected)"; });

@@ -26,6 +26,9 @@ export function icon(path) {
   return svg("svg", { viewBox: "0 0 24 24", "aria-hidden": "true" }, svg("path", { d: path }));
 }
 
+/** A colour of the page by its name: what a canvas draws with. */
+export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+
 export const find = (id) => document.getElementById(id);
 
 /** A number as a person writes it. */

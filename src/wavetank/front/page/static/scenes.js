@@ -1,6 +1,6 @@
 // Scenes as small drawings; any scene file can be dropped on the page.
 
-import { find, make, note } from "./make.js";
+import { colour, find, make, note } from "./make.js";
 import { on, send } from "./link.js";
 
 let current = "";
@@ -17,6 +17,7 @@ function draw(canvas, scene) {
   const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
   const scale = Math.min(0.84 * width / (right - left), 0.78 * height / (bottom - top));
   const to = (p) => { const [x, y] = project(p); return [width / 2 + (x - (left + right) / 2) * scale, height / 2 + (y - (top + bottom) / 2) * scale]; };
+  const shade = (what) => ["front", "top", "side"].map((side) => colour(`${what}-${side}`));
   const face = (shape, ks, style) => {
     const all = corners(shape);
     g.beginPath();
@@ -25,7 +26,7 @@ function draw(canvas, scene) {
   };
   const order = [...scene.shapes].sort((a, b) => a.lower[2] + a.lower[0] * 0.1 - b.lower[2] - b.lower[0] * 0.1);
   for (const shape of order) {
-    const [front, up, side] = shape.color ? Array(3).fill(shape.color) : shape.what === "water" ? ["#2a92d4", "#6cc7f6", "#1d70a8"] : ["#c99a73", "#e6c19f", "#a27852"];
+    const [front, up, side] = shape.color ? Array(3).fill(shape.color) : shape.what === "water" ? shade("water") : shade("solid");
     if (shape.round) {
       const middle = to(shape.lower.map((v, k) => (v + shape.upper[k]) / 2));
       g.beginPath(); g.arc(...middle, 0.5 * scale * (shape.upper[1] - shape.lower[1]), 0, 7);
@@ -33,7 +34,7 @@ function draw(canvas, scene) {
     } else if (flat) face(shape, [0, 1, 3, 2], front);
     else { face(shape, [1, 5, 7, 3], side); face(shape, [2, 3, 7, 6], up); face(shape, [4, 5, 7, 6], front); }
   }
-  g.strokeStyle = "#7d93a1"; g.lineWidth = 1.4; g.lineJoin = "round";
+  g.strokeStyle = colour("edge"); g.lineWidth = 1.4; g.lineJoin = "round";
   const all = corners(scene);
   const edges = flat ? [[0, 1], [1, 3], [3, 2], [2, 0]] : [[0, 1], [1, 5], [5, 4], [4, 0], [2, 3], [3, 7], [7, 6], [6, 2], [0, 2], [1, 3], [5, 7], [4, 6]];
   for (const [a, b] of edges) { g.beginPath(); g.moveTo(...to(all[a])); g.lineTo(...to(all[b])); g.stroke(); }

@@ -1,6 +1,6 @@
 // One control for one number, choice, colour or switch: parameters and tool options look alike.
 
-import { make, pretty, words } from "./make.js";
+import { colour, make, pretty, words } from "./make.js";
 
 /** How slider positions 0..1 map to values: straight, or bent where the range spans decades. */
 function scale(low, high) {
@@ -84,7 +84,7 @@ function color(element, value, change) {
   pick.oninput = () => { none.checked = true; tell(); };
   none.onchange = tell;
   const show = (v) => { none.checked = Boolean(v); if (v) pick.value = v; };
-  pick.value = value || "#2f9fe8";
+  pick.value = value || colour("dye");
   show(value);
   element.append(make("span", { className: "row" }, none, " ", pick));
   return { element, show };

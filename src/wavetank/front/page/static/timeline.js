@@ -3,15 +3,17 @@
 import { find, icon, make, pretty, say } from "./make.js";
 import { on, send } from "./link.js";
 
-const SPEEDS = [1 / 16, 1 / 8, 1 / 4, 1 / 2, 1, 2];
-const NAMES = ["1⁄16 ×", "⅛ ×", "¼ ×", "½ ×", "1 ×", "2 ×"];
+let speeds = [[1, "1 ×"]];
 const now = { time: 0, paused: false, speed: 1, past: [0, 0], bookmarks: [] };
 const scrub = find("scrub"), speed = find("speed");
 const marks = new Map(); // bookmark -> time at which it was set, as seen here
 let held = 0;
 
-speed.append(...SPEEDS.map((value, k) => make("option", { value, textContent: NAMES[k] })));
-speed.value = 1;
+on("hello", (hello) => {
+  speeds = hello.speeds;
+  speed.replaceChildren(...speeds.map(([value, textContent]) => make("option", { value, textContent })));
+  speed.value = speeds[closest(now.speed)][0];
+});
 speed.onchange = () => send({ do: "speed", factor: Number(speed.value) });
 
 export const time = {
@@ -19,7 +21,7 @@ export const time = {
   step: () => send({ do: "step" }),
   back: () => send({ do: "rewind", time: Math.max(0, now.time - 1) }),
   reset: () => { send({ do: "reset" }); send({ do: "pause", on: false }); },
-  faster: (by) => send({ do: "speed", factor: SPEEDS[Math.min(SPEEDS.length - 1, Math.max(0, closest(now.speed) + by))] }),
+  faster: (by) => send({ do: "speed", factor: speeds[Math.min(speeds.length - 1, Math.max(0, closest(now.speed) + by))][0] }),
   bookmark: () => {
     const name = `${pretty(now.time, 3)} s`;
     marks.set(name, now.time);
@@ -27,7 +29,7 @@ export const time = {
   },
 };
 
-const closest = (value) => SPEEDS.reduce((best, other, k) => (Math.abs(other - value) < Math.abs(SPEEDS[best] - value) ? k : best), 0);
+const closest = (value) => speeds.reduce((best, [other], k) => (Math.abs(other - value) < Math.abs(speeds[best][0] - value) ? k : best), 0);
 
 for (const [id, act] of Object.entries({ play: time.toggle, step: time.step, back: time.back, reset: time.reset, bookmark: time.bookmark })) find(id).onclick = act;
 
@@ -53,7 +55,7 @@ on("status", (status) => {
     find("play").replaceChildren(icon(icon_ ? "M8 5v14l11-7z" : "M7 5h3.500v14H7zM13.500 5H17v14h-3.500z"));
     find("play").title = icon_ ? "Play (space)" : "Pause (space)";
   }
-  if (document.activeElement !== speed) speed.value = SPEEDS[closest(status.speed)];
+  if (document.activeElement !== speed) speed.value = speeds[closest(status.speed)][0];
   const list = JSON.stringify(status.bookmarks);
   if (list !== drawn) {
     drawn = list;

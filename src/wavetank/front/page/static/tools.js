@@ -4,24 +4,20 @@ import { find, icon, make, words } from "./make.js";
 import { on, send } from "./link.js";
 import { control } from "./slider.js";
 
-const LOOK = {
-  name: "look", label: "Look", key: "l", options: [], cursor: false,
-  sentence: "Drag to turn the view. With any tool: right button or two fingers turn, wheel or pinch zooms, middle button or Shift moves.",
-  icon: "M2 12c3-5 6.500-7 10-7s7 2 10 7c-3 5-6.500 7-10 7s-7-2-10-7zM12 9a3 3 0 1 1 0 6 3 3 0 0 1 0-6",
-};
+let look = { name: "look", options: [], cursor: false }; // until the server tells
 const chosen = new Map(); // options by tool
 const buttons = new Map();
-export const hand = { tool: LOOK, options: {} };
-export let tools = [LOOK];
+export const hand = { tool: look, options: {} };
+export let tools = [look];
 
 export function choose(name) {
-  const tool = tools.find((other) => other.name === name) ?? LOOK;
+  const tool = tools.find((other) => other.name === name) ?? look;
   hand.tool = tool;
   hand.options = chosen.get(tool.name) ?? {};
   chosen.set(tool.name, hand.options);
   for (const [other, button] of buttons) button.setAttribute("aria-pressed", other === tool.name);
   buttons.get(tool.name)?.scrollIntoView({ block: "nearest", inline: "nearest" });
-  find("picture").classList.toggle("look", tool === LOOK);
+  find("picture").classList.toggle("look", tool === look);
   card(tool);
 }
 
@@ -41,7 +37,8 @@ function card(tool) {
 }
 
 on("hello", ({ tools: list }) => {
-  tools = [LOOK, ...list];
+  tools = list;
+  look = list.find((tool) => tool.name === "look");
   buttons.clear();
   find("tools").replaceChildren(...tools.map((tool) => {
     const button = make("button", { title: `${tool.label}${tool.key ? ` (${tool.key.toUpperCase()})` : ""}: ${tool.sentence}`, "aria-pressed": false, data: { tool: tool.name } },
@@ -51,7 +48,7 @@ on("hello", ({ tools: list }) => {
     return button;
   }));
   rules = "";
-  choose(hand.tool === LOOK && !chosen.size ? "push" : hand.tool.name);
+  choose(hand.tool.name === "look" && !chosen.size ? "push" : hand.tool.name);
 });
 
 let told = "", rules = "";

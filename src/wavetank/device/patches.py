@@ -1,0 +1,293 @@
+"""What is changed inside of the kernel compiler, each change by its name, so that kernels are read and launched sooner.
+
+The compiler asks Python's `inspect` for the source of a function each time it inlines it, and for the module of each
+decorated one; wraps every line of it as text, for error messages; asks for the range of a type with each number; and
+reads the same functions again for each kernel, to see whether they have changed. A third of a cold start went there,
+and half a second of a warm one (docs/performance.md). The answers stay the same.
+
+These are changes of private parts, written for the `VERSIONS` below. In another version one may find that its part is
+gone: then all works without it, only slower, and `wavetank doctor` says so.
+"""
+
+import contextlib
+import dataclasses
+import functools
+import importlib
+import inspect
+import linecache
+import sys
+import textwrap
+import types
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from wavetank.device.launches import NEEDED, keep_prepared_launches
+
+VERSIONS = ("1.3.3", "1.4.0")  # of Quadrants
+LANGUAGE = "quadrants.lang"  # the package that all places are in
+
+
+class MisfitError(Exception):
+    """What a patch is to change is not there."""
+
+
+@dataclasses.dataclass
+class Patch:
+    """One change."""
+
+    name: str
+    sentence: str  # what it does
+    places: tuple[str, ...]  # what is replaced: module:attribute, below `LANGUAGE`
+    needs: tuple[str, ...]  # what has to be there besides
+    replacement: Callable[[Any], Any]  # makes it from what was at a place
+    versions: tuple[str, ...] = VERSIONS  # of Quadrants that it is for
+    misfit: str | None = None  # why it is not in force
+
+    def apply(self) -> None:
+        """Put the replacement in its places, or note why that cannot be."""
+        try:
+            found = [_found(place) for place in self.places]
+            for need in self.needs:
+                _found(need)
+            made = [self.replacement(getattr(owner, name)) for owner, name in found]
+        except MisfitError as reason:
+            self.misfit = str(reason)
+            return
+        for (owner, name), new in zip(found, made, strict=True):
+            setattr(owner, name, new)
+
+
+PATCHES: list[Patch] = []
+
+
+def apply_all() -> None:
+    """Apply every patch, once the compiler is imported."""
+    for patch in PATCHES:
+        patch.apply()
+
+
+def _found(place: str) -> tuple[Any, str]:
+    """Return the object that has a place, and the name of it there; raises `MisfitError` where there is none."""
+    module, _, path = place.partition(":")
+    try:
+        owner: Any = importlib.import_module(f"{LANGUAGE}.{module}")
+    except ImportError:
+        raise MisfitError(f"there is no module {LANGUAGE}.{module}") from None
+    *parents, name = path.split(".")
+    for part in [*parents, name]:
+        if not hasattr(owner, part):
+            raise MisfitError(f"{LANGUAGE}.{module} has no {path}")
+        owner = getattr(owner, part) if part is not name else owner
+    return owner, name
+
+
+def _part(module: str) -> Any:
+    return sys.modules[f"{LANGUAGE}.{module}"]
+
+
+def patch(
+    name: str, *places: str, needs: tuple[str, ...] = ()
+) -> Callable[[Callable[[Any], Any]], Callable[[Any], Any]]:
+    """Declare a patch; the function makes the replacement, its sentence says what that does."""
+
+    def declare(replacement: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        PATCHES.append(Patch(name, inspect.getdoc(replacement) or "", places, needs, replacement))
+        return replacement
+
+    return declare
+
+
+@contextlib.contextmanager
+def short_frames() -> Iterator[None]:
+    """Let `inspect` tell a frame's line without a walk over all modules, while the compiler is imported.
+
+    It asks hundreds of times whether a function that it decorates, one of its own, stands in the body of a class.
+    """
+    whole = inspect.getframeinfo
+
+    def line_only(frame: Any, context: int = 1) -> inspect.Traceback:
+        name, line = frame.f_code.co_filename, frame.f_lineno
+        return inspect.Traceback(name, line, frame.f_code.co_name, [linecache.getline(name, line)] * context, 0)
+
+    inspect.getframeinfo = line_only
+    try:
+        yield
+    finally:
+        inspect.getframeinfo = whole
+
+
+# --- reading kernels ---
+
+
+@patch("sources", "_wrap_inspect:getsourcelines", "_wrap_inspect:getsourcefile")
+def remember_sources(look_up: Any) -> Any:
+    """Looks a function's source up once."""
+    return functools.cache(look_up)
+
+
+@patch("class bodies", "kernel_impl:_inside_class")
+def tell_class_bodies(_: Any) -> Any:
+    """Tells the body of a class by its names: only there a namespace has a qualified name."""
+
+    def is_in_class_body(level_of_class_stackframe: int) -> bool:
+        return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
+
+    return is_in_class_body
+
+
+@patch("hashes", "_fast_caching.function_hasher:_hash_function")
+def remember_hashes(hash_function: Any) -> Any:
+    """Hashes a function once."""
+    return functools.cache(hash_function)
+
+
+@patch("wrapped text", "_func_base:textwrap")
+def remember_wrapped_text(module: Any) -> Any:
+    """Wraps a line of source once."""
+    if module is not textwrap:
+        raise MisfitError(f"{LANGUAGE}._func_base wraps text in another way")
+    remembering = types.ModuleType("textwrap")
+    remembering.__dict__.update(vars(textwrap), fill=functools.cache(textwrap.fill))
+    return remembering
+
+
+@patch("ranges", "expr:_check_in_range")
+def remember_ranges(check: Any) -> Any:
+    """Looks the range of a type up once for each number."""
+    return functools.cache(check)
+
+
+@patch("places in sources", "ast.ast_transformer_utils:ASTTransformerFuncContext._build_pos_info")
+def place_in_source(place_in_lines: Any) -> Any:
+    """Marks the place of an error in a single line without wrapping it."""
+
+    def place(context: Any, node: Any) -> str:
+        line = context.src[node.lineno - 1] if node.lineno == node.end_lineno <= len(context.src) else ""
+        if not 0 < len(line) <= 120 or not line.isprintable():
+            return str(place_in_lines(context, node))
+        first, last = context.indent + node.col_offset, context.indent + node.end_col_offset
+        where = f'File "{context.file}", line {node.lineno + context.lineno_offset}, in {context.func.func.__name__}:'
+        return f"{where}\n{line.rstrip()}\n{' ' * first}{'^' * (last - first)}\n"
+
+    return place
+
+
+@patch(
+    "flat fields", "_kernel_impl_dataclass:unpack_ast_struct_expressions",
+    needs=("_kernel_impl_dataclass:FlattenAttributeNameTransformer",),
+)  # fmt: skip
+def flatten_fields(_: Any) -> Any:
+    """Walks over a function for the fields of its arguments only where it has some."""
+    transformer = _part("_kernel_impl_dataclass").FlattenAttributeNameTransformer
+
+    def flatten(tree: Any, struct_locals: set[str]) -> Any:
+        return transformer(struct_locals=struct_locals).visit(tree) if struct_locals else tree
+
+    return flatten
+
+
+@patch(
+    "final fields", "_func_base:subtree_has_final_fields", "_template_mapper_hotpath:subtree_has_final_fields",
+    "_template_mapper:annotation_has_final_subtree",
+)  # fmt: skip
+def trust_final_fields(_: Any) -> Any:
+    """Reads numbers of a frozen object that are compiled into a kernel (`Final`) once, as ours are plain integers."""
+    return lambda _: False
+
+
+# --- products of vectors ---
+#
+# The compiler reads the source of its own `dot`, and of the functions that this calls, each time that a kernel has a
+# dot product in it, and makes variables of their arguments: a quarter of the time it took to read kernels. These are
+# the same sums without the reading.
+
+PARTS = ("impl:expr_init", "impl:subscript", "impl:inside_kernel", "expr:Expr", "matrix:make_matrix")
+
+
+def _in_kernels(name: str, *lengths: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Declare a function for the compiler's of that name, where a kernel gives it vectors of those `lengths`."""
+
+    def declare(of_vectors: Callable[..., Any]) -> Callable[..., Any]:
+        @patch(f"product {name}", f"matrix_ops:{name}", needs=PARTS)
+        def make(of_anything: Any) -> Any:
+            """Adds up components where the compiler would read a function of its own."""
+
+            @functools.wraps(of_anything)
+            def chosen(*args: Any, **kwargs: Any) -> Any:
+                in_kernel = _part("impl").inside_kernel() and not kwargs
+                shapes = {_shape(value) for value in args} if in_kernel else set()
+                known = len(shapes) == 1 and shapes <= {(length,) for length in lengths}
+                return (of_vectors if known else of_anything)(*args, **kwargs)
+
+            return chosen
+
+        return of_vectors
+
+    return declare
+
+
+def _shape(value: Any) -> tuple[int, ...]:
+    return tuple(value.get_shape()) if isinstance(value, _part("expr").Expr) and value.is_tensor() else ()
+
+
+def _variable(value: Any) -> Any:
+    """Return a value that is computed once."""
+    return _part("impl").expr_init(value)
+
+
+def _components(vector: Any) -> list[Any]:
+    """Return the components of a vector that is computed once."""
+    value = _variable(vector)
+    return [_part("impl").subscript(None, value, k) for k in range(value.n)]
+
+
+@_in_kernels("sum", 2, 3, 4)
+def _sum(vector: Any) -> Any:
+    return functools.reduce(lambda total, x: _variable(total + x), _components(vector))
+
+
+@_in_kernels("dot", 2, 3, 4)
+def _dot(a: Any, b: Any) -> Any:
+    return _sum(a * b)
+
+
+@_in_kernels("norm_sqr", 2, 3, 4)
+def _norm_sqr(vector: Any) -> Any:
+    value = _variable(vector)
+    return _sum(value * value)
+
+
+@_in_kernels("norm", 2, 3, 4)
+def _norm(vector: Any) -> Any:
+    return _part("ops").sqrt(_norm_sqr(vector))
+
+
+@_in_kernels("normalized", 2, 3, 4)
+def _normalized(vector: Any) -> Any:
+    value = _variable(vector)
+    return _variable(1 / _norm(value)) * value
+
+
+@_in_kernels("cross", 3)
+def _cross(a: Any, b: Any) -> Any:
+    ax, ay, az = _components(a)
+    bx, by, bz = _components(b)
+    return _part("matrix").make_matrix([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
+# --- launches ---
+
+
+@patch("stale launches", "kernel:LaunchContextBufferCache.cache")
+def keep_no_stale_launches(_: Any) -> Any:
+    """Keeps none of the launches that the compiler prepares by itself: they may be stale (`launches.py`)."""
+    return lambda *_: None
+
+
+@patch(
+    "prepared launches", "kernel:Kernel", needs=("impl:get_runtime", *(f"kernel:{part}" for part in NEEDED))
+)  # fmt: skip
+def keep_launches(kernel: Any) -> Any:
+    """Keeps prepared launches by their arguments, and launches them at once."""
+    keep_prepared_launches(_part("kernel"), _part("impl").get_runtime)
+    return kernel

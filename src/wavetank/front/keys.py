@@ -1,0 +1,54 @@
+"""The keys of page and window, the paces of time, and the tool that only looks: each said once."""
+
+import dataclasses
+from typing import Any
+
+
+@dataclasses.dataclass(frozen=True)
+class Key:
+    """What a key does: a command as a plain table, or an action that a front knows by its name."""
+
+    key: str  # a sign, or a name as browsers tell it
+    label: str = ""  # in the list of keys, with `text`; keys without one are in the row of another
+    text: str = ""
+    action: str = ""
+    command: dict[str, Any] | None = None
+    page_only: bool = False
+
+
+KEYS = (
+    Key(" ", "Space", "Pause, play", "pause"),
+    Key(".", ".", "One frame", command={"do": "step"}),
+    Key(",", ",", "One second back", "back"),
+    Key("r", "R", "Start again", "again"),
+    Key("[", "[ ]", "Slower, faster", "slower"),
+    Key("]", action="faster"),
+    Key("m", "M", "Bookmark", "bookmark"),
+    Key("h", "H", "See all", command={"do": "home"}),
+    Key("Escape", "Esc", "Stop all tools", command={"do": "tool-stop"}),
+    Key("f", "F", "Full screen", "full-screen", page_only=True),
+    Key("Tab", "Tab", "Panel", "panel"),
+    Key("+", "+ −", "Closer, farther", command={"do": "zoom", "factor": 0.85}),
+    Key("-", command={"do": "zoom", "factor": 1.18}),
+    Key("ArrowLeft", "Arrows", "Turn", command={"do": "orbit", "azimuth": -0.12}),
+    Key("ArrowRight", command={"do": "orbit", "azimuth": 0.12}),
+    Key("ArrowUp", command={"do": "orbit", "elevation": 0.08}),
+    Key("ArrowDown", command={"do": "orbit", "elevation": -0.08}),
+    Key("?", "?", "This list", "help"),
+)
+
+#: seconds of water in a second that can be chosen, and what they are called
+SPEEDS = ((1 / 16, "1/16 ×"), (1 / 8, "1/8 ×"), (1 / 4, "1/4 ×"), (1 / 2, "1/2 ×"), (1.0, "1 ×"), (2.0, "2 ×"))
+
+#: a tool of the fronts alone, which makes no command
+LOOK: dict[str, Any] = {
+    "name": "look", "label": "Look", "key": "l", "options": [], "cursor": False,
+    "icon": "M2 12c3-5 6.500-7 10-7s7 2 10 7c-3 5-6.500 7-10 7s-7-2-10-7zM12 9a3 3 0 1 1 0 6 3 3 0 0 1 0-6",
+    "sentence": "Drag to turn the view. With any tool: right button or two fingers turn, wheel or pinch zooms, middle "
+    "button or Shift moves.",
+}  # fmt: skip
+
+
+def nearest_speed(factor: float) -> int:
+    """Return the place in `SPEEDS` of the pace that is nearest."""
+    return min(range(len(SPEEDS)), key=lambda n: abs(SPEEDS[n][0] - factor))

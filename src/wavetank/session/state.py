@@ -1,0 +1,150 @@
+"""What a session is about: a world, the hands in it, its past, what is shown of it. Rules act on this."""
+
+from typing import Any
+
+import numpy as np
+
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.params import LIVE
+from wavetank.scene.fluids import Points
+from wavetank.scene.forces import Force
+from wavetank.scene.scene import Scene
+from wavetank.session.game import HARMLESS, Game
+from wavetank.session.history import History
+from wavetank.session.pace import Pace
+from wavetank.session.tools import TOOL_NAMES, Hand, Tool
+from wavetank.session.tools.carry import TOOL_SOLID, carry
+from wavetank.simulation.simulation import Simulation
+from wavetank.simulation.snapshot import Snapshot
+from wavetank.solids.shapes import moved
+from wavetank.view.camera import Camera
+
+CARRY_PACE = 0.8  # of sqrt(g L): how fast a command carries a solid
+
+
+class SessionState:
+    """One running world with all that commands change, and no time that passes by itself: see `Session`."""
+
+    def __init__(self, scene: Scene, arch: str, most_particles: int, history: History) -> None:
+        self.most_particles, self.arch, self.history = most_particles, arch, history
+        self.pace = Pace()
+        self.notes: list[str] = []  # for the person, one sentence each
+        self.paused, self.speed, self.steps_left = False, 1.0, 0
+        self.frame_parts = 1  # into which a frame is divided
+        self.fills_frames = False  # whether frames end with a time step of full length
+        self.view, self.color_by = "", "speed"
+        self.aspect = 16 / 9  # of the picture, set by the front
+        self.hands: dict[int, tuple[Tool, Hand]] = {}
+        self.running: dict[str, tuple[Tool, Hand]] = {}
+        self.moving: dict[str, tuple[Any, Any]] = {}
+        self.commanded: list[Force] = []  # forces that tools push with in the next frame
+        self.begin(scene)
+
+    def begin(self, scene: Scene) -> None:
+        """Start a scene; raises `WavetankError` and changes nothing where it is too large."""
+        count = sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
+        if count > self.most_particles:
+            raise WavetankError(
+                f"spacing = {scene.spacing} makes about {count:,.0f} particles; at most {self.most_particles:,} are "
+                "allowed in a session: use a larger spacing or less fluid."
+            )
+        sim = Simulation(scene, self.arch)
+        sim.load_kernels()
+        game = Game(scene.goal, sim.frame(measured=False)) if scene.goal else None
+        self.scene, self.sim, self.game = scene, sim, game
+        self.hands, self.running, self.moving = {}, {}, {}
+        self.chosen_camera: Camera | None = None
+        self.history.clear()
+        self.history.keep(sim.snapshot())
+
+    def note(self, sentence: str) -> None:
+        """Keep a sentence for the person; fronts show it and take it away."""
+        if sentence not in self.notes[-3:]:
+            self.notes.append(sentence)
+            del self.notes[:-20]
+
+    @property
+    def camera(self) -> Camera:
+        """Where pictures are taken from."""
+        return self.chosen_camera or Camera.framing(self.sim.scene, self.aspect)
+
+    @camera.setter
+    def camera(self, camera: Camera | None) -> None:
+        self.chosen_camera = camera
+
+    def let_act(self, hand: Hand, act: Any, *arguments: Any) -> None:
+        """Let a tool act; what it has to say, and what it may not do, becomes a note."""
+        before = len(self.sim.pushed)
+        try:
+            act(*arguments)
+        except WavetankError as error:
+            hand.notes.append(str(error))
+        self.commanded += self.sim.pushed[before:]
+        for sentence in hand.notes:
+            self.note(sentence)
+        hand.notes.clear()
+
+    def lift(self, hand: int | str) -> None:
+        """End the tool of a pointer (a number), or one that goes on by itself (a name)."""
+        tool, held = self.hands.pop(hand) if isinstance(hand, int) else self.running.pop(hand)
+        self.let_act(held, tool.end, held)
+
+    def lift_all(self) -> None:
+        """End all tools."""
+        for pointer in [*self.hands]:
+            self.lift(pointer)
+        for name in [*self.running]:
+            self.lift(name)
+        self.moving = {}
+
+    def go_to(self, snapshot: Snapshot) -> None:
+        """Make an instant of the past the present."""
+        self.lift_all()
+        self.sim.resume(snapshot)
+        for name in [name for name in self.sim.solids.names if name.startswith(TOOL_SOLID)]:
+            self.sim.remove_solid(name)
+
+    def tool_named(self, name: str, options: dict[str, Any]) -> Tool:
+        """Return a tool with its options; raises `WavetankError` for what it does not have."""
+        if name not in TOOL_NAMES:
+            raise WavetankError(f"tool = {name!r} is not known; it must be one of {', '.join(TOOL_NAMES)}.")
+        tool: Tool = TOOL_NAMES[name].parse(options, name)
+        return tool
+
+    def changed_scene(self, parameters: dict[str, Any]) -> Scene:
+        """Return the scene as it began, with the live parameters as they are now and `parameters` as given.
+
+        A level keeps none that its water feels: a tank that was left tilted stands upright again.
+        """
+        now = {name: getattr(self.sim.scene, name) for name in LIVE}
+        start = {name: getattr(self.scene, name) for name in LIVE}
+        free = LIVE if self.game is None else HARMLESS
+        kept = {name: value for name, value in now.items() if value != start[name] and name in free}
+        return self.scene.changed(**{**kept, **parameters}) if kept or parameters else self.scene
+
+    def present_scene(self) -> Scene:
+        """Return what there is now as a scene: the water as points, the solids where they are; without tools' own."""
+        sim, frame = self.sim, self.sim.frame()
+        pairs = list(zip(sim.solids.members, sim.solids.names, sim.solids.poses, strict=True))[sim.solids.tank_count :]
+        solids = [
+            moved(solid, *pose).model_copy(update={"name": name})
+            for solid, name, pose in pairs
+            if not name.startswith(TOOL_SOLID)
+        ]
+        fluids = [Points(positions=frame.positions, velocities=frame.velocities)] if sim.count else []
+        return sim.scene.changed(fluids=fluids, solids=solids)
+
+    def carry_solids(self, duration: float) -> None:
+        """Bring the solids that commands carry as far as they get in a frame of `duration` [s]."""
+        for name, (position, rotation) in list(self.moving.items()):
+            self._carry(name, position, rotation, duration)
+
+    def _carry(self, name: str, position: Any, rotation: Any, duration: float) -> None:
+        if name not in self.sim.solids.names:
+            del self.moving[name]
+            return
+        where = self.sim.solids.poses[self.sim.solids.find(name)][0]
+        goal = np.array([*(where if position is None else position), 0.0][:3])
+        size = max(self.sim.scene.tank.size) if self.sim.scene.tank else 1.0
+        if carry(self.sim, name, goal, rotation, CARRY_PACE * (9.81 * size) ** 0.5 * duration):
+            del self.moving[name]

@@ -1,0 +1,72 @@
+"""Arrays from outside: checked, and written where each particle is on the device."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from wavetank.device.compiler import download, upload
+from wavetank.device.state import Particles
+from wavetank.foundation.errors import WavetankError
+from wavetank.scene.scene import Scene
+
+
+@dataclasses.dataclass(frozen=True)
+class Newcomers:
+    """Particles that are to be added."""
+
+    x: np.ndarray  # m, float32 [n, dim]
+    v: np.ndarray  # m/s, float32 [n, dim]
+    dye: np.ndarray  # int32 [n]
+    material: np.ndarray  # int32 [n]
+
+    @property
+    def fastest(self) -> float:
+        """The largest of their speeds [m/s]."""
+        return largest_norm(self.v)
+
+
+def check_newcomers(scene: Scene, positions: Any, velocities: Any, dyes: Any, materials: Any) -> Newcomers:
+    """Return what `Simulation.add` was given as arrays; raises `WavetankError` for wrong shapes and numbers."""
+    x = np.asarray(positions, np.float32)
+    v = np.zeros_like(x) if velocities is None else np.asarray(velocities, np.float32)
+    dye = np.zeros(len(x), np.int32) if dyes is None else np.asarray(dyes, np.int32)
+    material = scene.checked_kinds(materials, len(x))
+    shape = (len(x), scene.dim)
+    if x.shape != shape or v.shape != shape or dye.shape != shape[:1]:
+        raise WavetankError(
+            f"positions have shape {list(x.shape)}, velocities {list(v.shape)}; both must be [n, {scene.dim}]."
+        )
+    if not (np.isfinite(x).all() and np.isfinite(v).all()):
+        raise WavetankError("positions and velocities of new particles must be finite numbers.")
+    return Newcomers(x, v, dye, material)
+
+
+def check_rows(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Return `values` as float32 of that shape; raises `WavetankError` for another one and for what is not finite."""
+    try:
+        rows = np.asarray(values, np.float32)
+    except (TypeError, ValueError):
+        raise WavetankError(f"{name} must be an array of numbers of shape {list(shape)}.") from None
+    if rows.shape != shape:
+        raise WavetankError(
+            f"{name} have shape {list(rows.shape)}; they must have {list(shape)}, a row for each particle by id."
+        )
+    bad = ~np.isfinite(rows).all(axis=1)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise WavetankError(f"{name}[{row}] = {rows[row].tolist()} is not finite; every number must be.")
+    return rows
+
+
+def put_by_id(particles: Particles, count: int, name: str, values: np.ndarray) -> None:
+    """Write an array of the particles, given by id, to the device, where they lie in an order of their own."""
+    order = np.argsort(download(particles.id)[:count], kind="stable")
+    rows = np.empty_like(values)
+    rows[order] = values
+    upload(getattr(particles, name), rows)
+
+
+def largest_norm(vectors: np.ndarray) -> float:
+    """Return the length of the longest of the vectors [n, dim], 0 without any."""
+    return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))

@@ -1,0 +1,46 @@
+"""How short time steps must be, and how fast water may get: by what its world does to it."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from wavetank.physics.plan import capillary_speed, steps_in
+from wavetank.physics.time_step import largest_speed
+from wavetank.physics.world import World
+from wavetank.scene.forces import Force
+from wavetank.scene.scene import Scene
+from wavetank.simulation.ledger import Ledger
+from wavetank.simulation.moving_solids import MovingSolids
+
+
+def count_steps(
+    world: World, scene: Scene, solids: MovingSolids, ledger: Ledger, forces: Sequence[Force], duration: float
+) -> float:
+    """Return how many time steps make up `duration` [s], no whole number."""
+    box = (np.zeros(scene.dim), np.array(scene.tank.size)) if scene.tank else ledger.start_box
+    speed = max(_solid_speed(scene, solids, duration), largest_speed(world.particles, world.count))
+    speed += duration * sum(force.largest_acceleration() for force in forces)
+    return steps_in(world, scene, duration, speed, box, forced=bool(forces))
+
+
+def find_speed_limit(
+    world: World, scene: Scene, solids: MovingSolids, ledger: Ledger, forces: Sequence[Force], duration: float
+) -> float:
+    """Return the largest speed [m/s] that gravity, the start, solids and forces can have given to a particle.
+
+    Gravity gives that of a free fall through the tank. Without one a fall has no end, and neither has the limit. The
+    ledger keeps the fastest of solids and forces.
+    """
+    if scene.tank is None:
+        return math.inf
+    ledger.fastest_solid = max(ledger.fastest_solid, _solid_speed(scene, solids, duration))
+    ledger.fastest_force = max(ledger.fastest_force, sum(force.largest_speed() for force in forces))
+    fall = sum(2.0 * abs(g) * edge for g, edge in zip(scene.gravity, scene.tank.size, strict=True))
+    fastest = math.sqrt(fall + ledger.fastest_start**2) + 2.0 * ledger.fastest_solid + ledger.fastest_force
+    return scene.speed_limit * max(fastest + capillary_speed(world, scene), 1e-6)
+
+
+def _solid_speed(scene: Scene, solids: MovingSolids, duration: float) -> float:
+    """Return the largest speed [m/s] at which any solid moves through the tank in this frame."""
+    return solids.largest_speed(duration, scene.tank.size if scene.tank else None)
