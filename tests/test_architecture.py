@@ -90,6 +90,12 @@ def test_the_rooms_are_those_of_the_plan():
     assert len(entries) <= MOST_ENTRIES
 
 
+@pytest.mark.parametrize("path", sorted((PACKAGE / "view" / "passes").glob("*.py")), ids=lambda p: p.stem)
+def test_a_pass_knows_no_other_pass(path):
+    """What passes share lies beside them; which pass comes after which is for `views.py` to say."""
+    assert not {name for name in imports(path) if name.startswith("wavetank.view.passes")}
+
+
 def modules() -> dict[str, Path]:
     """Every module of the package by its dotted name."""
     names = {}
@@ -182,3 +188,57 @@ def test_parameters_page_is_up_to_date():
     from wavetank.lab.reference import parameters_page
 
     assert (ROOT / "docs" / "parameters.md").read_text() == parameters_page()
+
+
+# --- arguments, and what kernels see ---
+
+MOST_KERNEL_ARGUMENTS = 12
+MOST_ARGUMENTS = 7
+#: Functions with more. Those of `cli.py` are commands: typer makes options of their arguments.
+MANY_ARGUMENTS = ("cli.bench", "cli.play", "cli.render", "cli.run")
+
+
+def functions(path: Path) -> list[tuple[ast.FunctionDef, str]]:
+    """The functions of a file, each "kernel", "func" (which kernels call) or "host"."""
+    kinds = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.FunctionDef):
+            decorators = {ast.unparse(decorator).split("(")[0] for decorator in node.decorator_list}
+            kinds.append((node, next((kind for kind in ("kernel", "func") if f"qd.{kind}" in decorators), "host")))
+    return kinds
+
+
+def test_functions_take_few_arguments():
+    """One swap of two numbers among many is silent: what belongs together travels together."""
+    many = []
+    for path in FILES:
+        module = ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+        for node, kind in functions(path):
+            number = len([argument for argument in node.args.args if argument.arg not in ("self", "cls")])
+            most = {"kernel": MOST_KERNEL_ARGUMENTS, "func": 99, "host": MOST_ARGUMENTS}[kind]
+            if number > most:
+                many.append(f"{module}.{node.name}")
+    assert sorted(many) == sorted(MANY_ARGUMENTS)
+
+
+@pytest.mark.parametrize("path", [path for path in FILES if "@qd." in path.read_text()], ids=lambda path: path.stem)
+def test_kernels_read_no_constants_of_modules(path):
+    """The compiler's cache does not see them: a kernel that reads one goes on with what it was.
+
+    Functions are chosen from tuples and dicts by a number that the cache does see; these are append-only.
+    """
+    import importlib
+
+    module = importlib.import_module(".".join(("wavetank", *path.relative_to(PACKAGE).with_suffix("").parts)))
+    for node, kind in functions(path):
+        if kind == "host":
+            continue
+        names = {part.id for line in node.body for part in ast.walk(line) if isinstance(part, ast.Name)}
+        own = {argument.arg for argument in node.args.args}
+        own |= {part.id for part in ast.walk(node) if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)}
+        for name in names - own:
+            value = vars(module).get(name)
+            entries = value.values() if isinstance(value, dict) else value if isinstance(value, tuple) else ()
+            chosen_from = bool(entries) and all(callable(entry) for entry in entries)
+            constant = isinstance(value, bool | int | float | str | tuple | list | dict | set) and not chosen_from
+            assert not constant, f"{node.name} reads {name} = {value}"

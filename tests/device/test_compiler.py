@@ -1,6 +1,7 @@
 """Arguments of launches: the compiler reads what it is given, and is given what it knows."""
 
 import dataclasses
+from typing import Final
 
 import numpy as np
 import pytest
@@ -94,6 +95,35 @@ def test_variants_of_a_kernel_have_their_numbers_in_places_of_their_own(prepared
             write_some(x, more, 500 + 2 * place + whole, 1.0 + place, whole)
     assert len(prepared) == 2 * len(("x", "more", "place", "share"))  # once for each variant
     assert compiler.download(x)[500:508].tolist() == [11, 1111, 12, 1112, 13, 1113, 14, 1114]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Row:
+    """An array and a number that kernels are compiled for, as `state.Grid`."""
+
+    x: qd.types.ndarray()
+    step: Final[int]
+
+
+@qd.kernel(fastcache=True)
+def write_steps(row: Row, numbers: Numbers, place: qd.i32):
+    for k in qd.static(range(row.step)):
+        row.x[place + k] = numbers.one + row.step
+
+
+def test_launches_are_known_whose_objects_have_numbers_that_they_are_compiled_for(prepared):
+    compiler.start("cpu")
+    x, numbers = integers(1000), Numbers(one=5, half=0.0)
+    one, two = Row(x, 1), Row(x, 2)
+    write_steps(one, numbers, 500)
+    write_steps(two, numbers, 502)
+    before = len(prepared)
+    write_steps(one, numbers, 504)
+    write_steps(two, numbers, 506)
+    assert len(prepared) == before > 0
+    assert compiler.download(x)[500:508].tolist() == [6, 0, 7, 7, 6, 0, 7, 7]
+    write_steps(Row(integers(1000), 2), numbers, 0)
+    assert compiler.download(x)[:2].tolist() == [0, 0]
 
 
 def test_prepared_launches_go_with_their_arrays(prepared):

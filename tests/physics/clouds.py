@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 
 import wavetank as wt
+from wavetank.physics.coefficients import coefficients, method_number
 from wavetank.physics.smoothing import NAMES, kernel_shape, sigma
-from wavetank.physics.step import coefficients, method_number
 from wavetank.simulation.simulation import Simulation
 
 

@@ -5,9 +5,11 @@ import pytest
 
 import wavetank as wt
 from wavetank.device.compiler import download, upload
+from wavetank.physics.coefficients import coefficients
 from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE
 from wavetank.physics.dynamic_viscosity.implicit_viscosity import damper_scale, solve_viscosity
-from wavetank.physics.step import coefficients, prepare_fluids
+from wavetank.physics.mixture import blend
+from wavetank.physics.tension import prepare_fluids
 from wavetank.simulation.simulation import Simulation
 
 D, DT = 0.05, 1 / 300
@@ -44,11 +46,9 @@ def velocities(sim: Simulation) -> np.ndarray:
 
 def solve(sim: Simulation, most: int = 1000) -> int:
     world, scene = sim.world, sim.scene
-    kinds = prepare_fluids(world, world.particles, scene, DT)
-    return solve_viscosity(
-        world.particles, world.scratch, world.fluids, world.grid, world.solids, coefficients(scene, DT), kinds,
-        sim.count, scene.support, scene.no_slip, most,
-    )  # fmt: skip
+    kinds = blend(world.materials, scene)
+    prepare_fluids(world, kinds, scene, DT)
+    return solve_viscosity(world, kinds, scene, coefficients(scene, DT), most)
 
 
 def solved_directly(sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
@@ -122,7 +122,7 @@ def iterations_of(forgets: bool, monkeypatch) -> float:
 
     def counted(*arguments):
         if forgets:
-            arguments[0].viscous.fill(0.0)
+            arguments[0].particles.viscous.fill(0.0)
         numbers.append(solve_viscosity(*arguments))
         return numbers[-1]
 

@@ -8,7 +8,7 @@ from clouds import Cloud
 
 from wavetank.physics.density_constraint import correct_positions, schedule, start_multipliers
 from wavetank.physics.vorticity import confine_vorticity
-from wavetank.physics.xsph_viscosity import apply_viscosity
+from wavetank.physics.xsph_viscosity import apply_xsph
 
 CASES = [(2, "spiky"), (3, "spiky"), (3, "poly6-spiky"), (2, "cubic"), (3, "wendland")]
 cases = pytest.mark.parametrize(("dim", "kernel"), CASES)
@@ -18,19 +18,16 @@ def solve(cloud: Cloud) -> None:
     world, count = cloud.world, cloud.count
     start_multipliers(
         world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, cloud.method, 0,
-        world.grid.lanes,
     )  # fmt: skip
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, cloud.c, count,
-        cloud.method, int(cloud.scene.tensile_strength > 0), 0, 0, world.grid.lanes,
+        cloud.method, int(cloud.scene.tensile_strength > 0), 0, 0,
     )  # fmt: skip
 
 
 def smooth(cloud: Cloud, turning: int) -> None:
     world, grid = cloud.world, cloud.world.grid
-    apply_viscosity(
-        world.spare, world.particles, world.scratch, grid, cloud.c, cloud.count, cloud.method, turning, grid.lanes
-    )
+    apply_xsph(world.spare, world.particles, world.scratch, grid, cloud.c, cloud.count, cloud.method, turning)
 
 
 def multipliers(cloud: Cloud) -> np.ndarray:
@@ -117,7 +114,7 @@ def test_vorticity_confinement_eq_10(dim):
     world = cloud.world
     smooth(cloud, 1)
     omega = world.scratch.omega.to_numpy()[: cloud.count].astype(np.float64)
-    confine_vorticity(world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method, world.grid.lanes)
+    confine_vorticity(world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method)
     size = np.linalg.norm(omega, axis=1)
     pad = ((0, 0), (0, 0), (0, 3 - dim))
     eta = cloud.mass_over_rest_density() * np.sum(
@@ -137,7 +134,7 @@ def test_calm_water_is_not_pushed():
     smooth(cloud, 1)
     size = np.linalg.norm(world.scratch.omega.to_numpy()[: cloud.count], axis=1)
     c = dataclasses.replace(cloud.c, calm=float(np.median(size)))
-    confine_vorticity(world.particles, world.scratch, world.grid, c, cloud.count, cloud.method, world.grid.lanes)
+    confine_vorticity(world.particles, world.scratch, world.grid, c, cloud.count, cloud.method)
     pushed = np.any(world.particles.v.to_numpy()[: cloud.count] != cloud.v.astype(np.float32), axis=1)
     assert not pushed[size <= c.calm].any()
     assert pushed[size > 1.5 * c.calm].mean() > 0.8
@@ -146,7 +143,7 @@ def test_calm_water_is_not_pushed():
 def test_solid_rotation_has_twice_its_rate_as_vorticity():
     """curl of omega x r is 2 omega; inside a lattice Eq. 9 finds it up to the kernel's lattice error."""
     import wavetank as wt
-    from wavetank.physics.step import coefficients
+    from wavetank.physics.coefficients import coefficients
     from wavetank.simulation.simulation import Simulation
 
     axis = np.arange(-5, 6) * 0.1
@@ -156,7 +153,7 @@ def test_solid_rotation_has_twice_its_rate_as_vorticity():
     sim.frame()
     world = sim.world
     c = coefficients(sim.scene, 0.01)
-    apply_viscosity(world.spare, world.particles, world.scratch, world.grid, c, sim.count, 2, 1, world.grid.lanes)
+    apply_xsph(world.spare, world.particles, world.scratch, world.grid, c, sim.count, 2, 1)
     middle = np.argmin(np.linalg.norm(world.particles.x.to_numpy()[: sim.count], axis=1))
     assert world.scratch.omega.to_numpy()[middle] == pytest.approx([0, 0, 6], rel=0.05, abs=1e-3)
 

@@ -11,17 +11,17 @@ from wavetank.physics.foam.noise import stream, uniform
 from wavetank.physics.foam.pool import new_pool
 from wavetank.physics.foam.potentials import add_potentials, find_normals, limited
 from wavetank.physics.foam.update import air
-from wavetank.physics.pairs import part_of, teams, turns
+from wavetank.physics.teams import end_of, end_team, first_team, teams, turns
 from wavetank.solids.distance import SolidSet
 
 
 @qd.kernel
 def find_surface(
     births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
-    count: qd.i32, method: qd.template(), lanes: qd.template(),
+    count: qd.i32, method: qd.template(),
 ):  # fmt: skip
-    for team in range(teams(count, lanes)):
-        find_normals(births, team, particles, grid, solids, walls, c, a, count, method, lanes)
+    for team in range(teams(grid, count)):
+        find_normals(births, team, particles, grid, solids, walls, c, a, count, method)
 
 
 @qd.kernel
@@ -32,15 +32,14 @@ def scan(values: qd.types.ndarray(), blocks: qd.types.ndarray(), count: qd.i32, 
 @qd.kernel
 def fill_potentials(
     out: qd.types.ndarray(), births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air,
-    count: qd.i32, method: qd.template(), lanes: qd.template(),
+    count: qd.i32, method: qd.template(),
 ):  # fmt: skip
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, 1, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)
             add_potentials(sums, team, births, particles, grid, c, a, count, method)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                out[i] = sums[0, i - team * lanes]
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                out[i] = sums[0, i - team * grid.lanes]
 
 
 @qd.kernel
@@ -59,10 +58,10 @@ def potentials(cloud: Cloud, speed: float) -> tuple[np.ndarray, np.ndarray]:
     """Normals and potentials of a cloud whose U is `speed`, in device order."""
     world, births = cloud.world, new_pool(cloud.dim, 1, cloud.count).births
     a = dataclasses.replace(air(cloud.scene, cloud.count, 1 / 60), speed=speed)
-    particles, grid, lanes = world.particles, world.grid, world.grid.lanes
-    find_surface(births, particles, grid, world.solids, world.walls, cloud.c, a, cloud.count, cloud.method, lanes)
+    particles, grid = world.particles, world.grid
+    find_surface(births, particles, grid, world.solids, world.walls, cloud.c, a, cloud.count, cloud.method)
     out = scalars(cloud.count)
-    fill_potentials(out, births, particles, grid, cloud.c, a, cloud.count, cloud.method, lanes)
+    fill_potentials(out, births, particles, grid, cloud.c, a, cloud.count, cloud.method)
     return births.normal.to_numpy()[: cloud.count], out.to_numpy()
 
 

@@ -14,17 +14,17 @@ from wavetank.lab.cases.energy import energies
 from wavetank.physics.grid_pressure import coarse_grid, poisson
 from wavetank.physics.grid_pressure import correction as coarse_pressure
 from wavetank.physics.grid_pressure.coarse_grid import new_levels
+from wavetank.physics.plan import has_grid_pressure
 from wavetank.physics.smoothing import NAMES, kernel_shape, rest_lattice
-from wavetank.physics.step import has_grid_pressure
 from wavetank.scene.fluids import Points
 from wavetank.simulation.simulation import Simulation
 
 
 @qd.kernel(fastcache=True)
-def couple(level: CoarseGrid, least_theta: qd.f32, width: qd.template()):
+def couple(level: CoarseGrid, least_theta: qd.f32):
     """Set the couplings of a finest level, as `gather` does."""
     for piece in range(level.pieces * level.ny * level.nz):
-        poisson.couple_nodes(level, piece, least_theta, width)
+        poisson.couple_nodes(level, piece, least_theta)
 
 
 def filled(level, heights) -> None:
@@ -35,7 +35,7 @@ def filled(level, heights) -> None:
         whole = array.to_numpy()
         whole[: values.size] = values.ravel()
         array.from_numpy(whole)
-    couple(level, poisson.LEAST_THETA, coarse_grid.piece_width())
+    couple(level, poisson.LEAST_THETA)
 
 
 def test_weight_at_the_bottom_becomes_hydrostatic_pressure():
@@ -48,7 +48,7 @@ def test_weight_at_the_bottom_becomes_hydrostatic_pressure():
     rhs[: level.nx] = 1.0
     level.rhs.from_numpy(rhs)
     for _ in range(4):
-        poisson.solve(level, level, poisson.GO_ON, 200, 1.8, 0, coarse_grid.piece_width())
+        poisson.solve(level, level, poisson.GO_ON, 200, 1.8, 0)
     lam = level.lam.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
     # Between the full cell below and the air above, the level set f - 1/2 is zero a third of the way up.
     depth = level.dy * (12.0 + 0.25 / 0.75 - np.arange(13))
@@ -66,7 +66,7 @@ def random_errors(level) -> None:
 def error_of(lam: np.ndarray, finest) -> float:
     """Distance of multipliers from those of many sweeps, relative."""
     for _ in range(20):
-        poisson.solve(finest, finest, poisson.GO_ON, 200, 1.95, 0, coarse_grid.piece_width())
+        poisson.solve(finest, finest, poisson.GO_ON, 200, 1.95, 0)
     exact = finest.lam.to_numpy()
     return float(np.linalg.norm(lam - exact) / np.linalg.norm(exact))
 
@@ -80,7 +80,7 @@ def test_few_sweeps_on_all_levels_come_close(size):
     random_errors(finest)
     poisson.solve_levels(levels)
     assert error_of(finest.lam.to_numpy(), finest) < 0.05
-    poisson.solve(finest, finest, poisson.ZERO, 8, 1.5, 0, coarse_grid.piece_width())
+    poisson.solve(finest, finest, poisson.ZERO, 8, 1.5, 0)
     assert error_of(finest.lam.to_numpy(), finest) > (0.02 if size[1] < 1.0 else 0.3), "one level alone does not"
 
 
@@ -201,7 +201,7 @@ def energy_gained(*frames: int) -> np.ndarray:
 
 
 def test_a_block_that_runs_into_a_pool_does_not_gain_height(monkeypatch):
-    """Conservation of energy; docs/method.md, "Rows that are drawn apart"."""
+    """Conservation of energy; docs/notebook/grid-pressure.md, "Rows that are drawn apart"."""
     early, late = energy_gained(24, 36)
     assert early < 0.03
     assert late < 0.0

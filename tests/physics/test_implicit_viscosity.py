@@ -7,6 +7,7 @@ import pytest
 
 import wavetank as wt
 from wavetank.device.compiler import download
+from wavetank.physics.coefficients import coefficients
 from wavetank.physics.density_constraint import schedule
 from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE
 from wavetank.physics.dynamic_viscosity.implicit_viscosity import (
@@ -18,8 +19,10 @@ from wavetank.physics.dynamic_viscosity.implicit_viscosity import (
     iterations,
     solve_viscosity,
 )  # fmt: skip
+from wavetank.physics.mixture import blend
+from wavetank.physics.plan import has_grid_pressure
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
-from wavetank.physics.step import coefficients, has_grid_pressure, prepare_fluids
+from wavetank.physics.tension import prepare_fluids
 from wavetank.simulation.simulation import Simulation
 
 D, DT = 0.05, 1 / 300
@@ -37,12 +40,10 @@ def solved(x: np.ndarray, v: np.ndarray, viscosity: float, most: int = 400, **se
     world = sim.world
     before = world.particles.v.to_numpy()[: sim.count].astype(np.float64)
     c = coefficients(scene, DT)
-    kinds = prepare_fluids(world, world.particles, scene, DT)
+    kinds = blend(world.materials, scene)
+    prepare_fluids(world, kinds, scene, DT)
     world.remember_viscosity()
-    number = solve_viscosity(
-        world.particles, world.scratch, world.fluids, world.grid, world.solids, c, kinds, sim.count, scene.support,
-        scene.no_slip, most,
-    )  # fmt: skip
+    number = solve_viscosity(world, kinds, scene, c, most)
     after = world.particles.v.to_numpy()[: sim.count].astype(np.float64)
     return world.particles.x.to_numpy()[: sim.count].astype(np.float64), before, after, number
 
@@ -140,7 +141,7 @@ def test_thin_fluids_pay_nothing():
     sim.step()
     assert sim.world.fluids.arrays == {}
     c = coefficients(scene, DT)
-    kinds = prepare_fluids(sim.world, sim.world.particles, scene, DT)
+    kinds = blend(sim.world.materials, scene)
     assert not is_viscous(kinds, scene, c.dt)
     assert iterations(1.0, 60) == 0
     assert (
@@ -190,7 +191,7 @@ def test_what_presses_is_carried_on_by_thick_fluids_only():
         sim = Simulation(scene)
         sim.step()
         assert has_grid_pressure(sim.world, scene) is (viscosity < 100.0), "thin fluids need no other time steps"
-        shares[viscosity] = carried_share(prepare_fluids(sim.world, sim.world.particles, scene, DT), scene)
+        shares[viscosity] = carried_share(blend(sim.world.materials, scene), scene)
     assert shares.pop(1000.0) > 0.95 * CARRIED
     assert not any(shares.values())
     weightless = Simulation(wt.Scene.load("honey-2d").changed(gravity=(0, 0)))

@@ -9,7 +9,7 @@ from wavetank.device.compiler import upload
 from wavetank.foundation.materials import Material
 from wavetank.physics.density_constraint import correct_positions, start_multipliers
 from wavetank.physics.mixture import blend, pack_weights, stiffening
-from wavetank.physics.xsph_viscosity import apply_mixed_viscosity
+from wavetank.physics.xsph_viscosity import apply_mixed_xsph
 
 
 def mixed_cloud(dim: int, ratio: float = 100.0, **settings) -> tuple[Cloud, np.ndarray]:
@@ -32,11 +32,10 @@ def solve(cloud: Cloud, mixed: int) -> np.ndarray:
         cloud.count,
         cloud.method,
         mixed,
-        world.grid.lanes,
     )
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, cloud.c, cloud.count,
-        cloud.method, 0, mixed, 0, world.grid.lanes,
+        cloud.method, 0, mixed, 0,
     )  # fmt: skip
     return cloud.predictions(world.spare) - cloud.x
 
@@ -77,7 +76,7 @@ def test_smoothing_keeps_momentum_and_is_eq_11_for_equal_masses(dim):
     packed = world.fluids.array("packed")
     pack_weights(packed, world.particles, world.scratch, cloud.count)
     grid = world.grid
-    apply_mixed_viscosity(world.spare, world.particles, packed, grid, cloud.c, cloud.count, cloud.method, grid.lanes)
+    apply_mixed_xsph(world.spare, world.particles, packed, grid, cloud.c, cloud.count, cloud.method)
     smoothed = world.spare.v.to_numpy()[: cloud.count].astype(np.float64)
     momentum = (smoothed - cloud.v) / w[:, None]
     assert np.abs(momentum.sum(axis=0)).max() < 1e-6 * np.abs(cloud.v).sum()

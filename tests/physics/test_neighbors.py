@@ -9,10 +9,10 @@ from scipy.spatial import cKDTree
 import wavetank as wt
 from wavetank.device.compiler import upload
 from wavetank.physics import neighbors
+from wavetank.physics.coefficients import coefficients
 from wavetank.physics.integrate import forget_predictions
 from wavetank.physics.neighbors import new_grid, reorder
 from wavetank.physics.pairs import count_neighbors
-from wavetank.physics.step import coefficients
 from wavetank.simulation.simulation import Simulation
 
 

@@ -1,5 +1,6 @@
 """Passes over pairs: what they sum is held by test_equations.py; here, what the compiler makes of them."""
 
+import dataclasses
 import os
 import platform
 import re
@@ -12,7 +13,7 @@ from wavetank.device import compiler
 from wavetank.device.compiler import qd
 from wavetank.device.state import Grid, integers
 from wavetank.physics.neighbors import new_grid
-from wavetank.physics.pairs import part_of, teams, turns
+from wavetank.physics.teams import end_team, first_team, turns
 
 PROGRAM = """
 import sys
@@ -30,17 +31,16 @@ PASSES = {
     "solve_multipliers": 1,
     "correct_positions": 1,
     "measure_density": 1,
-    "apply_viscosity": 1,
+    "apply_xsph": 1,
     "confine_vorticity": 1,
-    "join_pairs": 1,
+    "find_dampers": 1,
 }
 
 
 @qd.kernel
-def count_visits(visits: qd.types.ndarray(), grid: Grid, count: qd.i32, lanes: qd.template()):
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
+def count_visits(visits: qd.types.ndarray(), grid: Grid, count: qd.i32):
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
             qd.atomic_add(visits[team], 1)
 
 
@@ -48,9 +48,9 @@ def count_visits(visits: qd.types.ndarray(), grid: Grid, count: qd.i32, lanes: q
 @pytest.mark.parametrize("count", [0, 1, 9, 128, 1000, 4097, 70001])
 def test_every_team_has_its_turn_once(count, lanes):
     compiler.start("cpu")
-    grid = new_grid(2, count, (1.0, 1.0), 0.5, 32)
+    grid = dataclasses.replace(new_grid(2, count, (1.0, 1.0), 0.5, 32), lanes=lanes)
     visits = integers(count + 1)
-    count_visits(visits, grid, count, lanes)
+    count_visits(visits, grid, count)
     teams = -(-count // lanes)
     assert compiler.download(visits).tolist() == [1] * teams + [0] * (count + 1 - teams)
 

@@ -5,9 +5,11 @@ import pytest
 
 import wavetank as wt
 from wavetank.device.compiler import download
+from wavetank.physics.coefficients import coefficients
 from wavetank.physics.dynamic_viscosity.implicit_viscosity import solve_viscosity
 from wavetank.physics.dynamic_viscosity.rigid_guess import FORGET
-from wavetank.physics.step import coefficients, prepare_fluids
+from wavetank.physics.mixture import blend
+from wavetank.physics.tension import prepare_fluids
 from wavetank.simulation.simulation import Simulation
 
 D, DT = 0.02, 1 / 120
@@ -34,11 +36,9 @@ def start_after(dim: int, flow: np.ndarray, pull: np.ndarray) -> np.ndarray:
     sim.frame()
     world = sim.world
     world.remember_viscosity(np.tile(pull.astype(np.float32), (sim.count, 1)))
-    kinds = prepare_fluids(world, world.particles, sim.scene, DT)
-    solve_viscosity(
-        world.particles, world.scratch, world.fluids, world.grid, world.solids, coefficients(sim.scene, DT), kinds,
-        sim.count, sim.scene.support, 1.0, 0,
-    )  # fmt: skip
+    kinds = blend(world.materials, sim.scene)
+    prepare_fluids(world, kinds, sim.scene, DT)
+    solve_viscosity(world, kinds, sim.scene, coefficients(sim.scene, DT), 0)
     return download(world.particles.viscous)[: sim.count].astype(float)
 
 

@@ -5,8 +5,8 @@ from scipy import integrate
 import wavetank as wt
 from wavetank.device.compiler import qd
 from wavetank.physics import smoothing
+from wavetank.physics.coefficients import coefficients, relaxations
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, lattice_density, rest_lattice, sigma
-from wavetank.physics.step import coefficients, relaxations
 
 SINGLE = [name for name, (a, b) in NAMES.items() if a == b]
 

@@ -87,7 +87,7 @@ def test_nothing_has_neither_speed_nor_depth():
 
 @pytest.mark.parametrize("on_grid", [0.0, 1.0])
 def test_deep_water_of_fine_particles_does_not_boil(on_grid):
-    """80 layers in one metre: with five time steps a frame they fall into themselves and bounce (docs/method.md)."""
+    """80 layers in one metre: with five steps a frame they fall into themselves and bounce (notebook/time-steps.md)."""
     world = Simulation(pool(1.0, 0.0125, grid_pressure=on_grid))
     for _ in world.frames(0.8, 20):
         pass

@@ -91,7 +91,7 @@ def test_a_drop_is_drawn_as_the_ball_it_is(make_frame, height):
     shot = renderer.shot(frame, camera)
     ellipsoids.draw(shot, renderer.buffers)
     surface.draw(shot, renderer.buffers)
-    depth = renderer.buffers.water.depth.to_numpy().view(np.float32)
+    depth = renderer.buffers.water.surface.depth.to_numpy().view(np.float32)
     radius = ellipsoids.BALL * D
     exact = entry_depths(camera, (0.45, 0.55, 0.5), radius)
     inner = np.isfinite(entry_depths(camera, (0.45, 0.55, 0.5), 0.95 * radius))
@@ -112,10 +112,10 @@ def test_an_outline_covers_its_share_of_a_pixel(make_frame, height):
         shot = renderer.shot(frame, camera)
         ellipsoids.draw(shot, renderer.buffers)
         surface.draw(shot, renderer.buffers)
-        water = renderer.buffers.water
-        there, rim = water.depth.to_numpy() < 0x7F000000, water.rim.to_numpy() >> 24
+        seen = renderer.buffers.water.surface
+        there, rim = seen.depth.to_numpy() < 0x7F000000, seen.rim.to_numpy() >> 24
         areas.append(np.where(rim > 0, (rim + 0.5) / 127.0, 1.0)[there].sum())
-        depth = water.depth.to_numpy().view(np.float32)[there].mean()
+        depth = seen.depth.to_numpy().view(np.float32)[there].mean()
     pixel = float(shot.lens.pixel) * (depth if height is None else 1.0)
     assert np.array(areas) == pytest.approx(np.pi * (ellipsoids.BALL * D / pixel) ** 2, rel=0.03)
 
@@ -126,7 +126,7 @@ def test_water_against_a_pane_is_as_flat_as_the_pane(make_frame, eye, shown):
     camera = Camera(eye=eye, target=(0.5, 0.4, 1.0), height=0.5)
     renderer = Renderer(64, 48)
     renderer.render(frame, camera)
-    depth = renderer.buffers.water.spare.to_numpy().view(np.float32)
+    depth = renderer.buffers.water.surface.nearest.to_numpy().view(np.float32)
     lens = camera.lens(64, 48)
     v = (24 - np.arange(48) - 0.5)[:, None] * lens.pixel
     pane = (1.0 - lens.eye[2] - v * lens.up[2]) / lens.forward[2]
@@ -143,7 +143,7 @@ def test_the_surface_meets_a_pane_along_a_straight_line(make_frame):
     camera = Camera(eye=(0.5, 1.1, 3.0), target=(0.5, 0.5, 1.0), height=0.6)
     renderer = Renderer(320, 240)
     renderer.render(make_frame(Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 1.0))), x), camera)
-    seen = renderer.buffers.water.spare.to_numpy().view(np.float32)
+    seen = renderer.buffers.water.surface.nearest.to_numpy().view(np.float32)
     lens = camera.lens(320, 240)
     v = (120 - np.arange(240) - 0.5)[:, None] * lens.pixel
     pane = (1.0 - lens.eye[2] - v * lens.up[2]) / lens.forward[2]

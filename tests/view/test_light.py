@@ -49,8 +49,8 @@ def test_a_shadow_is_softer_the_higher_what_casts_it(make_frame, tank_scene):
         renderer = Renderer(320, 240)
         frame = make_frame(tank_scene, [(0.5, height, 0.5)])
         renderer.render(frame, camera=CAMERA, legend=False, radius=2.0)
-        share = renderer.buffers.light.to_numpy()[..., 0]
-        floor = renderer.buffers.surface.to_numpy() == -2
+        share = renderer.buffers.light.share.to_numpy()[..., 0]
+        floor = renderer.buffers.pixels.surface.to_numpy() == -2
         return ((share > 0.1) & (share < 0.9) & floor).sum()
 
     assert rim(0.9) > 1.5 * rim(0.12)
@@ -60,7 +60,7 @@ def test_a_crease_is_darker_than_the_open_floor(make_frame):
     scene = Scene(spacing=0.05, tank=Tank(size=(1.0, 1.0, 1.0)), solids=[Sphere(center=(0.5, 0.1, 0.5), radius=0.1)])
     renderer = Renderer(*SIZE)
     renderer.render(make_frame(scene, []), camera=CAMERA, view="particles")
-    sky = renderer.buffers.light.to_numpy()[..., 1]
+    sky = renderer.buffers.light.share.to_numpy()[..., 1]
     column, row, _ = CAMERA.project((0.5, 0.0, 0.61), *SIZE)[0]
     assert sky[int(row), int(column)] < 0.96
     far_column, far_row, _ = CAMERA.project((0.5, 0.0, 1.2), *SIZE)[0]
@@ -74,7 +74,7 @@ def developed(colors, samples=1):
     array = qd.ndarray(vec3, shape=field.shape[:2])
     array.from_numpy(field)
     buffers = allocate(len(colors), 1, samples)
-    tonemap.develop(array, samples, 0, buffers.picture.shape[0] // 3, buffers.curve, buffers.picture)
+    tonemap.write(buffers, array, 0)
     return buffers.host_picture()[0]
 
 

@@ -9,7 +9,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.simulation.simulation import Simulation
 from wavetank.view import renderer as module
 from wavetank.view.camera import Camera
-from wavetank.view.passes import ellipsoids, shadow, sunlight
+from wavetank.view.passes import caustics, ellipsoids, solids
 from wavetank.view.renderer import Renderer, render
 from wavetank.view.style import Style
 from wavetank.view.views import VIEWS
@@ -71,7 +71,12 @@ def test_water_that_rests_is_looked_at_from_all_sides_for_less(monkeypatch):
 def test_shadows_of_solids_wait_for_the_solids_not_for_the_eye(monkeypatch):
     scene = Scene.load("drop").changed(spacing=0.06, solids=[Box(name="box", center=(0.2, 0.1, 0.2), size=(0.1,) * 3)])
     sim, renderer, casts = Simulation(scene), Renderer(*SIZE), []
-    monkeypatch.setattr(shadow, "cast", lambda *a, cast=shadow.cast: (casts.append(1), cast(*a)))
+
+    def trace(*args, trace=solids.trace) -> None:
+        casts.extend([1] * (args[-1] == 0))  # not drawn, but seen by the sun
+        trace(*args)
+
+    monkeypatch.setattr(solids, "trace", trace)
 
     def look(angle: float, view: str = "water") -> int:
         eye = Camera(eye=(3.0 * np.sin(angle), 1.5, 3.0 * np.cos(angle)), target=(0.4, 0.3, 0.4))
@@ -91,7 +96,7 @@ def test_shadows_of_solids_wait_for_the_solids_not_for_the_eye(monkeypatch):
 
 def test_in_haste_the_sun_looks_at_moving_water_every_second_time(monkeypatch):
     sim, renderer, looks = Simulation(Scene.load("drop").changed(spacing=0.06)), Renderer(*SIZE), []
-    monkeypatch.setattr(sunlight, "gather", lambda *a, gather=sunlight.gather: (looks.append(1), gather(*a)))
+    monkeypatch.setattr(caustics, "gather", lambda *a, gather=caustics.gather: (looks.append(1), gather(*a)))
 
     def count(**options) -> int:
         before = len(looks)
@@ -138,7 +143,7 @@ def test_nothing_breaks_from_any_eye(make_frame, eye, dim, count, tank, view):
     renderer = Renderer(*SIZE)
     image = renderer.render(frame, camera=EYES[eye], view=view)
     assert image.shape == (SIZE[1], SIZE[0], 3)
-    assert np.isfinite(renderer.buffers.color.to_numpy()).all()
+    assert np.isfinite(renderer.buffers.pixels.color.to_numpy()).all()
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 40), (40, 1), (3, 3)])

@@ -6,7 +6,7 @@ import pytest
 from wavetank import Box, HalfSpace, Scene, Sphere, Tank
 from wavetank.view.buffers import SOLID
 from wavetank.view.camera import Camera
-from wavetank.view.passes import solids, spheres
+from wavetank.view.passes import nothing, solids, spheres
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import Style
 
@@ -18,15 +18,15 @@ def buffers_of(frame, camera):
     """The buffers after particles and solids."""
     renderer = Renderer(WIDTH, HEIGHT)
     shot = renderer.shot(frame, camera, Style(radius=0.5))
-    for draw in (spheres.draw, solids.draw):
+    for draw in (nothing.draw, spheres.draw, solids.draw):
         draw(shot, renderer.buffers)
     return renderer.buffers
 
 
 def drawn(frame, camera):
     """(depth, surface) after particles and solids."""
-    buffers = buffers_of(frame, camera)
-    return buffers.depth.to_numpy().view(np.float32), buffers.surface.to_numpy()
+    pixels = buffers_of(frame, camera).pixels
+    return pixels.depth.to_numpy().view(np.float32), pixels.surface.to_numpy()
 
 
 def world(*shapes, size=(1.0, 1.0, 1.0)):
@@ -107,9 +107,9 @@ def test_a_plane_shows_the_cut_in_front_of_particles(make_frame, camera):
 def test_the_eye_inside_a_solid_sees_its_inside(make_frame):
     camera = Camera(eye=(0.5, 0.5, 0.5), target=(0.5, 0.5, 0.0))
     scene = world(Sphere(center=(0.5, 0.5, 0.55), radius=0.3))
-    buffers = buffers_of(make_frame(scene, [(0.5, 0.5, 0.1)]), camera)
-    assert (buffers.surface.to_numpy() == SOLID).all()
-    assert (buffers.normal.to_numpy()[..., 2] > 0.5).all()  # it faces the eye
+    pixels = buffers_of(make_frame(scene, [(0.5, 0.5, 0.1)]), camera).pixels
+    assert (pixels.surface.to_numpy() == SOLID).all()
+    assert (pixels.normal.to_numpy()[..., 2] > 0.5).all()  # it faces the eye
 
 
 def test_the_box_of_solids_is_empty_when_they_are_out_of_sight(make_frame):

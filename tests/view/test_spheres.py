@@ -6,7 +6,7 @@ import pytest
 from wavetank import Scene, Tank
 from wavetank.view.buffers import NOTHING
 from wavetank.view.camera import Camera
-from wavetank.view.passes import spheres
+from wavetank.view.passes import nothing, spheres
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import Style
 
@@ -34,8 +34,10 @@ def drawn(frame, camera):
     """(depth, surface) of the spheres pass, [height, width]."""
     renderer = Renderer(WIDTH, HEIGHT)
     shot = renderer.shot(frame, camera, Style(radius=RADIUS / frame.scene.spacing))
-    spheres.draw(shot, renderer.buffers)
-    return renderer.buffers.depth.to_numpy().view(np.float32), renderer.buffers.surface.to_numpy()
+    for draw in (nothing.draw, spheres.draw):
+        draw(shot, renderer.buffers)
+    pixels = renderer.buffers.pixels
+    return pixels.depth.to_numpy().view(np.float32), pixels.surface.to_numpy()
 
 
 CAMERAS = [

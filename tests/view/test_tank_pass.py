@@ -12,7 +12,7 @@ WIDTH, HEIGHT = 160, 120
 def lines_of(frame, camera):
     renderer = Renderer(WIDTH, HEIGHT)
     renderer.render(frame, camera=camera, view="particles", legend=False)
-    return renderer.buffers.lines.to_numpy() >> 23  # without their depth
+    return renderer.buffers.pixels.lines.to_numpy() >> 23  # without their depth
 
 
 def edge_points(scene, share):

@@ -13,6 +13,8 @@ from wavetank.view import renderer as renderer_module
 from wavetank.view.camera import Camera
 from wavetank.view.lens import vector
 from wavetank.view.look import pool as pool_look
+from wavetank.view.optics.fluid import coarseness
+from wavetank.view.optics.rays import OPEN, box
 from wavetank.view.passes import ellipsoids, flatten, thickness
 from wavetank.view.renderer import Renderer, affordable
 
@@ -26,12 +28,12 @@ def pool(make_frame, depth=0.5, noise=0.0, **scene):
     return make_frame(Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 1.0)), **scene), np.clip(x, 0.25 * D, 1 - 0.25 * D))
 
 
-def smoothed(field, camera=CAMERA, upper=ellipsoids.OPEN[1]):
+def smoothed(field, camera=CAMERA, walls=OPEN):
     """`field` of depths [m] after the filter, as `camera` sees it."""
     rows, columns = field.shape
     depth, spare = (qd.ndarray(qd.i32, shape=field.shape) for _ in range(2))
     depth.from_numpy(np.ascontiguousarray(field, np.float32).view(np.int32) & ~1)
-    flatten.even(depth, spare, camera.lens(columns, rows), flatten.SIGMA * D, D, ellipsoids.OPEN[0], upper)
+    flatten.even(depth, spare, camera.lens(columns, rows), walls, flatten.SIGMA * D, D)
     return depth.to_numpy().view(np.float32)
 
 
@@ -72,8 +74,8 @@ def test_thickness_is_that_of_the_water(make_frame, deep):
     shot = renderer.shot(frame, Camera(eye=(0.5, 4.0, 0.5), target=(0.5, 0.0, 0.5)))
     for draw in (ellipsoids.draw, thickness.draw):
         draw(shot, renderer.buffers)
-    seen = renderer.buffers.water.thickness.to_numpy() * D / 4096.0
-    coarse = thickness.coarseness(shot)
+    seen = renderer.buffers.water.thickness.water.to_numpy() * D / 4096.0
+    coarse = coarseness(shot)
     middle = seen[45 // coarse - 2 : 45 // coarse + 3, 60 // coarse - 2 : 60 // coarse + 3]
     assert middle == pytest.approx(deep, rel=0.06)
     assert np.ptp(middle) < 0.08 * deep
@@ -83,7 +85,7 @@ def test_a_surface_at_rest_has_no_bumps(make_frame):
     """Normals of a noisy flat surface, seen at a slant, all point up."""
     renderer = Renderer(240, 160)
     renderer.render(pool(make_frame, noise=0.05), CAMERA)
-    depth = renderer.buffers.water.depth.to_numpy()
+    depth = renderer.buffers.water.surface.depth.to_numpy()
     top = CAMERA.project([(0.3, 0.5, 0.3), (0.7, 0.5, 0.7)], 240, 160)
     rows, columns = np.sort(top[:, 1]).astype(int), np.sort(top[:, 0]).astype(int)
     heights = world_heights(renderer, CAMERA)[rows[0] : rows[1], columns[0] : columns[1]]
@@ -95,7 +97,7 @@ def test_a_surface_at_rest_has_no_bumps(make_frame):
 
 def world_heights(renderer, camera):
     """Height [m] of the water at every pixel."""
-    depth = renderer.buffers.water.depth.to_numpy().view(np.float32)
+    depth = renderer.buffers.water.surface.depth.to_numpy().view(np.float32)
     lens = camera.lens(depth.shape[1], depth.shape[0])
     rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]] + 0.5
     v, u = (depth.shape[0] / 2 - rows) * lens.pixel, (columns - depth.shape[1] / 2) * lens.pixel
@@ -232,7 +234,7 @@ def test_the_filter_fades_before_a_pane():
     camera = Camera(eye=(0.0, 0.0, 2.0), target=(0.0, 0.0, 0.0))
     bumps = 0.2 * D * np.sin(1.3 * np.arange(90))[:, None] * np.sin(1.3 * np.arange(120))
     field = 2.0 + bumps + np.linspace(-2.5 * D, 0.5 * D, 120)  # the pane is at z = 0, at a depth of 2
-    moved = [smoothed(field, camera, np.array([9.0, 9.0, z], np.float32)) for z in np.linspace(0.0, 0.1 * D, 21)]
+    moved = [smoothed(field, camera, box(OPEN.lower, (9.0, 9.0, z))) for z in np.linspace(0.0, 0.1 * D, 21)]
     steps = [np.abs(b - a).max() for a, b in itertools.pairwise(moved)]
     assert np.abs(moved[-1] - moved[0]).max() > 0.01 * D
     assert max(steps) < 0.1 * D

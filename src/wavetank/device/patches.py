@@ -186,6 +186,15 @@ def flatten_fields(_: Any) -> Any:
     return flatten
 
 
+@patch(
+    "final fields", "_func_base:subtree_has_final_fields", "_template_mapper_hotpath:subtree_has_final_fields",
+    "_template_mapper:annotation_has_final_subtree",
+)  # fmt: skip
+def trust_final_fields(_: Any) -> Any:
+    """Reads numbers of a frozen object that are compiled into a kernel (`Final`) once, as ours are plain integers."""
+    return lambda _: False
+
+
 # --- products of vectors ---
 #
 # The compiler reads the source of its own `dot`, and of the functions that this calls, each time that a kernel has a

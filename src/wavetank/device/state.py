@@ -12,14 +12,14 @@ the compiler then knows the arguments of a launch, which else cost more than a s
 """
 
 import dataclasses
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
 
 Numbers = TypeVar("Numbers")
-NOWHERE = 1e6  # m, in every direction
+Together = TypeVar("Together")
 MARGIN = 32  # rows behind the last particle that loops over whole blocks and groups may read
 
 
@@ -43,6 +43,12 @@ class Particles:
     near: qd.types.ndarray()  # i32 [capacity]: bit k is set where solid k is near, bit 30 for all solids from 30 on
     dye: qd.types.ndarray()  # i32 [capacity]: 0 or strength << 24 | red << 16 | green << 8 | blue, strength 1 .. 127
     frozen: qd.types.ndarray()  # i32 [capacity]: 1 where a particle is ice and keeps its place
+
+
+#: Arrays of particles that say what these are from step to step: they are saved, and move to larger arrays. The others
+#: follow from them, but for `viscous`, which goes along where fluids are viscous. All of them are sorted
+#: (`neighbors.copy_particle`) and written for new particles (`population.append_rows`).
+LASTING: tuple[str, ...] = ("x", "v", "a", "id", "dye", "frozen", "material")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -70,7 +76,7 @@ class Grid:
     number: qd.types.ndarray()  # i32 [groups]: entries of each group's list
     list: qd.types.ndarray()  # i32 [groups * room]: who is a neighbour of any of a group's eight particles
     room: qd.i32  # places for each group, a multiple of 16
-    lanes: qd.i32  # particles that are computed together: a group's, or one
+    lanes: Final[int]  # particles that are computed together: a group's, or one
     parts: qd.i32  # in which threads share a pass over pairs
     nowhere: qd.i32  # index of a particle that is far from all others
     nx: qd.i32  # cells before the pattern moves on along y
@@ -101,11 +107,13 @@ class CoarseGrid:
     nx: qd.i32
     ny: qd.i32
     nz: qd.i32  # 1 in 2-D
-    pieces: qd.i32  # along x, of so many nodes as a thread takes at once
+    pieces: qd.i32  # along x, of `width` nodes
     dx: qd.f32  # m: edges of a cell
     dy: qd.f32
     dz: qd.f32  # 1 in 2-D
     parts: qd.i32  # of the particles that have sums of their own
+    alone: Final[int]  # 1 where there are several, so that no thread waits for another, else 0
+    width: Final[int]  # nodes of a row that a thread takes at once
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -184,6 +192,16 @@ class Fluids:
             self.arrays["pairs"] = scalars(size)
         return self.arrays["pairs"]
 
+    def together(self, kind: type[Together], *arrays: Any) -> Together:
+        """Return these arrays as one object of that frozen `kind`, the same one each time."""
+        known = self.arrays.setdefault(kind.__name__, {})
+        asked = tuple(map(id, arrays))
+        if asked not in known:
+            known.clear()
+            known[asked] = kind(*arrays)
+        made: Together = known[asked]
+        return made
+
 
 @dataclasses.dataclass(frozen=True)
 class Coefficients:
@@ -256,6 +274,30 @@ def exchanged(
 KINDS = ("water", "spray", "foam", "bubble")
 
 
+@qd.func
+def spray():
+    """Number of spray in KINDS."""
+    return 1
+
+
+@qd.func
+def foam():
+    """Number of foam in KINDS."""
+    return 2
+
+
+@qd.func
+def bubble():
+    """Number of bubbles in KINDS."""
+    return 3
+
+
+@qd.func
+def nowhere():
+    """Where the particle is that is nowhere [m], in every direction."""
+    return 1e6
+
+
 def vectors(dim: int, capacity: int) -> Any:
     """Allocate a device array of `capacity` vectors with `dim` float32 components."""
     return qd.ndarray(qd.types.vector(dim, qd.f32), shape=(max(capacity, 1),))
@@ -276,7 +318,7 @@ def new_particles(dim: int, capacity: int) -> Particles:
     rows = capacity + MARGIN
     px, py, pz = (scalars(rows if k < dim else 1) for k in range(3))
     places = np.zeros(rows, np.float32)
-    places[capacity] = NOWHERE
+    places[capacity] = nowhere.fn()
     for component in (px, py, pz)[:dim]:
         upload(component, places)
     x, v, a = (vectors(dim, rows) for _ in range(3))

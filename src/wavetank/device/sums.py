@@ -2,13 +2,29 @@
 
 from wavetank.device.compiler import qd
 
-SCAN_BLOCK = 128  # values, or sums of as many, that one thread sums up; the kernel spells it out
+
+@qd.func
+def scan_block():
+    """Values, or sums of as many, that one thread sums up."""
+    return 128
+
+
+@qd.func
+def many_threads():
+    """Threads of a graphics processor that come to one number together: few enough to wait for each other."""
+    return 16384
+
+
+@qd.func
+def blocks_in(count):
+    """Blocks of so many values."""
+    return (count + scan_block() - 1) // scan_block()
 
 
 def blocks_of(values: int) -> int:
     """Return how many sums `sum_up` needs room for: of all blocks, and of all blocks of these."""
-    blocks = -(-values // SCAN_BLOCK)
-    return max(1, blocks + -(-blocks // SCAN_BLOCK))
+    blocks = -(-values // scan_block.fn())
+    return max(1, blocks + -(-blocks // scan_block.fn()))
 
 
 @qd.func
@@ -50,12 +66,12 @@ def sort_by(
 
 @qd.func
 def share_of(thread, count):
-    """How many of `count` things one of 16,384 threads sees to: number `thread`, `thread` + 16,384 and so on.
+    """How many of `count` things one of `many_threads` sees to: number `thread`, and so on in steps of as many.
 
     For one number from all of them on a graphics processor. There every 32 threads bring in what they have found, one
     exchange after the other, and in a loop over things there are as many threads as the card has room for.
     """
-    return (count + 16383 - thread) // 16384
+    return (count + many_threads() - 1 - thread) // many_threads()
 
 
 @qd.func
@@ -85,20 +101,20 @@ def sum_up(values: qd.template(), blocks: qd.template(), count, shared: qd.templ
     sums and their applications"). To be called at the top level of a kernel.
     """
     if qd.static(shared):
-        for b in range((count + 127) // 128):
-            blocks[b] = sum_of(values, b * 128, qd.min((b + 1) * 128, count))
-        for b in range(((count + 127) // 128 + 127) // 128):
-            few = (count + 127) // 128
-            blocks[few + b] = sum_of(blocks, b * 128, qd.min((b + 1) * 128, few))
+        for b in range(blocks_in(count)):
+            blocks[b] = sum_of(values, b * scan_block(), qd.min((b + 1) * scan_block(), count))
+        for b in range(blocks_in(blocks_in(count))):
+            few = blocks_in(count)
+            blocks[few + b] = sum_of(blocks, b * scan_block(), qd.min((b + 1) * scan_block(), few))
         qd.loop_config(serialize=True)
         for _ in range(1):
-            few = (count + 127) // 128
-            values[count] = run_up(blocks, few, few + (few + 127) // 128, 0)
-        for b in range(((count + 127) // 128 + 127) // 128):
-            few = (count + 127) // 128
-            run_up(blocks, b * 128, qd.min((b + 1) * 128, few), blocks[few + b])
-        for b in range((count + 127) // 128):
-            run_up(values, b * 128, qd.min((b + 1) * 128, count), blocks[b])
+            few = blocks_in(count)
+            values[count] = run_up(blocks, few, few + blocks_in(few), 0)
+        for b in range(blocks_in(blocks_in(count))):
+            few = blocks_in(count)
+            run_up(blocks, b * scan_block(), qd.min((b + 1) * scan_block(), few), blocks[few + b])
+        for b in range(blocks_in(count)):
+            run_up(values, b * scan_block(), qd.min((b + 1) * scan_block(), count), blocks[b])
     else:
         # A processor is done with it before other threads have started, or nearly so.
         qd.loop_config(serialize=True)

@@ -30,23 +30,33 @@ from wavetank.solids.distance import (
     vec4,
 )  # fmt: skip
 
-# Bit 30 of `near` stands for every solid from number 30 on.
+
+@qd.func
+def last_mark():
+    """The last bit of `near`, which stands for every solid from that number on."""
+    return 30
+
+
+@qd.func
+def mark(k):
+    """Bit of `near` that stands for solid `k`."""
+    return 1 << qd.min(k, last_mark())
 
 
 @qd.func
 def is_near(near, k):
     """Say whether solid `k` is marked in the bits `near`."""
-    return (near >> qd.min(k, 30)) & 1
+    return (near >> qd.min(k, last_mark())) & 1
 
 
 @qd.func
 def next_near(near, k, count):
     """First solid behind number `k` that is marked in the bits `near`, or `count`: most particles have few marks."""
     following = k + 1
-    if following < 30:
+    if following < last_mark():
         rest = near >> following
         following = following + qd.math.ffs(rest) - 1 if rest != 0 else count
-    elif (near >> 30) == 0:
+    elif (near >> last_mark()) == 0:
         following = count
     return qd.min(following, count)
 
@@ -235,7 +245,7 @@ def near_bodies(x, p, solids: SolidSet, h):
         margin = way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(solids.reach[k], away)
         if away < solids.reach[k] + margin:
             if signed_distance(solids, k, p).w < margin:
-                near |= 1 << qd.min(k, 30)
+                near |= mark(k)
     return near
 
 
@@ -250,7 +260,7 @@ def bodies_in_reach(x, p, solids: SolidSet, gap):
     for k in range(solids.tank_count, solids.count):
         away = (p - solids.position[k]).norm()
         if away < solids.reach[k] + way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(solids.reach[k], away):
-            near |= 1 << qd.min(k, 30)
+            near |= mark(k)
     return near
 
 

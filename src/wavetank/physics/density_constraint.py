@@ -33,9 +33,10 @@ multiplier: Moreau and Jean's projected iteration, as in Tonge et al. 2012 (10.1
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles, Scratch, Walls
 from wavetank.physics.boundary import find_walls, flattened, kept_in_tank, stopped
-from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
+from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.smoothing import kernel
+from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.solids.distance import SolidSet, lift, vec4
 
 
@@ -111,20 +112,19 @@ def set_multiplier(i, before, change, scratch: Scratch, c: Coefficients):
 @qd.kernel(fastcache=True)
 def start_multipliers(
     scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
-    count: qd.i32, method: qd.template(), mixed: qd.template(), lanes: qd.template(),
+    count: qd.i32, method: qd.template(), mixed: qd.template(),
 ):  # fmt: skip
     """Find the denominators of all iterations of a substep, and the multipliers of the first (Eq. 1 to 5)."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
             dim = qd.static(particles.x[team].n)
-            sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
+            sums = qd.Matrix.zero(qd.f32, dim + 2, grid.lanes)
             add_neighbors(sums, qd.static(DENSITIES[mixed]), team, particles, scratch.weight, grid, c, method)
-            found = qd.Matrix.zero(qd.f32, 4, lanes)
+            found = qd.Matrix.zero(qd.f32, 4, grid.lanes)
             near = find_walls(found, team, particles, solids, walls, c)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                sum = column(sums, i - team * lanes)
-                wall = kept_wall(found, i - team * lanes, i, near, scratch)
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                sum = column(sums, i - team * grid.lanes)
+                wall = kept_wall(found, i - team * grid.lanes, i, near, scratch)
                 constraint = c.density_scale * sum[0] + wall.w - 1.0  # Eq. 2
                 own = c.eps
                 for k in qd.static(range(dim)):
@@ -139,19 +139,18 @@ def start_multipliers(
 @qd.kernel(fastcache=True)
 def solve_multipliers(
     scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
-    count: qd.i32, method: qd.template(), lanes: qd.template(),
+    count: qd.i32, method: qd.template(),
 ):  # fmt: skip
     """Estimate densities (Eq. 1) and move the multipliers on towards the solution (Eq. 5)."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, 1, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)
             add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
-            found = qd.Matrix.zero(qd.f32, 4, lanes)
+            found = qd.Matrix.zero(qd.f32, 4, grid.lanes)
             near = find_walls(found, team, particles, solids, walls, c)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                wall = kept_wall(found, i - team * lanes, i, near, scratch)
-                constraint = c.density_scale * sums[0, i - team * lanes] + wall.w - 1.0  # Eq. 2
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                wall = kept_wall(found, i - team * grid.lanes, i, near, scratch)
+                constraint = c.density_scale * sums[0, i - team * grid.lanes] + wall.w - 1.0  # Eq. 2
                 change = -c.relaxation * constraint / scratch.squares[i] + c.momentum * scratch.dlam[i]  # Eq. 5
                 set_multiplier(i, scratch.lam[i], change, scratch, c)
 
@@ -160,20 +159,18 @@ def solve_multipliers(
 def correct_positions(
     corrected: Particles, particles: Particles, scratch: Scratch, grid: Grid, solids: SolidSet, c: Coefficients,
     count: qd.i32, method: qd.template(), correction: qd.template(), mixed: qd.template(), searched: qd.template(),
-    lanes: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by the corrections (Eq. 6 or 8, by its number in CORRECTIONS), inside the tank.
 
     Where solids are `searched` they stay out of those as well.
     """
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, grid.lanes)
             add_neighbors(sums, qd.static(CORRECTIONS[correction]), team, particles, scratch.dlam, grid, c, method)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
                 p = predicted(particles, i)
-                dp = column(sums, i - team * lanes)
+                dp = column(sums, i - team * grid.lanes)
                 near = particles.near[i]
                 if near != 0:
                     for k in qd.static(range(p.n)):
@@ -193,18 +190,17 @@ def correct_positions(
 @qd.kernel(fastcache=True)
 def measure_density(
     scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
-    count: qd.i32, largest_density: qd.f32, method: qd.template(), lanes: qd.template(),
+    largest_density: qd.f32, count: qd.i32, method: qd.template(),
 ):  # fmt: skip
     """Estimate the densities [kg/m^3] at the positions p (Eq. 1), walls included."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, 1, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)
             add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
-            found = qd.Matrix.zero(qd.f32, 4, lanes)
+            found = qd.Matrix.zero(qd.f32, 4, grid.lanes)
             find_walls(found, team, particles, solids, walls, c)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                rho = c.density_scale * sums[0, i - team * lanes] + (1.0 - found[3, i - team * lanes])
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                rho = c.density_scale * sums[0, i - team * grid.lanes] + (1.0 - found[3, i - team * grid.lanes])
                 scratch.rho[i] = largest_density * rho / scratch.weight[i]
 
 

@@ -4,8 +4,8 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles
 from wavetank.physics.boundary import flattened, kept_in_tank, near_bodies, stopped, walls_near
 from wavetank.physics.neighbors import cell_of
-from wavetank.physics.pairs import part_of, teams, turns
 from wavetank.physics.predicted_positions import predict_at, predicted
+from wavetank.physics.teams import end_team, first_team, turns
 from wavetank.solids.distance import SolidSet, lift, vec3
 
 
@@ -31,7 +31,6 @@ def accelerate(particles: Particles, i, v, c: Coefficients):
 @qd.kernel(fastcache=True)
 def predict(
     particles: Particles, grid: Grid, solids: SolidSet, c: Coefficients, count: qd.i32, searched: qd.template(),
-    lanes: qd.template(),
 ):  # fmt: skip
     """Accelerate, move freely (Algorithm 1, lines 2-3), mark what is near, stay out of it, and find the cell.
 
@@ -39,25 +38,24 @@ def predict(
     are not `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they are, wherever
     that is.
     """
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
+    for turn in range(turns(grid, count)):
         gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            first = team * lanes
-            origins = qd.Matrix.zero(qd.f32, 3, lanes)
-            targets = qd.Matrix.zero(qd.f32, 3, lanes)
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            first = team * grid.lanes
+            origins = qd.Matrix.zero(qd.f32, 3, grid.lanes)
+            targets = qd.Matrix.zero(qd.f32, 3, grid.lanes)
             # What walls are near is computed for a team at once; few particles are so near that they are moved.
-            for lane in range(lanes):
+            for lane in range(grid.lanes):
                 x = particles.x[first + lane]
                 v = particles.v[first + lane]
                 a = particles.a[first + lane]
                 for k in qd.static(range(x.n)):
                     origins[k, lane] = x[k]
                     targets[k, lane] = x[k] + c.dt * (v[k] + c.dt * (gravity[k] + c.carried * a[k]))
-            walls = qd.Matrix.zero(qd.i32, 1, lanes)
-            nearest = qd.Matrix.zero(qd.f32, 1, lanes) + 1e9
+            walls = qd.Matrix.zero(qd.i32, 1, grid.lanes)
+            nearest = qd.Matrix.zero(qd.f32, 1, grid.lanes) + 1e9
             walls_near(walls, nearest, origins, targets, solids, c.h)
-            for i in range(first, qd.min(first + lanes, count)):
+            for i in range(first, qd.min(first + grid.lanes, count)):
                 x = particles.x[i]
                 v = particles.v[i]
                 for k in qd.static(range(x.n)):

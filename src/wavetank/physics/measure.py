@@ -1,8 +1,35 @@
-"""Figures of an instant: density error, energies, speed. In double precision on the host."""
+"""An instant as it is: densities and neighbours on the device; figures in double precision on the host."""
 
 import numpy as np
 
 from wavetank.foundation.params import Parameters
+from wavetank.physics.coefficients import coefficients, method_number
+from wavetank.physics.density_constraint import measure_density
+from wavetank.physics.integrate import predict
+from wavetank.physics.mixture import blend
+from wavetank.physics.neighbors import find_neighbors, sort_particles
+from wavetank.physics.pairs import count_neighbors
+from wavetank.physics.tension import prepare_fluids
+from wavetank.physics.world import World
+
+
+def update_densities(world: World, params: Parameters) -> None:
+    """Measure the densities [kg/m^3] of `world` as it stands. The order of particles changes, the motion does not."""
+    c, count, kinds = coefficients(params, 0.0), world.count, blend(world.materials, params)
+    predict(world.particles, world.grid, world.solids, c, count, int(world.has_solids))
+    sort_particles(world.particles, world.spare, world.grid, count)
+    world.swap()
+    world.grid = find_neighbors(world.particles, world.grid, c, count)
+    prepare_fluids(world, kinds, params, params.frame_time)
+    measure_density(
+        world.scratch, world.particles, world.grid, world.solids, world.walls, c, kinds.largest_density, count,
+        method_number(params),
+    )  # fmt: skip
+
+
+def neighbor_numbers(world: World, params: Parameters) -> np.ndarray:
+    """Return how many neighbours every particle had in the last search, int32 [count], in device order."""
+    return count_neighbors(world.particles, world.grid, coefficients(params, 0.0), world.count)
 
 
 def density_error(densities: np.ndarray, rest_density: float | np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ one list, of all who are within h of any of the eight, itself included; `pairs.p
 as the list of one, so that lists of all take two fifths of the room.
 
 Building a list tests the candidates of a row without a branch, a block of them against eight places into the bits of
-one word, and then walks over the bits that are set. Measured: docs/performance.md.
+one word, and then walks over the bits that are set. Measured: docs/notebook/performance.md.
 
 Counting sort after Green 2010 ("Particle Simulation using CUDA"); Hoetzlein 2014 ("Fast Fixed-Radius Nearest
 Neighbors") for the counting by integer atomics. What there is little of is counted by one thread: waking the others
@@ -25,11 +25,11 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import lanes, qd, threads, worth_sharing
-from wavetank.device.state import Coefficients, Grid, Particles, integers
-from wavetank.device.sums import blocks_of, share_of, sort_by
+from wavetank.device.state import Coefficients, Grid, Particles, integers, nowhere
+from wavetank.device.sums import blocks_of, many_threads, share_of, sort_by
 from wavetank.foundation.errors import WavetankError
-from wavetank.physics.pairs import part_of, turns
 from wavetank.physics.predicted_positions import predict_at, predicted
+from wavetank.physics.teams import end_of_part, first_of_part, groups, turns_over
 
 PARTS = 8  # of a pass for each thread: enough to even out what takes longer
 MAX_ENTRIES = 2**31 - 1  # of a device array: the compiler counts them, and computes places in them, with 32 bits
@@ -97,11 +97,42 @@ def copy_particle(target: Particles, to, source: Particles, i):
 
 
 @qd.func
-def list_group(group, particles: Particles, grid: Grid, h2, count, lanes: qd.template()):
+def row_block(dim: qd.template()):
+    """Particles of a row that are tested without a branch: as many as a full row has, and some more."""
+    return qd.static(32 if dim == 3 else 16)
+
+
+@qd.func
+def row_offset(grid: Grid, row, dim: qd.template()):
+    """How far the cells of a row are from those of the middle one: of 3 rows in 2-D, of 9 in 3-D."""
+    offset = grid.nx * (row % 3 - 1)
+    if qd.static(dim == 3):
+        offset += grid.nx * grid.ny * (row // 3 - 1)
+    return offset
+
+
+@qd.func
+def beyond_last(grid: Grid, low, cells):
+    """How many of so many cells from number `low` on are beyond the last cell: the row goes on at the first one."""
+    return qd.max(low + cells - grid.cells, 0)
+
+
+@qd.func
+def piece_of_row(grid: Grid, low, cells, piece):
+    """The particles, from and to, of a piece of a row of so many cells: of those up to the last cell, or beyond it."""
+    over = beyond_last(grid, low, cells)
+    span = qd.Vector([grid.start[low], grid.start[low + cells - over]])
+    if piece == 1:
+        span = qd.Vector([0, grid.start[over]])
+    return span
+
+
+@qd.func
+def list_group(group, particles: Particles, grid: Grid, h2, count):
     """Write the neighbours of a group and return their number, even if it had no room."""
     room = grid.room
     dim = qd.static(particles.x[group].n)
-    block = qd.static(32 if dim == 3 else 16)  # what a full row has, and some more
+    block = qd.static(row_block(dim))
     first = 8 * group
     last = qd.min(first + 8, count)
     n = 0
@@ -117,23 +148,15 @@ def list_group(group, particles: Particles, grid: Grid, h2, count, lanes: qd.tem
         run = places_of(particles, first, begin_run, end_run)
         earlier = places_of(particles, first, first, begin_run)
         for row in range(qd.static(9 if dim == 3 else 3)):
-            layer = grid.nx * (row % 3 - 1)
-            if qd.static(dim == 3):
-                layer += grid.nx * grid.ny * (row // 3 - 1)
-            low = remainder(low_cell + layer - 1, grid.cells)
-            # A row that runs over the last cell goes on at the first.
-            over = qd.max(low + cells - grid.cells, 0)
-            for piece in range(1 + qd.min(over, 1)):
-                begin = grid.start[low]
-                end = grid.start[low + cells - over]
-                if piece == 1:
-                    begin = 0
-                    end = grid.start[over]
+            low = remainder(low_cell + row_offset(grid, row, dim) - 1, grid.cells)
+            for piece in range(1 + qd.min(beyond_last(grid, low, cells), 1)):
+                span = piece_of_row(grid, low, cells, piece)
+                begin, end = span[0], span[1]
                 while begin < end:
                     length = qd.min(end - begin, block)
-                    hits = near_bits(particles, run, begin, length, h2, lanes > 1)
+                    hits = near_bits(particles, run, begin, length, h2, grid.lanes > 1)
                     if begin_run > first:
-                        hits &= ~near_bits(particles, earlier, begin, length, h2, lanes > 1)
+                        hits &= ~near_bits(particles, earlier, begin, length, h2, grid.lanes > 1)
                     while hits != qd.u32(0):
                         grid.list[group * room + qd.min(n, room - 1)] = begin + qd.math.ffs(hits) - 1
                         hits &= hits - qd.u32(1)
@@ -147,20 +170,20 @@ def list_group(group, particles: Particles, grid: Grid, h2, count, lanes: qd.tem
 
 
 @qd.kernel(fastcache=True)
-def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()) -> qd.i32:
+def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.i32) -> qd.i32:
     """Write the neighbours of every group and return the largest number found, even if it had no room."""
     most = 0
-    for turn in range(turns((count + 7) >> 3, grid.parts, lanes)):
-        part = part_of(turn, (count + 7) >> 3, grid.parts, lanes)
-        for group in range(part[0], part[1]):
-            found = list_group(group, particles, grid, c.h * c.h, count, lanes)
-            if qd.static(lanes > 1):
+    for turn in range(turns_over(groups(count), grid.parts, grid.lanes)):
+        begin = first_of_part(turn, groups(count), grid.parts, grid.lanes)
+        for group in range(begin, end_of_part(turn, groups(count), grid.parts, grid.lanes)):
+            found = list_group(group, particles, grid, c.h * c.h, count)
+            if qd.static(grid.lanes > 1):
                 qd.atomic_max(most, found)
-    if qd.static(lanes == 1):
-        for thread in range(16384):
+    if qd.static(grid.lanes == 1):
+        for thread in range(many_threads()):
             found = 0
-            for k in range(share_of(thread, (count + 7) >> 3)):
-                found = qd.max(found, grid.number[thread + 16384 * k])
+            for k in range(share_of(thread, groups(count))):
+                found = qd.max(found, grid.number[thread + many_threads() * k])
             qd.atomic_max(most, found)
     return most
 
@@ -173,7 +196,7 @@ def places_of(particles: Particles, first, begin, end):
         p = predicted(particles, first + k)
         inside = first + k >= begin and first + k < end
         for axis in qd.static(range(p.n)):
-            places[axis, k] = p[axis] if inside else 1e6
+            places[axis, k] = p[axis] if inside else nowhere()
     return places
 
 
@@ -184,7 +207,7 @@ def near_bits(particles: Particles, places: qd.template(), begin, length, h2, wh
     Vectors want a `whole` block, whose number of turns the compiler knows: the bits of what is too many are cut off.
     """
     hits = qd.u32(0)
-    for k in range(qd.static(32 if places.n == 3 else 16) if qd.static(whole) else length):
+    for k in range(row_block(places.n) if qd.static(whole) else length):
         p = predicted(particles, begin + k)
         nearest = 2.0 * h2
         for column in qd.static(range(places.m)):
@@ -204,19 +227,10 @@ def for_each_row_around(sums: qd.template(), visit: qd.template(), point, partic
     """
     cell = cell_of(grid, point, h)
     for row in range(qd.static(9 if point.n == 3 else 3)):
-        layer = grid.nx * (row % 3 - 1)
-        if qd.static(point.n == 3):
-            layer += grid.nx * grid.ny * (row // 3 - 1)
-        low = remainder(cell + layer - 1, grid.cells)
-        # A row that runs over the last cell goes on at the first.
-        over = qd.max(low + 3 - grid.cells, 0)
-        for part in range(1 + qd.min(over, 1)):
-            begin = grid.start[low]
-            end = grid.start[low + 3 - over]
-            if part == 1:
-                begin = 0
-                end = grid.start[over]
-            visit(sums, point, begin, end, particles, h)
+        low = remainder(cell + row_offset(grid, row, point.n) - 1, grid.cells)
+        for piece in range(1 + qd.min(beyond_last(grid, low, 3), 1)):
+            span = piece_of_row(grid, low, 3, piece)
+            visit(sums, point, span[0], span[1], particles, h)
 
 
 def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, room: int) -> Grid:
@@ -262,11 +276,11 @@ def sort_particles(particles: Particles, spare: Particles, grid: Grid, count: in
 
 def find_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> Grid:
     """List the neighbours of sorted particles; return the grid, with larger lists where there was too little room."""
-    most = int(list_neighbors(particles, grid, c, count, grid.lanes))
+    most = int(list_neighbors(particles, grid, c, count))
     if most >= grid.room:
         room = _rounded(most)
         grid = dataclasses.replace(grid, room=room, list=_new_list(grid.order.shape[0], room))
-        list_neighbors(particles, grid, c, count, grid.lanes)
+        list_neighbors(particles, grid, c, count)
     return grid
 
 

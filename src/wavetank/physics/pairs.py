@@ -1,17 +1,16 @@
 """Sums over the neighbours of every particle, eight particles at a time.
 
-A pass over pairs runs over teams: `lanes` particles that follow each other in sorted order and share a neighbour list
-(`neighbors.py`), eight on a processor and one on a graphics card. Each neighbour is read once for the team, and the
-loop over lanes becomes vector instructions: nobody is collected one by one. A team's list holds three times what one
-particle needs, and is walked in half the time (docs/performance.md). A pass looks like this:
+A pass over pairs runs over teams (`teams.py`): particles that follow each other in sorted order and share a neighbour
+list (`neighbors.py`), eight on a processor and one on a graphics card. Each neighbour is read once for the team, and
+the loop over lanes becomes vector instructions: nobody is collected one by one. A team's list holds three times what
+one particle needs, and is walked in half the time (docs/notebook/performance.md). A pass looks like this:
 
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, 1, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)
             add_neighbors(sums, visit, team, particles, data, grid, c, method)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                ... sums[0, i - team * lanes] ...
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                ... sums[0, i - team * grid.lanes] ...
 
 Cluster pair lists for vector units: Páll and Hess 2013, "A flexible algorithm for calculating pair interactions on SIMD
 architectures" (10.1016/j.cpc.2013.06.003).
@@ -24,39 +23,7 @@ import numpy as np
 from wavetank.device.compiler import download, qd
 from wavetank.device.state import Coefficients, Grid, Particles, integers
 from wavetank.physics.predicted_positions import predicted
-
-
-@qd.func
-def teams(count, lanes: qd.template()):
-    """Number of teams of `lanes` particles."""
-    if qd.static(lanes == 1):
-        return count
-    return (count + lanes - 1) // lanes
-
-
-@qd.func
-def turns(number, parts, lanes: qd.template()):
-    """Turns of a loop over so many teams in equal `parts`; `part_of` says which of them are a turn's.
-
-    The compiler gives a thread 512 turns at least, which are too many teams to share them out evenly. The first of
-    every 512 turns therefore takes a part of them, and the others nothing.
-    """
-    if qd.static(lanes == 1):
-        return number
-    return 512 * parts
-
-
-@qd.func
-def part_of(turn, number, parts, lanes: qd.template()):
-    """The first team of a turn, and the one behind its last, of that `number` of teams."""
-    own = qd.Vector([turn, turn + 1])
-    if qd.static(lanes > 1):
-        own = qd.Vector([0, 0])
-        if turn & 511 == 0:
-            size = (number + parts - 1) // parts
-            own[0] = (turn >> 9) * size
-            own[1] = qd.min(own[0] + size, number)
-    return own
+from wavetank.physics.teams import end_of, end_team, first_team, group_of, place_in_group, turns
 
 
 @qd.func
@@ -85,18 +52,19 @@ def add_kept(
 @qd.func
 def keep_pairs(
     kept: qd.template(), strength: qd.template(), team, particles: Particles, data: qd.template(), grid: Grid,
-    c: Coefficients, lanes: qd.template(),
+    c: Coefficients,
 ):  # fmt: skip
     """Keep ``strength(square, a, b, c)`` of each neighbour j of each i of a team, for several sums by `add_kept`.
 
     `kept` has room for `grid.room` numbers of each particle. What follows from a distance takes a root and divisions;
     from the second sum on it takes less to read it.
     """
+    lanes = qd.static(grid.lanes)
     first = team * lanes
     own = _own(data, first, lanes)
-    begin = (first >> 3) * grid.room
+    begin = group_of(first) * grid.room
     found = qd.Matrix.zero(qd.f32, 4, lanes)  # what was stored at once might be one of the arrays that are read
-    for turn in range((grid.number[first >> 3] + 3) // 4):  # as far as visits in twos and fours come
+    for turn in range((grid.number[group_of(first)] + 3) // 4):  # as far as visits in twos and fours come
         n = begin + 4 * turn
         for lane in range(lanes):
             for k in qd.static(range(4)):
@@ -117,8 +85,8 @@ def _add(
     lanes = qd.static(sums.m)
     first = team * lanes
     own = _own(data, first, lanes)
-    begin = (first >> 3) * grid.room
-    end = begin + grid.number[first >> 3]
+    begin = group_of(first) * grid.room
+    end = begin + grid.number[group_of(first)]
     # A short loop over lanes would be unrolled before it can be computed as vectors: its visits come in twos or fours.
     size, dim = qd.static(sums.n, particles.x[first].n)
     pace = qd.static(1 if size > 3 else 4 if dim == 2 and size == 1 else 2)
@@ -163,7 +131,7 @@ def _place(n, first, lanes: qd.template()):
     """Where what is kept of the entry `n` of a list begins, for the team that begins with particle `first`."""
     place = 8 * n
     if qd.static(lanes == 1):
-        place += first & 7
+        place += place_in_group(first)
     return place
 
 
@@ -197,21 +165,18 @@ def add_one(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.te
 
 
 @qd.kernel(fastcache=True)
-def write_numbers(
-    number: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()
-):
+def write_numbers(number: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32):
     """Write how many neighbours every particle has."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, 1, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)
             add_neighbors(sums, add_one, team, particles, particles.x, grid, c, 0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                number[i] = qd.cast(sums[0, i - team * lanes], qd.i32) - 1  # without itself
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                number[i] = qd.cast(sums[0, i - team * grid.lanes], qd.i32) - 1  # without itself
 
 
 def count_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> np.ndarray:
     """Return how many neighbours within h every particle has, int32 [count], in device order."""
     number = integers(count)
-    write_numbers(number, particles, grid, c, count, grid.lanes)
+    write_numbers(number, particles, grid, c, count)
     return np.array(download(number)[:count])

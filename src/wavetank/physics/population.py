@@ -10,50 +10,55 @@ does it on threads, as every particle or place is judged by itself.
     gap               distance that free places keep            m
 """
 
+import dataclasses
+
 import numpy as np
 
 from wavetank.device.compiler import download, qd, upload
-from wavetank.device.state import Grid, Particles, integers, new_particles, vectors, with_viscosity
+from wavetank.device.state import LASTING, Grid, Particles, integers, new_particles, vectors, with_viscosity
 from wavetank.physics.neighbors import copy_particle
 from wavetank.physics.predicted_positions import predict_at
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3
 
-_FIELDS: tuple[str, ...] = ("x", "v", "a", "id", "material", "near", "dye", "frozen")
+
+@dataclasses.dataclass(frozen=True)
+class Capsule:
+    """Where something happens to particles."""
+
+    start: vec3  # m
+    end: vec3  # m
+    radius: qd.f32  # m
 
 
 @qd.func
-def in_capsule(point, start, end, radius):
-    """Say whether `point` is within `radius` of the segment."""
-    way = end - start
-    share = qd.min(qd.max((point - start).dot(way) / qd.max(way.norm_sqr(), 1e-20), 0.0), 1.0)
-    return (point - start - share * way).norm_sqr() < radius * radius
+def is_inside(capsule: Capsule, point):
+    """Say whether `point` is in the capsule."""
+    way = capsule.end - capsule.start
+    share = qd.min(qd.max((point - capsule.start).dot(way) / qd.max(way.norm_sqr(), 1e-20), 0.0), 1.0)
+    return (point - capsule.start - share * way).norm_sqr() < capsule.radius * capsule.radius
 
 
 @qd.kernel(fastcache=True)
-def mark_capsule(
-    marks: qd.types.ndarray(), particles: Particles, count: qd.i32, start: vec3, end: vec3, radius: qd.f32
-):
+def mark_particles(marks: qd.types.ndarray(), particles: Particles, capsule: Capsule, count: qd.i32):
     """Mark the particles inside with 1, the others with 0."""
     for i in range(count):
-        marks[i] = qd.cast(in_capsule(lift(particles.x[i]), start, end, radius), qd.i32)
+        marks[i] = qd.cast(is_inside(capsule, lift(particles.x[i])), qd.i32)
 
 
 @qd.kernel(fastcache=True)
-def paint_capsule(particles: Particles, count: qd.i32, start: vec3, end: vec3, radius: qd.f32, dye: qd.i32):
+def dye_particles(particles: Particles, capsule: Capsule, dye: qd.i32, count: qd.i32):
     """Dye the particles inside."""
     for i in range(count):
-        if in_capsule(lift(particles.x[i]), start, end, radius):
+        if is_inside(capsule, lift(particles.x[i])):
             particles.dye[i] = dye
 
 
 @qd.kernel(fastcache=True)
-def freeze_capsule(
-    particles: Particles, count: qd.i32, start: vec3, end: vec3, radius: qd.f32, frozen: qd.i32
-) -> qd.i32:
+def freeze_particles(particles: Particles, capsule: Capsule, frozen: qd.i32, count: qd.i32) -> qd.i32:
     """Turn the particles inside to ice (1) or water (0); return how many are ice in all."""
     total = 0
     for i in range(count):
-        if in_capsule(lift(particles.x[i]), start, end, radius):
+        if is_inside(capsule, lift(particles.x[i])):
             particles.frozen[i] = frozen
             particles.v[i] *= 1.0 - frozen
         qd.atomic_add(total, particles.frozen[i])
@@ -68,21 +73,33 @@ def hold_frozen(particles: Particles, count: qd.i32):
             predict_at(particles, i, particles.x[i])
 
 
+@qd.func
+def forget_viscosity(particles: Particles, i):
+    """Forget what viscosity did to particle `i`, where that is known."""
+    if particles.viscous.shape[0] > 1:
+        particles.viscous[i] *= 0.0
+
+
+@qd.func
+def forget_forces(particles: Particles, i):
+    """Forget what accelerated particle `i` in the last step."""
+    particles.a[i] *= 0.0
+    forget_viscosity(particles, i)
+
+
 @qd.kernel(fastcache=True)
 def stop_frozen(particles: Particles, count: qd.i32):
     """Take the velocity from ice."""
     for i in range(count):
         if particles.frozen[i] == 1:
             particles.v[i] *= 0.0
-            particles.a[i] *= 0.0
-            if particles.viscous.shape[0] > 1:
-                particles.viscous[i] *= 0.0
+            forget_forces(particles, i)
 
 
 @qd.kernel(fastcache=True)
 def append_rows(
-    particles: Particles, first: qd.i32, x: qd.types.ndarray(), v: qd.types.ndarray(), dye: qd.types.ndarray(),
-    material: qd.types.ndarray(), count: qd.i32, first_id: qd.i32,
+    particles: Particles, x: qd.types.ndarray(), v: qd.types.ndarray(), dye: qd.types.ndarray(),
+    material: qd.types.ndarray(), first: qd.i32, first_id: qd.i32, count: qd.i32,
 ):  # fmt: skip
     """Write `count` new particles from place `first` on, with ids from `first_id` on."""
     for i in range(count):
@@ -106,17 +123,14 @@ def copy_chosen(target: Particles, particles: Particles, grid: Grid, count: qd.i
     """
     for n in range(count):
         copy_particle(target, n, particles, grid.order[n])
-        if target.viscous.shape[0] > 1:
-            target.viscous[n] *= 0.0
+        forget_viscosity(target, n)
 
 
 @qd.kernel(fastcache=True)
 def clear_forces(particles: Particles, count: qd.i32):
     """Forget what accelerated the particles in the last step."""
     for i in range(count):
-        particles.a[i] *= 0.0
-        if particles.viscous.shape[0] > 1:
-            particles.viscous[i] *= 0.0
+        forget_forces(particles, i)
 
 
 @qd.kernel(fastcache=True)
@@ -142,9 +156,23 @@ def inside_capsule(particles: Particles, count: int, start: np.ndarray, end: np.
     if not count:
         return np.zeros(0, bool)
     marks = integers(count)
-    mark_capsule(marks, particles, count, start, end, radius)
+    mark_particles(marks, particles, Capsule(start, end, radius), count)
     result: np.ndarray = download(marks)[:count] == 1
     return result
+
+
+def paint_capsule(
+    particles: Particles, count: int, start: np.ndarray, end: np.ndarray, radius: float, dye: int
+) -> None:
+    """Dye the particles inside."""
+    dye_particles(particles, Capsule(start, end, radius), dye, count)
+
+
+def freeze_capsule(
+    particles: Particles, count: int, start: np.ndarray, end: np.ndarray, radius: float, frozen: int
+) -> int:
+    """Turn the particles inside to ice (1) or water (0); return how many are ice in all."""
+    return int(freeze_particles(particles, Capsule(start, end, radius), frozen, count))
 
 
 def free_places(
@@ -193,7 +221,7 @@ def append(
     arrays = [vectors(x.shape[1], rows), vectors(x.shape[1], rows), integers(rows), integers(rows)]
     for array, values in zip(arrays, (x, v, dye, material), strict=True):
         upload(array, values)
-    append_rows(particles, count, *arrays, rows, first_id)
+    append_rows(particles, *arrays, count, first_id, rows)
 
 
 def keep_only(particles: Particles, spare: Particles, grid: Grid, keep: np.ndarray) -> int:
@@ -209,9 +237,9 @@ def keep_only(particles: Particles, spare: Particles, grid: Grid, keep: np.ndarr
 
 def at_capacity(particles: Particles, dim: int, capacity: int) -> Particles:
     """Return a copy with room for `capacity` particles; where they are predicted to go is left open."""
-    larger, fields = new_particles(dim, capacity), _FIELDS
+    larger, names = new_particles(dim, capacity), LASTING
     if particles.viscous.shape == particles.x.shape:
-        larger, fields = with_viscosity(larger), (*_FIELDS, "viscous")
-    for name in fields:
+        larger, names = with_viscosity(larger), (*LASTING, "viscous")
+    for name in names:
         upload(getattr(larger, name), download(getattr(particles, name))[: capacity + 1])
     return larger

@@ -1,7 +1,8 @@
 """Predicted positions: read and written by component.
 
 Their components have arrays of their own, unlike those of other vectors: every pass over pairs reads them, and a
-processor that computes eight neighbours at a time reads plain numbers faster than vectors (docs/performance.md).
+processor that computes eight neighbours at a time reads plain numbers faster than vectors
+(docs/notebook/performance.md).
 """
 
 from wavetank.device.compiler import qd

@@ -98,6 +98,15 @@ def kernel(method: qd.template(), square):
     return qd.static(KERNELS[method])(square)
 
 
+@qd.func
+def interpolated(table: qd.template(), share):
+    """What a table of numbers says at that `share` of its length, 0 to 1, linear between its entries."""
+    last = table.shape[0] - 1
+    t = qd.min(qd.max(share, 0.0), 1.0) * last
+    k = qd.min(qd.cast(t, qd.i32), last - 1)
+    return table[k] + (table[k + 1] - table[k]) * (t - k)
+
+
 # --- on the host, in double precision ---
 
 
@@ -198,7 +207,7 @@ def half_space(name: str, dim: int, ratio: float, s: np.ndarray) -> np.ndarray:
     In the bulk a pair pushes with both multipliers, at a wall there is only the particle's own. Layers that kept their
     place in the wall would push with half the force, and particles would settle on the wall. Layers that mirrored the
     particle would balance it, and are too stiff for the solver. These move half as far: WALL_STIFFENING is measured
-    (docs/method.md).
+    (docs/notebook/walls.md).
     """
     layers = np.arange(int(ratio) + 2)
     depth = (s + WALL_STIFFENING / ratio * _tooth(s * ratio - 0.5))[:, None] + (layers + 0.5) / ratio

@@ -21,7 +21,7 @@ Where we differ, and why:
   sigma is in N/m. Inside, where g is noise,
   it is cut off (`QUIET`), and nothing pulls.
 - Cohesion acts at the surface alone. Attraction inside presses the particles into a crystal that does not flow: a drop
-  made of it keeps its corners. `COHESION` is the smallest share that keeps the skin whole; docs/materials.md.
+  made of it keeps its corners. `COHESION` is the smallest share that keeps the skin whole; docs/notebook/viscosity.md.
 - Solids pull like half a rest lattice of the fluid times `wetting`, from a table of the distance.
 - The tension is limited to what a time step can carry, and `substeps_for` asks for the time steps that the real one
   needs; so nothing explodes where the budget of time steps ends.
@@ -35,13 +35,16 @@ import math
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import MARGIN, Coefficients, Fluids, Grid, Particles, Scratch, remembered, scalars
+from wavetank.device.state import MARGIN, Coefficients, Grid, Particles, Scratch, remembered, scalars
+from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import is_near
 from wavetank.physics.integrate import accelerate
-from wavetank.physics.mixture import Blend
-from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
+from wavetank.physics.mixture import Blend, fill_table, weigh
+from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.predicted_positions import predicted
-from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.physics.smoothing import TABLE_SIZE, interpolated, rest_points
+from wavetank.physics.teams import end_of, end_team, first_team, turns
+from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3, vec4
 
 COHESION = 0.2  # share of the bond that alone would give the tension
@@ -154,6 +157,16 @@ def add_pull(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.t
         sums[k] -= tension * force[k]
 
 
+@dataclasses.dataclass(frozen=True)
+class Pull:
+    """Numbers of surfaces and walls that pull; those of pairs are `skin` and `cohesion` of the `Coefficients`."""
+
+    scale: qd.f32  # |g| over the sum of `add_gradient`
+    quiet: qd.f32  # |g| below which there is no surface
+    rate: qd.f32  # s/kg: dt over the largest mass of a particle
+    adhesion: qd.f32  # m^(dim - 2): pull of a wall that is wetted, over the tension and the table
+
+
 @qd.kernel(fastcache=True)
 def find_tensions(tension: qd.types.ndarray(), particles: Particles, rows: qd.types.ndarray(), count: qd.i32):
     """Write the tension of every particle."""
@@ -164,50 +177,45 @@ def find_tensions(tension: qd.types.ndarray(), particles: Particles, rows: qd.ty
 @qd.kernel(fastcache=True)
 def find_surface(
     surface: qd.types.ndarray(), tension: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients,
-    count: qd.i32, scale: qd.f32, quiet: qd.f32, lanes: qd.template(),
+    pull: Pull, count: qd.i32,
 ):  # fmt: skip
     """Find where the surface is and which way it faces: g, without what is noise."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, grid.lanes)
             add_neighbors(sums, add_gradient, team, particles, tension, grid, c, 0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                g = column(sums, i - team * lanes)
-                size = scale * g.norm()
-                g3 = lift(g) * (scale * qd.max(size - quiet, 0.0) / qd.max(size, 1e-12))
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                g = column(sums, i - team * grid.lanes)
+                size = pull.scale * g.norm()
+                g3 = lift(g) * (pull.scale * qd.max(size - pull.quiet, 0.0) / qd.max(size, 1e-12))
                 surface[i] = vec4(g3.x, g3.y, g3.z, tension[i])
 
 
 @qd.kernel(fastcache=True)
 def attract(
     pulled: qd.types.ndarray(), surface: qd.types.ndarray(), particles: Particles, scratch: Scratch,
-    rows: qd.types.ndarray(), grid: Grid, solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, count: qd.i32,
-    rate: qd.f32, adhesion: qd.f32, lanes: qd.template(),
+    rows: qd.types.ndarray(), grid: Grid, solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, pull: Pull,
+    count: qd.i32,
 ):  # fmt: skip
-    """Find the velocities after the pull of neighbours and solids; `rate` is dt over the largest mass of a particle."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, lanes)
+    """Find the velocities after the pull of neighbours and solids."""
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, grid.lanes)
             add_neighbors(sums, add_pull, team, particles, surface, grid, c, 0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
                 p = predicted(particles, i)
-                force = column(sums, i - team * lanes)
+                force = column(sums, i - team * grid.lanes)
                 if particles.near[i] != 0:
-                    last = table.shape[0] - 1
-                    wetting = adhesion * surface[i].w * rows[particles.material[i]][3]
+                    wetting = pull.adhesion * surface[i].w * rows[particles.material[i]][3]
                     for k in range(solids.count):
                         if is_near(particles.near[i], k) == 1:
                             value = signed_distance(solids, k, lift(p))
                             if value.w < c.h:
-                                t = qd.min(qd.max(value.w / c.h, 0.0), 1.0) * last
-                                m = qd.min(qd.cast(t, qd.i32), last - 1)
                                 n = vec3(value.x, value.y, value.z)
-                                share = wetting * (table[m] + (table[m + 1] - table[m]) * (t - m))
+                                share = wetting * interpolated(table, value.w / c.h)
                                 for axis in qd.static(range(p.n)):
                                     force[axis] -= share * n[axis]
-                v = lift(particles.v[i] + force * (rate * scratch.weight[i]))
+                v = lift(particles.v[i] + force * (pull.rate * scratch.weight[i]))
                 pulled[i] = vec4(v.x, v.y, v.z, 0.0)
 
 
@@ -221,12 +229,21 @@ def take_pull(particles: Particles, pulled: qd.types.ndarray(), c: Coefficients,
         accelerate(particles, i, v, c)
 
 
-def apply_tension(
-    particles: Particles, scratch: Scratch, fluids: Fluids, grid: Grid, solids: SolidSet, c: Coefficients,
-    kinds: Blend, count: int, ratio: float,
-) -> None:  # fmt: skip
-    """Let surfaces and solids pull the fluid for one substep; `ratio` is h / d."""
-    dim, d = particles.x.element_shape[0], c.h / ratio
+def prepare_fluids(world: World, kinds: Blend, params: Parameters, dt: float) -> None:
+    """Write what the fluids are to the device, for a step of `dt` [s]; weigh the particles where densities differ."""
+    fill_table(world.fluids, kinds, limited_tensions(kinds, params.dim, params.support, params.spacing, dt))
+    if kinds.mixed:
+        weigh(world.scratch, world.particles, world.fluids.rows, world.count)
+    elif world.fluids.weighed:
+        world.scratch.weight.fill(1.0)
+    world.fluids.weighed = bool(kinds.mixed)
+
+
+def apply_tension(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
+    """Let surfaces and solids pull the fluid for one substep."""
+    particles, grid, fluids, count = world.particles, world.grid, world.fluids, world.count
+    dim, ratio = params.dim, params.support
+    d = c.h / ratio
     if "adhesion table" not in fluids.arrays:
         fluids.arrays["adhesion table"] = scalars(TABLE_SIZE + 1)
         upload(fluids.arrays["adhesion table"], adhesion_table(dim, ratio))
@@ -235,11 +252,11 @@ def apply_tension(
     tension, table = fluids.arrays["tension"], fluids.arrays["adhesion table"]
     flat = flat_surface(dim, ratio)
     adhesion = flat.bond * d ** (dim - 2) / ratio
-    pull = CALIBRATION[dim]
-    stretch = pull * (1.0 - COHESION) * d ** (dim - 2) / flat.stress
-    c = remembered(dataclasses.replace(c, skin=stretch, cohesion=pull * COHESION * adhesion))
-    find_tensions(tension, particles, fluids.rows, count)
-    find_surface(surface, tension, particles, grid, c, count, flat.gradient_scale, flat.quiet, grid.lanes)
+    stretch = CALIBRATION[dim] * (1.0 - COHESION) * d ** (dim - 2) / flat.stress
+    c = remembered(dataclasses.replace(c, skin=stretch, cohesion=CALIBRATION[dim] * COHESION * adhesion))
     rate = c.dt / (kinds.largest_density * d**dim)
-    attract(pulled, surface, particles, scratch, fluids.rows, grid, solids, table, c, count, rate, adhesion, grid.lanes)
+    pull = remembered(Pull(scale=flat.gradient_scale, quiet=flat.quiet, rate=rate, adhesion=adhesion))
+    find_tensions(tension, particles, fluids.rows, count)
+    find_surface(surface, tension, particles, grid, c, pull, count)
+    attract(pulled, surface, particles, world.scratch, fluids.rows, grid, world.solids, table, c, pull, count)
     take_pull(particles, pulled, c, count)

@@ -1,12 +1,12 @@
 """How long a time step may be: the fastest particle and the fastest wave go a share of a spacing.
 
 The first is the usual Courant condition. The second is what keeps deep water stiff where no grid carries the pressure
-(`grid_pressure/correction.py`). A few iterations carry pressure a
-few spacings far: water answers a load as if sound went at c = beta d / dt, with beta near 4 for four iterations,
-whatever the depth. Water of depth H then compresses by g H / (2 c^2) on average, as in weakly compressible SPH, and
-where that is more than a few per cent, columns fall into themselves, bounce and boil. With w = sqrt(g H) dt / d the
-compression is (w / beta)^2 / 2: w is all there is to bound (docs/method.md). `largest_substeps` is a budget for fast
-scenes only, because a jet that is followed in too long steps is merely crude.
+(`grid_pressure/correction.py`). A few iterations carry pressure a few spacings far: water answers a load as if sound
+went at c = beta d / dt, with beta near 4 for four iterations, whatever the depth. Water of depth H then compresses by
+g H / (2 c^2) on average, as in weakly compressible SPH, and where that is more than a few per cent, columns fall into
+themselves, bounce and boil. With w = sqrt(g H) dt / d the compression is (w / beta)^2 / 2: w is all there is to bound
+(docs/notebook/time-steps.md). `largest_substeps` is a budget for fast scenes only, because a jet that is followed in
+too long steps is merely crude.
 
     code     symbol    meaning                                                   unit
     speed    v         speed of the fastest particle or solid                    m/s
@@ -21,7 +21,7 @@ import numpy as np
 
 from wavetank.device.compiler import lanes, qd
 from wavetank.device.state import Particles
-from wavetank.device.sums import share_of
+from wavetank.device.sums import many_threads, share_of
 from wavetank.foundation.params import Parameters
 
 ALONE = 2.0 / 3.0  # of `courant` where iterations alone carry the pressure
@@ -87,7 +87,7 @@ def pool_depth(
     if not height:
         return 0.0
     base, along = float(ends.min(axis=0).sum()), np.array([*up, 0.0][:3], np.float32)
-    total = summed_levels(particles, count, along, base, height / LEVELS, lanes())
+    total = summed_levels(particles, along, base, height / LEVELS, count, lanes())
     return max(0.0, 2.0 * height / LEVELS * total / count)
 
 
@@ -102,10 +102,10 @@ def largest_square(particles: Particles, count: qd.i32, lanes: qd.template()) ->
     """Return the bits of the largest squared speed; on a graphics processor, `lanes` = 1, by few threads."""
     most = 0
     if qd.static(lanes == 1):
-        for thread in range(16384):
+        for thread in range(many_threads()):
             own = 0
             for k in range(share_of(thread, count)):
-                own = qd.max(own, square_at(particles, thread + 16384 * k))
+                own = qd.max(own, square_at(particles, thread + many_threads() * k))
             qd.atomic_max(most, own)
     else:
         for i in range(count):
@@ -125,16 +125,16 @@ def level_at(particles: Particles, i, up, base, step):
 
 @qd.kernel(fastcache=True)
 def summed_levels(
-    particles: Particles, count: qd.i32, up: qd.types.vector(3, qd.f32), base: qd.f32, step: qd.f32,
+    particles: Particles, up: qd.types.vector(3, qd.f32), base: qd.f32, step: qd.f32, count: qd.i32,
     lanes: qd.template(),
 ) -> qd.i32:  # fmt: skip
     """Sum the heights along `up` above `base`, each in whole steps of `step` [m]: whole numbers repeat in any order."""
     levels = 0
     if qd.static(lanes == 1):
-        for thread in range(16384):
+        for thread in range(many_threads()):
             own = 0
             for k in range(share_of(thread, count)):
-                own += level_at(particles, thread + 16384 * k, up, base, step)
+                own += level_at(particles, thread + many_threads() * k, up, base, step)
             qd.atomic_add(levels, own)
     else:
         for i in range(count):

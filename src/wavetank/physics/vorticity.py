@@ -10,14 +10,15 @@ Macklin and Müller 2013; Eq. 9 and 10 of the report. In a 2-D world the vortici
 Where we differ, and why: N has length one even where eta is noise, so that Eq. 10 stirs water at rest. Noise differs
 from particle to particle, a vortex does not: |sum w omega_j| / sum w |omega_j| is 1 in a vortex and about 1 / sqrt(n)
 for n neighbours that turn at random. Below `vorticity_coherence` of it there is no force, nor where the water turns
-slower than the smallest waves do (`CALM` in step.py); a coherence of 0 leaves Eq. 10 as it is. The vorticity itself,
-Eq. 9, is summed in the sweep of XSPH (`xsph_viscosity.py`).
+slower than the smallest waves do (`CALM` in coefficients.py); a coherence of 0 leaves Eq. 10 as it is. The vorticity
+itself, Eq. 9, is summed in the sweep of XSPH (`xsph_viscosity.py`).
 """
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles, Scratch
-from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
+from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.smoothing import kernel
+from wavetank.physics.teams import end_team, first_team, turns
 from wavetank.solids.distance import lift, vec3
 
 
@@ -36,20 +37,18 @@ def add_eta(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.te
 @qd.kernel(fastcache=True)
 def confine_vorticity(
     particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, method: qd.template(),
-    lanes: qd.template(),
 ):  # fmt: skip
     """Push around every vortex: dv = dt eps_w s (N x omega), N = eta / |eta| (Eq. 10)."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            first = team * lanes
-            last = qd.min(first + lanes, count)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            first = team * grid.lanes
+            last = qd.min(first + grid.lanes, count)
             fastest = 0.0
             for i in range(first, last):
                 fastest = qd.max(fastest, scratch.omega[i].norm())
             # Calm water, most of a tank, is not asked for its neighbours.
             if c.coherence <= 0.0 or fastest > c.calm:
-                sums = qd.Matrix.zero(qd.f32, 7, lanes)
+                sums = qd.Matrix.zero(qd.f32, 7, grid.lanes)
                 add_neighbors(sums, add_eta, team, particles, scratch.omega, grid, c, method)
                 for i in range(first, last):
                     sum = column(sums, i - first)

@@ -12,8 +12,9 @@ ratio of the masses: m_i dv_i is antisymmetric, no share exceeds c.
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles, Scratch
-from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
+from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.smoothing import kernel
+from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.solids.distance import vec3
 
 
@@ -54,19 +55,18 @@ def add_mixed_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, method
 
 
 @qd.kernel(fastcache=True)
-def apply_viscosity(
+def apply_xsph(
     smoothed: Particles, particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32,
-    method: qd.template(), turning: qd.template(), lanes: qd.template(),
+    method: qd.template(), turning: qd.template(),
 ):  # fmt: skip
     """Smooth the velocities (Eq. 11); where `turning`, estimate the vorticity (Eq. 9)."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
             dim = qd.static(particles.v[team].n)
-            sums = qd.Matrix.zero(qd.f32, dim + turning * (2 * dim - 3), lanes)
+            sums = qd.Matrix.zero(qd.f32, dim + turning * (2 * dim - 3), grid.lanes)
             add_neighbors(sums, qd.static(SUMS[turning]), team, particles, particles.v, grid, c, method)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                sum = column(sums, i - team * lanes)
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                sum = column(sums, i - team * grid.lanes)
                 v = particles.v[i]
                 for k in qd.static(range(dim)):
                     v[k] += c.viscosity * c.density_scale * sum[k]
@@ -79,16 +79,15 @@ def apply_viscosity(
 
 
 @qd.kernel(fastcache=True)
-def apply_mixed_viscosity(
+def apply_mixed_xsph(
     smoothed: Particles, particles: Particles, packed: qd.types.ndarray(), grid: Grid, c: Coefficients, count: qd.i32,
-    method: qd.template(), lanes: qd.template(),
+    method: qd.template(),
 ):  # fmt: skip
     """Smooth the velocities (Eq. 11) of fluids of different density; `packed` as `mixture.pack_weights` leaves it."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, grid.lanes)
             add_neighbors(sums, add_mixed_xsph, team, particles, packed, grid, c, method)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                dv = column(sums, i - team * lanes)
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                dv = column(sums, i - team * grid.lanes)
                 smoothed.v[i] = particles.v[i] + c.viscosity * c.density_scale * dv

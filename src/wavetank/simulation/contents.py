@@ -6,7 +6,8 @@ import numpy as np
 
 from wavetank.device.state import KINDS
 from wavetank.physics import measure, population
-from wavetank.physics.step import World, neighbor_numbers, update_densities
+from wavetank.physics.measure import neighbor_numbers, update_densities
+from wavetank.physics.world import World
 from wavetank.scene.scene import Scene
 from wavetank.simulation.arrays import check_rows, largest_norm, put_by_id
 from wavetank.simulation.frame import Frame

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wavetank.physics.step import World, capillary_speed, steps_in
+from wavetank.physics.plan import capillary_speed, steps_in
 from wavetank.physics.time_step import largest_speed
+from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
 from wavetank.simulation.ledger import Ledger

@@ -16,12 +16,13 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import LIVE, refuse_assignment
 from wavetank.physics import population
 from wavetank.physics.foam.pool import pool_from, pool_rows
-from wavetank.physics.foam.update import load_kernels, update_diffuse
+from wavetank.physics.foam.update import load_kernels, update_foam
 from wavetank.physics.grid_pressure.coarse_grid import new_levels
 from wavetank.physics.neighbors import list_room, new_grid
 from wavetank.physics.smoothing import half_space_table
-from wavetank.physics.step import World, step
+from wavetank.physics.step import step
 from wavetank.physics.time_step import filled_share, whole
+from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import MAX_PARTICLES, Scene
 from wavetank.simulation import limits
@@ -142,7 +143,7 @@ class Simulation(Contents):
                     force.apply(self.world.particles, self.count, duration / parts, self.time + duration * part / parts)
                 step(self.world, self.scene, duration / parts, limit)
         self.solids.move_to(0.0, 1.0)
-        update_diffuse(self.world, self.scene, duration, self.frame_number)
+        update_foam(self.world, self.scene, duration, self.frame_number)
         self.pushed = []
         self.solids.arrive()
         compiler.synchronize()

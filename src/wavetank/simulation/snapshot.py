@@ -11,16 +11,17 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import download, upload
+from wavetank.device.state import LASTING
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.replacing import replacing
 from wavetank.physics.foam.pool import pool_from, pool_rows
-from wavetank.physics.step import World
+from wavetank.physics.world import World
 from wavetank.scene.scene import Scene
 from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids, Pose
 from wavetank.solids.solid import Solid
 
-ARRAYS = ("x", "v", "a", "id", "dye", "frozen", "material")  # of the particles, in device order
+ARRAYS = LASTING  # of the particles, in device order
 VISCOUS = "viscous"  # the same, where there are viscous fluids
 TOLD = ("id", "x", "v", "dye", "frozen", "material")  # of these, what a digest tells
 SAMPLE, WORTH = 1024, 0.8  # bytes; the share of these that must be left for packing to be worth it

@@ -22,14 +22,48 @@ import dataclasses
 
 from wavetank.device.compiler import qd
 
-# The numbers that `shapes.py` writes and `local_distance` reads; kernels spell them out, because the compiler's cache
-# does not see global constants.
-STACK = 8  # deepest nesting of set operations
-UNION, INTERSECTION, DIFFERENCE = -1, -2, -3
-
 vec2 = qd.types.vector(2, qd.f32)
 vec3 = qd.types.vector(3, qd.f32)
 vec4 = qd.types.vector(4, qd.f32)
+
+
+# The numbers that `shapes.py` writes and `local_distance` reads: functions, because the compiler's cache does not see
+# constants of modules.
+
+
+@qd.func
+def deepest():
+    """Deepest nesting of set operations."""
+    return 8
+
+
+@qd.func
+def union():
+    """Operation of all that is in one of two shapes."""
+    return -1
+
+
+@qd.func
+def intersection():
+    """Operation of what is in both."""
+    return -2
+
+
+@qd.func
+def difference():
+    """Operation of what is in the first and not in the second."""
+    return -3
+
+
+@qd.func
+def grids():
+    """The code of the first grid, numbered as in `SolidSet.grid`; others follow."""
+    return 1 << 16
+
+
+STACK, UNION, INTERSECTION, DIFFERENCE, GRIDS = (
+    code.fn() for code in (deepest, union, intersection, difference, grids)
+)
 
 
 @qd.func
@@ -213,8 +247,8 @@ def node_distance(solids: SolidSet, node, p):
     at = rotate(conjugate(turn), p - solids.offset[node])
     op = solids.op[node]
     value = vec4(0.0, 0.0, 0.0, 0.0)
-    if op >= 65536:  # GRIDS
-        value = grid_distance(solids, op - 65536, at, solids.size[node].x)
+    if op >= grids():
+        value = grid_distance(solids, op - grids(), at, solids.size[node].x)
     else:
         value = shape_distance(op, at, solids.size[node])
     n = rotate(turn, vec3(value.x, value.y, value.z))
@@ -224,7 +258,7 @@ def node_distance(solids: SolidSet, node, p):
 @qd.func
 def local_distance(solids: SolidSet, k, p):
     """(gradient, distance) of solid `k` at the point `p` in its own frame."""
-    stack = qd.Matrix([[0.0] * 4 for _ in range(8)])  # STACK
+    stack = qd.Matrix([[0.0] * 4 for _ in range(deepest())])
     depth = 0
     # The top of the stack stays in registers: most solids are a single shape and never touch the rest.
     top = vec4(0.0, 0.0, 0.0, 0.0)
@@ -239,9 +273,9 @@ def local_distance(solids: SolidSet, k, p):
         else:
             depth -= 1
             below = vec4(stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3])
-            if op == -3:  # DIFFERENCE
+            if op == difference():
                 top = -top
-            if (op == -1 and below.w < top.w) or (op != -1 and below.w > top.w):  # UNION
+            if (op == union() and below.w < top.w) or (op != union() and below.w > top.w):
                 top = below
     return top
 
@@ -251,8 +285,8 @@ def grain(solids: SolidSet, k):
     """Largest cell edge [m] of the grids that solid `k` is made of; 0 where its distances are exact."""
     largest = 0.0
     for node in range(solids.first[k], solids.first[k + 1]):
-        if solids.op[node] >= 65536:  # GRIDS
-            cell = solids.samples[solids.grid[solids.op[node] - 65536][0]]
+        if solids.op[node] >= grids():
+            cell = solids.samples[solids.grid[solids.op[node] - grids()][0]]
             largest = qd.max(largest, cell * solids.size[node].x)
     return largest
 

@@ -19,47 +19,60 @@ FARTHEST = 0x7F000000  # bits of 1.7e38 m
 CURVE_ENTRIES = 8192  # so many that the steepest part of the sRGB curve loses no byte
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Pixels:
+    """What each computed pixel shows, [rows, columns], on the device."""
+
+    depth: qd.types.ndarray()  # i32: bits of the f32 depth along the view [m] of the nearest surface
+    surface: qd.types.ndarray()  # i32: place of the particle in device order, or NOTHING, SOLID, FLOOR
+    normal: qd.types.ndarray()  # vec3, unit, in the world
+    color: qd.types.ndarray()  # vec3, linear RGB: albedo until the shade pass, radiance from then on
+    lines: qd.types.ndarray()  # i32: marks of the edges of the tank, see `optics/marks.py`; or 0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Light:
+    """Light that reaches what every `step`-th row and column shows, on the device."""
+
+    share: qd.types.ndarray()  # vec2: share of the sun, share of the sky
+    rough: qd.types.ndarray()  # vec2: the same while it is being smoothed
+    step: qd.i32
+
+
 @dataclasses.dataclass
 class Buffers:
-    """What the passes hand to each other, per computed pixel."""
+    """What the passes hand to each other."""
 
-    depth: Any  # i32 [rows, columns]: bits of the f32 depth along the view [m] of the nearest surface
-    surface: Any  # i32 [rows, columns]: place of the particle in device order, or NOTHING, SOLID, FLOOR
-    normal: Any  # vec3 [rows, columns], unit, in the world
-    color: Any  # vec3 [rows, columns], linear RGB: albedo until the shade pass, radiance from then on
-    light: Any  # vec2 [rows, columns]: share of the sun, share of the sky that reaches the surface; see `with_light`
-    rough_light: Any  # vec2 [rows, columns]: the same while it is being smoothed
+    pixels: Pixels
+    light: Light | None  # on every pixel; see `with_light`
     foam: Any  # i32 [height, width, 2]: optical depth of foam in 1/256, and the part of it that the sun reaches
-    lines: Any  # i32 [rows, columns]: share 0 to 255 that an edge of the tank covers, << 23, | 2^23 - 1 - depth >> 8
     sun_depth: Any  # i32 [texels, texels]: bits of the depth [m] of what the sun sees first
     solid_box: Any  # i32 [4]: first and last column, first and last row that may show a solid
     curve: Any  # i32 [entries]: sRGB byte of linear light 0 to 1, in equal steps
     picture: Any  # i32 [words]: the finished picture, three sRGB bytes a pixel, row by row
     water: Any  # WaterBuffers once a picture of water was taken
     supersample: int  # computed pixels per pixel of the picture, in each direction
-    shadows_rest: bool  # whether the solids are in `sun_depth` as they stand, and nothing else is
     probes: int  # of light per computed pixel: fewer where more pixels are averaged
 
     @property
     def rows(self) -> int:
         """Computed pixels from top to bottom."""
-        return int(self.depth.shape[0])
+        return int(self.pixels.depth.shape[0])
 
     @property
     def columns(self) -> int:
         """Computed pixels from left to right."""
-        return int(self.depth.shape[1])
+        return int(self.pixels.depth.shape[1])
 
     @property
     def texels(self) -> int:
         """Edge of the sun's depth map in pixels."""
         return int(self.sun_depth.shape[0])
 
-    def with_light(self) -> Any:
-        """Return `light`, allocated by the first view that needs it at every pixel."""
+    def with_light(self) -> Light:
+        """Return the light on every pixel, allocated by the first view that needs it."""
         if self.light is None:
-            shape = (self.rows, self.columns)
-            self.light, self.rough_light = (qd.ndarray(vec2, shape=shape) for _ in range(2))
+            self.light = new_light(self.rows, self.columns, 1)
         return self.light
 
     def host_picture(self) -> np.ndarray:
@@ -76,20 +89,27 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
     curve = qd.ndarray(qd.i32, shape=(CURVE_ENTRIES,))
     upload(curve, (255.0 * to_srgb(np.linspace(0.0, 1.0, CURVE_ENTRIES)) + 0.5).astype(np.int32))
     return Buffers(
-        depth=qd.ndarray(qd.i32, shape=shape),
-        surface=qd.ndarray(qd.i32, shape=shape),
-        normal=qd.ndarray(vec3, shape=shape),
-        color=qd.ndarray(vec3, shape=shape),
+        pixels=Pixels(
+            depth=qd.ndarray(qd.i32, shape=shape),
+            surface=qd.ndarray(qd.i32, shape=shape),
+            normal=qd.ndarray(vec3, shape=shape),
+            color=qd.ndarray(vec3, shape=shape),
+            lines=qd.ndarray(qd.i32, shape=shape),
+        ),
         light=None,
-        rough_light=None,
         foam=qd.ndarray(qd.i32, shape=(height, width, 2)),
-        lines=qd.ndarray(qd.i32, shape=shape),
         sun_depth=qd.ndarray(qd.i32, shape=(texels, texels)),
         solid_box=qd.ndarray(qd.i32, shape=(4,)),
         curve=curve,
         picture=qd.ndarray(qd.i32, shape=(3 * -(-height * width // 4),)),
         water=None,
         supersample=supersample,
-        shadows_rest=False,
         probes=8 if supersample == 1 else 4,
     )
+
+
+def new_light(rows: int, columns: int, step: int) -> Light:
+    """Allocate light for every `step`-th of so many rows and columns."""
+    shape = (-(-rows // step), -(-columns // step))
+    share, rough = (qd.ndarray(vec2, shape=shape) for _ in range(2))
+    return Light(share=share, rough=rough, step=step)

@@ -156,6 +156,14 @@ def interval_of_ball(lens: Lens, across, depth, r):
 
 
 @qd.func
+def pixels_between(low, high, size):
+    """First and last of `size` pixels whose centres lie between two places; the first centre is 0."""
+    # Clamped twice: a float before it becomes an integer, and the integer in case that float was no number.
+    first = qd.max(qd.cast(qd.ceil(qd.max(low, 0.0)), qd.i32), 0)
+    return first, qd.min(qd.cast(qd.floor(qd.min(high, size - 1.0)), qd.i32), size - 1)
+
+
+@qd.func
 def box_of_ball(lens: Lens, c, r, rows, columns):
     """First and last column, first and last row (inclusive) whose centres the ball may cover, inside the picture.
 
@@ -169,11 +177,8 @@ def box_of_ball(lens: Lens, c, r, rows, columns):
     below = lens.middle.y - lens.focal * v[0] - 0.5
     box = qd.Vector([0, -1, 0, -1])
     if left < columns and right >= 0.0 and above < rows and below >= 0.0:
-        # Clamped twice: a float before it becomes an integer, and the integer in case that float was no number.
-        box[0] = qd.max(qd.ceil(qd.max(left, 0.0), int), 0)
-        box[1] = qd.min(qd.floor(qd.min(right, columns - 1.0), int), columns - 1)
-        box[2] = qd.max(qd.ceil(qd.max(above, 0.0), int), 0)
-        box[3] = qd.min(qd.floor(qd.min(below, rows - 1.0), int), rows - 1)
+        box[0], box[1] = pixels_between(left, right, columns)
+        box[2], box[3] = pixels_between(above, below, rows)
     return box
 
 

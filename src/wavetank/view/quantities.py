@@ -106,6 +106,24 @@ def key_of(name: str) -> int:
 DEVICE_FUNCTIONS = {0: nothing, **{key_of(name): quantity.value for name, quantity in QUANTITIES.items()}}
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Coloring:
+    """Colours of a quantity's values, on the device."""
+
+    colors: qd.types.ndarray()  # vec3 [entries]: the colour map as linear RGB
+    low: qd.f32  # value of the first colour
+    scale: qd.f32  # 1 over the way to the value of the last one
+
+
+@qd.func
+def color_of(coloring: Coloring, value):
+    """The colour of a value."""
+    last = coloring.colors.shape[0] - 1
+    entry = qd.cast(qd.min(qd.max((value - coloring.low) * coloring.scale, 0.0), 1.0) * last + 0.5, qd.i32)
+    # Once more as an integer: a quantity that is no number must still be a colour.
+    return coloring.colors[qd.min(qd.max(entry, 0), last)]
+
+
 def _round_up(value: float) -> float:
     """The next of 1, 1.5, 2, 3, 4, 5, 6, 8, 10 times a power of ten."""
     power = 10.0 ** math.floor(math.log10(value))

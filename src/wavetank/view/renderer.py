@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.device.compiler import current_backend, download, qd, synchronize, upload
+from wavetank.device.compiler import current_backend, qd, synchronize, upload
+from wavetank.device.state import remembered
 from wavetank.foundation.errors import WavetankError
 from wavetank.simulation.frame import Frame
 from wavetank.view import legend as legends
@@ -20,14 +21,16 @@ from wavetank.view.extent import Extent, extent_of
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
 from wavetank.view.look import Look, fluid_optics, paper, pool, studio, usual_depth
 from wavetank.view.passes import tonemap
-from wavetank.view.quantities import QUANTITIES, usual
+from wavetank.view.quantities import QUANTITIES, Coloring, usual
 from wavetank.view.shot import Shot
+from wavetank.view.stages import Stages, Sunlight, eye_and_style, sun_and_solids
 from wavetank.view.style import QUALITIES, Style, quality_named
-from wavetank.view.views import Pass
-from wavetank.view.water_buffers import sun_texels
+from wavetank.view.views import Pass, View
+from wavetank.view.water_buffers import sun_texels, water_of
 
 LARGEST_SIDE, LARGEST_SUPERSAMPLE = 8192, 4
 KEPT_RENDERERS, KEPT_SAMPLES = 4, 2**24
+Timings = dict[str, float] | None  # milliseconds of each pass, added up
 POINT_SUN = 0.004  # tangent of the sun's radius where many suns are averaged
 
 
@@ -47,17 +50,11 @@ class Renderer:
         self.buffers = allocate(self.width, self.height, self.supersample)
         self._colors = qd.ndarray(vec3, shape=(ENTRIES,))
         self._colors_name = ""
-        self._kept: Any = None  # what the still part of the last picture depended on
-        self._shadows: Any = None  # what its shadows of solids depended on
-        self._water: Any = None  # moment and places of the water in the last picture
-        self._shaped: Any = None  # for which buffers its shape was found
-        self._sun: Any = None  # for which solids and way to the sun the light in that water was found
-        self._lit: Any = None  # the water whose light was found
-        self._waits = False  # whether the last picture did without a new one
+        self._stages = Stages()
         self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
 
     def render(
-        self, frame: Frame, camera: Camera | None = None, *, timings: dict[str, float] | None = None, **options: Any
+        self, frame: Frame, camera: Camera | None = None, *, timings: Timings = None, **options: Any
     ) -> np.ndarray:
         """Return a picture of `frame`, uint8 [height, width, 3].
 
@@ -66,18 +63,12 @@ class Renderer:
         """
         style = Style.of(options)
         shot = self.shot(frame, camera, style)
-        if not self._rested(style, shot):
-            self._run(style.kind.once, shot, timings)
-            self._shaped = self.buffers.water
-            if not self._sun_waits(style, shot):
-                self._sun = None
-        elif self._waits:
-            self._waits, self._sun = False, None
+        lit = self._begin(style, shot, timings)
         if style.samples == 1:
-            self._take(style, shot, timings)
+            self._take(style.kind, shot, lit, timings)
             self._run((tonemap.draw,), shot, timings)
         else:
-            self._average(style, shot, timings)
+            self._average(style, shot, lit, timings)
         picture = self.buffers.host_picture()
         if style.legend and style.kind.coloured:
             _write_legend(picture, shot, style, self.supersample)
@@ -93,6 +84,8 @@ class Renderer:
         if name != self._colors_name:
             upload(self._colors, colors)
             self._colors_name = name
+        low, high = limits
+        coloring = remembered(Coloring(colors=self._colors, low=low, scale=1.0 / (high - low)))
         absorption, scattering, tint = fluid_optics(None if style.kind.coloured else style.color_by, extent)
         return Shot(
             frame=frame,
@@ -104,7 +97,7 @@ class Renderer:
             radius=style.particle_radius(extent),
             quantity=quantity,
             limits=limits,
-            colors=self._colors,
+            coloring=coloring,
             absorption=absorption,
             scattering=scattering,
             tint=tint,
@@ -113,48 +106,33 @@ class Renderer:
             hasty=style.hasty,
         )
 
-    def _take(self, style: Style, shot: Shot, timings: dict[str, float] | None) -> None:
-        """Fill `color`; what does not move is kept from the picture before, and comes out as it would anew."""
-        key, shadows = None, None
-        if style.kind.still:
-            shadows = style.kind.name, *_stands(shot)
-            key = *shadows, *_looks(shot), id(self.buffers.water)
-        if key is None or key != self._kept:
-            self.buffers.shadows_rest = shadows is not None and shadows == self._shadows
-            self._run(style.kind.still, shot, timings)
-            self._kept = key and (*key[:-1], id(self.buffers.water))
-        self._shadows = shadows
-        sun = shadows, np.asarray(shot.look.to_sun).tobytes()
-        if sun != self._sun:
-            self._run(style.kind.sunny, shot, timings)
-            self._sun = sun
-        self._run(style.kind.passes, shot, timings)
+    def _begin(self, style: Style, shot: Shot, timings: Timings) -> int:
+        """Find what does not depend on the eye, and return the number of the shape in whose light water is seen."""
+        if not style.kind.still:
+            self._stages.forget()
+            self._run(style.kind.once, shot, timings)
+            return 0
+        water = water_of(self.buffers, shot)
+        shape, lit = self._stages.shapes(shot.frame, water, style.hasty)
+        self._renew("once", (water, shape), style.kind, shot, timings)
+        return lit
 
-    def _rested(self, style: Style, shot: Shot) -> bool:
-        """Say whether the water is where it was in the last picture, as when an eye goes round it.
+    def _take(self, kind: View, shot: Shot, lit: int, timings: Timings) -> None:
+        """Fill `color`; what does not change is kept from the picture before, and comes out as it would anew."""
+        if kind.still:
+            cast, water = sun_and_solids(shot), self.buffers.water
+            stages = {"shadows": cast, "still": (cast, eye_and_style(shot), water), "sunny": Sunlight(cast, water, lit)}
+            for stage, of in stages.items():
+                self._renew(stage, of, kind, shot, timings)
+        self._run(kind.passes, shot, timings)
 
-        Only in the second picture of a moment its places are kept, so that moving water costs nothing here.
-        """
-        frame, before = shot.frame, self._water
-        moment = (style.kind.name, frame.number, frame.time, frame.count)
-        if not style.kind.still or before is None or before[0] != moment:
-            self._water = moment, None
-            return False
-        arrays = [download(array)[: frame.count] for array in (frame.x, frame.id)]
-        same = before[1] is not None and all(map(np.array_equal, before[1], arrays))
-        if same and self._shaped is self.buffers.water:
-            return True
-        self._water = moment, [array.copy() for array in arrays]
-        return False
+    def _renew(self, stage: str, of: Any, kind: View, shot: Shot, timings: Timings) -> None:
+        """Draw a stage of a view, unless it has been drawn for that."""
+        if self._stages.is_due(stage, of):
+            self._run(getattr(kind, stage), shot, timings)
+            self._stages.remember(stage, of)
 
-    def _sun_waits(self, style: Style, shot: Shot) -> bool:
-        """Say whether moving water may lie in the light of the picture before: every second time, in haste."""
-        water = (style.kind.name, shot.frame.dim, id(self.buffers.water))
-        self._waits = style.hasty and self._lit == water and not self._waits
-        self._lit = water
-        return self._waits
-
-    def _run(self, passes: tuple[Pass, ...], shot: Shot, timings: dict[str, float] | None) -> None:
+    def _run(self, passes: tuple[Pass, ...], shot: Shot, timings: Timings) -> None:
         for draw in passes:
             began = time.perf_counter()
             draw(shot, self.buffers)
@@ -163,19 +141,19 @@ class Renderer:
                 name = draw.__module__.rpartition(".")[2]
                 timings[name] = timings.get(name, 0.0) + 1e3 * (time.perf_counter() - began)
 
-    def _average(self, style: Style, shot: Shot, timings: dict[str, float] | None) -> None:
+    def _average(self, style: Style, shot: Shot, lit: int, timings: Timings) -> None:
         """Take many pictures, each moved by less than a pixel and lit by another point of the sun, and average them."""
         if self._total is None:
             self._total = qd.ndarray(vec3, shape=(self.buffers.rows, self.buffers.columns))
         for number in range(style.samples):
-            self._take(style, self._moved(shot, number), timings)
-            tonemap.collect(self.buffers.color, self._total, 1.0 / (number + 1))
+            self._take(style.kind, self._moved(shot, number), lit, timings)
+            tonemap.collect(self.buffers.pixels.color, self._total, 1.0 / (number + 1))
         tonemap.draw_collected(self._total, self.buffers)
 
     def _moved(self, shot: Shot, number: int) -> Shot:
         """Return the shot of one sample: low-discrepancy points in a pixel and on the sun."""
         across, down, angle, reach = (_radical_inverse(number + 1, prime) for prime in (2, 3, 5, 7))
-        axes = basis(-shot.look.to_sun, np.array([0.0, 0.0, -1.0]))
+        axes = _sun_axes(shot.look.to_sun)
         wide, turn = shot.look.sun_size * math.sqrt(reach), 2.0 * math.pi * angle
         to_sun = shot.look.to_sun + wide * (math.cos(turn) * axes[0] + math.sin(turn) * axes[1])
         to_sun = vector(*(to_sun / np.linalg.norm(to_sun)))
@@ -186,28 +164,6 @@ class Renderer:
             water_sun=_sun_lens(shot.extent, to_sun, sun_texels(shot.extent)),
             look=dataclasses.replace(shot.look, to_sun=to_sun, sun_size=min(POINT_SUN, shot.look.sun_size)),
         )
-
-
-def _bytes(numbers: list[Any]) -> tuple[bytes, ...]:
-    return tuple(np.asarray(number).tobytes() for number in numbers)
-
-
-def _looks(shot: Shot) -> tuple[Any, ...]:
-    """Return all of eye and style that what is not water depends on, to be compared with another picture's."""
-    return _bytes(
-        [*(getattr(shot.lens, f.name) for f in dataclasses.fields(shot.lens)), shot.look.sun_size, shot.radius]
-    )
-
-
-def _stands(shot: Shot) -> tuple[Any, ...]:
-    """Return all that the shadows of solids in the sun's view depend on, likewise."""
-    numbers = [getattr(shot.sun, field.name) for field in dataclasses.fields(shot.sun)]
-    numbers += [shot.look.to_sun, shot.extent.lower, shot.extent.upper]
-    solids = shot.frame.solids
-    if solids.count > solids.tank_count:
-        arrays = (solids.op, solids.size, solids.offset, solids.turn, solids.first, solids.reach, solids.position)
-        numbers += [download(array) for array in (*arrays, solids.rotation)]
-    return shot.frame.dim, solids.count, *_bytes(numbers)
 
 
 def _radical_inverse(number: int, prime: int) -> float:
@@ -240,9 +196,13 @@ def _look(dim: int, coloured: bool) -> Look:
     return studio() if coloured else pool()
 
 
+def _sun_axes(to_sun: Any) -> np.ndarray:
+    return basis(-to_sun, np.array([0.0, 0.0, -1.0]))
+
+
 def _sun_lens(extent: Extent, to_sun: Any, texels: int) -> Lens:
     """An orthographic view of the extent from the sun, with room for what splashes out of it."""
-    axes = basis(-to_sun, np.array([0.0, 0.0, -1.0]))
+    axes = _sun_axes(to_sun)
     reach = 1.15 * extent.radius
     eye = extent.middle - 10.0 * reach * axes[2]
     return lens_at(eye, axes, texels, texels, 0.5 * texels / reach, perspective=False, near=1e-6)

@@ -7,6 +7,8 @@ from wavetank.simulation.frame import Frame
 from wavetank.view.extent import Extent
 from wavetank.view.lens import Lens
 from wavetank.view.look import Look
+from wavetank.view.optics.rays import OPEN, Box, box
+from wavetank.view.quantities import Coloring
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,10 +24,20 @@ class Shot:
     radius: float  # m, of a drawn particle
     quantity: int  # key in `quantities.DEVICE_FUNCTIONS`
     limits: tuple[float, float]  # of the quantity: first and last colour
-    colors: Any  # device ndarray of vec3 [entries]: the colour map as linear RGB
+    coloring: Coloring  # its colours on the device
     absorption: Any  # numpy f32 [3], 1/m: of the water, per colour
     scattering: float  # 1/m: what makes deep water shine
     tint: Any  # numpy f32 [3]: colour of the light that comes back out of deep water
     usual: float  # m: water that gives its colour to what is behind it
     hasty: bool  # whether outlines stay rough
     plane: tuple[Any, float]  # of a cut: unit normal [3], and the distance [m] of the plane from the origin along it
+
+    @property
+    def box(self) -> Box:
+        """The extent on the device."""
+        return box(self.extent.lower, self.extent.upper)
+
+    @property
+    def walls(self) -> Box:
+        """The tank on the device; far away where there is none."""
+        return OPEN if self.frame.scene.tank is None else self.box

@@ -7,6 +7,8 @@ from wavetank.view.buffers import Buffers
 from wavetank.view.passes import (
     backdrop,
     below,
+    caustics,
+    clip,
     cut,
     ellipsoids,
     flatten,
@@ -19,7 +21,6 @@ from wavetank.view.passes import (
     smooth,
     solids,
     spheres,
-    sunlight,
     surface,
     tank,
     thickness,
@@ -32,64 +33,60 @@ Pass = Callable[[Shot, Buffers], None]
 
 @dataclasses.dataclass(frozen=True)
 class View:
-    """One way to look at a world."""
+    """One way to look at a world: passes in stages. With a still part, what rests is kept from picture to picture."""
 
     name: str
     sentence: str
-    still: tuple[Pass, ...]  # what depends on eye, sun and solids alone; kept while these rest
-    once: tuple[Pass, ...]  # what depends on the frame alone, not on the eye
-    sunny: tuple[Pass, ...]  # what depends on frame and sun; with a still part these two are kept while the water rests
-    passes: tuple[Pass, ...]
     coloured: bool  # whether particles show a quantity, with its legend
+    once: tuple[Pass, ...] = ()  # what depends on the frame alone, not on the eye
+    shadows: tuple[Pass, ...] = ()  # what depends on sun and solids alone
+    still: tuple[Pass, ...] = ()  # what depends on these and the eye
+    sunny: tuple[Pass, ...] = ()  # what depends on frame, sun and solids
+    passes: tuple[Pass, ...] = ()  # all others
 
 
+_LIT = (floor.draw, shadow.draw, occlusion.draw, smooth.draw, shade.draw)  # solids and particles, in their light
+_CAST = (nothing.draw_from_sun, solids.draw_from_sun)
 VIEWS: dict[str, View] = {
     "water": View(
         "water",
         "the surface of the water, with light and shadow",
-        still=(nothing.draw, solids.draw, floor.draw, sunlight.draw, backdrop.prepare, tank.draw_lines),
+        coloured=False,
         once=(ellipsoids.draw,),
-        sunny=(sunlight.see_water,),
+        shadows=_CAST,
+        still=(
+            nothing.draw, solids.draw, floor.draw, shadow.draw_on_backdrop, occlusion.draw_on_backdrop,
+            smooth.draw_on_backdrop, backdrop.prepare, tank.draw_lines,
+        ),
+        sunny=(
+            thickness.draw_from_sun, surface.draw_from_sun, flatten.draw_from_sun, clip.draw_from_sun,
+            caustics.draw_from_sun,
+        ),
         passes=(
             backdrop.draw, surface.draw, flatten.draw, thickness.draw, water.draw, below.draw,
             foam.draw_over_water,
         ),
-        coloured=False,
     ),
     "particles": View(
         "particles",
         "particles as balls, coloured by a quantity",
-        still=(),
-        once=(),
-        sunny=(),
-        passes=(
-            spheres.draw, solids.draw, floor.draw, shadow.draw, occlusion.draw, smooth.draw, shade.draw,
-            tank.draw, foam.draw,
-        ),
         coloured=True,
+        passes=(
+            nothing.draw_from_sun, spheres.draw_from_sun, solids.draw_from_sun,
+            nothing.draw, spheres.draw, solids.draw, *_LIT, tank.draw, foam.draw,
+        ),
     ),
     "slice": View(
         "slice",
         "a quantity on a plane that cuts the water",
-        still=(),
-        once=(cut.prepare,),
-        sunny=(),
-        passes=(
-            nothing.draw, solids.draw, floor.draw, shadow.draw_solids, occlusion.draw, smooth.draw, shade.draw,
-            cut.draw, tank.draw,
-        ),
         coloured=True,
+        once=(cut.prepare,),
+        passes=(*_CAST, nothing.draw, solids.draw, *_LIT, cut.draw, tank.draw),
     ),
     "foam": View(
         "foam",
         "spray, foam and bubbles alone",
-        still=(),
-        once=(),
-        sunny=(),
-        passes=(
-            nothing.draw, solids.draw, floor.draw, shadow.draw_solids, occlusion.draw, smooth.draw, shade.draw,
-            tank.draw, foam.draw,
-        ),
         coloured=False,
+        passes=(*_CAST, nothing.draw, solids.draw, *_LIT, tank.draw, foam.draw),
     ),
 }  # fmt: skip

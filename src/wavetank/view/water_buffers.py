@@ -7,10 +7,10 @@ import numpy as np
 
 from wavetank.device.compiler import qd, threads, upload
 from wavetank.simulation.frame import Frame
-from wavetank.view.buffers import Buffers
+from wavetank.view.buffers import Buffers, Light, new_light
+from wavetank.view.cells import Cells, new_cells
 from wavetank.view.extent import Extent
-from wavetank.view.lens import vec2, vec3
-from wavetank.view.passes.cells import Cells, new_cells
+from wavetank.view.lens import vec3
 from wavetank.view.quantities import usual
 from wavetank.view.shot import Shot
 
@@ -27,37 +27,61 @@ class Ellipsoids:
     edge: qd.types.ndarray()  # i32 [2 capacity]: 1 where its outline may be seen, 0 elsewhere
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
+class WaterSurface:
+    """The surface of the water as the eye sees it, [rows, columns], on the device."""
+
+    depth: qd.types.ndarray()  # i32: bits of the depth [m], FARTHEST where there is none
+    rim: qd.types.ndarray()  # i32: marks of its outlines, see `optics/marks.py`; or 0
+    nearest: qd.types.ndarray()  # i32: bits of the depth [m] of what is seen, water or not; scratch before
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SunlitWater:
+    """The surface of the water as the sun sees it, [texels, texels], on the device."""
+
+    depth: qd.types.ndarray()  # i32: bits of the depth [m] at which the sun's rays meet the water
+    spare: qd.types.ndarray()  # i32: the same while it is being smoothed
+    caustic: qd.types.ndarray()  # i32: light that refraction brings or takes, in 1 / 4096 of the sun's
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Thickness:
+    """Water along the rays of the eye or of the sun, in 1 / 4096 of a spacing, on the device."""
+
+    water: qd.types.ndarray()  # i32 [rows, columns]
+    sums: qd.types.ndarray()  # i32 [parts x texels]: the same, of each part of the particles
+    dye: qd.types.ndarray()  # i32 [rows, columns, 4]: the dyed part of it, and that part times linear red, green, blue
+    stained: qd.types.ndarray()  # i32 [1]: 1 where any of it is dyed, else `dye` holds nothing of use
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Backdrop:
+    """Radiance of what is not water, vec3 [rows, columns], on the device."""
+
+    in_sun: qd.types.ndarray()  # what comes from the sun
+    in_sky: qd.types.ndarray()  # and what comes from elsewhere, both without any water
+    behind: qd.types.ndarray()  # both as far as the water lets them through
+
+
+@dataclasses.dataclass(eq=False)
 class WaterBuffers:
     """What the water passes hand to each other."""
 
     cells: Cells
     ellipsoids: Ellipsoids
-    depth: Any  # i32 [rows, columns]: bits of the depth [m] of the water's surface, FARTHEST where there is none
-    rim: Any  # i32 [rows, columns]: share 0 to 127 that an outline covers, << 24, | 2^24 - 1 - depth >> 7; or 0
-    spare: (
-        Any  # i32 [rows, columns]: the same while it is being smoothed, then of the nearest that is seen, water or not
-    )
-    thickness: Any  # i32 [rows / 2, columns / 2]: water along the view, in 1 / 4096 of a spacing
-    sums: Any  # i32 [parts x texels]: the same, of each part of the particles
-    dye: Any  # i32 [rows / 2, columns / 2, 4]: the dyed part of it, and that part times linear red, green, blue
-    stained: Any  # i32 [1]: 1 where any of it is dyed, else `dye` holds nothing of use
+    surface: WaterSurface
+    thickness: Thickness  # on every second pixel in each direction, or less
+    backdrop: Backdrop
+    light: Light  # on every second pixel in each direction of what is not water
+    sunlit: SunlitWater
+    sun_thickness: Thickness
     stains: Any  # i32 [materials]: colour of each fluid as a dye, 0 where the scene has one fluid only
-    light: Any  # vec2 [rows / 2, columns / 2]: share of the sun, share of the sky that reaches what is not water
-    rough_light: Any  # vec2, likewise: the same while it is being smoothed
-    sun_thickness: Any  # i32 [texels, texels]: water along the sun's rays, likewise
-    sun_sums: Any  # i32 [parts x texels]: the same, of each part of the particles
-    sun_first: Any  # i32 [texels, texels]: bits of the depth [m] at which the sun's rays meet the water
-    sun_spare: Any  # i32 [texels, texels]: the same while it is being smoothed
-    sun_dye: Any  # i32 [texels, texels, 4]: the dyed part of the water along the sun's rays, as `dye`
-    caustic: Any  # i32 [texels, texels]: light that refraction brings or takes, in 1 / 4096 of the sun's
-    in_sun: Any  # vec3 [rows, columns]: radiance of what is not water that comes from the sun
-    in_sky: Any  # vec3 [rows, columns]: and that comes from elsewhere, both without any water
-    behind: Any  # vec3 [rows, columns]: radiance of what is not water
     key: tuple[Any, ...]  # what the sizes were made for
 
 
-SUN_MAPS = ("sun_thickness", "sun_first", "sun_spare", "caustic")
+REACH = 2.2  # d: radius of the neighbourhood of a particle or a point
+LIGHT_STEP = 2  # floor and solids are smooth
 MOST_PARTS, MOST_SUMS = 8, 1 << 23  # of particles whose discs are added apart; numbers that are kept for that
 UNIT = 4096.0  # steps of thickness in a spacing
 
@@ -69,8 +93,6 @@ def sun_texels(extent: Extent) -> int:
 
 def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
     """Return the water buffers of `buffers`, made anew when a frame of another kind comes."""
-    from wavetank.view.passes.ellipsoids import REACH
-
     frame, extent = shot.frame, shot.extent
     capacity = max(int(frame.x.shape[0]), 1)
     stains = _stains(frame)
@@ -79,41 +101,43 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
     water = buffers.water
     if water is not None and water.key == key:
         return water
-    rows, columns = buffers.rows, buffers.columns
-    fields: dict[str, Any] = {
-        "depth": qd.ndarray(qd.i32, shape=(rows, columns)),
-        "rim": qd.ndarray(qd.i32, shape=(rows, columns)),
-        "spare": qd.ndarray(qd.i32, shape=(rows, columns)),
-        "thickness": qd.ndarray(qd.i32, shape=(rows // 2 + 1, columns // 2 + 1)),
-        "sums": _sums(rows // 2 + 1, columns // 2 + 1),
-        "dye": qd.ndarray(qd.i32, shape=(rows // 2 + 1, columns // 2 + 1, 4)),
-        "light": qd.ndarray(vec2, shape=((rows + 1) // 2, (columns + 1) // 2)),
-        "rough_light": qd.ndarray(vec2, shape=((rows + 1) // 2, (columns + 1) // 2)),
-        "in_sun": qd.ndarray(vec3, shape=(rows, columns)),
-        "in_sky": qd.ndarray(vec3, shape=(rows, columns)),
-        "behind": qd.ndarray(vec3, shape=(rows, columns)),
-    }
+    rows, columns, texels = buffers.rows, buffers.columns, sun_texels(extent)
+    stained = qd.ndarray(qd.i32, shape=(1,))
     if water is not None:  # only the particles or the scene changed
-        fields = {name: getattr(water, name) for name in fields}
-    fields["stained"] = qd.ndarray(qd.i32, shape=(1,))
-    fields["stains"] = qd.ndarray(qd.i32, shape=stains.shape)
-    upload(fields["stains"], stains)
-    texels = sun_texels(extent)
-    fields |= {name: qd.ndarray(qd.i32, shape=(texels, texels)) for name in SUN_MAPS}
-    fields["sun_dye"] = qd.ndarray(qd.i32, shape=(texels, texels, 4))
-    fields["sun_sums"] = _sums(texels, texels)
+        fields: dict[str, Any] = {name: getattr(water, name) for name in ("surface", "backdrop", "light")}
+        fields["thickness"] = dataclasses.replace(water.thickness, stained=stained)
+    else:
+        fields = {
+            "surface": WaterSurface(*_maps(3, qd.i32, rows, columns)),
+            "backdrop": Backdrop(*_maps(3, vec3, rows, columns)),
+            "light": new_light(rows, columns, LIGHT_STEP),
+            "thickness": _thickness(rows // 2 + 1, columns // 2 + 1, stained),
+        }
     buffers.water = WaterBuffers(
         cells=new_cells(frame, extent, REACH * extent.spacing),
         ellipsoids=_ellipsoids(capacity),
+        sunlit=SunlitWater(*_maps(3, qd.i32, texels, texels)),
+        sun_thickness=_thickness(texels, texels, stained),
+        stains=qd.ndarray(qd.i32, shape=stains.shape),
         key=key, **fields,
     )  # fmt: skip
+    upload(buffers.water.stains, stains)
     return buffers.water
 
 
-def _sums(rows: int, columns: int) -> Any:
-    """Sums over particles for each thread that adds, as many as may be kept; graphics processors add at once."""
+def _maps(number: int, kind: Any, rows: int, columns: int) -> list[Any]:
+    return [qd.ndarray(kind, shape=(rows, columns)) for _ in range(number)]
+
+
+def _thickness(rows: int, columns: int, stained: Any) -> Thickness:
+    """Allocate maps of thickness.
+
+    There are sums over particles for each thread that adds, as many as may be kept; graphics processors add at once.
+    """
     parts = max(1, min(threads(), MOST_PARTS, MOST_SUMS // (rows * columns)))
-    return qd.ndarray(qd.i32, shape=(parts * rows * columns if threads() else 1,))
+    sums = qd.ndarray(qd.i32, shape=(parts * rows * columns if threads() else 1,))
+    water, dye = (qd.ndarray(qd.i32, shape=(rows, columns, *more)) for more in ((), (4,)))
+    return Thickness(water=water, sums=sums, dye=dye, stained=stained)
 
 
 def _stains(frame: Frame) -> np.ndarray:

@@ -14,9 +14,9 @@ import numpy as np
 from wavetank.device import compiler
 from wavetank.device.compiler import download, qd
 from wavetank.device.state import Coefficients, Grid, Particles, integers
+from wavetank.physics.coefficients import coefficients
 from wavetank.physics.neighbors import for_each_row_around
 from wavetank.physics.pairs import count_neighbors
-from wavetank.physics.step import coefficients
 from wavetank.simulation.simulation import Simulation
 
 

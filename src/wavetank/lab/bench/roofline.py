@@ -29,8 +29,9 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.lab.bench.counts import water_bytes
 from wavetank.lab.bench.machine import load, machine
 from wavetank.lab.bench.scenes import check, measured, sized, timed
-from wavetank.physics.pairs import add_neighbors, count_neighbors, part_of, teams, turns
-from wavetank.physics.step import coefficients
+from wavetank.physics.coefficients import coefficients
+from wavetank.physics.pairs import add_neighbors, count_neighbors
+from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.scene.scene import Scene
 from wavetank.simulation.simulation import Simulation
 
@@ -61,7 +62,7 @@ COSTS: dict[str, Cost] = {
     "solve_multipliers": Cost(vectors=1, words=6, pair_words=0.4, operations=12, pair_operations=14),
     "correct_positions": Cost(vectors=2, words=3, pair_words=0.4, operations=12, pair_operations=24),
     "update_velocities": Cost(vectors=5, operations=24),
-    "apply_viscosity": Cost(vectors=3, words=1, pair_words=0.4, operations=7, pair_operations=22),
+    "apply_xsph": Cost(vectors=3, words=1, pair_words=0.4, operations=7, pair_operations=22),
     "confine_vorticity": Cost(vectors=4, words=1, pair_words=0.4, operations=25, pair_operations=36),
 }
 
@@ -100,17 +101,14 @@ def add_way(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.te
 
 
 @qd.kernel(fastcache=True)
-def walk(
-    total: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32, lanes: qd.template()
-):
+def walk(total: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32):
     """Go once over all neighbour lists."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            ways = qd.Matrix.zero(qd.f32, 1, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            ways = qd.Matrix.zero(qd.f32, 1, grid.lanes)
             add_neighbors(ways, add_way, team, particles, particles.v, grid, c, 0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                total[i] = ways[0, i - team * lanes]
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                total[i] = ways[0, i - team * grid.lanes]
 
 
 def roofline(
@@ -174,7 +172,7 @@ def measure_ceilings(scene: Scene, arch: str) -> dict[str, float]:
         "copy": 8.0 * own / _fastest(lambda: copy(target, source, own)),
         "copy_large": 8.0 * LARGE / _fastest(lambda: copy(target, source, LARGE)),
         "arithmetic": operations / _fastest(lambda: spin(target, SPINS, 0.999, 0.001, TURNS, wide)),
-        "walk": lists / _fastest(lambda: walk(target, world.particles, world.grid, c, count, world.grid.lanes)),
+        "walk": lists / _fastest(lambda: walk(target, world.particles, world.grid, c, count)),
     }
 
 

@@ -19,10 +19,10 @@ from wavetank.device.state import new_particles
 from wavetank.foundation.errors import WavetankError
 from wavetank.lab.bench.counts import device_bytes
 from wavetank.lab.bench.machine import cores, load, machine
+from wavetank.physics.coefficients import coefficients
 from wavetank.physics.integrate import forget_predictions
 from wavetank.physics.neighbors import find_neighbors, new_grid, sort_particles
 from wavetank.physics.pairs import count_neighbors
-from wavetank.physics.step import coefficients
 from wavetank.scene.scene import Scene
 
 SIZES = (10_000, 100_000, 1_000_000)

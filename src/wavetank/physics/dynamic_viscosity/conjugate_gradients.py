@@ -26,16 +26,46 @@ The sums are those of equal slices, in order: they do not depend on threads. For
 the vectors, so momentum is as exact as that of the start, wherever the iterations end.
 """
 
+import dataclasses
 from typing import Any
 
 from wavetank.device.compiler import current_backend, download, qd
-from wavetank.device.state import Coefficients, Fluids, Grid, Particles, Scratch
-from wavetank.physics.pairs import add_kept, column, part_of, teams, turns
+from wavetank.device.state import Coefficients, Grid, Particles, Scratch
+from wavetank.physics.pairs import add_kept, column
+from wavetank.physics.teams import end_of, end_team, first_team, teams, turns
+from wavetank.physics.world import World
 from wavetank.solids.distance import vec3, vec4
 
 TOLERANCE = 0.02  # of what viscosity changes in a step
 LOOK = 8  # iterations between two looks at the error: over fewer, what is slow to come seems to be there
-SLICES = 256  # of the sums; the kernel spells it out
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Damping:
+    """What holds the fluid back: vec4 hold three numbers and one that the kernels of this file do not read."""
+
+    pairs: qd.types.ndarray()  # f32 [8 * places in the lists], Pa s/m^2: mu_ij f(q) / r^2 of each pair, its damper
+    drag: qd.types.ndarray()  # vec4 [capacity]: of the walls, and its rate
+    normal: qd.types.ndarray()  # vec4 [capacity]: of the wall along which they do not, if it is one
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Iterates:
+    """The vectors of the iterations, as the table above has them; vec4 [capacity] whose last number is not theirs."""
+
+    x: qd.types.ndarray()
+    residual: qd.types.ndarray()
+    pulled: qd.types.ndarray()
+    direction: qd.types.ndarray()
+    slope: qd.types.ndarray()
+    products: qd.types.ndarray()  # vec4 [teams]: of each team
+    totals: qd.types.ndarray()  # vec4 [2 + slices], see `iterate`
+
+
+@qd.func
+def slices():
+    """Slices of the teams, whose sums are added up in order."""
+    return 256
 
 
 @qd.func
@@ -56,86 +86,79 @@ def along_walls(pull, normal):
 
 @qd.kernel(fastcache=True)
 def start_residual(
-    residual: qd.types.ndarray(), x: qd.types.ndarray(), dampers: qd.types.ndarray(), drag: qd.types.ndarray(),
-    normal: qd.types.ndarray(), particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32,
-    rate: qd.f32, lanes: qd.template(),
+    state: Iterates, particles: Particles, scratch: Scratch, damping: Damping, grid: Grid, c: Coefficients,
+    rate: qd.f32, count: qd.i32,
 ):  # fmt: skip
     """Set r = b - A x, where b are the velocities as they are and what moving walls add."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
-            add_kept(sums, add_damping, team, particles, x, dampers, grid, c, 0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, grid.lanes)
+            add_kept(sums, add_damping, team, particles, state.x, damping.pairs, grid, c, 0)
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
                 v = particles.v[i]
-                own = x[i]
-                force = column(sums, i - team * lanes)
+                own = state.x[i]
+                force = column(sums, i - team * grid.lanes)
                 if particles.near[i] != 0:
-                    wall = vec3(drag[i].x, drag[i].y, drag[i].z) - vec3(own.x, own.y, own.z) * drag[i].w
-                    wall = along_walls(wall, normal[i])
+                    drag = damping.drag[i]
+                    wall = vec3(drag.x, drag.y, drag.z) - vec3(own.x, own.y, own.z) * drag.w
+                    wall = along_walls(wall, damping.normal[i])
                     for k in qd.static(range(v.n)):
                         force[k] += wall[k]
                 result = own * 0.0
                 for k in qd.static(range(v.n)):
                     result[k] = v[k] - own[k] + rate * scratch.weight[i] * force[k]
-                residual[i] = result * (1.0 - particles.frozen[i])
+                state.residual[i] = result * (1.0 - particles.frozen[i])
 
 
 @qd.kernel(fastcache=True)
-def pull(
-    pulled: qd.types.ndarray(), products: qd.types.ndarray(), residual: qd.types.ndarray(), x: qd.types.ndarray(),
-    dampers: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles,
-    scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, rate: qd.f32, lanes: qd.template(),
+def multiply(
+    state: Iterates, particles: Particles, scratch: Scratch, damping: Damping, grid: Grid, c: Coefficients,
+    rate: qd.f32, count: qd.i32,
 ):  # fmt: skip
     """Set A r, and each team's share of (r, r), (r, A r) and (x - b, x - b)."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, lanes)
-            add_kept(sums, add_damping, team, particles, residual, dampers, grid, c, 0)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, grid.lanes)
+            add_kept(sums, add_damping, team, particles, state.residual, damping.pairs, grid, c, 0)
             product = vec4(0.0, 0.0, 0.0, 0.0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                r = residual[i]
-                force = column(sums, i - team * lanes)
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                r = state.residual[i]
+                force = column(sums, i - team * grid.lanes)
                 if particles.near[i] != 0:
-                    wall = along_walls(vec3(r.x, r.y, r.z) * -drag[i].w, normal[i])
+                    wall = along_walls(vec3(r.x, r.y, r.z) * -damping.drag[i].w, damping.normal[i])
                     for k in qd.static(range(force.n)):
                         force[k] += wall[k]
                 result = r
                 change = 0.0
                 for k in qd.static(range(force.n)):
                     result[k] = (r[k] - rate * scratch.weight[i] * force[k]) * (1.0 - particles.frozen[i])
-                    change += (x[i][k] - particles.v[i][k]) ** 2 * (1.0 - particles.frozen[i])
-                pulled[i] = result
+                    change += (state.x[i][k] - particles.v[i][k]) ** 2 * (1.0 - particles.frozen[i])
+                state.pulled[i] = result
                 product += vec4(r.dot(r), r.dot(result), change, 0.0) / scratch.weight[i]
-            products[team] = product
+            state.products[team] = product
 
 
 @qd.kernel(fastcache=True)
-def go_on(
-    x: qd.types.ndarray(), residual: qd.types.ndarray(), direction: qd.types.ndarray(), slope: qd.types.ndarray(),
-    pulled: qd.types.ndarray(), products: qd.types.ndarray(), totals: qd.types.ndarray(), count: qd.i32, first: qd.i32,
-    looked: qd.i32, lanes: qd.template(), shared: qd.template(),
-):  # fmt: skip
+def iterate(state: Iterates, grid: Grid, first: qd.i32, looked: qd.i32, count: qd.i32, shared: qd.template()):
     """Go on to the next x. Threads share the sums where `shared`.
 
     `totals` has (gamma, alpha, beta, 0), then (what was gained since it was `looked` at, (x - b, x - b), 0, 0), then
     the slices.
     """
     qd.loop_config(serialize=not shared)
-    for b in range(256):
-        size = (teams(count, lanes) + 255) // 256
+    for b in range(slices()):
+        size = (teams(grid, count) + slices() - 1) // slices()
         total = vec4(0.0, 0.0, 0.0, 0.0)
-        for team in range(b * size, qd.min(b * size + size, teams(count, lanes))):
-            total += products[team]
-        totals[2 + b] = total
+        for team in range(b * size, qd.min(b * size + size, teams(grid, count))):
+            total += state.products[team]
+        state.totals[2 + b] = total
     qd.loop_config(serialize=True)
     for _ in range(1):
         total = vec4(0.0, 0.0, 0.0, 0.0)
-        for b in range(256):
-            total += totals[2 + b]
+        for b in range(slices()):
+            total += state.totals[2 + b]
         gamma, delta = total.x, total.y
-        before = totals[0]
+        before = state.totals[0]
         alpha, beta = 0.0, 0.0
         # What is left may be less than rounding: then it stays where it is.
         if gamma > 0.0 and (first == 1 or before.y > 0.0):
@@ -144,42 +167,35 @@ def go_on(
                 delta -= beta * gamma / before.y
             if delta > 0.5 * gamma:
                 alpha = gamma / delta
-        totals[0] = vec4(gamma, alpha, beta, 0.0)
+        state.totals[0] = vec4(gamma, alpha, beta, 0.0)
         gained = alpha * gamma
         if looked == 0:
-            gained += totals[1].x
-        totals[1] = vec4(gained, total.z, 0.0, 0.0)
+            gained += state.totals[1].x
+        state.totals[1] = vec4(gained, total.z, 0.0, 0.0)
     for i in range(count):
-        alpha, beta = totals[0].y, totals[0].z
-        p, q = residual[i], pulled[i]
+        alpha, beta = state.totals[0].y, state.totals[0].z
+        p, q = state.residual[i], state.pulled[i]
         if first == 0:
-            p += beta * direction[i]
-            q += beta * slope[i]
-        direction[i] = p
-        slope[i] = q
-        x[i] += alpha * p
-        residual[i] -= alpha * q
+            p += beta * state.direction[i]
+            q += beta * state.slope[i]
+        state.direction[i] = p
+        state.slope[i] = q
+        state.x[i] += alpha * p
+        state.residual[i] -= alpha * q
 
 
-def solve(
-    x: Any, dampers: Any, drag: Any, normal: Any, particles: Particles, scratch: Scratch, fluids: Fluids, grid: Grid,
-    c: Coefficients, count: int, rate: float, most: int,
-) -> int:  # fmt: skip
+def solve(world: World, damping: Damping, x: Any, c: Coefficients, rate: float, most: int) -> int:
     """Solve for the velocities `x`, which hold where to start; return the number of iterations, at most `most`."""
-    residual, pulled, direction, slope, products = (
-        fluids.array(name) for name in ("residual", "pulled", "direction", "slope", "products")
-    )
-    totals = fluids.array("totals", 2 + SLICES)
+    particles, scratch, grid, fluids, count = world.particles, world.scratch, world.grid, world.fluids, world.count
+    names = ("residual", "pulled", "direction", "slope", "products")
+    state = fluids.together(Iterates, x, *map(fluids.array, names), fluids.array("totals", 2 + slices.fn()))
     shared = int(current_backend() != "cpu")
-    start_residual(residual, x, dampers, drag, normal, particles, scratch, grid, c, count, rate, grid.lanes)
+    start_residual(state, particles, scratch, damping, grid, c, rate, count)
     for number in range(most):
-        pull(pulled, products, residual, x, dampers, drag, normal, particles, scratch, grid, c, count, rate, grid.lanes)
-        looked = int(number % LOOK == 0)
-        go_on(
-            x, residual, direction, slope, pulled, products, totals, count, int(number == 0), looked, grid.lanes, shared
-        )
+        multiply(state, particles, scratch, damping, grid, c, rate, count)
+        iterate(state, grid, int(number == 0), int(number % LOOK == 0), count, shared)
         if (number + 1) % LOOK == 0 and number + 1 < most:
-            gained, change = map(float, download(totals)[1][:2])
+            gained, change = map(float, download(state.totals)[1][:2])
             if gained <= TOLERANCE**2 * change:
                 return number + 1
     return most

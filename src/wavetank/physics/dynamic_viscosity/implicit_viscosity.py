@@ -21,7 +21,8 @@ Where we differ, and why:
   pole, and B makes its second moment on the rest lattice exact, averaged over directions.
 - Conjugate gradients (`conjugate_gradients.py`) start at what viscosity did in the last step, which is not far off:
   half of the iterations that they take from rest, a quarter of Chebyshev's, where the fluid is thick
-  (docs/materials.md). Momentum is still exact; what is so stiff that it is turned (`rigid_guess.py`) keeps it to 1 %.
+  (docs/notebook/viscosity.md). Momentum is still exact; what is so stiff that it is turned (`rigid_guess.py`) keeps it
+  to 1 %.
 - Solids hold the fluid back along their surface (no-slip) as half a rest lattice would that continues the
   velocity linearly to its value at the wall (Takeda et al. 1994, 10.1143/ptp/92.5.939; Morris et al. 1997,
   10.1006/jcph.1997.5776), from a table of the distance.
@@ -29,28 +30,31 @@ Where we differ, and why:
   made honey flow a fifth too fast at any affordable step. A thick fluid therefore begins a step with the share w of
   what pressed it in the last one, and only the change comes afterwards: the incremental projection of Goda 1979
   (10.1016/0021-9991(79)90088-3; Guermond et al. 2006, 10.1016/j.cma.2005.10.010). w = `CARRIED` k / (`HALF` + k) of the
-  `thickness` k: thin water carries nothing here, it would keep its noise. docs/materials.md has the figures.
+  `thickness` k: thin water carries nothing here, it would keep its noise. docs/notebook/viscosity.md has the figures.
 """
 
+import dataclasses
 import functools
 import math
 
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import Coefficients, Fluids, Grid, Particles, Scratch, scalars
+from wavetank.device.state import Coefficients, Grid, Particles, remembered, scalars
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import is_near
-from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE, solve
-from wavetank.physics.dynamic_viscosity.rigid_guess import FORGET, RIGID, SHEARED, STIFF, turn_along
+from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE, Damping, solve
+from wavetank.physics.dynamic_viscosity.rigid_guess import FORGET, RIGID, SHEARED, STIFF, rotate_guess
 from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate, free_motion
 from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import MAX_ENTRIES
-from wavetank.physics.pairs import keep_pairs, part_of, teams, turns
+from wavetank.physics.pairs import keep_pairs
 from wavetank.physics.predicted_positions import predicted
-from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.physics.smoothing import TABLE_SIZE, interpolated, rest_points
+from wavetank.physics.teams import end_team, first_team, turns
+from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec4
 
 STIFFER = 3.0  # times as stiff as the rest lattice: water in motion, and the drag of walls
@@ -107,10 +111,10 @@ def damper(square, a, b, c: Coefficients):
 
 
 @qd.kernel(fastcache=True)
-def prepare(
+def find_drag(
     packed: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles,
-    rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, count: qd.i32,
-    no_slip: qd.f32, most: qd.f32,
+    rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients,
+    no_slip: qd.f32, most: qd.f32, count: qd.i32,
 ):  # fmt: skip
     """Pack velocities and viscosities [Pa s], `most` at most, and find how fast the walls hold every particle back.
 
@@ -125,15 +129,12 @@ def prepare(
         free = vec4(0.0, 0.0, 0.0, 0.0)
         if near != 0:
             p = lift(predicted(particles, i))
-            last = table.shape[0] - 1
             walls = 0
             for k in range(solids.count):
                 if is_near(near, k) == 1:
                     value = signed_distance(solids, k, p)
                     if value.w < c.h:
-                        t = qd.min(qd.max(value.w / c.h, 0.0), 1.0) * last
-                        m = qd.min(qd.cast(t, qd.i32), last - 1)
-                        share = table[m] + (table[m + 1] - table[m]) * (t - m)
+                        share = interpolated(table, value.w / c.h)
                         v = surface_velocity(solids, k, p, c.dt) * share
                         pull += vec4(v.x, v.y, v.z, share)
                         free = vec4(value.x, value.y, value.z, 0.0)
@@ -146,19 +147,18 @@ def prepare(
 
 
 @qd.kernel(fastcache=True)
-def join_pairs(
+def find_dampers(
     dampers: qd.types.ndarray(), packed: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients,
-    count: qd.i32, lanes: qd.template(),
+    count: qd.i32,
 ):  # fmt: skip
     """Keep the dampers of all pairs."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            keep_pairs(dampers, damper, team, particles, packed, grid, c, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            keep_pairs(dampers, damper, team, particles, packed, grid, c)
 
 
 @qd.kernel(fastcache=True)
-def start(velocities: qd.types.ndarray(), particles: Particles, c: Coefficients, count: qd.i32):
+def guess_velocities(velocities: qd.types.ndarray(), particles: Particles, c: Coefficients, count: qd.i32):
     """Start at the velocities that there are if viscosity does what it did in the last step; ice has none."""
     for i in range(count):
         for k in qd.static(range(particles.v[i].n)):
@@ -178,24 +178,30 @@ def take_velocities(particles: Particles, packed: qd.types.ndarray(), c: Coeffic
         accelerate(particles, i, v, c)
 
 
+@dataclasses.dataclass(frozen=True)
+class Carrying:
+    """How much of what pressed them thick fluids carry on."""
+
+    rate: qd.f32  # 1/(Pa s): `thickness` of the heaviest fluid over its viscosity
+    most: qd.f32  # share of the thickest
+    half: qd.f32  # thickness with half of that share
+    largest: qd.f32  # m/s^2
+    again: qd.f32  # of the push of this step: what has left the floor is not pushed any more
+
+
 @qd.kernel(fastcache=True)
-def carry_pressure(
-    particles: Particles, rows: qd.types.ndarray(), c: Coefficients, count: qd.i32, most: qd.f32, half: qd.f32,
-    rate: qd.f32, largest: qd.f32, again: qd.f32,
-):  # fmt: skip
+def carry_pressure(particles: Particles, rows: qd.types.ndarray(), c: Coefficients, carrying: Carrying, count: qd.i32):
     """Keep the share of what pressure and solids accelerated thick fluids by that the next prediction begins with.
 
-    It is called before velocities are read off. `rate` is the `thickness` of the heaviest fluid over its viscosity;
-    the share is `most`, half of that where the thickness is `half`, and no more than `largest` [m/s^2] is kept, nor
-    more than `again` times the push of this step: what has left the floor is not pushed any more.
+    It is called before velocities are read off.
     """
     for i in range(count):
         row = rows[particles.material[i]]
         pushed = predicted(particles, i) - free_motion(particles.x[i], particles.v[i], c)
         a = particles.a[i] + pushed / (c.dt * c.dt)
-        thick = rate * row[0] * row[1]
-        share = most * thick / (half + thick)
-        limit = qd.min(largest, again * pushed.norm() / (c.dt * c.dt))
+        thick = carrying.rate * row[0] * row[1]
+        share = carrying.most * thick / (carrying.half + thick)
+        limit = qd.min(carrying.largest, carrying.again * pushed.norm() / (c.dt * c.dt))
         particles.a[i] = a * (share * qd.min(1.0, limit / qd.max(a.norm(), 1e-12)))
 
 
@@ -219,50 +225,47 @@ def is_thick(kinds: Blend, params: Parameters) -> bool:
     return usual_thickness(kinds.kinematic_viscosity, params) > THICK and any(params.gravity)
 
 
-def solve_viscosity(
-    particles: Particles, scratch: Scratch, fluids: Fluids, grid: Grid, solids: SolidSet, c: Coefficients,
-    kinds: Blend, count: int, ratio: float, no_slip: float, largest_number: int,
-) -> int:  # fmt: skip
-    """Make velocities and predicted positions those of viscous fluids; return the number of iterations it took.
+def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficients, most: int) -> int:
+    """Make velocities and predicted positions those of viscous fluids; return the number of iterations, `most` at most.
 
-    `ratio` is h / d; at most `largest_number` iterations are taken.
+    Raises `WavetankError` for more pairs than there is room for.
     """
-    dim = particles.x.element_shape[0]
-    d = c.h / ratio
+    particles, grid, fluids, count = world.particles, world.grid, world.fluids, world.count
+    dim, ratio = params.dim, params.support
+    rate = c.dt * damper_scale(dim, ratio, c.h / ratio) / kinds.largest_density
+    stiffest = 1.0 + STIFFER * rate * kinds.largest_density * kinds.kinematic_viscosity * stiffness(dim, ratio)
+    largest = STIFFEST / (STIFFER * rate * stiffness(dim, ratio))
     if "drag table" not in fluids.arrays:
         fluids.arrays["drag table"] = scalars(TABLE_SIZE + 1)
         upload(fluids.arrays["drag table"], drag_table(dim, ratio))
-    packed, drag, normal = (fluids.array(name) for name in ("packed", "drag", "normal"))
-    rate = c.dt * damper_scale(dim, ratio, d) / kinds.largest_density
     if 8 * grid.list.shape[0] > MAX_ENTRIES:
         raise WavetankError(
             f"{count:,} particles of viscous fluids are too many: what joins their pairs has at most {MAX_ENTRIES:,} "
             f"places, enough for {MAX_ENTRIES // grid.room:,} particles; use a larger spacing, less fluid, or "
             "viscosity = 0 in its materials and dynamic_viscosity = 0."
         )
+    packed, drag, normal = (fluids.array(name) for name in ("packed", "drag", "normal"))
     dampers = fluids.pairs(grid)
-    most = STIFFEST / (STIFFER * rate * stiffness(dim, ratio))
-    prepare(packed, drag, normal, particles, fluids.rows, solids, fluids.arrays["drag table"], c, count, no_slip, most)
-    join_pairs(dampers, packed, particles, grid, c, count, grid.lanes)
-    stiffest = 1.0 + STIFFER * rate * kinds.largest_density * kinds.kinematic_viscosity * stiffness(dim, ratio)
-    start(packed, particles, c, count)
-    if stiffest > STIFF:
-        turn_along(particles, packed, dampers, grid, c, count, RIGID / SHEARED[dim], FORGET, grid.lanes)
-        start(packed, particles, c, count)
-    number = solve(
-        packed, dampers, drag, normal, particles, scratch, fluids, grid, c, count, rate,
-        iterations(min(stiffest, STIFFEST), largest_number),
+    find_drag(
+        packed, drag, normal, particles, fluids.rows, world.solids, fluids.arrays["drag table"], c,
+        params.no_slip, largest, count,
     )  # fmt: skip
+    find_dampers(dampers, packed, particles, grid, c, count)
+    guess_velocities(packed, particles, c, count)
+    if stiffest > STIFF:
+        rotate_guess(particles, packed, dampers, grid, c, RIGID / SHEARED[dim], FORGET, count)
+        guess_velocities(packed, particles, c, count)
+    damping = fluids.together(Damping, dampers, drag, normal)
+    number = solve(world, damping, packed, c, rate, iterations(min(stiffest, STIFFEST), most))
     take_velocities(particles, packed, c, count)
     return number
 
 
-def carry_on(
-    particles: Particles, fluids: Fluids, c: Coefficients, kinds: Blend, params: Parameters, count: int
-) -> None:  # fmt: skip
+def carry_on(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
     """Let thick fluids carry on a share of what pressed them in this step."""
     rate, largest = thickness(1.0 / kinds.largest_density, params, c.dt), LARGEST * math.hypot(*params.gravity)
-    carry_pressure(particles, fluids.rows, c, count, CARRIED, HALF, rate, largest, AGAIN)
+    carrying = remembered(Carrying(rate=rate, most=CARRIED, half=HALF, largest=largest, again=AGAIN))
+    carry_pressure(world.particles, world.fluids.rows, c, carrying, world.count)
 
 
 def carried_share(kinds: Blend, params: Parameters) -> float:

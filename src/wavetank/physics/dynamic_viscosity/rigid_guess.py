@@ -1,9 +1,9 @@
-"""What viscosity did in the last step, turned as the fluid has turned since.
+"""The guess that conjugate gradients start at: what viscosity did in the last step, turned with the rotation since.
 
-Conjugate gradients start there (`implicit_viscosity.py`). What holds a spinning drop together points inwards; pointing
-where it did a step ago it has a torque. That a drop turns as a whole is the last thing that iterations come to where it
-is stiff, so the torques of all steps added up: a drop of 10^6 Pa s had 3 to 5 times its energy after two radians.
-Turned, it has what iterations from rest leave it, within 4 % (docs/materials.md).
+What holds a spinning drop together points inwards; pointing where it did a step ago it has a torque. That a drop turns
+as a whole is the last thing that iterations come to where it is stiff, so the torques of all steps added up: a drop of
+10^6 Pa s had 3 to 5 times its energy after two radians. Turned, it has what iterations from rest leave it, within 4 %
+(docs/notebook/viscosity.md).
 
     code      symbol                       meaning                                                     unit
     dv        v_i - v_j                    difference of the velocities that it has moved with since   m/s
@@ -24,7 +24,8 @@ it forgets what it has, by 1 / (1 + `FORGET` |omega| dt / 2). Without that the t
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles
-from wavetank.physics.pairs import add_kept, column, part_of, teams, turns
+from wavetank.physics.pairs import add_kept, column
+from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.solids.distance import lift, vec3
 
 STIFF = 5000.0  # largest eigenvalue from which on it is done: of what is less stiff, iterations come to all modes
@@ -33,15 +34,15 @@ FORGET = 5.0
 #: sum D (m . dv)^2 / (h^2 omega^2 sum D m^2) in simple shear: the mean of (2 omega n_x n_y)^2 over directions is
 #: omega^2 / 2 in the plane and 4 omega^2 / 15 in space; sum D m^4 / (h^2 sum D m^2) is 3/10 and 4/10.
 SHEARED = {2: 0.15, 3: 8 / 75}
-#: Where the elements of a symmetric matrix of 2 x 2 and 3 x 3 stand whose upper triangle is kept row by row.
-PLACES = {2: ((0, 1), (1, 2)), 3: ((0, 1, 2), (1, 3, 4), (2, 4, 5))}
-MOMENTS = {2: 1, 3: 3}  # numbers in the first of the sums, the others come behind
-SIZE = {2: 1 + 3 + 1, 3: 3 + 6 + 1}
+
+
+# The sums of a particle are 1 (2-D) or 3 numbers, the upper triangle of a symmetric matrix row by row, and one number:
+# the element in row k and column n >= k of the matrix stands dim k - k (k + 1) / 2 + n places behind its first.
 
 
 @qd.func
-def add_spin(sums: qd.template(), r, damper, a, b, c: Coefficients, method: qd.template()):
-    """Add neighbour j to the sums."""
+def add_rotation(sums: qd.template(), r, damper, a, b, c: Coefficients, method: qd.template()):
+    """Add neighbour j to the sums that tell the rigid rotation."""
     dim = qd.static(r.n)
     dv, m = r, r
     along = 0.0
@@ -51,21 +52,21 @@ def add_spin(sums: qd.template(), r, damper, a, b, c: Coefficients, method: qd.t
         along += m[k] * dv[k]
     for k in qd.static(range(dim)):
         for n in qd.static(range(k, dim)):
-            sums[qd.static(MOMENTS[dim] + PLACES[dim][k][n])] += damper * m[k] * m[n]
-    sums[qd.static(SIZE[dim] - 1)] += damper * (along * c.inverse_h) ** 2
+            sums[qd.static((1 if dim == 2 else 3) + dim * k - k * (k + 1) // 2 + n)] += damper * m[k] * m[n]
+    sums[qd.static(4 if dim == 2 else 9)] += damper * (along * c.inverse_h) ** 2
     for axis in qd.static(range(2 if dim == 2 else 0, 3)):
         k, n = qd.static((axis + 1) % 3, (axis + 2) % 3)
         sums[qd.static(axis if dim == 3 else 0)] += damper * (m[k] * dv[n] - m[n] * dv[k])
 
 
 @qd.func
-def spin(sums, gate):
+def angular_velocity(sums, gate):
     """Return omega as far as the fluid turns as a whole, of a particle's sums; `gate` is RIGID / SHEARED."""
     omega = vec3(0.0, 0.0, 0.0)
-    dim = qd.static(2 if sums.n == SIZE[2] else 3)
+    dim = qd.static(2 if sums.n == 5 else 3)
     trace = 0.0
     for k in qd.static(range(dim)):
-        trace += sums[qd.static(MOMENTS[dim] + PLACES[dim][k][k])]
+        trace += sums[qd.static((1 if dim == 2 else 3) + dim * k - k * (k - 1) // 2)]
     if trace > 0.0:
         share = sums / trace
         if qd.static(dim == 2):
@@ -73,31 +74,31 @@ def spin(sums, gate):
         else:
             inertia = qd.Matrix.zero(qd.f32, 3, 3)
             for k in qd.static(range(3)):
-                for n in qd.static(range(3)):
-                    inertia[k, n] = -share[MOMENTS[3] + PLACES[3][k][n]]
+                for n in qd.static(range(k, 3)):
+                    inertia[k, n] = -share[qd.static(3 + 3 * k - k * (k + 1) // 2 + n)]
+                    inertia[n, k] = inertia[k, n]
                 inertia[k, k] += 1.0001  # neighbours on a line do not tell how it turns about itself
             omega = inertia.inverse() @ vec3(share[0], share[1], share[2])
-        strain = share[qd.static(SIZE[dim] - 1)] / qd.max(omega.norm_sqr(), 1e-20)
+        strain = share[qd.static(4 if dim == 2 else 9)] / qd.max(omega.norm_sqr(), 1e-20)
         omega *= qd.max(0.0, 1.0 - gate * strain)
     return omega
 
 
 @qd.kernel(fastcache=True)
-def turn_along(
+def rotate_guess(
     particles: Particles, velocities: qd.types.ndarray(), dampers: qd.types.ndarray(), grid: Grid, c: Coefficients,
-    count: qd.i32, gate: qd.f32, forget: qd.f32, lanes: qd.template(),
+    gate: qd.f32, forget: qd.f32, count: qd.i32,
 ):  # fmt: skip
     """Turn what viscosity did in the last step with the `velocities` that particles have moved with since."""
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            sums = qd.Matrix.zero(qd.f32, qd.static(SIZE[particles.v[team].n]), lanes)
-            add_kept(sums, add_spin, team, particles, velocities, dampers, grid, c, 0)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, qd.static(5 if particles.v[team].n == 2 else 10), grid.lanes)
+            add_kept(sums, add_rotation, team, particles, velocities, dampers, grid, c, 0)
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
                 turned = particles.viscous[i]
                 own = lift(turned)
                 a = vec3(own.x, own.y, own.z)
-                half = 0.5 * c.dt * spin(column(sums, i - team * lanes), gate)
+                half = 0.5 * c.dt * angular_velocity(column(sums, i - team * grid.lanes), gate)
                 a += 2.0 / (1.0 + half.norm_sqr()) * half.cross(a + half.cross(a))
                 for k in qd.static(range(turned.n)):
                     turned[k] = a[k] / (1.0 + forget * half.norm())

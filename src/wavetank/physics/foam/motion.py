@@ -24,10 +24,10 @@ Where we differ, and why:
 """
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import Air, Births, Coefficients, Diffuse, Grid, Particles
+from wavetank.device.state import Air, Births, Coefficients, Diffuse, Grid, Particles, bubble, foam, spray
 from wavetank.device.sums import sum_up
 from wavetank.physics.boundary import bodies_in_reach, flattened, stopped
-from wavetank.physics.neighbors import for_each_row_around, near_bits
+from wavetank.physics.neighbors import for_each_row_around, near_bits, row_block
 from wavetank.physics.predicted_positions import predicted
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec2, vec3
 
@@ -35,7 +35,7 @@ from wavetank.solids.distance import SolidSet, lift, signed_distance, vec2, vec3
 @qd.func
 def add_water(sums: qd.template(), point, begin, end, water: Particles, h):
     """Add the water particles of a row to (sum W, sum v W) with Poly6."""
-    block = qd.static(32 if point.n == 3 else 16)
+    block = qd.static(row_block(point.n))
     place = qd.Matrix.zero(qd.f32, point.n, 1)
     for k in qd.static(range(point.n)):
         place[k, 0] = point[k]
@@ -85,19 +85,19 @@ def water_at(point: qd.template(), free, water: Particles, grid: Grid, c: Coeffi
 
 @qd.func
 def kind_in(share):
-    """1 spray, 2 foam or 3 bubble, by the share of water around it."""
-    kind = 2
+    """Spray, foam or bubble, by the share of water around it."""
+    kind = foam()
     if share < 0.2:
-        kind = 1
+        kind = spray()
     elif share > 0.7:
-        kind = 3
+        kind = bubble()
     return kind
 
 
 @qd.kernel(fastcache=True)
 def move(
     packed: Diffuse, diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients,
-    a: Air, count: qd.i32, frame: qd.i32, shared: qd.template(),
+    a: Air, frame: qd.i32, count: qd.i32, shared: qd.template(),
 ) -> qd.i32:  # fmt: skip
     """Move everything by one frame, and copy those who live on to the front, in their order.
 
@@ -121,10 +121,10 @@ def move(
             kind = kind_in(here[0])
             for k in qd.static(range(x.n)):
                 medium[k] = here[1 + k]
-        if kind == 1:
+        if kind == spray():
             later = v * a.spray_keep + pull * a.spray_path
             target = x + v * a.spray_path + pull * a.spray_bend
-        elif looks and kind == 2:
+        elif looks and kind == foam():
             later = medium
             target = x + 0.5 * a.dt * (v + medium)
         elif looks:

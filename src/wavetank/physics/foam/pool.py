@@ -84,9 +84,9 @@ def pool_from(rows: dict[str, np.ndarray], born: int, capacity: int, dim: int, w
 
 
 @qd.kernel(fastcache=True)
-def bear(
+def append_births(
     diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients, a: Air,
-    count: qd.i32, old: qd.i32, born: qd.i32, frame: qd.i32,
+    frame: qd.i32, old: qd.i32, born: qd.i32, count: qd.i32,
 ):  # fmt: skip
     """Append the newborn behind the `old` ones, each around the way that its water particle came.
 

@@ -27,8 +27,9 @@ from wavetank.device.sums import sum_up
 from wavetank.physics.boundary import wall_density
 from wavetank.physics.density_constraint import add_density
 from wavetank.physics.foam.noise import stream, uniform
-from wavetank.physics.pairs import add_neighbors, column, part_of, teams, turns
+from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.predicted_positions import predicted
+from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.solids.distance import SolidSet
 
 
@@ -73,17 +74,17 @@ def outward_normal(i, sum, particles: Particles, solids: SolidSet, walls: Walls,
 @qd.func
 def find_normals(
     births: Births, team, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
-    count, method: qd.template(), lanes: qd.template(),
+    count, method: qd.template(),
 ):  # fmt: skip
     """Set the normals of the surface at a team, except where the water is too slow to matter for a crest."""
-    first = team * lanes
-    last = qd.min(first + lanes, count)
+    first = team * grid.lanes
+    last = qd.min(first + grid.lanes, count)
     dim = qd.static(particles.x[team].n)
     slow = 0.01 * a.speed * a.speed
     fastest = 0.0
     for i in range(first, last):
         fastest = qd.max(fastest, particles.v[i].norm_sqr())
-    sums = qd.Matrix.zero(qd.f32, dim + 2, lanes)
+    sums = qd.Matrix.zero(qd.f32, dim + 2, grid.lanes)
     if fastest > slow:
         add_neighbors(sums, add_density, team, particles, particles.v, grid, c, method)
     for i in range(first, last):
@@ -113,17 +114,16 @@ def add_potentials(
     method: qd.template(),
 ):  # fmt: skip
     """Births of a team's particles where one of the most agitated makes one: Phi_k (Phi_ta + 2 Phi_wc), Eq. 8."""
-    lanes = qd.static(sums.m)
-    first = team * lanes
-    last = qd.min(first + lanes, count)
+    first = team * grid.lanes
+    last = qd.min(first + grid.lanes, count)
     agitated = False
     crested = False
     for i in range(first, last):
         if energy(i, births, particles, a) > 0.0:
             agitated = True
             crested = crested or is_crest(i, births, particles)
-    trapped = qd.Matrix.zero(qd.f32, 1, lanes)
-    crest = qd.Matrix.zero(qd.f32, 1, lanes)
+    trapped = qd.Matrix.zero(qd.f32, 1, grid.lanes)
+    crest = qd.Matrix.zero(qd.f32, 1, grid.lanes)
     if agitated:
         add_neighbors(trapped, add_approach, team, particles, particles.v, grid, c, method)
     if crested:
@@ -140,23 +140,21 @@ def add_potentials(
 @qd.kernel(fastcache=True)
 def count_births(
     births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
-    count: qd.i32, room: qd.f32, frame: qd.i32, method: qd.template(), lanes: qd.template(), shared: qd.template(),
+    room: qd.f32, frame: qd.i32, count: qd.i32, method: qd.template(), shared: qd.template(),
 ) -> qd.i32:  # fmt: skip
     """Draw how many each water particle bears in an interval, of which the share `room` is wanted; return their sum.
 
     Threads share the sums where `shared`.
     """
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            find_normals(births, team, particles, grid, solids, walls, c, a, count, method, lanes)
-    for turn in range(turns(teams(count, lanes), grid.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), grid.parts, lanes)
-        for team in range(part[0], part[1]):
-            potentials = qd.Matrix.zero(qd.f32, 1, lanes)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            find_normals(births, team, particles, grid, solids, walls, c, a, count, method)
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            potentials = qd.Matrix.zero(qd.f32, 1, grid.lanes)
             add_potentials(potentials, team, births, particles, grid, c, a, count, method)
-            for i in range(team * lanes, qd.min(team * lanes + lanes, count)):
-                expected = room * a.made * potentials[0, i - team * lanes]
+            for i in range(team * grid.lanes, end_of(team, grid, count)):
+                expected = room * a.made * potentials[0, i - team * grid.lanes]
                 births.first[i] = qd.cast(expected + uniform(stream(a.seed, frame, particles.id[i]), 0), qd.i32)
     sum_up(births.first, births.blocks, count, shared)
     return births.first[count]

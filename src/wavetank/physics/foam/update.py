@@ -8,12 +8,13 @@ from wavetank.device.compiler import current_backend
 from wavetank.device.state import Air, remembered
 from wavetank.foundation.materials import Material
 from wavetank.foundation.params import SURFACE_TENSION, Parameters
+from wavetank.physics.coefficients import coefficients, method_number
 from wavetank.physics.foam.motion import move
-from wavetank.physics.foam.pool import bear, new_pool
+from wavetank.physics.foam.pool import append_births, new_pool
 from wavetank.physics.foam.potentials import count_births
 from wavetank.physics.smoothing import sigma
-from wavetank.physics.step import World, coefficients, method_number
 from wavetank.physics.time_step import largest_speed
+from wavetank.physics.world import World
 
 RATE = 24.0  # births of a most agitated water particle in the time L / U, at foam = 1
 SPRAY_DRAG = 0.25  # U / L: the terminal speed of spray is U / 0.25
@@ -26,7 +27,7 @@ MOST_FRAMES = 2  # in an interval: births come in beats, which nobody shall see
 LEAST_ENERGY = 0.0499
 
 
-def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> None:
+def update_foam(world: World, params: Parameters, dt: float, frame: int) -> None:
     """Move what there is by `dt` [s] and add what the water makes in this frame."""
     is_empty = world.pool is None or not world.pool.count
     if is_empty and not (params.foam and world.count):
@@ -42,17 +43,15 @@ def update_diffuse(world: World, params: Parameters, dt: float, frame: int) -> N
     shared = int(current_backend() != "cpu")
 
     if pool.count:
-        kept = move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, pool.count, frame, shared)
+        kept = move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, frame, pool.count, shared)
         pool.now, pool.spare, pool.count = pool.spare, pool.now, int(kept)
     if makes:
         # A fuller pool takes less, evenly everywhere, rather than all of what comes first.
         room = min(1.0, 2.0 * (1.0 - pool.count / pool.capacity))
         pool.set_reluctance(reluctance(world.materials, params))
-        number = count_births(
-            pool.births, water, grid, solids, world.walls, c, a, count, room, frame, method, grid.lanes, shared
-        )
+        number = count_births(pool.births, water, grid, solids, world.walls, c, a, room, frame, count, method, shared)
         if number:
-            bear(pool.now, pool.births, water, grid, solids, c, a, count, pool.count, pool.born, frame)
+            append_births(pool.now, pool.births, water, grid, solids, c, a, frame, pool.count, pool.born, count)
         pool.count, pool.born = min(pool.count + int(number), pool.capacity), (pool.born + int(number)) % 2**31
 
 
@@ -62,10 +61,8 @@ def load_kernels(world: World, params: Parameters) -> None:
         return
     pool, c, a = new_pool(params.dim, 1, 1), coefficients(params, params.frame_time), air(params, 1, params.frame_time)
     water, grid, solids, shared = world.particles, world.grid, world.solids, int(current_backend() != "cpu")
-    count_births(
-        pool.births, water, grid, solids, world.walls, c, a, 0, 0.0, 0, method_number(params), grid.lanes, shared
-    )
-    bear(pool.now, pool.births, water, grid, solids, c, a, 0, 0, 0, 0)
+    count_births(pool.births, water, grid, solids, world.walls, c, a, 0.0, 0, 0, method_number(params), shared)
+    append_births(pool.now, pool.births, water, grid, solids, c, a, 0, 0, 0, 0)
     move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, 0, 0, shared)
 
 

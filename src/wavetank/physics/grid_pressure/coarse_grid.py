@@ -7,6 +7,7 @@ node alone: that is what particle-in-cell methods do (Harlow 1964).
 
 import dataclasses
 import math
+from typing import Final
 
 from wavetank.device.compiler import LANES, lanes, qd, threads, worth_sharing
 from wavetank.device.state import CoarseGrid, integers, scalars
@@ -101,7 +102,9 @@ def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
     kinds = {field.name: field.type for field in dataclasses.fields(CoarseGrid)}
     parts = sums_of(nodes)
     sums = {"sums": integers(parts * nodes), "mass_sums": integers(parts * nodes)}
-    fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in (qd.i32, qd.f32) and name not in sums}
+    numbers = (qd.i32, qd.f32, Final[int])
+    fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in numbers and name not in sums}
     return CoarseGrid(
         **sums, **fields, nx=nx, ny=ny, nz=nz, pieces=-(-nx // piece_width()), dx=dx, dy=dy, dz=dz, parts=parts,
+        alone=int(parts > 1), width=piece_width(),
     )  # fmt: skip

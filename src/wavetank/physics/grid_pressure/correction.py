@@ -12,7 +12,7 @@ lambda <= 0, because water pushes and does not pull.
 Pressure from a grid, details from the particles: Zhu and Bridson 2005 (10.1145/1073204.1073298) in FLIP, Cornelis et
 al. 2014 (10.1111/cgf.12324) for SPH. Where we differ: the right side is the error of the particles' own densities, so
 that volume does not drift, and it is the positions that are moved. The sums are of whole numbers, so that runs repeat
-bit for bit. What was tried, and what it gives: docs/method.md.
+bit for bit. What was tried, and what it gives: docs/notebook/grid-pressure.md.
 
 In time. A correction at the end of a step is implicit Euler, which damps waves by half of omega^2 dt. Each particle
 therefore carries what the grid accelerated it by, `a`, and a share w of it acts in the next prediction;
@@ -36,24 +36,57 @@ cells around are less than `FULL`, the rows have gaps that the water around may 
 nothing; of two cells in a row the mean counts, as a single one of four or eight particles is never quite even.
 """
 
+import dataclasses
+
 from wavetank.device.compiler import qd
-from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls
+from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls, remembered
+from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
-from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, in_cells, nearest, piece_width, tents
+from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, in_cells, nearest, tents
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
-from wavetank.physics.pairs import column, part_of, teams, turns
+from wavetank.physics.mixture import Blend
+from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predict_at, predicted
+from wavetank.physics.smoothing import rest_lattice
+from wavetank.physics.teams import (
+    end_of,
+    end_of_part,
+    end_team,
+    first_of_part,
+    first_team,
+    part_of,
+    teams,
+    turns,
+    turns_over,
+)  # fmt: skip
+from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, signed_distance, to_local, vec3, vec4
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 LEAST_OPEN = 0.1  # a cell that is less open is solid
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 REACH = 0.2  # of the support: the longest correction
-DAMPING = 0.44  # of a frame: the length of a step that damps as much, docs/method.md
+DAMPING = 0.44  # of a frame: the length of a step that damps as much, docs/notebook/grid-pressure.md
 LARGEST_CARRIED = 1.2  # of gravity
-MISSING = 0.18  # of a wall's answer, over what it gives; 1/3 would be all, see docs/method.md
+MISSING = 0.18  # of a wall's answer, over what it gives; 1/3 would be all, see docs/notebook/grid-pressure.md
 FULL = 0.96  # fill that cells without gaps have at least, also where few rows of particles do not match them
 GAP_SHARE = 4.0  # by which errors are less, of what lacks there
+
+
+@dataclasses.dataclass(frozen=True)
+class Errors:
+    """The numbers of `gather`, which are the same in every step of a world."""
+
+    unit: qd.f32  # what a whole number in the sums is the inverse of
+    volume: qd.f32  # of a particle, over that of a cell and the unit
+    scale: qd.f32  # 1/m^2, the same over the stiffness M
+    inner_from: qd.f32  # the fill from which a particle counts
+    inner_to: qd.f32  # and with which it counts in full
+    missing: qd.f32  # share by which the answer of solids is increased
+    full: qd.f32  # fill of cells without gaps
+    gap_share: qd.f32  # by which errors are less, of what lacks there
+    least_open: qd.f32  # share of a cell
+    least_theta: qd.f32  # of an edge
 
 
 def carried(dt: float, frame_time: float) -> float:
@@ -72,11 +105,18 @@ def add_whole(sums: qd.template(), at, amount, alone: qd.template()):
 
 
 @qd.func
+def parts_of(grid: CoarseGrid, cells: Grid):
+    """Parts in which threads share the particles."""
+    return grid.parts if qd.static(grid.alone) else cells.parts
+
+
+@qd.func
 def add_fill(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, team, part, unit, count, mixed: qd.template(),
-    lanes: qd.template(), alone: qd.template(),
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, team, part, unit, count,
+    mixed: qd.template(),
 ):  # fmt: skip
     """Add the tents of a team's particles to the sums of a `part`, and those over their weights where `mixed`."""
+    lanes = qd.static(cells.lanes)
     first = team * lanes
     dim = qd.static(particles.x[first].n)
     at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
@@ -94,9 +134,9 @@ def add_fill(
                 masses[k, lane] = qd.cast(qd.round(w / scratch.weight[first + lane]), qd.i32)
     for lane in range(qd.min(lanes, count - first)):
         for k in qd.static(range(2**dim)):
-            add_whole(grid.sums, at[k, lane], amounts[k, lane], alone)
+            add_whole(grid.sums, at[k, lane], amounts[k, lane], grid.alone)
             if qd.static(mixed):
-                add_whole(grid.mass_sums, at[k, lane], masses[k, lane], alone)
+                add_whole(grid.mass_sums, at[k, lane], masses[k, lane], grid.alone)
 
 
 @qd.func
@@ -125,11 +165,11 @@ def approached(x, p, near, solids: SolidSet, walls: Walls, c: Coefficients, sear
 
 @qd.func
 def add_errors(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, team,
-    part, unit, inner_from, inner_to, missing, gap_share, count, searched: qd.template(), lanes: qd.template(),
-    alone: qd.template(),
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
+    e: Errors, cells: Grid, team, part, count, searched: qd.template(),
 ):  # fmt: skip
     """Add the tents of a team's particles, if inside of the water, times their errors (Eq. 2) to a `part`'s sums."""
+    lanes = qd.static(cells.lanes)
     first = team * lanes
     dim = qd.static(particles.x[first].n)
     at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
@@ -139,7 +179,7 @@ def add_errors(
         near = particles.near[i]
         if near != 0:
             x = lift(particles.x[i])
-            added[0, i - first] = missing * approached(
+            added[0, i - first] = e.missing * approached(
                 x, lift(predicted(particles, i)), near, solids, walls, c, searched
             )
     for lane in range(lanes):
@@ -149,16 +189,16 @@ def add_errors(
         filled = 0.0
         for k in qd.static(range(2**dim)):
             filled += weights[k] * grid.fill[nodes[k]]
-        inside = qd.min(qd.max((filled - inner_from) / (inner_to - inner_from), 0.0), 1.0)
+        inside = qd.min(qd.max((filled - e.inner_from) / (e.inner_to - e.inner_from), 0.0), 1.0)
         error = scratch.rho[first + lane] * scratch.weight[first + lane] - 1.0
-        error += added[0, lane] - gap_share * grid.gaps[nearest(grid, qd.floor(s + 0.5, qd.i32))]
-        error = unit * inside * qd.min(qd.max(error, -1.0), 1.0)
+        error += added[0, lane] - e.gap_share * grid.gaps[nearest(grid, qd.floor(s + 0.5, qd.i32))]
+        error = e.unit * inside * qd.min(qd.max(error, -1.0), 1.0)
         for k in qd.static(range(2**dim)):
             at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
             amounts[k, lane] = qd.cast(qd.round(error * weights[k]), qd.i32)
     for lane in range(qd.min(lanes, count - first)):
         for k in qd.static(range(2**dim)):
-            add_whole(grid.sums, at[k, lane], amounts[k, lane], alone)
+            add_whole(grid.sums, at[k, lane], amounts[k, lane], grid.alone)
 
 
 @qd.func
@@ -222,51 +262,45 @@ def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: 
 
 @qd.kernel(fastcache=True)
 def gather(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
-    unit: qd.f32, volume: qd.f32, scale: qd.f32, inner_from: qd.f32, inner_to: qd.f32, missing: qd.f32,
-    full: qd.f32, gap_share: qd.f32, least_open: qd.f32, least_theta: qd.f32, count: qd.i32, parts: qd.i32,
-    searched: qd.template(), mixed: qd.template(), alone: qd.template(), few: qd.template(), lanes: qd.template(),
-    width: qd.template(),
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, solids: SolidSet, walls: Walls,
+    c: Coefficients, e: Errors, count: qd.i32, searched: qd.template(), mixed: qd.template(), few: qd.template(),
 ):  # fmt: skip
     """Sum the tents of all particles at the nodes, find gaps, sum density errors (Eq. 2), and set up the equation.
 
-    The sums are 0 before. `volume` is that of a particle over that of a cell and over the `unit`, `scale` the same over
-    the stiffness M. What solids answer to the way of a particle is increased by the share `missing`; there are only the
-    walls of the tank unless they are `searched`. Errors are less by `gap_share` times what cells lack of being `full`.
-    Where fluids are `mixed`, their densities are averaged.
+    The sums are 0 before. There are only the walls of the tank unless solids are `searched`. Where fluids are `mixed`,
+    their densities are averaged.
 
-    Threads share the particles in `parts`. Where these are `alone`, each has sums of its own and waits for no other.
+    Threads share the particles in parts. Where these are alone, each has sums of its own and waits for no other.
     Where nodes are `few`, one thread is done with them before others have started.
     """
-    for turn in range(turns(teams(count, lanes), parts, lanes)):
-        part = part_of(turn, teams(count, lanes), parts, lanes)
-        for team in range(part[0], part[1]):
-            add_fill(grid, particles, scratch, team, alone * (turn >> 9), unit, count, mixed, lanes, alone)
+    for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
+        begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
+        for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
+            add_fill(grid, particles, scratch, cells, team, grid.alone * part_of(turn), e.unit, count, mixed)
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.fill[n] = volume * total / qd.max(grid.room[n], least_open)
+        grid.fill[n] = e.volume * total / qd.max(grid.room[n], e.least_open)
         grid.density[n] = 1.0
         if qd.static(mixed):
             mass = taken(grid.mass_sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
             grid.density[n] = qd.max(mass, 1) / qd.cast(qd.max(total, 1), qd.f32)
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
-        grid.gaps[n] = gaps_at(grid, n, full)
-    for turn in range(turns(teams(count, lanes), parts, lanes)):
-        part = part_of(turn, teams(count, lanes), parts, lanes)
-        for team in range(part[0], part[1]):
+        grid.gaps[n] = gaps_at(grid, n, e.full)
+    for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
+        begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
+        for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
             add_errors(
-                grid, particles, scratch, solids, walls, c, team, alone * (turn >> 9), unit, inner_from, inner_to,
-                missing, gap_share, count, searched, lanes, alone,
-            )  # fmt: skip
+                grid, particles, scratch, solids, walls, c, e, cells, team, grid.alone * part_of(turn), count, searched
+            )
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.rhs[n] = scale * total / qd.max(grid.room[n], least_open)
+        grid.rhs[n] = e.scale * total / qd.max(grid.room[n], e.least_open)
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
-        couple_nodes(grid, piece, least_theta, width)
+        couple_nodes(grid, piece, e.least_theta)
 
 
 @qd.func
@@ -296,7 +330,7 @@ def slope_along(grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), 
 @qd.kernel(fastcache=True)
 def move_particles(
     grid: CoarseGrid, particles: Particles, cells: Grid, solids: SolidSet, c: Coefficients, stiffness: qd.f32,
-    reach: qd.f32, count: qd.i32, few: qd.template(), lanes: qd.template(),
+    reach: qd.f32, count: qd.i32, few: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank, and carry it on.
 
@@ -308,19 +342,18 @@ def move_particles(
         grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
         grid.slope_y[n] = slope_across(grid.wy[n], grid.dy, grid.lam[n + grid.nx] - lam)
         grid.slope_z[n] = slope_across(grid.wz[n], grid.dz, grid.lam[n + grid.nx * grid.ny] - lam)
-    for turn in range(turns(teams(count, lanes), cells.parts, lanes)):
-        part = part_of(turn, teams(count, lanes), cells.parts, lanes)
-        for team in range(part[0], part[1]):
-            first = team * lanes
+    for turn in range(turns(cells, count)):
+        for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
+            first = team * cells.lanes
             dim = qd.static(particles.x[first].n)
-            slopes = qd.Matrix.zero(qd.f32, dim, lanes)
-            for lane in range(lanes):
+            slopes = qd.Matrix.zero(qd.f32, dim, cells.lanes)
+            for lane in range(cells.lanes):
                 s = in_cells(grid, predicted(particles, first + lane))
                 slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, dim)
                 slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, dim)
                 if qd.static(dim == 3):
                     slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, dim)
-            for i in range(first, qd.min(first + lanes, count)):
+            for i in range(first, end_of(team, cells, count)):
                 p = predicted(particles, i)
                 dp = column(slopes, i - first) * stiffness
                 dp *= qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
@@ -333,25 +366,31 @@ def move_particles(
                 predict_at(particles, i, p)
 
 
-def correct_pressure(
-    levels: list[CoarseGrid], particles: Particles, cells: Grid, scratch: Scratch, solids: SolidSet, walls: Walls,
-    c: Coefficients, stiffness: float, volume: float, count: int, share: float, *, searched: bool, mixed: bool,
-    moved: bool,
-) -> None:  # fmt: skip
-    """Move the predicted positions of `particles` so that the `share` of the mean errors of their densities vanishes.
+def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
+    """Move the predicted positions so that the share `grid_pressure` of the mean errors of densities vanishes.
 
-    `scratch.rho` holds the densities over that of the heaviest fluid there, `volume` [m^dim] is that of a particle.
-    Unless solids have `moved`, the room that they leave is what it was.
+    `scratch.rho` holds the densities over that of the heaviest fluid there. Unless solids have moved, the room that
+    they leave is what it was.
     """
-    finest = levels[0]
-    if moved:
-        find_room(finest, solids, LEAST_OPEN, int(searched))
-    alone, few = finest.parts > 1, int(not is_shared(finest))
-    scale = volume / (finest.dx * finest.dy * finest.dz) / UNIT
+    finest, cells, count, searched = world.levels[0], world.grid, world.count, int(world.has_solids)
+    if world.room_version != world.solids_version:
+        find_room(finest, world.solids, LEAST_OPEN, searched)
+        world.room_version = world.solids_version
+    stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
+    few = int(not is_shared(finest))
     gather(
-        finest, particles, scratch, solids, walls, c, UNIT, scale, share * scale / stiffness, *INNER, MISSING,
-        FULL, GAP_SHARE, LEAST_OPEN, LEAST_THETA, count, finest.parts if alone else cells.parts, int(searched),
-        int(mixed), int(alone), few, cells.lanes, piece_width(),
+        finest, world.particles, world.scratch, cells, world.solids, world.walls, c, errors(finest, params, stiffness),
+        count, searched, kinds.mixed, few,
     )  # fmt: skip
-    solve_levels(levels)
-    move_particles(finest, particles, cells, solids, c, stiffness, REACH * c.h, count, few, cells.lanes)
+    solve_levels(world.levels)
+    move_particles(finest, world.particles, cells, world.solids, c, stiffness, REACH * c.h, count, few)
+
+
+def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
+    """Return the numbers of `gather`."""
+    volume = params.spacing**params.dim / (grid.dx * grid.dy * grid.dz) / UNIT
+    return remembered(Errors(
+        unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness, inner_from=INNER[0],
+        inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN,
+        least_theta=LEAST_THETA,
+    ))  # fmt: skip

@@ -3,7 +3,7 @@
 At the free surface lambda is 0, at the place between two nodes where the filling is one half (the ghost fluid method,
 Gibou et al. 2002, 10.1006/jcph.2001.6977), and nothing flows into solids. The solution on a grid starts from that of
 the next coarser one, so that a few sweeps of projected over-relaxation are enough on each. It does not start from the
-time step before: pressures that are carried over make water pulse (docs/method.md).
+time step before: pressures that are carried over make water pulse (docs/notebook/solver.md).
 
     code    symbol     meaning                                                      unit
     fill    f          water in the tent of a node, over the room that it has       1
@@ -17,13 +17,39 @@ import math
 
 from wavetank.device.compiler import current_backend, qd, worth_sharing
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import coordinates, piece_width
+from wavetank.physics.grid_pressure.coarse_grid import coordinates
 
 SWEEPS, MOST_SWEEPS = 8, 200  # of a level, and of the coarsest
 OVER_RELAXATION = 1.5
 LEAST_THETA = 0.1
 BLOCK_NODES = 8192  # at most, of a level that one block of a graphics processor sees to
-ZERO, FROM_COARSER, GO_ON = 0, 1, 2  # where a level starts
+
+
+@qd.func
+def start_at_zero():
+    """A level starts at 0."""
+    return 0
+
+
+@qd.func
+def start_from_coarser():
+    """A level starts at what the coarser one has found."""
+    return 1
+
+
+@qd.func
+def start_where_it_was():
+    """A level goes on."""
+    return 2
+
+
+ZERO, FROM_COARSER, GO_ON = (start.fn() for start in (start_at_zero, start_from_coarser, start_where_it_was))
+
+
+@qd.func
+def block_threads():
+    """Threads of a block of a graphics processor that see to a level."""
+    return 512
 
 
 @qd.func
@@ -44,12 +70,12 @@ def coupling(grid: CoarseGrid, n, m, edge, least_theta):
 
 
 @qd.func
-def couple_nodes(grid: CoarseGrid, piece, least_theta, width: qd.template()):
+def couple_nodes(grid: CoarseGrid, piece, least_theta):
     """Set the couplings of `width` nodes of a row with the next ones along x, y and z, and what inverts their equation.
 
     The rim of the arrays, where there is no room, stands for what is beyond the tank.
     """
-    first = piece % grid.pieces * width
+    first = piece % grid.pieces * grid.width
     row = piece // grid.pieces
     y = row % grid.ny
     z = row // grid.ny
@@ -58,8 +84,8 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta, width: qd.template()):
     before_y = begin - grid.nx if y > 0 else rim
     after_z = begin + layer if z + 1 < grid.nz else rim
     before_z = begin - layer if z > 0 else rim
-    found = qd.Matrix.zero(qd.f32, 4, width)
-    for lane in range(width):
+    found = qd.Matrix.zero(qd.f32, 4, grid.width)
+    for lane in range(grid.width):
         x = first + lane
         n = begin + x
         wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, rim), grid.dx, least_theta)
@@ -74,7 +100,7 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta, width: qd.template()):
         found[1, lane] = wy
         found[2, lane] = wz
         found[3, lane] = qd.select(is_water, 1.0 / qd.max(diagonal, 1e-12), 0.0)
-    for lane in range(qd.min(width, grid.nx - first)):
+    for lane in range(qd.min(grid.width, grid.nx - first)):
         n = begin + first + lane
         grid.wx[n] = found[0, lane]
         grid.wy[n] = found[1, lane]
@@ -93,9 +119,9 @@ def start_nodes(grid: CoarseGrid, coarser: CoarseGrid, row, first, last, start):
         n = grid.nx * row + x
         lam = 0.0
         if grid.inverse[n] > 0.0:
-            if start == 2:  # GO_ON
+            if start == start_where_it_was():
                 lam = grid.lam[n]
-            if start == 1:  # FROM_COARSER
+            if start == start_from_coarser():
                 lam = coarser.lam[below + (x >> halved)]
         grid.lam[n] = lam
 
@@ -123,25 +149,25 @@ def relax_nodes(grid: CoarseGrid, row, first, last, over_relaxation):
 
 
 @qd.func
-def start_piece(grid: CoarseGrid, coarser: CoarseGrid, piece, start, width: qd.template()):
+def start_piece(grid: CoarseGrid, coarser: CoarseGrid, piece, start):
     """Set lambda of `width` nodes of a row to what `start` says."""
-    first = piece % grid.pieces * width
-    start_nodes(grid, coarser, piece // grid.pieces, first, qd.min(first + width, grid.nx), start)
+    first = piece % grid.pieces * grid.width
+    start_nodes(grid, coarser, piece // grid.pieces, first, qd.min(first + grid.width, grid.nx), start)
 
 
 @qd.func
-def relax_piece(grid: CoarseGrid, piece, colour, over_relaxation, width: qd.template()):
+def relax_piece(grid: CoarseGrid, piece, colour, over_relaxation):
     """Relax those of `width` nodes of a row that have a `colour`."""
     row = piece // grid.pieces
-    first = piece % grid.pieces * width
+    first = piece % grid.pieces * grid.width
     x = first + (row % grid.ny + row // grid.ny + colour) % 2
-    relax_nodes(grid, row, x, qd.min(first + width, grid.nx), over_relaxation)
+    relax_nodes(grid, row, x, qd.min(first + grid.width, grid.nx), over_relaxation)
 
 
 @qd.kernel(fastcache=True)
 def solve(
     grid: CoarseGrid, coarser: CoarseGrid, start: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32,
-    shared: qd.template(), width: qd.template(),
+    shared: qd.template(),
 ):  # fmt: skip
     """Relax the equation of a level, whose couplings are set, in sweeps of two colours, starting as `start` says.
 
@@ -149,10 +175,10 @@ def solve(
     """
     if qd.static(shared):
         for piece in range(grid.pieces * grid.ny * grid.nz):
-            start_piece(grid, coarser, piece, start, width)
+            start_piece(grid, coarser, piece, start)
         for colour in qd.static(range(2 * shared)):
             for piece in range(grid.pieces * grid.ny * grid.nz):
-                relax_piece(grid, piece, colour, over_relaxation, width)
+                relax_piece(grid, piece, colour, over_relaxation)
     else:
         # A grid of some thousand nodes is done before other threads have started.
         qd.loop_config(serialize=True)
@@ -180,25 +206,25 @@ def wait_for_block(fenced: qd.template()):
 @qd.kernel(fastcache=True)
 def solve_in_block(
     grid: CoarseGrid, coarser: CoarseGrid, start: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32,
-    fenced: qd.template(), width: qd.template(),
+    fenced: qd.template(),
 ):  # fmt: skip
     """Do what `solve` does, in one launch on a graphics processor: its threads wait for each other after each colour.
 
     Only those of a block can, so that this is for levels of some thousand nodes.
     """
-    qd.loop_config(block_dim=512)
-    for thread in range(512):
+    qd.loop_config(block_dim=block_threads())
+    for thread in range(block_threads()):
         pieces = grid.pieces * grid.ny * grid.nz
         piece = thread
         while piece < pieces:
-            start_piece(grid, coarser, piece, start, width)
-            piece += 512
+            start_piece(grid, coarser, piece, start)
+            piece += block_threads()
         wait_for_block(fenced)
         for colour in range(2 * sweeps):
             piece = thread
             while piece < pieces:
-                relax_piece(grid, piece, colour, over_relaxation, width)
-                piece += 512
+                relax_piece(grid, piece, colour, over_relaxation)
+                piece += block_threads()
             wait_for_block(fenced)
 
 
@@ -225,32 +251,30 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
 
 
 @qd.kernel(fastcache=True)
-def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: qd.template(), width: qd.template()):
+def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: qd.template()):
     """Set up the equation of a coarser level; `shared` by all threads, or done by one."""
     qd.loop_config(serialize=not shared)
     for n in range(coarse.nx * coarse.ny * coarse.nz):
         average_node(coarse, fine, n)
     qd.loop_config(serialize=not shared)
     for piece in range(coarse.pieces * coarse.ny * coarse.nz):
-        couple_nodes(coarse, piece, least_theta, width)
+        couple_nodes(coarse, piece, least_theta)
 
 
 @qd.kernel(fastcache=True)
-def restrict_in_block(
-    coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, fenced: qd.template(), width: qd.template()
-):
+def restrict_in_block(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, fenced: qd.template()):
     """Do what `restrict` does, in one launch of one block on a graphics processor."""
-    qd.loop_config(block_dim=512)
-    for thread in range(512):
+    qd.loop_config(block_dim=block_threads())
+    for thread in range(block_threads()):
         n = thread
         while n < coarse.nx * coarse.ny * coarse.nz:
             average_node(coarse, fine, n)
-            n += 512
+            n += block_threads()
         wait_for_block(fenced)
         piece = thread
         while piece < coarse.pieces * coarse.ny * coarse.nz:
-            couple_nodes(coarse, piece, least_theta, width)
-            piece += 512
+            couple_nodes(coarse, piece, least_theta)
+            piece += block_threads()
 
 
 def is_shared(level: CoarseGrid) -> bool:
@@ -283,12 +307,12 @@ def coarsest_relaxation(level: CoarseGrid) -> tuple[int, float]:
 
 def solve_levels(levels: list[CoarseGrid]) -> None:
     """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set."""
-    fenced, width = int(current_backend() != "cuda"), piece_width()
+    fenced = int(current_backend() != "cuda")
     for fine, coarse in itertools.pairwise(levels):
         if in_block(coarse):
-            restrict_in_block(coarse, fine, LEAST_THETA, fenced, width)
+            restrict_in_block(coarse, fine, LEAST_THETA, fenced)
         else:
-            restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)), width)
+            restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)))
     coarsest = coarser = levels[-1]
     for level in reversed(levels):
         start, sweeps, over_relaxation = FROM_COARSER, SWEEPS, OVER_RELAXATION
@@ -296,11 +320,11 @@ def solve_levels(levels: list[CoarseGrid]) -> None:
             start = ZERO
             sweeps, over_relaxation = coarsest_relaxation(level)
         if in_block(level):
-            solve_in_block(level, coarser, start, sweeps, over_relaxation, fenced, width)
+            solve_in_block(level, coarser, start, sweeps, over_relaxation, fenced)
         elif is_shared(level):
             for _ in range(sweeps // SWEEPS):
-                solve(level, coarser, start, sweeps, over_relaxation, SWEEPS, width)
+                solve(level, coarser, start, sweeps, over_relaxation, SWEEPS)
                 start = GO_ON
         else:
-            solve(level, coarser, start, sweeps, over_relaxation, 0, width)
+            solve(level, coarser, start, sweeps, over_relaxation, 0)
         coarser = level

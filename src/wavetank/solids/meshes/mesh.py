@@ -12,9 +12,9 @@ from typing_extensions import override
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import METRES, Length, Number
+from wavetank.solids.distance import GRIDS
 from wavetank.solids.meshes.files import bundled_models, read_file, read_model
 from wavetank.solids.meshes.grid import DistanceGrid
-from wavetank.solids.meshes.on_device import GRIDS
 from wavetank.solids.meshes.store import grid_of
 from wavetank.solids.meshes.triangles import Triangles
 from wavetank.solids.solid import Node, Solid, point_in_space

@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
+from wavetank.solids.distance import GRIDS
 from wavetank.solids.meshes.grid import DistanceGrid
 from wavetank.solids.solid import Node
-
-GRIDS = 1 << 16  # in a program, from this code on come grids, numbered as in `SolidSet.grid`
 
 
 def put_grids(nodes: Sequence[Node], spacing: float) -> tuple[list[int], Any, Any]:

@@ -1,1 +1,1 @@
-"""One file per pass, named after what it adds to the picture; `renderer.PASSES` is their order."""
+"""One file per pass, named after what it adds to the picture; `views.VIEWS` has their order. No pass knows another."""

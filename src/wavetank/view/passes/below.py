@@ -2,7 +2,7 @@
 
 Light from the whole sky reaches an eye under water through a circle of 48.6 degrees around the zenith (Snell's window,
 R. W. Wood 1911); beyond it the surface reflects all that is below. The surface is the one that the sun sees
-(`sunlight.py`): a ray is followed in even steps through the sun's map of depths until it comes out of the water, and
+(`SunlitWater`): a ray is followed in even steps through the sun's map of depths until it comes out of the water, and
 the place is then found by halving. What bulges beyond the sun's view is not known to the map.
 
     code      symbol   meaning                                                        unit
@@ -14,17 +14,18 @@ the place is then found by halving. What bulges beyond the sun's view is not kno
 """
 
 from wavetank.device.compiler import qd
-from wavetank.view.buffers import Buffers
+from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, view_ray
 from wavetank.view.look import Look
-from wavetank.view.passes.ellipsoids import walls
-from wavetank.view.passes.shade import smoothstep
-from wavetank.view.passes.solids import box_interval
-from wavetank.view.passes.surface import normal_of, rise_at
-from wavetank.view.passes.water import Optics, environment, optics_of, picture_at, under_water
+from wavetank.view.optics.fluid import Optics, dimmed, optics_of
+from wavetank.view.optics.maps import margins_inside, picture_at
+from wavetank.view.optics.normals import normal_of, rise_at
+from wavetank.view.optics.radiance import environment, glint, smoothstep
+from wavetank.view.optics.rays import Box, box_interval
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
-from wavetank.view.water_buffers import water_of
+from wavetank.view.water_buffers import Backdrop, SunlitWater, WaterSurface, water_of
+from wavetank.view.weights import under_water
 
 STEPS, HALVINGS = 64, 6
 
@@ -33,10 +34,10 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     """Draw the surface over what an eye in the water sees straight on; any other eye is left alone."""
     if not under_water(shot, buffers):
         return
-    water = water_of(buffers, shot)
+    water, pixels = water_of(buffers, shot), buffers.pixels
     look_up(
-        strips_of(buffers.depth), shot.lens, shot.water_sun, shot.look, optics_of(shot), *walls(shot), STEPS, HALVINGS,
-        water.sun_first, buffers.depth, water.behind, buffers.color, water.spare,
+        pixels, water.surface, water.sunlit, water.backdrop, strips_of(pixels.depth), shot.lens, shot.water_sun,
+        shot.look, optics_of(shot), shot.walls, STEPS, HALVINGS,
     )  # fmt: skip
 
 
@@ -77,46 +78,46 @@ def normal_above(sun: Lens, first: qd.template(), at, spacing):
 
 @qd.kernel(fastcache=True)
 def look_up(
-    strips: Strips, lens: Lens, sun: Lens, look: Look, optics: Optics, lower: vec3, upper: vec3, steps: qd.i32,
-    halvings: qd.i32, first: qd.types.ndarray(), depth: qd.types.ndarray(), behind: qd.types.ndarray(),
-    color: qd.types.ndarray(), seen: qd.types.ndarray(),
+    pixels: Pixels, surface: WaterSurface, sunlit: SunlitWater, backdrop: Backdrop, strips: Strips, lens: Lens,
+    sun: Lens, look: Look, optics: Optics, walls: Box, steps: qd.i32, halvings: qd.i32,
 ):  # fmt: skip
     """Shade every pixel whose ray leaves the water through its surface before it meets anything."""
     for task in range(strips.count):
-        row, begin, end = strip(strips, task, depth.shape[0], depth.shape[1])
+        row, begin, end = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
         for column in range(begin, end):
             ray = view_ray(lens, row, column)
             origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
             pace = direction.norm()
-            ends = box_interval(origin, direction, lower, upper)
-            last = qd.min(ends[1], qd.bit_cast(depth[row, column], qd.f32))
+            ends = box_interval(origin, direction, walls)
+            last = qd.min(ends[1], qd.bit_cast(pixels.depth[row, column], qd.f32))
             low, out, step = 0.0, -1.0, last / steps
             k = 1
             while k <= steps and out < 0.0:
-                if depth_below(sun, first, origin + (k * step) * direction) < 0.0:
+                if depth_below(sun, sunlit.depth, origin + (k * step) * direction) < 0.0:
                     low, out = (k - 1) * step, k * step
                 k += 1
             # Where it leaves through a pane the backdrop is right.
             if out > 0.0 and out < last - 1.5 * step:
                 for _ in range(halvings):
                     middle = 0.5 * (low + out)
-                    if depth_below(sun, first, origin + middle * direction) < 0.0:
+                    if depth_below(sun, sunlit.depth, origin + middle * direction) < 0.0:
                         out = middle
                     else:
                         low = middle
                 at, ahead = origin + out * direction, direction / pace
-                n = normal_above(sun, first, at, optics.spacing)
-                cosi = ahead.dot(n)
-                if cosi > 0.0:
-                    color[row, column] = through(lens, look, optics, at, ahead, n, cosi, out * pace, depth, behind)
-                    seen[row, column] = qd.bit_cast(out, qd.i32)
+                n = normal_above(sun, sunlit.depth, at, optics.spacing)
+                if ahead.dot(n) > 0.0:
+                    radiance = through(pixels.depth, backdrop, lens, look, optics, at, ahead, n)
+                    pixels.color[row, column] = dimmed(
+                        radiance, out * pace, optics.absorption, optics.scattering, optics.glow
+                    )
+                    surface.nearest[row, column] = qd.bit_cast(out, qd.i32)
 
 
 @qd.func
-def through(
-    lens: Lens, look: Look, optics: Optics, at, ahead, n, cosi, way, depth: qd.template(), behind: qd.template()
-):
-    """Radiance of the surface at `at`: what it lets in from above and mirrors from below, `way` [m] of water away."""
+def through(depth: qd.template(), backdrop: Backdrop, lens: Lens, look: Look, optics: Optics, at, ahead, n):
+    """Radiance of the surface at `at`: what it lets in from above and mirrors from below."""
+    cosi = ahead.dot(n)
     k = 1.0 - 1.7689 * (1.0 - cosi * cosi)
     mirror, above = 1.0, vec3(0.0, 0.0, 0.0)
     if k > 0.0:
@@ -126,8 +127,7 @@ def through(
         p = (cosi - 1.33 * cost) / (cosi + 1.33 * cost)
         mirror = 0.5 * (s * s + p * p)
         up = 1.33 * ahead + (cost - 1.33 * cosi) * n
-        above = environment(look, up)
-        above += qd.min(qd.max(up.dot(look.to_sun), 0.0), 1.0) ** 600 * look.sparkle * look.sun
+        above = environment(look, up) + glint(look, up.dot(look.to_sun))
     # What is mirrored comes from the floor or out of deep water.
     down = ahead - 2.0 * cosi * n
     below, more = optics.glow, 1e3
@@ -140,13 +140,10 @@ def through(
         )
         if c.z > lens.near:
             there = to_pixel(lens, c)
-            rows, columns = depth.shape[0], depth.shape[1]
-            inside = qd.min(there.x, columns - there.x, there.y, rows - there.y) / (0.12 * rows)
+            inside = margins_inside(depth, there, 0.12)
             if inside > 0.0:
                 z = qd.bit_cast(depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32)
                 if qd.abs(z - c.z) < 0.1 * c.z:
-                    shown += smoothstep(inside) * (picture_at(behind, there) - shown)
-        left = qd.exp(-more * optics.absorption)
-        below = shown * left + (1.0 - qd.exp(-more * optics.scattering)) * optics.glow
-    radiance = above + mirror * (below - above)
-    return radiance * qd.exp(-way * optics.absorption) + (1.0 - qd.exp(-way * optics.scattering)) * optics.glow
+                    shown += smoothstep(inside) * (picture_at(backdrop.behind, there) - shown)
+        below = dimmed(shown, more, optics.absorption, optics.scattering, optics.glow)
+    return above + mirror * (below - above)

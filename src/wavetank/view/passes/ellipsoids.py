@@ -18,21 +18,21 @@ Few neighbours fade to a ball, so that a drop is round. Walls are no surface: wh
 Particles deep inside are not drawn: cells whose neighbours are all well filled are left out.
 """
 
-from typing import Any
+import dataclasses
 
 from wavetank.device.compiler import qd
+from wavetank.device.state import remembered
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import vec3, vector
-from wavetank.view.passes import cells as sorting
-from wavetank.view.passes.cells import Cells
+from wavetank.view.cells import Cells, sort
+from wavetank.view.lens import vec3
+from wavetank.view.optics.panes import share_before_wall
+from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
-from wavetank.view.water_buffers import Ellipsoids, water_of
+from wavetank.view.water_buffers import REACH, Ellipsoids, water_of
 
-REACH = 2.2  # d
 BALL = 0.58  # d: radius of a lone particle, a little more than that of its volume
 LEAST = 0.36  # d: radius across a sheet
 WIDEST = {2: 1.9, 3: 1.15}  # d: radius in full water; a plane can afford smoother outlines
-OPEN = vector(-1e6, -1e6, -1e6), vector(1e6, 1e6, 1e6)  # m: corners of no tank
 BEYOND = 1.3  # d: how far what touches a pane reaches through it
 MIRRORED = 3.2  # d: how near a pane the surface has a mirror image behind it
 DEPTH_2D = 0.75  # d: half thickness of a 2-D world's water
@@ -41,36 +41,44 @@ DEPTH_2D = 0.75  # d: half thickness of a 2-D world's water
 FULL = {2: 1e9, 3: 0.93 * 16.9}
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Shape:
+    """Sizes of ellipsoids, on the device."""
+
+    spacing: qd.f32  # m
+    reach: qd.f32  # m
+    least: qd.f32  # m: radius across a sheet
+    growth: qd.f32  # m: from there to the radius in full water
+    ball: qd.f32  # m: radius of a lone particle
+    beyond: qd.f32  # m: how far what touches a pane reaches through it
+    mirrored: qd.f32  # m: how near a pane there is a mirror image behind it
+    depth_2d: qd.f32  # m: half thickness of a 2-D world's water
+    full: qd.f32  # sum of the weights from which on a particle is not drawn
+
+
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Find the ellipsoids of a frame; they hold for every eye."""
-    water, d = water_of(buffers, shot), shot.extent.spacing
-    sorting.sort(shot.frame, water.cells)
-    fit(
-        water.cells, water.ellipsoids, shot.frame.dim, *walls(shot), d, REACH * d, LEAST * d,
-        (WIDEST[shot.frame.dim] - LEAST) * d, BALL * d, BEYOND * d, MIRRORED * d, DEPTH_2D * d, FULL[shot.frame.dim],
-        shot.frame.count,
-    )  # fmt: skip
+    water, frame = water_of(buffers, shot), shot.frame
+    sort(frame, water.cells)
+    fit(water.ellipsoids, water.cells, shot.walls, shape(frame.dim, shot.extent.spacing), frame.dim, frame.count)
 
 
-def walls(shot: Shot) -> tuple[Any, Any]:
-    """Corners of the tank; far away where there is none."""
-    if shot.frame.scene.tank is None:
-        return OPEN
-    return vector(*shot.extent.lower), vector(*shot.extent.upper)
+def shape(dim: int, d: float) -> Shape:
+    """Return the sizes of the ellipsoids of particles with the spacing `d` [m]."""
+    return remembered(Shape(
+        spacing=d, reach=REACH * d, least=LEAST * d, growth=(WIDEST[dim] - LEAST) * d, ball=BALL * d,
+        beyond=BEYOND * d, mirrored=MIRRORED * d, depth_2d=DEPTH_2D * d, full=FULL[dim],
+    ))  # fmt: skip
 
 
 @qd.kernel(fastcache=True)
-def fit(
-    cells: Cells, ellipsoids: Ellipsoids, dim: qd.template(), lower: vec3, upper: vec3, spacing: qd.f32,
-    reach: qd.f32, least: qd.f32, growth: qd.f32, ball: qd.f32, beyond: qd.f32, far: qd.f32, depth_2d: qd.f32,
-    full: qd.f32, count: qd.i32,
-):  # fmt: skip
+def fit(ellipsoids: Ellipsoids, cells: Cells, walls: Box, shape: Shape, dim: qd.template(), count: qd.i32):
     """Fit an ellipsoid to the neighbourhood of every particle that may be seen."""
     for k in range(cells.cells):
         cells.fill[k] = 0
         if qd.static(dim == 3):  # a 2-D world shows all of its water
             if cells.own == 1 and cells.start[k + 1] > cells.start[k]:
-                cells.fill[k] = deep(cells, k, lower, upper)
+                cells.fill[k] = deep(cells, k, walls)
     for a in range(count):
         p = cells.x[a]
         cell = cells.cell[cells.order[a]]
@@ -78,13 +86,15 @@ def fit(
         ellipsoids.size[count + a] = -1.0
         if cells.fill[cell] == 1:
             # Full water all around: a ball, seen through a wall if at all.
-            touch, to_wall = near_walls(p, lower, upper, spacing, dim)
-            ball_there = (least + growth) * vec3(1.0, 1.0, 1.0)
-            put_inside(ellipsoids, a, p, touch, to_wall, joined(ball_there, touch, to_wall, beyond), spacing)
+            touch, to_wall = near_walls(p, walls, shape.spacing, dim)
+            ball_there = (shape.least + shape.growth) * vec3(1.0, 1.0, 1.0)
+            put_inside(
+                ellipsoids, a, p, touch, to_wall, joined(ball_there, touch, to_wall, shape.beyond), shape.spacing
+            )
         else:
             weight = 0.0
             mean, square, mixed = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
-            scale = 1.0 / (reach * reach)
+            scale = 1.0 / (shape.reach * shape.reach)
             for row in range(qd.static(9 if dim == 3 else 3)):
                 layer = cells.nx * (row % 3 - 1)
                 if qd.static(dim == 3):
@@ -114,37 +124,37 @@ def fit(
             n, o = squared(diagonal, side)
             few = qd.static(2.0 if dim == 3 else 1.5)
             trust = qd.min(qd.max((weight - few) / qd.static(3.5 if dim == 3 else 1.5), 0.0), 1.0)
-            diagonal = trust * (least + growth * n) + (1.0 - trust) * ball
-            side = trust * growth * o
-            touch, to_wall = near_walls(p, lower, upper, spacing, dim)
+            diagonal = trust * (shape.least + shape.growth * n) + (1.0 - trust) * shape.ball
+            side = trust * shape.growth * o
+            touch, to_wall = near_walls(p, walls, shape.spacing, dim)
             free, share = 1.0 - touch, 1.0
             for k in qd.static(range(dim)):
-                share *= share_before_wall(qd.abs(to_wall[k]) / reach)
-            diagonal = joined(diagonal, touch, to_wall, beyond)
+                share *= share_before_wall(qd.abs(to_wall[k]) / shape.reach)
+            diagonal = joined(diagonal, touch, to_wall, shape.beyond)
             side *= vec3(free.x * free.y, free.x * free.z, free.y * free.z)
             mean *= free
             if qd.static(dim == 2):
-                diagonal.z = trust * depth_2d + (1.0 - trust) * ball
-            if weight > full * share:
-                put_inside(ellipsoids, a, p, touch, to_wall, diagonal, spacing)
+                diagonal.z = trust * shape.depth_2d + (1.0 - trust) * shape.ball
+            if weight > shape.full * share:
+                put_inside(ellipsoids, a, p, touch, to_wall, diagonal, shape.spacing)
             else:
                 out = mean.norm()
-                flat = qd.static(0.31 if dim == 3 else 0.34) * reach  # out of a particle in a flat surface
+                flat = qd.static(0.31 if dim == 3 else 0.34) * shape.reach  # out of a particle in a flat surface
                 at_surface = qd.min(qd.max((out / flat - 0.5) / 0.35, 0.0), 1.0)
                 pull = 0.9 * trust * at_surface * (1.0 - flat / qd.max(out, 0.3 * flat))
                 ellipsoids.center[a] = p + touch * to_wall + pull * mean
-                ellipsoids.outward[a] = -trust * mean / reach
+                ellipsoids.outward[a] = -trust * mean / shape.reach
                 ellipsoids.axes[a], ellipsoids.mixed[a] = squared(diagonal, side)
                 ellipsoids.size[a] = qd.max(diagonal.x, diagonal.y, diagonal.z) + side.norm()
                 if qd.static(dim == 3):
-                    mirror(ellipsoids, a, count + a, p, lower, upper, far)
+                    mirror(ellipsoids, a, count + a, p, walls, shape.mirrored)
 
 
 @qd.func
-def deep(cells: Cells, k, lower, upper):
+def deep(cells: Cells, k, walls: Box):
     """1 where cell `k` of a tank and all around it hold four particles and more; what lies behind a wall counts."""
-    last = qd.cast(qd.ceil((upper - lower) / cells.edge), qd.i32) - 1
-    rest = (upper - lower) / cells.edge - last  # share of the last cell that lies in the tank
+    last = qd.cast(qd.ceil((walls.upper - walls.lower) / cells.edge), qd.i32) - 1
+    rest = (walls.upper - walls.lower) / cells.edge - last  # share of the last cell that lies in the tank
     here = qd.Vector([k % cells.nx, k // cells.nx % cells.ny, k // (cells.nx * cells.ny)])
     result = 1
     for n in range(27):
@@ -171,14 +181,14 @@ def deep(cells: Cells, k, lower, upper):
 
 
 @qd.func
-def near_walls(p, lower, upper, spacing, dim: qd.template()):
+def near_walls(p, walls: Box, spacing, dim: qd.template()):
     """How much a particle touches the walls of each axis, 0 to 1, and the way [m] to the nearer; no ceiling."""
     touch, way = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
     for k in qd.static(range(dim)):
-        way[k] = lower[k] - p[k]
+        way[k] = walls.lower[k] - p[k]
         if qd.static(k != 1):
-            if upper[k] - p[k] < p[k] - lower[k]:
-                way[k] = upper[k] - p[k]
+            if walls.upper[k] - p[k] < p[k] - walls.lower[k]:
+                way[k] = walls.upper[k] - p[k]
         touch[k] = qd.min(qd.max((1.5 - qd.abs(way[k]) / spacing) / 0.8, 0.0), 1.0)
     return touch, way
 
@@ -205,8 +215,9 @@ def put_inside(ellipsoids: Ellipsoids, a, p, touch, way, diagonal, spacing):
 
 
 @qd.func
-def mirror(ellipsoids: Ellipsoids, a, b, p, lower, upper, reach):
+def mirror(ellipsoids: Ellipsoids, a, b, p, walls: Box, reach):
     """Put the mirror image of ellipsoid `a` behind the nearest pane, if that is within `reach`, into place `b`."""
+    lower, upper = walls.lower, walls.upper
     x, z = qd.min(p.x - lower.x, upper.x - p.x), qd.min(p.z - lower.z, upper.z - p.z)
     if qd.min(x, z) < reach:
         turn, wall = vec3(-1.0, 1.0, 1.0), qd.select(p.x - lower.x > x, upper, lower)
@@ -218,13 +229,6 @@ def mirror(ellipsoids: Ellipsoids, a, b, p, lower, upper, reach):
         ellipsoids.axes[b] = ellipsoids.axes[a]
         ellipsoids.mixed[b] = vec3(turn.x * turn.y, turn.x * turn.z, turn.y * turn.z) * ellipsoids.mixed[a]
         ellipsoids.size[b] = ellipsoids.size[a]
-
-
-@qd.func
-def share_before_wall(gap):
-    """Share of the weight of full water that a wall `gap` reaches away leaves."""
-    t = qd.min(gap, 1.0)
-    return 0.5 + t * (15.0 - t * t * (10.0 - 3.0 * t * t)) / 16.0
 
 
 @qd.func

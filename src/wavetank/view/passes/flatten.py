@@ -19,41 +19,60 @@ between the filter fades, in eighths that the last three bits count, because wha
 seen to flicker beside it. Large windows are sampled at up to `TAPS` pairs.
 """
 
+import dataclasses
 from typing import Any
 
 from wavetank.device.compiler import qd
+from wavetank.device.state import remembered
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, ray_direction, ray_origin, vec3, view_ray
-from wavetank.view.passes.ellipsoids import OPEN, walls
-from wavetank.view.passes.solids import box_interval
+from wavetank.view.lens import Lens, ray_direction, ray_origin, view_ray
+from wavetank.view.optics.rays import Box, box_interval
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import water_of
 
-SIGMA, TAPS = 1.4, 6  # d; pairs of taps at most
+SIGMA = 1.4  # d
+CAUSTIC_SIGMA = 1.8  # d: in the sun's view finer ripples are the particles', not the water's
 NARROW, SLOPE = 1.0, 5.0  # d
+TAPS = 6  # pairs of taps at most
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Window:
+    """How far and how much alike what is averaged may be, on the device."""
+
+    sigma: qd.f32  # m
+    per_narrow: qd.f32  # 1/m
+    per_slope: qd.f32  # 1/m
+    taps: qd.i32
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Smooth the water's depth in place; in a plane nothing looks at its shape."""
     if shot.frame.dim == 3:
-        water, d = water_of(buffers, shot), shot.extent.spacing
-        even(water.depth, water.spare, shot.lens, SIGMA * d, d, *walls(shot))
+        surface, d = water_of(buffers, shot).surface, shot.extent.spacing
+        even(surface.depth, surface.nearest, shot.lens, shot.walls, SIGMA * d, d)
 
 
-def even(
-    depth: Any, spare: Any, lens: Lens, sigma: float, d: float, lower: Any = OPEN[0], upper: Any = OPEN[1]
-) -> None:
+def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
+    """Smooth the water's depth in the sun's view, likewise."""
+    if shot.frame.dim == 3:
+        sunlit, d = water_of(buffers, shot).sunlit, shot.extent.spacing
+        even(sunlit.depth, sunlit.spare, shot.water_sun, shot.walls, CAUSTIC_SIGMA * d, d)
+
+
+def even(depth: Any, spare: Any, lens: Lens, walls: Box, sigma: float, d: float) -> None:
     """Smooth `depth` as `lens` sees it, in place; the second round closes the gaps between the first one's taps."""
     strips = strips_of(depth)
-    straighten(strips, lens, lower, upper, d, depth)
+    window = remembered(Window(sigma=sigma, per_narrow=1.0 / (NARROW * d), per_slope=1.0 / (SLOPE * d), taps=TAPS))
+    straighten(depth, strips, lens, walls, d)
     for clean in (0, 1):
-        blur(strips, lens, 0, 1, TAPS, clean, 0, sigma, 1.0 / (NARROW * d), 1.0 / (SLOPE * d), depth, spare)
-        blur(strips, lens, 1, 0, TAPS, clean, clean, sigma, 1.0 / (NARROW * d), 1.0 / (SLOPE * d), spare, depth)
+        blur(spare, depth, strips, lens, window, 0, 1, clean, 0)
+        blur(depth, spare, strips, lens, window, 1, 0, clean, clean)
 
 
 @qd.kernel(fastcache=True)
-def straighten(strips: Strips, lens: Lens, lower: vec3, upper: vec3, margin: qd.f32, depth: qd.types.ndarray()):
+def straighten(depth: qd.types.ndarray(), strips: Strips, lens: Lens, walls: Box, margin: qd.f32):
     """Put q in the place of depth; 0 (or far below any other) where there is no water.
 
     The last three bits say how far the surface lies before the tank: 0 up to `margin` / 2 [m], 7 from 3/2 of it on.
@@ -68,7 +87,7 @@ def straighten(strips: Strips, lens: Lens, lower: vec3, upper: vec3, margin: qd.
             if z < 1e30:
                 ray = view_ray(lens, row, column)
                 origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
-                there = box_interval(origin, direction, lower, upper)
+                there = box_interval(origin, direction, walls)
                 away = (there[0] - z) * direction.norm() / margin - 0.5
                 outside = qd.cast(7.0 * qd.min(qd.max(away, 0.0), 1.0) + 0.5, qd.i32)
             depth[row, column] = (qd.bit_cast(q, qd.i32) & ~7) | outside
@@ -88,8 +107,8 @@ def depth_of(q, perspective):
 
 @qd.kernel(fastcache=True)
 def blur(
-    strips: Strips, lens: Lens, down: qd.i32, across: qd.i32, taps: qd.i32, clean: qd.i32, final: qd.i32,
-    sigma: qd.f32, per_narrow: qd.f32, per_slope: qd.f32, depth: qd.types.ndarray(), result: qd.types.ndarray(),
+    result: qd.types.ndarray(), depth: qd.types.ndarray(), strips: Strips, lens: Lens, window: Window,
+    down: qd.i32, across: qd.i32, clean: qd.i32, final: qd.i32,
 ):  # fmt: skip
     """Blur q along rows or columns; the `final` round puts depth in its place."""
     rows, columns = depth.shape[0], depth.shape[1]
@@ -100,23 +119,23 @@ def blur(
             q = qd.bit_cast(key, qd.f32)
             kept = key & 7
             if kept < 7 and q != 0.0 and q > -1e8:
-                grain, spread = 1.0, sigma * lens.focal
+                grain, spread = 1.0, window.sigma * lens.focal
                 if lens.perspective > 0.5:
                     grain = 1.0 / (q * q)
                     spread *= q
                 # Two standard deviations in whole steps; no step where a pixel is larger than the window.
-                step = qd.max(qd.cast(2.0 * spread / taps + 0.5, qd.i32), 1)
+                step = qd.max(qd.cast(2.0 * spread / window.taps + 0.5, qd.i32), 1)
                 if clean == 1:
                     spread = qd.max(0.5 * step, 0.25 * spread)
                     step = 1
                 room = qd.min(row, rows - 1 - row) * down + qd.min(column, columns - 1 - column) * across
                 last = qd.min(qd.cast(2.0 * spread, qd.i32), room) // step
-                last = qd.min(last, taps)
+                last = qd.min(last, window.taps)
                 # exp(-k^2 / (2 spread^2)) from one k to the next: w, then w ratio, then w ratio (ratio decay), ...
                 ratio = qd.exp(-0.5 * step * step / qd.max(spread * spread, 1e-6))
                 decay = ratio * ratio
                 gauss = 1.0
-                bend_scale, apart_scale = grain * per_narrow, grain * per_slope
+                bend_scale, apart_scale = grain * window.per_narrow, grain * window.per_slope
                 total, weight = q, 1.0
                 for k in range(1, last + 1):
                     gauss *= ratio

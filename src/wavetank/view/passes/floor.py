@@ -1,7 +1,7 @@
 """The floor: the plane y = 0, seen from above only, without end."""
 
 from wavetank.device.compiler import qd
-from wavetank.view.buffers import Buffers
+from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec3, view_ray
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
@@ -10,16 +10,8 @@ from wavetank.view.strips import Strips, strip, strips_of
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Draw the floor where it is nearer than what is there; a 2-D world has none."""
     if shot.frame.dim == 3:
-        lay(
-            strips_of(buffers.depth),
-            shot.lens,
-            shot.look.floor,
-            shot.look.tile,
-            buffers.depth,
-            buffers.surface,
-            buffers.normal,
-            buffers.color,
-        )
+        pixels, look = buffers.pixels, shot.look
+        lay(pixels, strips_of(pixels.depth), shot.lens, look.floor, look.tile)
 
 
 @qd.func
@@ -38,27 +30,24 @@ def joint_cover(place, grain):
 
 
 @qd.kernel(fastcache=True)
-def lay(
-    strips: Strips, lens: Lens, albedo: vec3, tile: qd.f32, depth: qd.types.ndarray(), surface: qd.types.ndarray(),
-    normal: qd.types.ndarray(), color: qd.types.ndarray(),
-):  # fmt: skip
+def lay(pixels: Pixels, strips: Strips, lens: Lens, albedo: vec3, tile: qd.f32):
     """Intersect every view ray with y = 0."""
     for task in range(strips.count):
-        row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
+        row, first, last = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
         for column in range(first, last):
             ray = view_ray(lens, row, column)
             origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
             if origin.y > 0.0 and direction.y < -1e-6:
                 t = -origin.y / direction.y
-                if t > lens.near and t < 1e4 and qd.bit_cast(t, qd.i32) < depth[row, column]:
-                    depth[row, column] = qd.bit_cast(t, qd.i32)
-                    surface[row, column] = -2  # FLOOR
-                    normal[row, column] = vec3(0.0, 1.0, 0.0)
-                    color[row, column] = albedo
+                if t > lens.near and t < 1e4 and qd.bit_cast(t, qd.i32) < pixels.depth[row, column]:
+                    pixels.depth[row, column] = qd.bit_cast(t, qd.i32)
+                    pixels.surface[row, column] = -2  # FLOOR
+                    pixels.normal[row, column] = vec3(0.0, 1.0, 0.0)
+                    pixels.color[row, column] = albedo
                     if tile > 0.0:
                         at = origin + t * direction
                         # Joints fade where a pixel holds more than a few tiles.
                         per = 1.0 / tile
                         grain = pixels_across(lens, t, direction) * per
                         joint = joint_cover(at.x * per, grain) + joint_cover(at.z * per, grain)
-                        color[row, column] = albedo * (1.0 - 0.45 * qd.min(joint, 1.0))
+                        pixels.color[row, column] = albedo * (1.0 - 0.45 * qd.min(joint, 1.0))

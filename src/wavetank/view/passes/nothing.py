@@ -1,4 +1,4 @@
-"""An empty picture, for views that begin with what is not water."""
+"""An empty picture to begin with, of the eye or of the sun."""
 
 from wavetank.view.buffers import FARTHEST, NOTHING, Buffers
 from wavetank.view.shot import Shot
@@ -6,5 +6,11 @@ from wavetank.view.shot import Shot
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Empty the picture: nothing anywhere, infinitely far."""
-    buffers.depth.fill(FARTHEST)
-    buffers.surface.fill(NOTHING)
+    buffers.pixels.depth.fill(FARTHEST)
+    buffers.pixels.surface.fill(NOTHING)
+
+
+def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
+    """Empty the sun's depth map; a 2-D world has no shadows."""
+    if shot.frame.dim == 3:
+        buffers.sun_depth.fill(FARTHEST)

@@ -14,10 +14,14 @@ particles, which are balls around that plane and would cover the rim of every so
 import dataclasses
 from typing import Any
 
+import numpy as np
+
 from wavetank.device.compiler import qd
+from wavetank.device.state import remembered
 from wavetank.solids.distance import SolidSet, grain, signed_distance
-from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, vector, view_ray
+from wavetank.view.buffers import Buffers, Pixels
+from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, view_ray
+from wavetank.view.optics.rays import Box, box, box_interval
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 
@@ -28,55 +32,39 @@ UNBOUNDED = 1e4  # m
 class Window:
     """Where solids are drawn, on the device."""
 
-    lower: vec3  # m: every solid between these corners
-    upper: vec3
-    lower_endless: vec3  # m: and those without end between these
-    upper_endless: vec3
+    inside: Box  # every solid
+    endless: Box  # and those without end
     raised: qd.f32  # m
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Draw the solids that are not walls of the tank, in front of or behind what is there."""
-    lower_depth(shot, buffers, shot.lens, buffers.depth, 1)
+    lower_depth(shot, buffers, shot.lens, buffers.pixels.depth, 1)
+
+
+def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
+    """Draw the solids into the sun's depth map, likewise."""
+    if shot.frame.dim == 3:
+        lower_depth(shot, buffers, shot.sun, buffers.sun_depth, 0)
 
 
 def lower_depth(shot: Shot, buffers: Buffers, lens: Lens, depth: Any, is_seen: int) -> None:
-    """Lower `depth` to the solids that `lens` sees; with `is_seen` (1 or 0) draw them into the picture's buffers."""
+    """Lower `depth` to the solids that `lens` sees; with `is_seen` (1 or 0) draw them into the picture."""
     solids = shot.frame.solids
     if solids.count > solids.tank_count:
         trace(
-            strips_of(depth), solids, window(shot), lens, shot.look.solid, is_seen, buffers.solid_box,
-            depth, buffers.surface, buffers.normal, buffers.color,
+            depth, buffers.pixels, buffers.solid_box, strips_of(depth), solids, window(shot), lens, shot.look.solid,
+            is_seen,
         )  # fmt: skip
 
 
 def window(shot: Shot) -> Window:
     """Return where the solids of this world are drawn."""
     flat = shot.frame.dim == 2
-    wide = [UNBOUNDED, UNBOUNDED, 0.0 if flat else UNBOUNDED]
-    lower, upper = [-w for w in wide], wide
-    if shot.frame.scene.tank is not None:
-        lower, upper = list(map(float, shot.extent.lower)), list(map(float, shot.extent.upper))
-    return Window(
-        lower=vector(*(-w for w in wide)),
-        upper=vector(*wide),
-        lower_endless=vector(*lower),
-        upper_endless=vector(*upper),
-        raised=shot.radius if flat else 0.0,
-    )
-
-
-@qd.func
-def box_interval(origin, direction, lower, upper):
-    """Depths at which a ray enters and leaves a box; enters after leaving where it misses."""
-    first, last = -1e9, 1e9
-    for k in qd.static(range(3)):
-        slope = direction[k]
-        if qd.abs(slope) < 1e-9:
-            slope = 1e-9
-        a, b = (lower[k] - origin[k]) / slope, (upper[k] - origin[k]) / slope
-        first, last = qd.max(first, qd.min(a, b)), qd.min(last, qd.max(a, b))
-    return vec2(first, last)
+    wide = np.array([UNBOUNDED, UNBOUNDED, 0.0 if flat else UNBOUNDED])
+    inside = box(-wide, wide)
+    endless = inside if shot.frame.scene.tank is None else shot.box
+    return remembered(Window(inside=inside, endless=endless, raised=shot.radius if flat else 0.0))
 
 
 @qd.func
@@ -147,9 +135,9 @@ def nearest_solid(solids: SolidSet, window: Window, lens: Lens, row, column, far
         bound = ball_interval(origin, direction, solids.position[k], 1.001 * solids.reach[k] + 1e-4)
         first, end = qd.max(lens.near + window.raised, bound[0]), qd.min(last, bound[1])
         if first <= end:
-            inside = box_interval(origin, direction, window.lower, window.upper)
+            inside = box_interval(origin, direction, window.inside)
             if solids.reach[k] > 1e4:
-                inside = box_interval(origin, direction, window.lower_endless, window.upper_endless)
+                inside = box_interval(origin, direction, window.endless)
             first, end = qd.max(first, inside[0]), qd.min(end, inside[1])
         if first <= end:
             hit = meet(solids, k, origin, direction, first, end, window.raised)
@@ -183,14 +171,12 @@ def box_of_solids(solids: SolidSet, lens: Lens, rows, columns):
 
 @qd.kernel(fastcache=True)
 def trace(
-    strips: Strips, solids: SolidSet, window: Window, lens: Lens, albedo: vec3, is_seen: qd.i32,
-    box: qd.types.ndarray(), depth: qd.types.ndarray(), surface: qd.types.ndarray(), normal: qd.types.ndarray(),
-    color: qd.types.ndarray(),
+    depth: qd.types.ndarray(), pixels: Pixels, box: qd.types.ndarray(), strips: Strips, solids: SolidSet,
+    window: Window, lens: Lens, albedo: vec3, is_seen: qd.i32,
 ):  # fmt: skip
-    """Lower `depth` to that of the nearest solid at every pixel; with `is_seen` draw the solid there as well.
+    """Lower `depth` to that of the nearest solid; with `is_seen` it is that of `pixels`, where the solid is drawn.
 
-    One kernel for eye and sun, because tracing takes long to compile; without `is_seen` the last three may be of any
-    size.
+    One kernel for eye and sun, because tracing takes long to compile.
     """
     for _ in range(1):
         whole = box_of_solids(solids, lens, depth.shape[0], depth.shape[1])
@@ -204,6 +190,6 @@ def trace(
                 if hit.w > 0.0:
                     depth[row, column] = qd.bit_cast(hit.w, qd.i32)
                     if is_seen == 1:
-                        surface[row, column] = -1  # SOLID
-                        normal[row, column] = vec3(hit.x, hit.y, hit.z)
-                        color[row, column] = albedo
+                        pixels.surface[row, column] = -1  # SOLID
+                        pixels.normal[row, column] = vec3(hit.x, hit.y, hit.z)
+                        pixels.color[row, column] = albedo

@@ -15,20 +15,15 @@ As with the particles, depths meet in an integer minimum, so the order of thread
 Within an ellipsoid rays count as parallel; at a distance of a hundred radii that moves its rim by a hundredth.
 """
 
+import dataclasses
 from typing import Any
 
 from wavetank.device.compiler import qd, threads
+from wavetank.device.state import remembered
 from wavetank.view.buffers import Buffers
-from wavetank.view.lens import (
-    Lens,
-    from_view,
-    pixels_per_metre,
-    plane_position,
-    to_view,
-    vec2,
-    vec3,
-)
-from wavetank.view.passes.ellipsoids import walls
+from wavetank.view.lens import Lens, pixels_between, pixels_per_metre, to_view, vec2, vec3
+from wavetank.view.optics.marks import rim_key, rim_mark
+from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import Ellipsoids, water_of
@@ -38,29 +33,46 @@ GAP = 2.0  # d: what an outline stands before by more, it stands out from
 AWAY = 0.12  # how much an ellipsoid faces away that no eye can see
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Limits:
+    """What of an ellipsoid is drawn, on the device."""
+
+    largest: qd.f32  # px: radius up to which it is
+    away: qd.f32  # how much one faces away that no eye can see
+    gap: qd.f32  # m: what an outline stands before by more, it stands out from
+
+
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill the water's depth and its outlines, as if the water went on behind the panes."""
     water = water_of(buffers, shot)
     if shot.hasty:
-        water.rim.fill(0)
-    see(shot, buffers, shot.lens, water.depth, None if shot.hasty else water.rim)
+        water.surface.rim.fill(0)
+    see(shot, water.ellipsoids, shot.lens, water.surface.depth, None if shot.hasty else water.surface.rim)
 
 
-def see(shot: Shot, buffers: Buffers, lens: Lens, depth: Any, rim: Any = None) -> None:
-    """Fill `depth` with the water as `lens` sees it, and `rim` with what its outlines cover in part."""
+def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
+    """Fill the depth at which the sun's rays meet the water, likewise."""
+    if shot.frame.dim == 3:
+        water = water_of(buffers, shot)
+        see(shot, water.ellipsoids, shot.water_sun, water.sunlit.depth, None)
+
+
+def see(shot: Shot, ellipsoids: Ellipsoids, lens: Lens, depth: Any, rim: Any) -> None:
+    """Fill `depth` with the water as `lens` sees it, and `rim`, if any, with what its outlines cover in part."""
     count, turns = shot.frame.count, max(threads(), 1)
+    limits = remembered(Limits(
+        largest=max(LARGEST * depth.shape[0], 2.0), away=AWAY, gap=GAP * shot.extent.spacing,
+    ))  # fmt: skip
     splat(
-        strips_of(depth), water_of(buffers, shot).ellipsoids, count, turns, -(-count // turns), lens, *walls(shot),
-        max(LARGEST * depth.shape[0], 2.0), AWAY, GAP * shot.extent.spacing, int(rim is not None), depth,
-        depth if rim is None else rim,
+        depth, depth if rim is None else rim, ellipsoids, strips_of(depth), lens, shot.walls, limits,
+        int(rim is not None), turns, -(-count // turns), count,
     )  # fmt: skip
 
 
 @qd.kernel(fastcache=True)
 def splat(
-    strips: Strips, ellipsoids: Ellipsoids, count: qd.i32, turns: qd.i32, run: qd.i32, lens: Lens, lower: vec3,
-    upper: vec3, largest: qd.f32, away: qd.f32, gap: qd.f32, soft: qd.template(), depth: qd.types.ndarray(),
-    rim: qd.types.ndarray(),
+    depth: qd.types.ndarray(), rim: qd.types.ndarray(), ellipsoids: Ellipsoids, strips: Strips, lens: Lens,
+    walls: Box, limits: Limits, soft: qd.template(), turns: qd.i32, run: qd.i32, count: qd.i32,
 ):  # fmt: skip
     """Lower `depth` to the front of every ellipsoid that may be seen, and of its mirror image.
 
@@ -82,26 +94,26 @@ def splat(
                 j = i + image * count
                 ellipsoids.edge[j] = 0
                 if ellipsoids.size[j] > 0.0:
-                    if may_be_seen(ellipsoids, j, image, lens, lower, upper, away):
+                    if may_be_seen(ellipsoids, j, image, lens, walls, limits.away):
                         ellipsoids.edge[j] = fill_ellipse(
-                            ellipsoids, j, lens, largest, gap, qd.static(1 if soft else 0), depth, rim
+                            depth, rim, ellipsoids, j, lens, limits, qd.static(1 if soft else 0)
                         )
     # What stands out from nothing in the finished depth has no outline, whatever the order of the threads.
     for n in range(2 * count):
         if qd.static(soft):
             if ellipsoids.edge[n] == 1:
-                fill_ellipse(ellipsoids, n, lens, largest, gap, 2, depth, rim)
+                fill_ellipse(depth, rim, ellipsoids, n, lens, limits, 2)
     # Pixels that only outlines cover get their depth.
     for task in range(strips.count):
         row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
         if qd.static(soft):
             for column in range(first, last):
                 if rim[row, column] > 0 and depth[row, column] == 0x7F000000:  # FARTHEST
-                    depth[row, column] = (0xFFFFFF - (rim[row, column] & 0xFFFFFF)) << 7
+                    depth[row, column] = rim_key(rim[row, column])
 
 
 @qd.func
-def may_be_seen(ellipsoids: Ellipsoids, i, image, lens: Lens, lower, upper, away):
+def may_be_seen(ellipsoids: Ellipsoids, i, image, lens: Lens, walls: Box, away):
     """Whether an ellipsoid lies before the eye and does not face away from it."""
     c = to_view(lens, ellipsoids.center[i])
     look = lens.forward
@@ -112,15 +124,15 @@ def may_be_seen(ellipsoids: Ellipsoids, i, image, lens: Lens, lower, upper, away
         outside = vec3(0.0, 0.0, 0.0)
         for k in qd.static((0, 2)):
             x = ellipsoids.center[i][k]
-            outside[k] = qd.cast(x > upper[k], qd.f32) - qd.cast(x < lower[k], qd.f32)
+            outside[k] = qd.cast(x > walls.upper[k], qd.f32) - qd.cast(x < walls.lower[k], qd.f32)
         hidden = look.dot(outside) <= 0.0
     return c.z > lens.near + ellipsoids.size[i] and not hidden
 
 
 @qd.func
 def fill_ellipse(
-    ellipsoids: Ellipsoids, i, lens: Lens, largest, gap, part: qd.template(), depth: qd.template(),
-    rim: qd.template(),
+    depth: qd.template(), rim: qd.template(), ellipsoids: Ellipsoids, i, lens: Lens, limits: Limits,
+    part: qd.template(),
 ):  # fmt: skip
     """Lower `depth` to that of one ellipsoid, or raise `rim` to the share of a pixel that its outline covers.
 
@@ -129,7 +141,7 @@ def fill_ellipse(
     """
     c, size = to_view(lens, ellipsoids.center[i]), ellipsoids.size[i]
     scale = pixels_per_metre(lens, c.z)
-    shrink = qd.min(1.0, largest / (size * scale))
+    shrink = qd.min(1.0, limits.largest / (size * scale))
     axes, mixed, left_over = ellipsoids.axes[i], ellipsoids.mixed[i], 0
     # Rotated into the view ...
     a, b, f = lens.right, lens.up, lens.forward
@@ -160,8 +172,7 @@ def fill_ellipse(
     rows, columns = depth.shape[0], depth.shape[1]
     tall = qd.sqrt(yy * outer)
     per, lean, fall = 1.0 / pxx, -pxy / pxx, pyy - pxy * pxy / pxx
-    first = qd.max(qd.cast(qd.ceil(qd.max(middle.y - tall - 0.5, 0.0)), qd.i32), 0)
-    last = qd.min(qd.cast(qd.floor(qd.min(middle.y + tall - 0.5, rows - 1.0)), qd.i32), rows - 1)
+    first, last = pixels_between(middle.y - tall - 0.5, middle.y + tall - 0.5, rows)
     for row in range(first, last + 1):
         v = middle.y - row - 0.5
         reach = 1.0 - v * v * fall
@@ -170,8 +181,7 @@ def fill_ellipse(
             wide = qd.sqrt(room)
             at = middle.x + lean * v - 0.5
             base = c.z + (gx * lean + gy) * v
-            left = qd.max(qd.cast(qd.ceil(qd.max(at - wide, 0.0)), qd.i32), 0)
-            right = qd.min(qd.cast(qd.floor(qd.min(at + wide, columns - 1.0)), qd.i32), columns - 1)
+            left, right = pixels_between(at - wide, at + wide, columns)
             for column in range(left, right + 1):
                 u = column - at  # from the middle of the row
                 inside = reach - pxx * u * u
@@ -191,11 +201,10 @@ def fill_ellipse(
                         if cover >= 1.0:
                             if qd.static(part != 2):
                                 qd.atomic_min(depth[row, column], key)
-                        elif cover > 0.0 and qd.bit_cast(depth[row, column], qd.f32) > front + gap:
+                        elif cover > 0.0 and qd.bit_cast(depth[row, column], qd.f32) > front + limits.gap:
                             left_over = 1
                             if qd.static(part == 2):
-                                share = qd.cast(127.0 * cover, qd.i32)
-                                qd.atomic_max(rim[row, column], (share << 24) | (0xFFFFFF - (key >> 7)))
+                                qd.atomic_max(rim[row, column], rim_mark(cover, key))
     return left_over
 
 
@@ -207,35 +216,3 @@ def times(axes, mixed, v):
         mixed.x * v.x + axes.y * v.y + mixed.z * v.z,
         mixed.y * v.x + mixed.z * v.y + axes.z * v.z,
     )
-
-
-@qd.func
-def rise_along(row, column, down, across, z, limit, depth: qd.template()):
-    """Change of depth [m] to the next pixel of a row or column, taken more from the side where it is less."""
-    total, weight = 0.0, 1e-30
-    for k in range(2):
-        side = 2 * k - 1
-        r = qd.min(qd.max(row + side * down, 0), depth.shape[0] - 1)
-        c = qd.min(qd.max(column + side * across, 0), depth.shape[1] - 1)
-        rise = qd.bit_cast(depth[r, c], qd.f32) - z
-        if qd.abs(rise) < limit:
-            w = 1.0 / (rise * rise + 1e-4 * limit * limit)
-            total += w * side * rise
-            weight += w
-    return total / weight
-
-
-@qd.func
-def rise_at(row, column, z, limit, depth: qd.template()):
-    """Change of depth [m] to the next column and to the next row, from the smoother sides."""
-    return vec2(rise_along(row, column, 0, 1, z, limit, depth), rise_along(row, column, 1, 0, z, limit, depth))
-
-
-@qd.func
-def normal_of(lens: Lens, row, column, z, rise):
-    """Unit normal, in the world and towards the eye, of a surface at depth `z` that rises so from pixel to pixel."""
-    uv = plane_position(lens, row, column) * lens.perspective
-    wide = lens.pixel * (1.0 + lens.perspective * (z - 1.0))
-    # Cross product of the ways along the surface: (wide + u right, v right, right), (u below, v below - wide, below).
-    n = vec3(rise.x, -rise.y, -wide - uv.x * rise.x + uv.y * rise.y)
-    return from_view(lens, n).normalized(1e-20)

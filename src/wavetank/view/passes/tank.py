@@ -10,54 +10,38 @@ order is irrelevant.
     slack              depth by which a line wins against what it touches     m
 """
 
-from typing import Any
-
 from wavetank.device.compiler import qd
-from wavetank.view.buffers import Buffers
-from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, vector, view_ray
+from wavetank.view.buffers import Buffers, Pixels
+from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, view_ray
 from wavetank.view.look import Look
-from wavetank.view.passes.solids import box_interval
+from wavetank.view.optics.glass import slack, with_tank
+from wavetank.view.optics.marks import line_mark
+from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Draw the tank over the picture, if the world has one."""
+    draw_lines(shot, buffers)
     if shot.frame.scene.tank is not None:
-        lower, upper = _mark_over(shot, buffers, buffers.depth)
-        blend(shot.lens, shot.look, lower, upper, buffers.depth, buffers.lines, buffers.color)
+        blend(buffers.pixels, shot.lens, shot.look, shot.box)
 
 
 def draw_lines(shot: Shot, buffers: Buffers) -> None:
     """Mark the edges for those who draw them: the backdrop, and the water those in front of it."""
     if shot.frame.scene.tank is not None:
-        _mark_over(shot, buffers, buffers.depth)
-
-
-def slack(shot: Shot) -> float:
-    """Depth [m] by which a line wins."""
-    return 2.0 * shot.radius
-
-
-def _mark_over(shot: Shot, buffers: Buffers, depth: Any) -> tuple[Any, Any]:
-    """Mark the edges that `depth` does not hide; returns the corners of the tank."""
-    lower, upper = vector(*shot.extent.lower), vector(*shot.extent.upper)
-    width = max(1.0, buffers.rows / 420.0)
-    edges = 12 if shot.frame.dim == 3 else 4
-    buffers.lines.fill(0)
-    mark(
-        shot.lens, lower, upper, edges, max(buffers.rows, buffers.columns) + 2, width, slack(shot), depth,
-        buffers.lines,
-    )  # fmt: skip
-    return lower, upper
+        buffers.pixels.lines.fill(0)
+        edges, steps = 12 if shot.frame.dim == 3 else 4, max(buffers.rows, buffers.columns) + 2
+        mark(buffers.pixels, shot.lens, shot.box, max(1.0, buffers.rows / 420.0), slack(shot), edges, steps)
 
 
 @qd.func
-def edge_corner(lower, upper, edge, end):
+def edge_corner(box: Box, edge, end):
     """Corner `end` (0 or 1) of edge 0 to 11 of a box; the first four lie in the plane z = upper.z."""
     axis = edge // 2 % 2
     if edge >= 4 and edge < 8:
         axis = 2
-    corner = upper
+    corner = box.upper
     for k in qd.static(range(3)):
         side = edge % 2
         if k == axis:
@@ -67,29 +51,26 @@ def edge_corner(lower, upper, edge, end):
         elif axis == 2 and k == 1:
             side = edge // 2 % 2
         if side == 0:
-            corner[k] = lower[k]
+            corner[k] = box.lower[k]
     return corner
 
 
 @qd.kernel(fastcache=True)
-def mark(
-    lens: Lens, lower: vec3, upper: vec3, edges: qd.i32, steps: qd.i32, width: qd.f32, slack: qd.f32,
-    depth: qd.types.ndarray(), lines: qd.types.ndarray(),
-):  # fmt: skip
+def mark(pixels: Pixels, lens: Lens, box: Box, width: qd.f32, slack: qd.f32, edges: qd.i32, steps: qd.i32):
     """Mark the pixels of every edge."""
     for edge, step in qd.ndrange(edges, steps):
-        a = to_view(lens, edge_corner(lower, upper, edge, 0))
-        b = to_view(lens, edge_corner(lower, upper, edge, 1))
+        a = to_view(lens, edge_corner(box, edge, 0))
+        b = to_view(lens, edge_corner(box, edge, 1))
         if a.z > b.z:
             a, b = b, a
         if b.z > lens.near * 1.001:
             if a.z < lens.near:
                 a = a + (b - a) * ((lens.near - a.z) / (b.z - a.z))
-            mark_step(lens, a, b, step, width, slack, depth, lines)
+            mark_step(pixels, lens, a, b, step, width, slack)
 
 
 @qd.func
-def mark_step(lens: Lens, a, b, step, width, slack, depth: qd.template(), lines: qd.template()):
+def mark_step(pixels: Pixels, lens: Lens, a, b, step, width, slack):
     """Mark the pixels across the line from `a` to `b` (view coordinates) in one row or column of the picture."""
     p, q = to_pixel(lens, a), to_pixel(lens, b)
     along = 0 if qd.abs(q.x - p.x) >= qd.abs(q.y - p.y) else 1
@@ -97,7 +78,7 @@ def mark_step(lens: Lens, a, b, step, width, slack, depth: qd.template(), lines:
         p, q = q, p
         a, b = b, a
     length = q[along] - p[along]
-    sizes = qd.Vector([depth.shape[1], depth.shape[0]])
+    sizes = qd.Vector([pixels.depth.shape[1], pixels.depth.shape[0]])
     first = qd.cast(qd.floor(qd.max(p[along], 0.0)), qd.i32)
     pixel = first + step
     if length > 1e-3 and pixel < sizes[along] and pixel < q[along]:
@@ -119,47 +100,16 @@ def mark_step(lens: Lens, a, b, step, width, slack, depth: qd.template(), lines:
                 row, column = other, pixel
                 if along == 1:
                     row, column = pixel, other
-                if z - slack < qd.bit_cast(depth[row, column], qd.f32):
-                    place = 0x7FFFFF - (qd.bit_cast(z, qd.i32) >> 8)
-                    qd.atomic_max(lines[row, column], (qd.cast(255.0 * cover + 0.5, qd.i32) << 23) | place)
-
-
-@qd.func
-def line_cover(line, depth, slack):
-    """Share of a pixel that a line covers, unless something at `depth` hides it."""
-    cover = 0.0
-    if line > 0:
-        z = qd.bit_cast((0x7FFFFF - (line & 0x7FFFFF)) << 8, qd.f32)
-        if z - slack < depth:
-            cover = (line >> 23) / 255.0
-    return cover
-
-
-@qd.func
-def with_tank(lens: Lens, look: Look, lower, upper, origin, direction, depth, line, radiance):
-    """Radiance with panes and lines laid over it."""
-    result = radiance
-    if look.glass > 0.0:
-        panes = box_interval(origin, direction, lower, upper)
-        if panes[0] <= panes[1]:
-            for k in qd.static(range(2)):
-                if panes[k] > lens.near and panes[k] < depth:
-                    result += look.glass * (look.pane - result)
-        elif look.glass == 1.0:  # a plane: particles are wider than their distance to the wall
-            result = look.horizon
-    cover = look.line_strength * line_cover(line, depth, 1e30)
-    return result + cover * (look.line - result)
+                if z - slack < qd.bit_cast(pixels.depth[row, column], qd.f32):
+                    qd.atomic_max(pixels.lines[row, column], line_mark(cover, z))
 
 
 @qd.kernel(fastcache=True)
-def blend(
-    lens: Lens, look: Look, lower: vec3, upper: vec3, depth: qd.types.ndarray(), lines: qd.types.ndarray(),
-    color: qd.types.ndarray(),
-):  # fmt: skip
+def blend(pixels: Pixels, lens: Lens, look: Look, box: Box):
     """Lay panes and lines over the picture."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
+    for row, column in qd.ndrange(pixels.depth.shape[0], pixels.depth.shape[1]):
         ray = view_ray(lens, row, column)
-        color[row, column] = with_tank(
-            lens, look, lower, upper, ray_origin(lens, ray), ray_direction(lens, ray),
-            qd.bit_cast(depth[row, column], qd.f32), lines[row, column], color[row, column],
+        pixels.color[row, column] = with_tank(
+            lens, look, box, ray_origin(lens, ray), ray_direction(lens, ray),
+            qd.bit_cast(pixels.depth[row, column], qd.f32), pixels.lines[row, column], pixels.color[row, column],
         )  # fmt: skip

@@ -14,26 +14,27 @@ from wavetank.view.shot import Shot
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill `picture` from `color`."""
-    develop(buffers.color, buffers.supersample, 0, _groups(buffers), buffers.curve, buffers.picture)
-
-
-def _groups(buffers: Buffers) -> int:
-    """Threes of words in a picture."""
-    return int(buffers.picture.shape[0]) // 3
+    write(buffers, buffers.pixels.color, 0)
 
 
 def collect(color: Any, total: Any, share: float) -> None:
     """Add `share` of a picture, tone-mapped, to `total`; a share of 1 starts anew, so that the mean is kept."""
-    add(color, total, share)
+    add(total, color, share)
 
 
 def draw_collected(total: Any, buffers: Buffers) -> None:
     """Fill `picture` from what was collected."""
-    develop(total, buffers.supersample, 1, _groups(buffers), buffers.curve, buffers.picture)
+    write(buffers, total, 1)
+
+
+def write(buffers: Buffers, color: Any, mapped: int) -> None:
+    """Fill `picture` from `color`, which may be `mapped` (1 or 0) by now."""
+    threes = int(buffers.picture.shape[0]) // 3  # of words in a picture
+    develop(buffers.picture, color, buffers.curve, buffers.supersample, mapped, threes)
 
 
 @qd.kernel(fastcache=True)
-def add(color: qd.types.ndarray(), total: qd.types.ndarray(), share: qd.f32):
+def add(total: qd.types.ndarray(), color: qd.types.ndarray(), share: qd.f32):
     """Move `total` by `share` of the way to the tone-mapped `color`."""
     for row, column in qd.ndrange(color.shape[0], color.shape[1]):
         mapped = neutral(color[row, column])
@@ -65,8 +66,8 @@ def neutral(color):
 
 @qd.kernel(fastcache=True)
 def develop(
-    color: qd.types.ndarray(), samples: qd.i32, mapped: qd.i32, groups: qd.i32, curve: qd.types.ndarray(),
-    picture: qd.types.ndarray(),
+    picture: qd.types.ndarray(), color: qd.types.ndarray(), curve: qd.types.ndarray(), samples: qd.i32,
+    mapped: qd.i32, threes: qd.i32,
 ):  # fmt: skip
     """Write the picture from `samples`^2 samples a pixel; `curve` encodes linear light as sRGB bytes.
 
@@ -74,7 +75,7 @@ def develop(
     """
     rows, columns = color.shape[0] // samples, color.shape[1] // samples
     # As an argument: portable back ends cannot divide before they start a loop.
-    for group in range(groups):
+    for group in range(threes):
         first, second, third = 0, 0, 0
         row = 4 * group // columns
         column = 4 * group - row * columns

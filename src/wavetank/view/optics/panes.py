@@ -1,9 +1,9 @@
 """Where the surface of the water meets the walls of the tank.
 
-The surface is splatted and smoothed as if the water went on behind the panes (`ellipsoids.py`), so that it crosses
-them as smoothly as it is anywhere else. What of a line of sight lies outside of the tank is then left out here: where
-the surface is met before the tank is entered, the water begins at the pane; where it is met behind the tank, there is
-none. Both happen along a line in the picture, and a pixel on that line has a share of both.
+The surface is splatted and smoothed as if the water went on behind the panes (`passes/ellipsoids.py`), so that it
+crosses them as smoothly as it is anywhere else. What of a line of sight lies outside of the tank is then left out here:
+where the surface is met before the tank is entered, the water begins at the pane; where it is met behind the tank,
+there is none. Both happen along a line in the picture, and a pixel on that line has a share of both.
 
     code        symbol   meaning                                                             unit
     first, last          depths at which a ray enters and leaves the tank                    m
@@ -13,12 +13,12 @@ none. Both happen along a line in the picture, and a pixel on that line has a sh
 """
 
 from wavetank.device.compiler import qd
-from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, vec4, view_ray
-from wavetank.view.passes.solids import box_interval
+from wavetank.view.lens import Lens, vec2, vec3, vec4
+from wavetank.view.optics.rays import Box
 
 
 @qd.func
-def tank_interval(lens: Lens, origin, direction, lower, upper):
+def tank_interval(lens: Lens, origin, direction, walls: Box):
     """(first, last), (into, out), and the normal of the wall through which the ray comes in; first > last: no tank."""
     first, last = -1e9, 1e9
     into, out, n = vec2(0.0, 0.0), vec2(0.0, 0.0), vec3(0.0, 0.0, 0.0)
@@ -27,7 +27,7 @@ def tank_interval(lens: Lens, origin, direction, lower, upper):
         if qd.abs(slope) < 1e-9:
             slope = 1e-9
         per = 1.0 / slope
-        a, b = (lower[k] - origin[k]) * per, (upper[k] - origin[k]) * per
+        a, b = (walls.lower[k] - origin[k]) * per, (walls.upper[k] - origin[k]) * per
         near, far = qd.min(a, b), qd.max(a, b)
         turn = (lens.pixel * per) * vec2(-lens.right[k], lens.up[k])
         if near > first:
@@ -47,15 +47,8 @@ def share_behind(depth, limit, rise, limit_rise):
     return qd.min(qd.max(0.5 + (depth - limit) / qd.max(change.norm(), 1e-9), 0.0), 1.0)
 
 
-@qd.kernel(fastcache=True)
-def clip(lens: Lens, lower: vec3, upper: vec3, depth: qd.types.ndarray()):
-    """Move depths before the tank onto its walls, and leave out those behind it."""
-    for row, column in qd.ndrange(depth.shape[0], depth.shape[1]):
-        if depth[row, column] < 0x7F000000:  # FARTHEST
-            ray = view_ray(lens, row, column)
-            ends = box_interval(ray_origin(lens, ray), ray_direction(lens, ray), lower, upper)
-            z = qd.bit_cast(depth[row, column], qd.f32)
-            if z > ends[1] or ends[0] > ends[1]:
-                depth[row, column] = 0x7F000000
-            elif z < ends[0]:
-                depth[row, column] = qd.bit_cast(ends[0], qd.i32)
+@qd.func
+def share_before_wall(gap):
+    """Share that a wall leaves of what is spread smoothly over a ball or a disc, its middle `gap` radii before it."""
+    t = qd.min(gap, 1.0)
+    return 0.5 + t * (15.0 - t * t * (10.0 - 3.0 * t * t)) / 16.0

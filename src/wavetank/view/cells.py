@@ -59,7 +59,7 @@ def new_cells(frame: Frame, extent: Extent, edge: float) -> Cells:
 
 def sort(frame: Frame, cells: Cells) -> None:
     """Sort the particles of `frame`."""
-    sort_particles(cells, frame.x, frame.id, frame.count, int(worth_sharing(cells.cells + frame.count)))
+    sort_particles(cells, frame.x, frame.id, int(worth_sharing(cells.cells + frame.count)), frame.count)
 
 
 @qd.func
@@ -70,7 +70,7 @@ def cell_number(cells: Cells, c):
 
 
 @qd.kernel(fastcache=True)
-def sort_particles(cells: Cells, x: qd.types.ndarray(), id: qd.types.ndarray(), count: qd.i32, shared: qd.template()):
+def sort_particles(cells: Cells, x: qd.types.ndarray(), id: qd.types.ndarray(), shared: qd.template(), count: qd.i32):
     """Sort particles by cell, and those of a cell by id, and copy their positions: all in one kernel, to load fast.
 
     All threads count and place where the work is `shared`.

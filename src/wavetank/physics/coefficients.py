@@ -1,0 +1,77 @@
+"""The numbers of a step, from the parameters of a scene."""
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+
+from wavetank.device.state import Coefficients, remembered
+from wavetank.foundation.params import Parameters
+from wavetank.physics.density_constraint import schedule
+from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED
+from wavetank.physics.mixture import stiffening
+from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
+
+LEAST_MIXING = 1e-6  # of S_0: a particle without neighbours has no gradient to divide by
+REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
+#: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; docs/notebook/solver.md.
+DISORDER = {2: 0.75, 3: 0.35}
+CALM = 0.1  # of sqrt(g / h), the rate of the shortest waves: water that turns slower counts as calm
+
+
+def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf, *, carries: float = 0.0) -> Coefficients:
+    """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here."""
+    h, gravity = params.support * params.spacing, (*params.gravity, 0.0)
+    rest = rest_lattice(params.kernel, params.dim, params.support)
+    s_0 = rest.squared_gradients / h**2
+    w_dq = float(kernel_shape(NAMES[params.kernel][0], np.array(params.tensile_distance))[0])
+    return remembered(
+        Coefficients(
+            dt=dt,
+            gravity_x=gravity[0],
+            gravity_y=gravity[1],
+            gravity_z=gravity[2],
+            h=h,
+            inverse_h=1.0 / h,
+            inverse_h2=1.0 / h**2,
+            density_scale=rest.density_scale,
+            gradient_scale=rest.gradient_scale / h**2,
+            eps=max(params.force_mixing, LEAST_MIXING) * s_0,
+            relaxation=params.relaxation,
+            momentum=0.0,
+            attraction=params.attraction,
+            tensile=params.tensile_strength / s_0 / params.iterations / w_dq**params.tensile_exponent,
+            tensile_exponent=params.tensile_exponent,
+            largest_correction=h / params.iterations,
+            viscosity=min(1.0, params.viscosity * REFERENCE_RATE * dt),
+            vorticity=params.vorticity,
+            coherence=params.vorticity_coherence,
+            calm=CALM * math.sqrt(math.hypot(*params.gravity) / h),
+            speed_limit=speed_limit,
+            carried=carries,
+            largest_carried=LARGEST_CARRIED * math.hypot(*params.gravity),
+            wall_density=params.wall_density,
+            wall_gap=params.wall_gap * params.spacing,
+        )
+    )
+
+
+@functools.lru_cache(maxsize=256)
+def in_iteration(c: Coefficients, relaxation: float, momentum: float) -> Coefficients:
+    """Return `c` with the numbers of one iteration, the same object for the same numbers."""
+    return dataclasses.replace(c, relaxation=relaxation, momentum=momentum)
+
+
+def relaxations(params: Parameters, density_ratio: float = 1.0) -> list[tuple[float, float]]:
+    """Return (relaxation, momentum) of each iteration; fewer iterations have to damp a narrower range of modes."""
+    rest = rest_lattice(params.kernel, params.dim, params.support)
+    stiffest = (rest.stiffest_mode + DISORDER[params.dim] + stiffening(density_ratio)) / params.relaxation
+    return schedule(params.iterations, 4.0 * params.slowest_mode / params.iterations, stiffest)
+
+
+def method_number(params: Parameters) -> int:
+    """Return the place of the chosen smoothing kernel in KERNELS."""
+    number = list(NAMES).index(params.kernel)
+    assert number < len(KERNELS)
+    return number

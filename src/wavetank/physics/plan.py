@@ -1,0 +1,87 @@
+"""What a time step consists of, and how many there are: both follow from fluids, parameters and motion."""
+
+import dataclasses
+import math
+
+import numpy as np
+
+from wavetank.foundation.params import Parameters
+from wavetank.physics.coefficients import method_number
+from wavetank.physics.dynamic_viscosity.implicit_viscosity import carried_share, is_thick, is_viscous
+from wavetank.physics.grid_pressure.correction import carried
+from wavetank.physics.mixture import Blend, blend
+from wavetank.physics.tension import substeps_for
+from wavetank.physics.time_step import pool_depth, steps_needed
+from wavetank.physics.world import World
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """Which terms a step has. Whole numbers are what kernels are specialised by: 1 where so, else 0."""
+
+    kinds: Blend  # the fluids
+    method: int  # smoothing kernel: its place in KERNELS
+    searched: int  # whether there are solids besides the walls of the tank
+    tensile: int  # whether there is artificial pressure
+    turning: int  # whether vortices are confined
+    is_tense: bool  # fluids have surface tension
+    is_viscous: bool  # fluids have viscosity that matters
+    is_thick: bool  # so much that they carry on what pressed them
+    is_smoothed: bool  # velocities are drawn to each other
+    on_grid: bool  # errors of the whole tank are removed on a grid
+    carried: float  # share of that pressure which is carried on
+
+
+def plan_step(world: World, params: Parameters, dt: float) -> Plan:
+    """Plan a step of `dt` [s]."""
+    kinds, on_grid = blend(world.materials, params), has_grid_pressure(world, params)
+    thick = is_thick(kinds, params)
+    return Plan(
+        kinds=kinds,
+        method=method_number(params),
+        searched=int(world.has_solids),
+        tensile=int(params.tensile_strength > 0.0),
+        turning=int(params.vorticity > 0.0),
+        is_tense=kinds.surface_tension > 0.0,
+        is_viscous=is_viscous(kinds, params, dt),
+        is_thick=thick,
+        is_smoothed=params.viscosity > 0.0,
+        on_grid=on_grid,
+        # What thick fluids carry on has been shortened to their share already.
+        carried=carried(dt, params.frame_time) if on_grid else float(thick),
+    )
+
+
+def has_grid_pressure(world: World, params: Parameters) -> bool:
+    """Whether errors of the whole tank are removed on a grid: in a tank, and without ice, which it would move.
+
+    It is gravity that needs it. Thick fluids, and water so fine that tension rules within a cell, are held by forces
+    that vary from particle to particle; the grid would take what they press together for a lack of room.
+    """
+    if not (params.grid_pressure > 0.0 and world.levels) or world.frozen:
+        return False
+    kinds, h = blend(world.materials, params), params.support * params.spacing
+    weight = kinds.largest_density * math.hypot(*params.gravity) * h**2  # of water as high as a cell, per length
+    return weight >= kinds.surface_tension and not is_thick(kinds, params)
+
+
+def steps_in(
+    world: World, params: Parameters, duration: float, speed: float, box: tuple[np.ndarray, np.ndarray], *, forced: bool
+) -> float:
+    """Return how many time steps make up `duration` [s], no whole number; what bounds them is in `time_step.py`.
+
+    The fastest particle or solid has the `speed` [m/s], more than gravity acts where `forced`, and the water rests on
+    the bottom of the `box` from one corner to another [m]. Surface tension needs steps of its own.
+    """
+    on_grid, kinds = has_grid_pressure(world, params), blend(world.materials, params)
+    depth = 0.0 if on_grid else pool_depth(world.particles, world.count, params.gravity, *box)
+    carried_on = carried_share(kinds, params)
+    needed = steps_needed(params, duration, speed, depth, on_grid=on_grid, forced=forced, carried=carried_on)
+    capillary = substeps_for(kinds, params.dim, params.support, params.spacing, duration)
+    return max(needed, min(capillary, params.largest_substeps))
+
+
+def capillary_speed(world: World, params: Parameters) -> float:
+    """Return the speed [m/s] at which a sheet one spacing thick draws back (Taylor 1959, Culick 1960)."""
+    fluids = blend(world.materials, params).fluids.values()
+    return math.sqrt(max(2.0 * f.surface_tension / (f.density * params.spacing) for f in fluids))

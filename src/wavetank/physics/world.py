@@ -1,0 +1,85 @@
+"""A world on the device: all that a step reads and writes."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from wavetank.device.compiler import upload
+from wavetank.device.state import (
+    CoarseGrid,
+    Fluids,
+    Grid,
+    Particles,
+    Scratch,
+    Walls,
+    exchanged,
+    with_viscosity,
+    without_viscosity,
+)  # fmt: skip
+from wavetank.foundation.materials import Material
+from wavetank.physics.foam.pool import Pool
+from wavetank.solids.distance import SolidSet
+
+
+@dataclasses.dataclass
+class World:
+    """Everything on the device that a step reads and writes."""
+
+    particles: Particles  # as they are
+    spare: Particles  # where they are sorted to, and what is read of them is not written yet
+    scratch: Scratch
+    grid: Grid
+    solids: SolidSet
+    walls: Walls
+    fluids: Fluids
+    materials: dict[int, Material]  # in use, by their numbers
+    count: int
+    has_friction: bool
+    levels: list[CoarseGrid]  # of the tank, the finest first; none without a tank
+    frozen: int = 0  # particles that are ice
+    solids_version: int = 0  # changes with each motion of the solids
+    room_version: int = -1  # of the solids when the grid was last told which room they leave
+    known: dict[tuple[Any, ...], Any] = dataclasses.field(default_factory=dict)  # see `exchanged`
+    pool: Pool | None = None  # of spray, foam and bubbles; made when the first are
+
+    @property
+    def has_solids(self) -> bool:
+        """Whether there is anything solid besides the walls of the tank, which are planes and need no search."""
+        return bool(self.solids.count > self.solids.tank_count)
+
+    @property
+    def remembers_viscosity(self) -> bool:
+        """Whether there is room for what viscosity did to each particle."""
+        return bool(self.particles.viscous.shape == self.particles.x.shape)
+
+    def swap(self) -> None:
+        """Let the spare particles be those that count: they have been sorted, or chosen."""
+        self.particles, self.spare = self.spare, self.particles
+
+    def exchange(self, *names: str) -> None:
+        """Let the arrays of those `names` be the spare ones, which have been written."""
+        self.particles, self.spare = exchanged(self.known, self.particles, self.spare, *names)
+
+    def adopt(self, particles: Particles) -> None:
+        """Take other particles, and make room for all that is known of them where they are sorted to."""
+        self.particles = particles
+        if self.remembers_viscosity:
+            self.remember_viscosity()
+
+    def keep_viscosity(self, is_viscous: bool) -> None:
+        """Keep what viscosity does to each particle where fluids are viscous, and forget it where none is any more."""
+        if is_viscous:
+            self.remember_viscosity()
+        elif self.remembers_viscosity:
+            self.forget_viscosity()
+
+    def remember_viscosity(self, values: np.ndarray | None = None) -> None:
+        """Make room for what viscosity did to each particle, and set it to `values` [m/s^2], [n, dim], if any."""
+        self.particles, self.spare = with_viscosity(self.particles), with_viscosity(self.spare)
+        if values is not None:
+            upload(self.particles.viscous, values)
+
+    def forget_viscosity(self) -> None:
+        """Forget what viscosity did before it was switched off: the fluid will be elsewhere when it comes back."""
+        self.particles, self.spare = without_viscosity(self.particles), without_viscosity(self.spare)

@@ -1,0 +1,1 @@
+"""Functions of rays, light and water that passes share, for kernels."""
