@@ -14,7 +14,7 @@ def rows() -> dict[str, dict[str, str]]:
 
 def test_all_patches_are_in_force():
     assert importlib.metadata.version("quadrants") in patches.VERSIONS
-    assert len(patches.PATCHES) == 15
+    assert len({patch.name for patch in patches.PATCHES}) == len(patches.PATCHES) > 14
     for patch in patches.PATCHES:
         assert patch.misfit is None, patch.name
         assert patch.sentence.endswith(".") and "\n" not in patch.sentence, patch.name
