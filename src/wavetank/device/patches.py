@@ -3,7 +3,7 @@
 The compiler asks Python's `inspect` for the source of a function each time it inlines it, and for the module of each
 decorated one; wraps every line of it as text, for error messages; asks for the range of a type with each number; and
 reads the same functions again for each kernel, to see whether they have changed. A third of a cold start went there,
-and half a second of a warm one (docs/notebook/performance.md). The answers stay the same.
+and half a second of a warm one (docs/performance.md). The answers stay the same.
 
 These are changes of private parts, written for the `VERSIONS` below. In another version one may find that its part is
 gone: then all works without it, only slower, and `wavetank doctor` says so.
