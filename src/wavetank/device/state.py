@@ -28,15 +28,11 @@ class Particles:
     """What a particle carries, in device order (sorted by cell)."""
 
     x: qd.types.ndarray()  # vec [capacity], m: position at the start of the substep
-    px: (
-        qd.types.ndarray()
-    )  # f32 [capacity + 32], m: predicted position, Algorithm 1's x*; see `physics/predicted_positions.py`
+    px: qd.types.ndarray()  # f32 [capacity], m: predicted position, x*; see `physics/predicted_positions.py`
     py: qd.types.ndarray()  # likewise
     pz: qd.types.ndarray()  # likewise; unused in 2-D
     v: qd.types.ndarray()  # vec [capacity], m/s
-    a: (
-        qd.types.ndarray()
-    )  # vec [capacity], m/s^2: by the pressure of the grid, see `physics/grid_pressure/correction.py`
+    a: qd.types.ndarray()  # vec [capacity], m/s^2: by pressure, see `physics/grid_pressure/correction.py`
     viscous: qd.types.ndarray()  # vec [capacity], m/s^2: by viscosity in the last step; [1] where nothing is viscous
     id: qd.types.ndarray()  # i32 [capacity]: name of the particle for life; those of removed ones are not used again
     material: qd.types.ndarray()  # i32 [capacity]: number of its material

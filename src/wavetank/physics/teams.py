@@ -15,8 +15,8 @@ from wavetank.device.state import Grid
 
 
 @qd.func
-def idle_turns():
-    """Turns of a part on a processor, as a power of two: the first takes the whole part, the others nothing.
+def turn_bits():
+    """Bits that number the turns of a part on a processor: the first takes the whole part, the others nothing.
 
     The compiler gives a thread 512 turns at least, which are too many teams to share them out evenly.
     """
@@ -28,13 +28,13 @@ def turns_over(number, parts, lanes: qd.template()):
     """Turns of a loop over so many things in equal `parts`."""
     if qd.static(lanes == 1):
         return number
-    return parts << idle_turns()
+    return parts << turn_bits()
 
 
 @qd.func
 def part_of(turn):
     """Number of the part that a turn takes, if any, on a processor."""
-    return turn >> idle_turns()
+    return turn >> turn_bits()
 
 
 @qd.func
@@ -51,7 +51,7 @@ def end_of_part(turn, number, parts, lanes: qd.template()):
     if qd.static(lanes == 1):
         return turn + 1
     end = part_of(turn) * ((number + parts - 1) // parts)
-    if turn & ((1 << idle_turns()) - 1) == 0:
+    if turn & ((1 << turn_bits()) - 1) == 0:
         end = qd.min(end + (number + parts - 1) // parts, number)
     return end
 
