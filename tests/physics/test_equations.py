@@ -79,7 +79,7 @@ def test_correction_eq_8(dim, kernel):
     name = NAMES[kernel][0]
     ratio = kernel_shape(name, cloud.distance / cloud.h)[0] / kernel_shape(name, np.array(0.3))[0]
     s_0 = rest_lattice(kernel, dim, cloud.scene.support).squared_gradients / cloud.h**2
-    s_corr = -0.2 / s_0 * ratio**4.0
+    s_corr = -0.2 * (cloud.c.dt / cloud.scene.frame_time) / s_0 * ratio**4.0
     expected = volume * np.sum((lam[:, None] + lam[None, :] + s_corr)[..., None] * cloud.grad_w(), axis=1)
     moved = cloud.predictions(cloud.world.spare) - cloud.x
     np.testing.assert_allclose(moved, expected, atol=2e-4 * np.abs(expected).max())
@@ -161,12 +161,28 @@ def test_solid_rotation_has_twice_its_rate_as_vorticity():
 @pytest.mark.parametrize("turning", [0, 1])
 @cases
 def test_xsph_eq_11(dim, kernel, turning):
-    cloud = Cloud(dim, kernel=kernel, viscosity=0.2)
+    cloud = Cloud(dim, kernel=kernel, viscosity=0.2, calming=0.0)
     world = cloud.world
     smooth(cloud, turning)
     v_ij = cloud.v[None, :, :] - cloud.v[:, None, :]
     expected = cloud.v + 0.2 * cloud.mass_over_rest_density() * np.sum(v_ij * cloud.w()[..., None], axis=1)
     np.testing.assert_allclose(world.spare.v.to_numpy()[: cloud.count], expected, atol=1e-5 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("turning", [0, 1])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_slow_motion_is_taken_sooner(dim, turning):
+    """Of a velocity difference that is slow, of sqrt(g d), Eq. 11 takes a larger share: physics/xsph_viscosity.py."""
+    cloud = Cloud(dim, viscosity=0.2, calming=0.9)
+    smooth(cloud, turning)
+    v_ij = cloud.v[None, :, :] - cloud.v[:, None, :]
+    in_a_step = 1.0 - 0.1 ** (cloud.c.dt / cloud.scene.frame_time)
+    slow = np.maximum(0.0, 1.0 - np.sum(v_ij**2, axis=-1) / (0.1**2 * 9.81 * cloud.scene.spacing))
+    share = 0.2 + (in_a_step - 0.2) * slow
+    assert np.sum(slow > 0.0) > cloud.count, "some pairs are slow"
+    expected = cloud.v + cloud.mass_over_rest_density() * np.sum(v_ij * (share * cloud.w())[..., None], axis=1)
+    found = cloud.world.spare.v.to_numpy()[: cloud.count]
+    np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("turning", [0, 1])

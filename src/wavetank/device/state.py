@@ -90,6 +90,7 @@ class CoarseGrid:
     room: qd.types.ndarray()  # f32 [nodes]: share of the cell that no solid takes, 0 where next to nothing is left
     fill: qd.types.ndarray()  # f32 [nodes]: water over room
     gaps: qd.types.ndarray()  # f32 [nodes]: share of the room that is free between rows of particles
+    depth: qd.types.ndarray()  # f32 [nodes], m: depth below the surface that the volume of the water has
     density: qd.types.ndarray()  # f32 [nodes]: mean density over that of the heaviest fluid
     rhs: qd.types.ndarray()  # f32 [nodes]: mean density error over the stiffness
     wx: qd.types.ndarray()  # f32 [nodes], 1/m^2: coupling with the next node along x
@@ -220,6 +221,10 @@ class Coefficients:
     tensile_exponent: qd.f32
     largest_correction: qd.f32  # m, of one iteration
     viscosity: qd.f32  # share per substep
+    calming: qd.f32  # share per substep of what is slow, over that of the viscosity
+    slow: qd.f32  # s^2/m^2: inverse square of the speed below which motion past neighbours is slow
+    calming_at_solids: qd.f32  # share per substep of slow sliding
+    slow_at_solids: qd.f32  # s^2/m^2: inverse square of the speed below which sliding is slow
     vorticity: qd.f32  # m/s
     coherence: qd.f32
     calm: qd.f32  # 1/s, vorticity of water at rest

@@ -70,11 +70,12 @@ class Parameters(Model):
     relaxation: float = parameter(1.0, 0.1, 3.0, "", "omega", "First relaxation of a time step, in units of the largest that damps every mode.")
     slowest_mode: float = parameter(0.15, 0.0, 0.5, "", "a", "Lower end of the eigenvalues that four iterations damp evenly (Chebyshev); 0 is plain Jacobi.")
     force_mixing: float = parameter(0.01, 0.0, 1e4, "S_0", "eps", "Constraint force mixing (Eq. 5), relative to the sum of squared gradients in the rest lattice.")
-    tensile_strength: float = parameter(0.0, 0.0, 1.0, "1/S_0", "k", "Artificial pressure against clustering (Eq. 7), relative likewise; shared by the iterations.")
+    tensile_strength: float = parameter(0.01, 0.0, 1.0, "1/S_0", "k", "Artificial pressure against clustering (Eq. 7) in a step as long as a frame, relative likewise; shorter steps, and weaker gravity, have less.")
     tensile_exponent: float = parameter(4.0, 1.0, 8.0, "", "n", "Exponent of the artificial pressure (Eq. 7).")
     tensile_distance: float = parameter(0.3, 0.05, 0.95, "h", "dq", "Distance at which the artificial pressure is k (Eq. 7).")
     grid_pressure: float = parameter(1.0, 0.0, 1.0, "", "", "Share of the tank's mean density errors that a coarse grid removes before the iterations; 0 leaves all to them.")
     attraction: float = parameter(0.0, 0.0, 1.0, "", "", "Share of negative pressure that is kept; 0 keeps none, so that water parts freely.")
+    calming: float = parameter(0.9, 0.0, 1.0, "", "", "Share of slow motion past neighbours, and past solids that water lies on, that is taken in a frame; 0 lets calm water creep.")
     viscosity: float = parameter(0.08, 0.0, 1.0, "", "c", "XSPH viscosity (Eq. 11), dimensionless; the share of one step at 240 steps a second.")
     dynamic_viscosity: float = parameter(0.0, 0.0, 1e6, "Pa s", "mu", "Dynamic viscosity of fluids whose material names none, solved implicitly; honey has 10.")
     viscosity_iterations: int = parameter(100, 1, 1000, "", "", "Iterations of the implicit viscosity in a time step, at most; fewer are taken where fewer do.")
@@ -159,6 +160,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "tensile_exponent": 4.0,
         "tensile_distance": 0.3,
         "attraction": 1.0,
+        "calming": 0.0,
         "viscosity": 0.03,
         "vorticity": 0.01,
         "vorticity_coherence": 0.0,

@@ -14,9 +14,12 @@ from wavetank.physics.mixture import stiffening
 from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
 
 LEAST_MIXING = 1e-6  # of S_0: a particle without neighbours has no gradient to divide by
+EARTH = 9.81  # m/s^2
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
 #: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; docs/notebook/solver.md.
 DISORDER = {2: 0.75, 3: 0.35}
+#: Of sqrt(g d): below which motion past neighbours, and along solids, is slow. A wave that can be seen is faster.
+SLOW, SLOW_AT_SOLIDS = 0.1, 0.2
 CALM = 0.1  # of sqrt(g / h), the rate of the shortest waves: water that turns slower counts as calm
 
 
@@ -26,6 +29,13 @@ def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf, *
     rest = rest_lattice(params.kernel, params.dim, params.support)
     s_0 = rest.squared_gradients / h**2
     w_dq = float(kernel_shape(NAMES[params.kernel][0], np.array(params.tensile_distance))[0])
+    tensile = params.tensile_strength / s_0 / params.iterations / w_dq**params.tensile_exponent
+    # Packings need it that gravity presses; without gravity it would blow them up (docs/notebook/calm.md).
+    tensile *= dt / params.frame_time * min(1.0, math.hypot(*params.gravity) / EARTH)
+    viscosity = min(1.0, params.viscosity * REFERENCE_RATE * dt)
+    calming = 1.0 - (1.0 - params.calming) ** (dt / params.frame_time)
+    # Without gravity nothing is slow: there is no speed to compare with.
+    slow = 1.0 / max(math.hypot(*params.gravity) * params.spacing, 1e-30)
     return remembered(
         Coefficients(
             dt=dt,
@@ -41,10 +51,14 @@ def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf, *
             relaxation=params.relaxation,
             momentum=0.0,
             attraction=params.attraction,
-            tensile=params.tensile_strength / s_0 / params.iterations / w_dq**params.tensile_exponent,
+            tensile=tensile,
             tensile_exponent=params.tensile_exponent,
             largest_correction=h / params.iterations,
-            viscosity=min(1.0, params.viscosity * REFERENCE_RATE * dt),
+            viscosity=viscosity,
+            calming=max(0.0, calming - viscosity),
+            slow=slow / SLOW**2,
+            calming_at_solids=calming,
+            slow_at_solids=slow / SLOW_AT_SOLIDS**2,
             vorticity=params.vorticity,
             coherence=params.vorticity_coherence,
             calm=CALM * math.sqrt(math.hypot(*params.gravity) / h),
@@ -68,6 +82,11 @@ def relaxations(params: Parameters, density_ratio: float = 1.0) -> list[tuple[fl
     rest = rest_lattice(params.kernel, params.dim, params.support)
     stiffest = (rest.stiffest_mode + DISORDER[params.dim] + stiffening(density_ratio)) / params.relaxation
     return schedule(params.iterations, 4.0 * params.slowest_mode / params.iterations, stiffest)
+
+
+def correction_number(params: Parameters) -> int:
+    """Return the place of the correction in `density_constraint.CORRECTIONS`."""
+    return 0 if params.tensile_strength == 0.0 else 2 if params.tensile_exponent == 4.0 else 1
 
 
 def method_number(params: Parameters) -> int:

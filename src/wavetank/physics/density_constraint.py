@@ -73,6 +73,15 @@ def add_tensile_correction(sums: qd.template(), r, square, a, b, c: Coefficients
 
 
 @qd.func
+def add_quartic_correction(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
+    """`add_tensile_correction` with the exponent 4, without a power."""
+    w = kernel(method, square * c.inverse_h2)
+    square_of_w = w[0] * w[0]
+    s_corr = -c.tensile * square_of_w * square_of_w  # Eq. 7
+    sums += r * ((a[0] + b[0] + s_corr) * c.gradient_scale * w[1])
+
+
+@qd.func
 def add_weighted_density(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """`add_density` for fluids of different density: squared gradients count with the inverse masses."""
     w = kernel(method, square * c.inverse_h2)
@@ -87,7 +96,7 @@ def add_weighted_density(sums: qd.template(), r, square, a, b, c: Coefficients, 
 #: By `mixed`; append only, as `smoothing.KERNELS`.
 DENSITIES = (add_density, add_weighted_density)
 #: Append only, as `smoothing.KERNELS`.
-CORRECTIONS = (add_correction, add_tensile_correction)
+CORRECTIONS = (add_correction, add_tensile_correction, add_quartic_correction)
 
 
 @qd.func

@@ -1,8 +1,12 @@
-"""Coulomb friction between water and solids.
+"""Friction between water and solids: Coulomb's, and what lets thin water on a solid come to rest.
 
 A wall that has pushed a particle by delta along its normal in this substep may hold back its sliding by at most
 mu delta. The push is that of the wall's share of the density (`boundary.py`): |lambda_i grad rho_wall|.
 Position-based friction after Macklin et al. 2014, "Unified Particle Physics" (10.1145/2601097.2601152), Sec. 6.1.
+
+Solids of a scene (not the walls of its tank) also take a share of slow sliding from the layer of particles that lies on
+them. A layer or two of water on a ledge is thinner than the boundary layer that it has in nature, and without that it
+slid to and fro for minutes on what the coarse grid has wrong about the room beside an edge.
 
     code     symbol    meaning                                           unit
     push     delta     displacement that the wall has given              m
@@ -20,14 +24,14 @@ from wavetank.solids.distance import SolidSet, lift, rotate, signed_distance, to
 def apply_friction(
     particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, count: qd.i32
 ):
-    """Reduce the velocities along walls by Coulomb friction."""
+    """Reduce the velocities along walls and solids."""
     for i in range(count):
         near = particles.near[i]
         if near != 0:
             p = lift(predicted(particles, i))
             v = lift(particles.v[i])
             for k in range(solids.count):
-                if is_near(near, k) == 1 and solids.friction[k] > 0.0:
+                if is_near(near, k) == 1 and (solids.friction[k] > 0.0 or k >= solids.tank_count):
                     value = signed_distance(solids, k, p)
                     n = vec3(value.x, value.y, value.z)
                     push = (
@@ -39,7 +43,10 @@ def apply_friction(
                     )
                     relative = v - surface_velocity(solids, k, p, c.dt)
                     slip = relative - n * n.dot(relative)
-                    v -= slip * qd.min(1.0, solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12))
+                    share = solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12)
+                    if k >= solids.tank_count and value.w < c.h:
+                        share += c.calming_at_solids * qd.max(0.0, 1.0 - slip.norm_sqr() * c.slow_at_solids)
+                    v -= slip * qd.min(1.0, share)
             held = particles.v[i]
             for axis in qd.static(range(held.n)):
                 held[axis] = v[axis]

@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from wavetank.foundation.params import Parameters
-from wavetank.physics.coefficients import method_number
+from wavetank.physics.coefficients import correction_number, method_number
 from wavetank.physics.dynamic_viscosity.implicit_viscosity import carried_share, is_thick, is_viscous
 from wavetank.physics.grid_pressure.correction import carried
 from wavetank.physics.mixture import Blend, blend
@@ -22,11 +22,12 @@ class Plan:
     kinds: Blend  # the fluids
     method: int  # smoothing kernel: its place in KERNELS
     searched: int  # whether there are solids besides the walls of the tank
-    tensile: int  # whether there is artificial pressure
+    correction: int  # with artificial pressure or without: its place in CORRECTIONS
     turning: int  # whether vortices are confined
     is_tense: bool  # fluids have surface tension
     is_viscous: bool  # fluids have viscosity that matters
     is_thick: bool  # so much that they carry on what pressed them
+    is_rubbed: bool  # walls or solids hold sliding back
     is_smoothed: bool  # velocities are drawn to each other
     on_grid: bool  # errors of the whole tank are removed on a grid
     carried: float  # share of that pressure which is carried on
@@ -40,12 +41,13 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         kinds=kinds,
         method=method_number(params),
         searched=int(world.has_solids),
-        tensile=int(params.tensile_strength > 0.0),
+        correction=correction_number(params),
         turning=int(params.vorticity > 0.0),
         is_tense=kinds.surface_tension > 0.0,
         is_viscous=is_viscous(kinds, params, dt),
         is_thick=thick,
-        is_smoothed=params.viscosity > 0.0,
+        is_rubbed=world.has_friction or (world.has_solids and params.calming > 0.0),
+        is_smoothed=params.viscosity > 0.0 or params.calming > 0.0,
         on_grid=on_grid,
         # What thick fluids carry on has been shortened to their share already.
         carried=carried(dt, params.frame_time) if on_grid else float(thick),

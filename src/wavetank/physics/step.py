@@ -56,7 +56,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     if plan.is_thick:
         carry_on(world, plan.kinds, params, c)
     update_velocities(world.particles, c, world.count)  # 21, 23
-    if world.has_friction:
+    if plan.is_rubbed:
         apply_friction(world.particles, world.scratch, world.solids, world.walls, c, world.count)
     if plan.is_smoothed or plan.turning:
         smooth_and_confine(world, plan, c)  # 22
@@ -97,7 +97,7 @@ def apply_corrections(world: World, plan: Plan, c: Coefficients) -> None:
     """Move the predicted positions by what the multipliers say, outside of solids; ice stays."""
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, c, world.count,
-        plan.method, plan.tensile, plan.kinds.mixed, plan.searched,
+        plan.method, plan.correction, plan.kinds.mixed, plan.searched,
     )  # fmt: skip
     world.exchange("px", "py", "pz")
     if world.frozen:

@@ -3,10 +3,12 @@
 Schechter and Bridson 2012 (10.1145/2185520.2185557), Eq. 11 of the report; the vorticity is its Eq. 9. Both are of the
 velocities before either acts. Where we differ: the sum is a mean, with the volume of a particle, so that c has no unit;
 pairs are weighted alike from both sides, so momentum is kept exactly. Of two fluids the heavier follows less, by the
-ratio of the masses: m_i dv_i is antisymmetric, no share exceeds c.
+ratio of the masses: m_i dv_i is antisymmetric, no share exceeds c. And c is larger where two particles hardly move past
+each other, so that calm water comes to rest: particles of a packing that yields creep for minutes, and now and then one
+slips. How slow that is (`coefficients.SLOW`) goes with sqrt(g d); waves that can be seen, and jets, keep Eq. 11's c.
 
     code     symbol     meaning                                                       unit
-    sums                sum_j (v_j - v_i) w_ij, and behind it omega_i                 m/s, 1/s
+    sums                sum_j c_ij (v_j - v_i) w_ij, and behind it omega_i            m/s, 1/s
     omega    omega_i    vorticity; in a 2-D world it points along z                   1/s
 """
 
@@ -19,20 +21,28 @@ from wavetank.solids.distance import vec3
 
 
 @qd.func
+def share_of_pair(dv, c: Coefficients):
+    """Share c of the difference of two velocities that is taken: more where it is small."""
+    return c.viscosity + c.calming * qd.max(0.0, 1.0 - dv.norm_sqr() * c.slow)
+
+
+@qd.func
 def add_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
-    """Add neighbour j to sum_j (v_j - v_i) w_ij."""
-    dv = (b - a) * kernel(method, square * c.inverse_h2)[0]
+    """Add neighbour j to sum_j c_ij (v_j - v_i) w_ij."""
+    dv = b - a
+    dv *= share_of_pair(dv, c) * kernel(method, square * c.inverse_h2)[0]
     for k in qd.static(range(r.n)):
         sums[k] += dv[k]
 
 
 @qd.func
 def add_vorticity(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
-    """Add neighbour j to sum_j (v_j - v_i) w_ij and to omega_i = sum_j (v_j - v_i) x grad_j W (Eq. 9)."""
+    """Add neighbour j to sum_j c_ij (v_j - v_i) w_ij and to omega_i = sum_j (v_j - v_i) x grad_j W (Eq. 9)."""
     w = kernel(method, square * c.inverse_h2)
     dv = b - a
+    share = share_of_pair(dv, c) * w[0]
     for k in qd.static(range(r.n)):
-        sums[k] += dv[k] * w[0]
+        sums[k] += dv[k] * share
     # grad_j W = -grad_i W, and a x b = -b x a.
     turn = (r * (c.gradient_scale * w[1])).cross(dv)
     if qd.static(r.n == 3):
@@ -48,10 +58,13 @@ SUMS = (add_xsph, add_vorticity)
 
 @qd.func
 def add_mixed_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
-    """Add neighbour j to sum_j (v_j - v_i) w_ij min(1, m_j / m_i); the inverse masses w are in `data`, behind v."""
-    share = kernel(method, square * c.inverse_h2)[0] * qd.min(1.0, a[3] / b[3])
+    """Add neighbour j to sum_j c_ij (v_j - v_i) w_ij min(1, m_j / m_i); the inverse masses are in `data`, behind v."""
+    dv = 0.0 * r
     for k in qd.static(range(r.n)):
-        sums[k] += (b[k] - a[k]) * share
+        dv[k] = b[k] - a[k]
+    share = share_of_pair(dv, c) * kernel(method, square * c.inverse_h2)[0] * qd.min(1.0, a[3] / b[3])
+    for k in qd.static(range(r.n)):
+        sums[k] += dv[k] * share
 
 
 @qd.kernel(fastcache=True)
@@ -69,7 +82,7 @@ def apply_xsph(
                 sum = column(sums, i - team * grid.lanes)
                 v = particles.v[i]
                 for k in qd.static(range(dim)):
-                    v[k] += c.viscosity * c.density_scale * sum[k]
+                    v[k] += c.density_scale * sum[k]
                 smoothed.v[i] = v
                 if qd.static(turning):
                     if qd.static(dim == 3):
@@ -90,4 +103,4 @@ def apply_mixed_xsph(
             add_neighbors(sums, add_mixed_xsph, team, particles, packed, grid, c, method)
             for i in range(team * grid.lanes, end_of(team, grid, count)):
                 dv = column(sums, i - team * grid.lanes)
-                smoothed.v[i] = particles.v[i] + c.viscosity * c.density_scale * dv
+                smoothed.v[i] = particles.v[i] + c.density_scale * dv

@@ -42,8 +42,10 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls, remembered
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
-from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, in_cells, nearest, tents
+from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
+from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, gaps_at
+from wavetank.physics.grid_pressure.surface import carried_share, depth_at
 from wavetank.physics.mixture import Blend
 from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predict_at, predicted
@@ -63,14 +65,15 @@ from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, signed_distance, to_local, vec3, vec4
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
-LEAST_OPEN = 0.1  # a cell that is less open is solid
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 REACH = 0.2  # of the support: the longest correction
-DAMPING = 0.44  # of a frame: the length of a step that damps as much, docs/notebook/grid-pressure.md
+DAMPING = 0.1  # of a frame: the length of a step that damps as much, docs/notebook/calm.md
 LARGEST_CARRIED = 1.2  # of gravity
-MISSING = 0.18  # of a wall's answer, over what it gives; 1/3 would be all, see docs/notebook/grid-pressure.md
-FULL = 0.96  # fill that cells without gaps have at least, also where few rows of particles do not match them
-GAP_SHARE = 4.0  # by which errors are less, of what lacks there
+SUPPORTED = 0.5  # d: depth from which on the grid carries a particle in full, that of the top layer at rest
+FADE = 1.0  # d: by how much higher it carries nothing
+MISSING = 1.0 / 3.0  # of a wall's answer, over what it gives: all of what lacks, docs/notebook/grid-pressure.md
+FULL = 0.97  # fill that cells without gaps have at least, also where few rows of particles do not match them
+GAP_SHARE = 6.0  # by which errors are less, of what lacks there
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,6 +90,16 @@ class Errors:
     gap_share: qd.f32  # by which errors are less, of what lacks there
     least_open: qd.f32  # share of a cell
     least_theta: qd.f32  # of an edge
+
+
+@dataclasses.dataclass(frozen=True)
+class Push:
+    """The numbers of `move_particles`, likewise."""
+
+    stiffness: qd.f32  # M
+    reach: qd.f32  # m: the longest correction
+    supported: qd.f32  # m: depth from which on particles have all of it
+    fade: qd.f32  # m: by how much higher they have none
 
 
 def carried(dt: float, frame_time: float) -> float:
@@ -211,55 +224,6 @@ def taken(sums: qd.template(), n, nodes, parts):
     return total
 
 
-@qd.func
-def gaps_at(grid: CoarseGrid, n, full):
-    """How far even the fullest two cells in a row are from `full`, of those around node `n`.
-
-    0 near solids, since what room these leave is known only roughly.
-    """
-    fullest, room = 0.0, grid.room[n]
-    for axis in qd.static(range(3)):
-        for side in qd.static((-1, 1)):
-            if grid.nz > 1 or axis < 2:
-                c = coordinates(grid, n)
-                before = grid.fill[n]
-                for _ in qd.static(range(2)):
-                    c[axis] += side
-                    at = nearest(grid, c)
-                    fullest = qd.max(fullest, 0.5 * (before + grid.fill[at]))
-                    room = qd.min(room, grid.room[at])
-                    before = grid.fill[at]
-    return qd.max(full - fullest, 0.0) if room >= 1.0 else 0.0
-
-
-@qd.func
-def open_share(grid: CoarseGrid, solids: SolidSet, n):
-    """Share of the cell of node `n` that no solid takes."""
-    c = coordinates(grid, n)
-    center = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
-    edge = qd.min(grid.dx, grid.dy)
-    if grid.nz > 1:
-        edge = qd.min(edge, grid.dz)
-    else:
-        center.z = 0.0
-    room = 1.0
-    for k in range(solids.count):
-        if k < solids.tank_count or (center - solids.position[k]).norm() < solids.reach[k] + 0.5 * edge:
-            if room > 0.0:
-                room = qd.min(room, 0.5 + signed_distance(solids, k, center).w / edge)
-    return qd.max(room, 0.0)
-
-
-@qd.kernel(fastcache=True)
-def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: qd.template()):
-    """Find which share of each cell is open where solids are `searched`; else the tank ends where the cells do."""
-    for n in range(grid.nx * grid.ny * grid.nz):
-        room = 1.0
-        if qd.static(searched):
-            room = open_share(grid, solids, n)
-        grid.room[n] = room if room >= least_open else 0.0
-
-
 @qd.kernel(fastcache=True)
 def gather(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, solids: SolidSet, walls: Walls,
@@ -288,6 +252,7 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.gaps[n] = gaps_at(grid, n, e.full)
+        grid.depth[n] = depth_at(grid, n)
     for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
         for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
@@ -329,10 +294,10 @@ def slope_along(grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), 
 
 @qd.kernel(fastcache=True)
 def move_particles(
-    grid: CoarseGrid, particles: Particles, cells: Grid, solids: SolidSet, c: Coefficients, stiffness: qd.f32,
-    reach: qd.f32, count: qd.i32, few: qd.template(),
+    grid: CoarseGrid, particles: Particles, cells: Grid, solids: SolidSet, c: Coefficients, push: Push, count: qd.i32,
+    few: qd.template(),
 ):  # fmt: skip
-    """Move the predicted positions by M grad lambda, at most by `reach` [m], inside the tank, and carry it on.
+    """Move the predicted positions by M grad lambda, inside the tank, and carry it on; what sticks out has less.
 
     One thread sees to the nodes where they are `few`.
     """
@@ -347,16 +312,18 @@ def move_particles(
             first = team * cells.lanes
             dim = qd.static(particles.x[first].n)
             slopes = qd.Matrix.zero(qd.f32, dim, cells.lanes)
+            shares = qd.Matrix.zero(qd.f32, 1, cells.lanes)
             for lane in range(cells.lanes):
                 s = in_cells(grid, predicted(particles, first + lane))
+                shares[0, lane] = carried_share(grid, s, push.supported, push.fade, dim)
                 slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, dim)
                 slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, dim)
                 if qd.static(dim == 3):
                     slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, dim)
             for i in range(first, end_of(team, cells, count)):
                 p = predicted(particles, i)
-                dp = column(slopes, i - first) * stiffness
-                dp *= qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
+                dp = column(slopes, i - first) * (push.stiffness * shares[0, i - first])
+                dp *= qd.min(1.0, push.reach / qd.max(dp.norm(), 1e-12))
                 p += dp
                 a = particles.a[i] + dp / (c.dt * c.dt)
                 particles.a[i] = a * qd.min(1.0, c.largest_carried / qd.max(a.norm(), 1e-12))
@@ -383,7 +350,8 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         count, searched, kinds.mixed, few,
     )  # fmt: skip
     solve_levels(world.levels)
-    move_particles(finest, world.particles, cells, world.solids, c, stiffness, REACH * c.h, count, few)
+    push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing)
+    move_particles(finest, world.particles, cells, world.solids, c, remembered(push), count, few)
 
 
 def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:

@@ -1,0 +1,87 @@
+"""Where the surface of the water is, by its volume, and how much the grid carries of a particle that sticks out.
+
+The grid's push is the gradient of a smooth pressure. It knows no bump that is shorter than two cells, and carried all
+particles of the top layer alike: without weight, a bump stayed where it was, and as particles of a bump that is lifted
+move apart, the fill below it even fell and the push there rose. Bumps of the wave length of two cells grew by a tenth
+of a spacing in three seconds, an egg carton, until single particles were thrown (docs/notebook/calm.md).
+
+Particles above the place of the top layer at rest, half a spacing below the surface, therefore lose the grid's push, by
+a share that grows with their height: what sticks out has weight, rests on its neighbours, and sinks back. Nobody has
+more than the grid's push: that would be a layer of light water below a heavy one. Nobody deeper loses any: iterations
+between particles would have to carry it, and the top layer would sink by a sixth of a spacing.
+
+For that the surface must be known to a tenth of a spacing. A crossing of the fill between two nodes is off by up to a
+fifth; the sum of the fills on the way to the air is not, because tents add up to the volume: the height function of
+the volume of fluid method (Cummins et al. 2005, 10.1016/j.compstruc.2004.08.017). What three axes say is taken for the
+distance of a plane that cuts them there.
+
+    code      meaning                                                     unit
+    depth     of a node below the surface, above it less than 0           m
+    way       along an axis, from a node to the surface                   m
+"""
+
+from wavetank.device.compiler import qd
+from wavetank.device.state import CoarseGrid
+from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, nearest, tents
+from wavetank.solids.distance import vec3
+
+
+@qd.func
+def is_open(grid: CoarseGrid, m, c, axis: qd.template()):
+    """Whether node `m`, the nearest to the coordinates `c`, is where these are along `axis`, and not inside a solid."""
+    return coordinates(grid, m)[axis] == c[axis] and grid.room[m] > 0.0
+
+
+@qd.func
+def way_to_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
+    """Cells from node `n`, in water, to the surface on a `side` along an `axis`; 0 if there is none within three."""
+    c = coordinates(grid, n)
+    total, reached, open_so_far = grid.fill[n] - 0.5, 0, 1
+    for _ in qd.static(range(3)):
+        c[axis] += side
+        m = nearest(grid, c)
+        open_so_far *= qd.cast(is_open(grid, m, c, axis), qd.i32)
+        if open_so_far == 1:
+            total += qd.min(grid.fill[m], 1.0)
+            reached = 1 if grid.fill[m] < 0.5 else reached
+    return qd.max(total, 1e-3) if reached == 1 else 0.0
+
+
+@qd.func
+def depth_in_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
+    """Depth [cells] of node `n`, in the air, if there is water at the next node; else one cell above the surface."""
+    c = coordinates(grid, n)
+    c[axis] += side
+    m = nearest(grid, c)
+    next_to_water = is_open(grid, m, c, axis) and grid.fill[m] >= 0.5
+    return grid.fill[n] + qd.min(grid.fill[m], 1.0) - 1.5 if next_to_water else -1.0
+
+
+@qd.func
+def depth_at(grid: CoarseGrid, n):
+    """Depth [m] of node `n` below the surface that the volume of the water has, at most three cells."""
+    edges = vec3(grid.dx, grid.dy, grid.dz)
+    deepest = 3.0 * grid.dy
+    closeness, depth = 0.0, -1.0  # sum of inverse squares of the ways [1/m^2]; cells
+    for axis in qd.static(range(3)):
+        if grid.nz > 1 or axis < 2:
+            for side in qd.static((-1, 1)):
+                if grid.fill[n] >= 0.5:
+                    way = way_to_air(grid, n, axis, side) * edges[axis]
+                    closeness += 1.0 / (way * way) if way > 0.0 else 0.0
+                else:
+                    depth = qd.max(depth, depth_in_air(grid, n, axis, side))
+    below = qd.min(deepest, 1.0 / qd.sqrt(closeness)) if closeness > 0.0 else deepest
+    found = below if grid.fill[n] >= 0.5 else depth * grid.dy
+    return found if grid.room[n] > 0.0 else deepest  # inside of a solid nothing sticks out
+
+
+@qd.func
+def carried_share(grid: CoarseGrid, s, supported, fade, dim: qd.template()):
+    """Share of the grid's push at the place `s` [cells]: 1 from the depth `supported` on, 0 by `fade` above it [m]."""
+    at = corners(grid, qd.floor(s, qd.i32), dim)
+    weights = tents(s - qd.floor(s), dim)
+    depth = 0.0
+    for k in qd.static(range(2**dim)):
+        depth += weights[k] * grid.depth[at[k]]
+    return qd.min(qd.max(1.0 + (depth - supported) / fade, 0.0), 1.0)
