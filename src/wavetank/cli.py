@@ -18,8 +18,10 @@ console = Console(stderr=True)
 
 CASE_NAMES = (
     "buckling, calm-vorticity, coiling, column, cup, drop, elliptical-drop, energy, gravity-current, layers, "
-    "lock-exchange, martin-moyce, momentum, resolution, seeds, shear-wave, standing-wave, still-tank, tension-drop"
+    "lock-exchange, martin-moyce, momentum, resolution, rest, seeds, shear-wave, standing-wave, still-tank, "
+    "tension-drop"
 )
+Cases = Annotated[list[str], typer.Argument(metavar="[CASE]...", help=f"Of {CASE_NAMES}; all but rest without one.")]
 SceneName = Annotated[str, typer.Argument(help="A bundled scene or the path of a TOML file.")]
 Settings = Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="Set a key of the scene.")]
 Arch = Annotated[str, typer.Option(help="Back end: cpu, gpu (the best there is), cuda, vulkan, metal, amdgpu.")]
@@ -223,7 +225,7 @@ def converge(
 
 @app.command()
 def validate(
-    cases: Annotated[list[str], typer.Argument(metavar="[CASE]...", help=f"Of {CASE_NAMES}; all without a name.")] = [],  # noqa: B006
+    cases: Cases = [],  # noqa: B006
     quick: Annotated[bool, typer.Option("--quick", help="Coarser and shorter runs with bounds of their own.")] = False,
     out: Annotated[Path | None, typer.Option(help="Folder for a picture and a table of each case.")] = None,
     arch: Arch = "cpu",

@@ -23,7 +23,7 @@ from wavetank.scene.scene import Tank
 from wavetank.simulation.simulation import Simulation
 
 QUICK = ["still-tank", "column", "martin-moyce", "standing-wave", "elliptical-drop", "drop", "energy", "momentum",
-         "seeds", "layers", "lock-exchange", "shear-wave", "gravity-current", "buckling", "tension-drop",
+         "rest", "seeds", "layers", "lock-exchange", "shear-wave", "gravity-current", "buckling", "tension-drop",
          "calm-vorticity"]  # fmt: skip
 
 

@@ -58,6 +58,7 @@ class Case:
     name: str
     title: str
     run: Callable[[bool, str], Outcome]
+    is_long: bool = False  # takes half an hour, unless quick: run where it is named
 
 
 def measured(name: str) -> dict[str, np.ndarray]:

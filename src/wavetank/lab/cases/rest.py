@@ -1,0 +1,123 @@
+"""Every bundled scene and level comes to rest and stays there, for two minutes of water.
+
+Reference: hydrostatics; nothing acts on water at rest. `still-tank` has the bounds of water that was never touched from
+the third second on; scenes that splash, from the second minute on. Roughness is the standard deviation of the tops of
+columns two spacings wide, in spacings; it has a bound where the surface is level. Particles count as still below
+0.02 m/s: a spacing of 2.5 cm in a second and a quarter.
+"""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from wavetank.lab.cases.case import Case, Figure, Outcome, surface
+from wavetank.lab.plots import BLUE, RED, tidy
+from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
+from wavetank.simulation.simulation import Simulation
+
+SECONDS, QUICK_SECONDS = 120.0, 20.0
+QUICK = ("still-tank", "still-tank-2d", "double-dam-2d", "dam-break-2d")
+SETTLED = 60.0  # s after which a splash is over, see `SPLASHES`
+MOST = 6_000  # particles: scenes of more are coarsened
+#: Not at rest by then, each for a reason of its own; their figures have no bounds (docs/notebook/calm.md).
+RESTLESS = {
+    "weightless-drop": "a drop under tension shivers",
+    "weightless-drop-2d": "a drop under tension shivers",
+    "spill": "films run down the terraces",
+}
+V_RMS, V_MAX, STILL, ROUGH = 0.001, 0.01, 0.02, 0.06  # m/s, m/s, m/s, d
+
+
+@dataclasses.dataclass
+class Rest:
+    """What was seen of a scene, a row each half second."""
+
+    name: str
+    spacing: float
+    time: list[float] = dataclasses.field(default_factory=list)
+    v_rms: list[float] = dataclasses.field(default_factory=list)
+    v_max: list[float] = dataclasses.field(default_factory=list)  # of the half second
+    roughness: list[float] = dataclasses.field(default_factory=list)
+    level: list[float] = dataclasses.field(default_factory=list)  # m
+    energy: list[float] = dataclasses.field(default_factory=list)  # J
+
+    def since(self, name: str, start: float) -> np.ndarray:
+        """Return the values of a column from a time [s] on."""
+        return np.array(getattr(self, name))[np.array(self.time) > start - 1e-6]
+
+
+def watch(name: str, seconds: float, arch: str, **changes: Any) -> Rest:
+    """Let a bundled scene run, and look at it each half second."""
+    scene = Scene.load(name).changed(**changes)
+    count = sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
+    if count > 1.2 * MOST:
+        scene = scene.changed(spacing=scene.spacing * (count / MOST) ** (1.0 / scene.dim))
+    sim = Simulation(scene, arch)
+    rest = Rest(name, scene.spacing)
+    fastest = 0.0
+    for number in range(1, round(seconds * 60.0) + 1):
+        sim.advance(1.0 / 60.0)
+        frame = sim.frame(measured=False)
+        speed = np.linalg.norm(frame.velocities.astype(float), axis=1)
+        fastest = max(fastest, float(speed.max()))
+        if number % 30:
+            continue
+        x = frame.positions.astype(float)
+        tops = surface(x, scene.spacing, scene.tank.size) if scene.tank else np.zeros(1)
+        mass = frame.rest_densities.astype(float) * scene.spacing**scene.dim
+        rest.time.append(sim.time)
+        rest.v_rms.append(float(np.sqrt(np.mean(speed**2))))
+        rest.v_max.append(fastest)
+        rest.roughness.append(float(tops.std() / scene.spacing))
+        rest.level.append(float(tops.mean()))
+        rest.energy.append(float(np.sum(mass * (0.5 * speed**2 - x @ np.array(scene.gravity)))))
+        fastest = 0.0
+    return rest
+
+
+def run(quick: bool, arch: str) -> Outcome:
+    """Let all bundled scenes and levels run for 120 s (quick: four of them for 20 s)."""
+    seconds = QUICK_SECONDS if quick else SECONDS
+    names = QUICK if quick else (*bundled_scenes(), *bundled_levels())
+    changes = {"spacing": 0.05} if quick else {}
+    watched = [watch(name, seconds, arch, **(changes if name == "still-tank" else {})) for name in names]
+    figures = [figure for rest in watched for figure in _figures(rest, seconds)]
+
+    def draw(plot: Any) -> None:
+        left, right = plot.subplots(1, 2)
+        for rest in watched:
+            color = "0.6" if rest.name in RESTLESS else BLUE if rest.name.startswith("still") else RED
+            left.semilogy(rest.time, np.maximum(rest.v_max, 1e-5), color=color, lw=0.7, alpha=0.6)
+            if rest.name.startswith("still"):
+                right.plot(rest.time, rest.roughness, label=rest.name)
+        left.axhline(STILL, color=RED, lw=0.8, ls=":")
+        left.set(xlabel="time [s]", ylabel="fastest particle [m/s]")
+        right.axhline(ROUGH, color="0.5", lw=0.8, ls=":")
+        right.set(xlabel="time [s]", ylabel="roughness of the surface [d]", ylim=(0.0, 0.2))
+        right.legend(frameon=False)
+        for axis in (left, right):
+            tidy(axis)
+
+    series = {"time": watched[0].time} | {f"v_max {rest.name}": rest.v_max for rest in watched}
+    return Outcome(figures, series, draw)
+
+
+def _figures(rest: Rest, seconds: float) -> list[Figure]:
+    if rest.name.startswith("still"):
+        level, fastest = rest.since("level", 3.0) / 0.5, float(rest.since("v_max", 3.5).max())
+        return [
+            Figure(f"{rest.name}: v_max from 3 s on", fastest, "m/s", None, V_MAX, "0", "rest"),
+            Figure(f"{rest.name}: v_rms", float(rest.since("v_rms", 3.0).max()), "m/s", None, V_RMS, "0", "rest"),
+            Figure(f"{rest.name}: roughness", float(rest.since("roughness", 3.0).max()), "d", None, ROUGH, "0", "rest"),
+            Figure(f"{rest.name}: lowest level / filled", float(level.min()), "", 0.99, 1.01, "1", "hydrostatics"),
+            Figure(f"{rest.name}: highest level / filled", float(level.max()), "", 0.99, 1.01, "1", "hydrostatics"),
+        ]  # fmt: skip
+    settled = SETTLED if seconds > SETTLED else seconds - 2.0
+    bound = None if rest.name in RESTLESS or seconds < SETTLED else STILL
+    source = RESTLESS.get(rest.name, "rest")
+    fastest = float(rest.since("v_max", settled).max())
+    return [Figure(f"{rest.name}: v_max after {settled:g} s", fastest, "m/s", None, bound, "0", source)]
+
+
+CASE = Case("rest", "All scenes come to rest", run, is_long=True)
