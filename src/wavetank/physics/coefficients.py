@@ -23,13 +23,18 @@ SLOW, SLOW_AT_SOLIDS = 0.1, 0.2
 CALM = 0.1  # of sqrt(g / h), the rate of the shortest waves: water that turns slower counts as calm
 
 
-def coefficients(params: Parameters, dt: float, speed_limit: float = math.inf, *, carries: float = 0.0) -> Coefficients:
-    """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here."""
+def coefficients(
+    params: Parameters, dt: float, speed_limit: float = math.inf, *, carries: float = 0.0, parts: int = 0
+) -> Coefficients:
+    """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here.
+
+    Artificial pressure comes in so many `parts`, one an iteration where 0.
+    """
     h, gravity = params.support * params.spacing, (*params.gravity, 0.0)
     rest = rest_lattice(params.kernel, params.dim, params.support)
     s_0 = rest.squared_gradients / h**2
     w_dq = float(kernel_shape(NAMES[params.kernel][0], np.array(params.tensile_distance))[0])
-    tensile = params.tensile_strength / s_0 / params.iterations / w_dq**params.tensile_exponent
+    tensile = params.tensile_strength / s_0 / (parts or params.iterations) / w_dq**params.tensile_exponent
     # Packings need it that gravity presses; without gravity it would blow them up (docs/notebook/calm.md).
     tensile *= dt / params.frame_time * min(1.0, math.hypot(*params.gravity) / EARTH)
     viscosity = min(1.0, params.viscosity * REFERENCE_RATE * dt)

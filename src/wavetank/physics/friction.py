@@ -27,7 +27,7 @@ def apply_friction(
     """Reduce the velocities along walls and solids."""
     for i in range(count):
         near = particles.near[i]
-        if near != 0:
+        if near >> solids.tank_count != 0 or (near != 0 and solids.friction[0] > 0.0):
             p = lift(predicted(particles, i))
             v = lift(particles.v[i])
             for k in range(solids.count):

@@ -34,7 +34,7 @@ from wavetank.physics.xsph_viscosity import apply_mixed_xsph, apply_xsph
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
     """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
     plan = plan_step(world, params, dt)
-    c = coefficients(params, dt, speed_limit, carries=plan.carried)
+    c = coefficients(params, dt, speed_limit, carries=plan.carried, parts=plan.parts)
     world.keep_viscosity(plan.is_viscous)
 
     predict(world.particles, world.grid, world.solids, c, world.count, plan.searched)  # 1-4
@@ -51,7 +51,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     for number, (relaxation, momentum) in enumerate(relaxations(params, plan.kinds.density_ratio)):  # 8-19
         c = in_iteration(c, relaxation, momentum)
         find_multipliers(world, plan, c, first=number == 0)  # 9-11
-        apply_corrections(world, plan, c)  # 12-18
+        apply_corrections(world, plan, c, first=number == 0)  # 12-18
 
     if plan.is_thick:
         carry_on(world, plan.kinds, params, c)
@@ -93,11 +93,11 @@ def find_multipliers(world: World, plan: Plan, c: Coefficients, *, first: bool) 
         solve_multipliers(scratch, particles, grid, solids, walls, c, count, plan.method)
 
 
-def apply_corrections(world: World, plan: Plan, c: Coefficients) -> None:
+def apply_corrections(world: World, plan: Plan, c: Coefficients, *, first: bool) -> None:
     """Move the predicted positions by what the multipliers say, outside of solids; ice stays."""
     correct_positions(
         world.spare, world.particles, world.scratch, world.grid, world.solids, c, world.count,
-        plan.method, plan.correction, plan.kinds.mixed, plan.searched,
+        plan.method, plan.correction if first else plan.later_correction, plan.kinds.mixed, plan.searched,
     )  # fmt: skip
     world.exchange("px", "py", "pz")
     if world.frozen:

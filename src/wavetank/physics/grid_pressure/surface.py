@@ -22,38 +22,39 @@ distance of a plane that cuts them there.
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, nearest, tents
+from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, tents
 from wavetank.solids.distance import vec3
 
 
 @qd.func
-def is_open(grid: CoarseGrid, m, c, axis: qd.template()):
-    """Whether node `m`, the nearest to the coordinates `c`, is where these are along `axis`, and not inside a solid."""
-    return coordinates(grid, m)[axis] == c[axis] and grid.room[m] > 0.0
+def along(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
+    """How many nodes there are beyond node `n` on a `side` along an `axis`, and by how much their numbers differ."""
+    stride = qd.Vector([1, grid.nx, grid.nx * grid.ny])[axis] * side
+    place = coordinates(grid, n)[axis]
+    beyond = place if qd.static(side < 0) else qd.Vector([grid.nx, grid.ny, grid.nz])[axis] - 1 - place
+    return qd.Vector([beyond, stride])
 
 
 @qd.func
 def way_to_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
     """Cells from node `n`, in water, to the surface on a `side` along an `axis`; 0 if there is none within three."""
-    c = coordinates(grid, n)
-    total, reached, open_so_far = grid.fill[n] - 0.5, 0, 1
-    for _ in qd.static(range(3)):
-        c[axis] += side
-        m = nearest(grid, c)
-        open_so_far *= qd.cast(is_open(grid, m, c, axis), qd.i32)
-        if open_so_far == 1:
-            total += qd.min(grid.fill[m], 1.0)
-            reached = 1 if grid.fill[m] < 0.5 else reached
+    nodes = along(grid, n, axis, side)
+    total, reached, m = grid.fill[n] - 0.5, 0, n
+    for _ in range(qd.min(nodes[0], 3)):
+        m += nodes[1]
+        if grid.room[m] <= 0.0:
+            break
+        total += qd.min(grid.fill[m], 1.0)
+        reached = 1 if grid.fill[m] < 0.5 else reached
     return qd.max(total, 1e-3) if reached == 1 else 0.0
 
 
 @qd.func
 def depth_in_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
     """Depth [cells] of node `n`, in the air, if there is water at the next node; else one cell above the surface."""
-    c = coordinates(grid, n)
-    c[axis] += side
-    m = nearest(grid, c)
-    next_to_water = is_open(grid, m, c, axis) and grid.fill[m] >= 0.5
+    nodes = along(grid, n, axis, side)
+    m = n + (nodes[1] if nodes[0] > 0 else 0)
+    next_to_water = grid.room[m] > 0.0 and grid.fill[m] >= 0.5
     return grid.fill[n] + qd.min(grid.fill[m], 1.0) - 1.5 if next_to_water else -1.0
 
 
