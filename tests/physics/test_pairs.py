@@ -29,7 +29,7 @@ sim.step()
 PASSES = {
     "start_multipliers": 1,
     "solve_multipliers": 1,
-    "correct_positions": 1,
+    "correct_positions": 2,  # with artificial pressure and without
     "measure_density": 1,
     "apply_xsph": 1,
     "confine_vorticity": 1,
