@@ -38,14 +38,14 @@ class Plan:
 def plan_step(world: World, params: Parameters, dt: float) -> Plan:
     """Plan a step of `dt` [s]."""
     kinds, on_grid = blend(world.materials, params), has_grid_pressure(world, params)
-    thick = is_thick(kinds, params)
+    thick, correction = is_thick(kinds, params), correction_number(params)
     return Plan(
         kinds=kinds,
         method=method_number(params),
         searched=int(world.has_solids),
-        correction=correction_number(params),
+        correction=correction,
         # Beside the grid, which carries the water, all of it comes at once: it keeps packings even, and costs a fifth.
-        later_correction=0 if on_grid else correction_number(params),
+        later_correction=0 if on_grid else correction,
         parts=1 if on_grid else params.iterations,
         turning=int(params.vorticity > 0.0),
         is_tense=kinds.surface_tension > 0.0,

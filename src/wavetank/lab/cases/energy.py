@@ -12,6 +12,7 @@ import numpy as np
 
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
+from wavetank.physics.measure import kinetic_energy, potential_energy
 from wavetank.scene.fluids import Block
 from wavetank.scene.scene import Scene, Tank
 from wavetank.simulation.simulation import Simulation
@@ -36,8 +37,8 @@ def energies(scene: Scene, arch: str, seconds: float) -> tuple[list[float], np.n
     times, kinetic, potential = [], [], []
     for frame in sim.frames(seconds, 60.0):
         times.append(sim.time)
-        kinetic.append(0.5 * mass * float(np.sum(frame.velocities.astype(float) ** 2)))
-        potential.append(-mass * float(np.sum(frame.positions.astype(float) @ np.array(scene.gravity))))
+        kinetic.append(kinetic_energy(frame.velocities, mass))
+        potential.append(potential_energy(frame.positions, mass, scene.gravity))
     return times, np.array(kinetic), np.array(potential)
 
 

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from wavetank.lab.cases.case import Case, Figure, Outcome, surface
+from wavetank.lab.cases.still_tank import DEPTH
 from wavetank.lab.plots import BLUE, RED, tidy
+from wavetank.physics.measure import kinetic_energy, potential_energy
 from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
 from wavetank.simulation.simulation import Simulation
 
@@ -71,7 +73,7 @@ def watch(name: str, seconds: float, arch: str) -> Rest:
         rest.v_max.append(fastest)
         rest.roughness.append(float(tops.std() / scene.spacing))
         rest.level.append(float(tops.mean()))
-        rest.energy.append(float(np.sum(mass * (0.5 * speed**2 - x @ np.array(scene.gravity)))))
+        rest.energy.append(kinetic_energy(frame.velocities, mass) + potential_energy(x, mass, scene.gravity))
         fastest = 0.0
     return rest
 
@@ -98,13 +100,17 @@ def run(quick: bool, arch: str) -> Outcome:
         for axis in (left, right):
             tidy(axis)
 
-    series = {"time": watched[0].time} | {f"v_max {rest.name}": rest.v_max for rest in watched}
+    series = {"time": watched[0].time} | {
+        f"{column} {rest.name}": getattr(rest, column)
+        for rest in watched
+        for column in ("v_max", "v_rms", "roughness", "level", "energy")
+    }
     return Outcome(figures, series, draw)
 
 
 def _figures(rest: Rest, seconds: float) -> list[Figure]:
     if rest.name.startswith("still"):
-        level, fastest = rest.since("level", 3.0) / 0.5, float(rest.since("v_max", 3.5).max())
+        level, fastest = rest.since("level", 3.0) / DEPTH, float(rest.since("v_max", 3.5).max())
         return [
             Figure(f"{rest.name}: v_max from 3 s on", fastest, "m/s", None, V_MAX, "0", "rest"),
             Figure(f"{rest.name}: v_rms", float(rest.since("v_rms", 3.0).max()), "m/s", None, V_RMS, "0", "rest"),
