@@ -48,11 +48,12 @@ class Desk:
     def __post_init__(self) -> None:
         """Read the declarations."""
         self.declared = everything(self.engine.session)
+        self.shown = self.engine.shown
 
     @property
     def game(self) -> dict[str, Any] | None:
         """How the game stands, where there is one."""
-        return self.engine.shown.game
+        return self.shown.game
 
     @property
     def rules(self) -> dict[str, Any] | None:
@@ -84,12 +85,12 @@ class Desk:
     @property
     def status(self) -> dict[str, Any]:
         """What changes all the time."""
-        return self.engine.shown.status
+        return self.shown.status
 
     @property
     def world(self) -> dict[str, Any]:
         """What changes with the scene."""
-        return self.engine.shown.world
+        return self.shown.world
 
     def value(self, name: str) -> Any:
         """Return a parameter as it was last set here, or as it is."""
@@ -114,14 +115,14 @@ class Desk:
             self.notes = [*self.notes[-3:], (sentence, time.perf_counter() + 2.5 + 0.045 * len(sentence))]
 
     def pass_time(self) -> None:
-        """Collect notes and the points of the curves."""
+        """Take what this picture of the window shows, the same for all its parts; collect notes and curves."""
+        self.shown = shown = self.engine.shown
         while not self.engine.notes.empty():
             self.say(self.engine.notes.get())
         self.notes = [note for note in self.notes if note[1] > time.perf_counter()]
         if self.rules != self._rules:
             self._rules = self.rules
             self.tool = next(iter(self._rules), "look") if self._rules is not None else self.tool
-        shown = self.engine.shown
         if shown.measured != self._measured:
             self._measured = shown.measured
             if shown.status["ticks"] <= FIRST_FRAMES:

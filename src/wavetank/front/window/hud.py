@@ -39,7 +39,7 @@ def _regions(desk: Desk, game: dict[str, Any], box: Box) -> None:
     """Outline the regions as they lie in the picture, each with what is asked of it."""
     draw, em, (x, y, width, height) = imgui.get_window_draw_list(), imgui.get_font_size(), box
     draw.push_clip_rect(ImVec2(x, y), ImVec2(x + width, y + height), True)
-    for k, (aim, region) in enumerate(zip(game["aims"], desk.engine.shown.regions, strict=False)):
+    for k, (aim, region) in enumerate(zip(game["aims"], desk.shown.regions, strict=False)):
         outline = [ImVec2(x + u * width, y + v * height) for u, v in region["outline"]]
         corners = [ImVec2(x + u * width, y + v * height) for u, v in region["corners"]]
         if not corners:

@@ -49,7 +49,7 @@ def _card(desk: Desk, scene: dict[str, Any], size: ImVec2, tall: float) -> None:
     draw.push_clip_rect(at, end, True)
     draw.add_text(ImVec2(at.x + 8, at.y + tall), ink(TEXT), scene["title"])
     if scene["goal"]:
-        best = desk.engine.shown.scores.get(scene["name"], {}).get("stars", 0)
+        best = desk.shown.scores.get(scene["name"], {}).get("stars", 0)
         stars(best, ImVec2(at.x + 8, at.y + tall + 1.35 * em), 0.95 * em)
     else:
         draw.add_text(ImVec2(at.x + 8, at.y + tall + 1.25 * em), ink(SOFT), f"{scene['dim']}-D · {scene['count']:,}")

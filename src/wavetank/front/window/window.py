@@ -173,7 +173,7 @@ class Window:
 
     def _upload(self) -> None:
         """Bring a new picture of the water into the texture."""
-        shown = self.engine.shown
+        shown = self.desk.shown
         if self._plate is not None and shown.image is not None and shown.number != self._shown:
             self._shown = shown.number
             self._plate.show(shown.image)
