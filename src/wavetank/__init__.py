@@ -14,6 +14,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import PARAMETERS, PRESETS
 from wavetank.foundation.version import VERSION
 from wavetank.scene.fluids import Ball, Block, Points
+from wavetank.scene.joints import BallJoint, Hinge, Rope, Slider, Spring, Weld
 from wavetank.scene.scene import Scene, Tank, bundled_scenes
 from wavetank.solids.meshes.mesh import Mesh
 from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
@@ -30,9 +31,10 @@ if TYPE_CHECKING:
 __version__ = VERSION
 
 __all__ = [
-    "PARAMETERS", "PRESETS", "Ball", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference", "HalfSpace",
-    "Intersection", "Mesh", "Points", "Recording", "Scene", "Session", "Simulation", "Sphere", "Tank", "Union",
-    "WavetankError", "__version__", "bundled_scenes", "commands", "render", "replay", "show",
+    "PARAMETERS", "PRESETS", "Ball", "BallJoint", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference",
+    "HalfSpace", "Hinge", "Intersection", "Mesh", "Points", "Recording", "Rope", "Scene", "Session", "Simulation",
+    "Slider", "Sphere", "Spring", "Tank", "Union", "WavetankError", "Weld", "__version__", "bundled_scenes",
+    "commands", "render", "replay", "show",
 ]  # fmt: skip
 
 #: what needs the kernels' sources is imported when it is first used: data alone should load fast

@@ -34,7 +34,7 @@ def solve(cloud: Cloud, mixed: int) -> np.ndarray:
         mixed,
     )
     correct_positions(
-        world.spare, world.particles, world.scratch, world.grid, world.solids, cloud.c, cloud.count,
+        world.spare, world.particles, world.scratch, world.grid, world.solids, world.walls, cloud.c, cloud.count,
         cloud.method, 0, mixed, 0,
     )  # fmt: skip
     return cloud.predictions(world.spare) - cloud.x

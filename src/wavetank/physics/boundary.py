@@ -16,8 +16,9 @@ Contact: conservative advancement along the path (Hart 1996, "Sphere tracing", 1
 """
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import Coefficients, Particles, Walls
+from wavetank.device.state import Coefficients, Particles, Scratch, Walls
 from wavetank.physics.predicted_positions import predict_at, predicted
+from wavetank.physics.reactions import push_back
 from wavetank.solids.distance import (
     SolidSet,
     lift,
@@ -120,6 +121,22 @@ def find_walls(sums: qd.template(), team, particles: Particles, solids: SolidSet
 
 
 @qd.func
+def press_back(p, near, free, push, solids: SolidSet, walls: Walls, c: Coefficients):
+    """Let bodies feel what their share of the density at `p` moves a particle by: `push` [m^2] times the gradient.
+
+    `free` is the share of the support that all the marked solids leave.
+    """
+    k = next_near(near, solids.tank_count - 1, solids.count)
+    while k < solids.count:
+        if solids.unit[k] > 0.0:
+            value = signed_distance(solids, k, p)
+            share = wall_share(walls, value.w, c.h) * c.wall_density
+            others = free / qd.max(1.0 - share[0], 1e-6)
+            push_back(solids, k, p, vec3(value.x, value.y, value.z) * (-push * others * share[1] * c.inverse_h))
+        k = next_near(near, k, solids.count)
+
+
+@qd.func
 def wall_density(x: qd.template(), near, solids: SolidSet, walls: Walls, c: Coefficients):
     """(gradient [1/m], relative density) that the marked solids add at `x`."""
     sums = qd.Matrix([[0.0], [0.0], [0.0], [1.0]])
@@ -184,8 +201,10 @@ def kept_in_tank(target, near, solids: SolidSet, gap):
 
 
 @qd.func
-def stopped(origin, target, near, solids: SolidSet, gap):
+def stopped(origin, target, near, solids: SolidSet, gap, mass):
     """Return where the way from `origin` to `target` ends outside of the marked solids, in their motion.
+
+    Bodies feel what they move by this way, which has that `mass`, over a particle's of the heaviest fluid.
 
     The tank comes last: it is convex from inside, so its word holds. Where one solid moved a particle all are asked
     once more.
@@ -200,8 +219,11 @@ def stopped(origin, target, near, solids: SolidSet, gap):
             at = to_local(solids.old_position[k], solids.old_rotation[k], origin)
             out = follow(k, at, end, solids, gap)
             if (out - end).norm() > 0.0:
+                before = target
                 target = solids.position[k] + rotate(rotation, out)
                 moved = 1
+                if mass > 0.0:
+                    push_back(solids, k, target, mass * (target - before))
             k = next_near(near, k, solids.count)
         marks = near
         if moved == 1:  # perhaps farther than its marks reach
@@ -274,7 +296,7 @@ def flattened(point, x: qd.template()):
 
 
 @qd.kernel(fastcache=True)
-def keep_out_of_solids(particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
+def keep_out_of_solids(particles: Particles, scratch: Scratch, solids: SolidSet, c: Coefficients, count: qd.i32):
     """Mark the solids that are near the predicted positions as they are now, and move these out of them."""
     for i in range(count):
         x = particles.x[i]
@@ -289,4 +311,5 @@ def keep_out_of_solids(particles: Particles, solids: SolidSet, c: Coefficients, 
         near = near_tank[0, 0] | near_bodies(lift(x), lift(p), solids, c.h)
         particles.near[i] = near
         if near >> solids.tank_count != 0:
-            predict_at(particles, i, flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap), x))
+            weight = scratch.weight[i]
+            predict_at(particles, i, flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap, 1.0 / weight), x))

@@ -32,7 +32,7 @@ multiplier: Moreau and Jean's projected iteration, as in Tonge et al. 2012 (10.1
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles, Scratch, Walls
-from wavetank.physics.boundary import find_walls, flattened, kept_in_tank, stopped
+from wavetank.physics.boundary import find_walls, flattened, kept_in_tank, press_back, stopped
 from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.smoothing import kernel
@@ -166,12 +166,13 @@ def solve_multipliers(
 
 @qd.kernel(fastcache=True)
 def correct_positions(
-    corrected: Particles, particles: Particles, scratch: Scratch, grid: Grid, solids: SolidSet, c: Coefficients,
-    count: qd.i32, method: qd.template(), correction: qd.template(), mixed: qd.template(), searched: qd.template(),
+    corrected: Particles, particles: Particles, scratch: Scratch, grid: Grid, solids: SolidSet, walls: Walls,
+    c: Coefficients, count: qd.i32, method: qd.template(), correction: qd.template(), mixed: qd.template(),
+    searched: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by the corrections (Eq. 6 or 8, by its number in CORRECTIONS), inside the tank.
 
-    Where solids are `searched` they stay out of those as well.
+    Where solids are `searched` they stay out of those as well; with 2, bodies feel it.
     """
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
@@ -187,12 +188,18 @@ def correct_positions(
                 if qd.static(mixed):
                     dp *= scratch.weight[i]
                 # Within one substep a particle must not run past the solids that were marked for it.
-                p += dp * qd.min(1.0, c.largest_correction / qd.max(dp.norm(), 1e-12))
+                short = qd.min(1.0, c.largest_correction / qd.max(dp.norm(), 1e-12))
+                before = lift(p)
+                p += dp * short
                 if near != 0:
                     p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
                     if qd.static(searched):
                         if near >> solids.tank_count != 0:
-                            p = flattened(stopped(lift(particles.x[i]), lift(p), near, solids, c.wall_gap), p)
+                            mass = 1.0 / scratch.weight[i] if qd.static(searched == 2) else 0.0
+                            p = flattened(stopped(lift(particles.x[i]), lift(p), near, solids, c.wall_gap, mass), p)
+                            if qd.static(searched == 2):
+                                push = scratch.dlam[i] * short
+                                press_back(before, near, 1.0 - scratch.wall[i].w, push, solids, walls, c)
                 predict_at(corrected, i, p)
 
 

@@ -17,6 +17,7 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Particles, Scratch, Walls
 from wavetank.physics.boundary import is_near, wall_share
 from wavetank.physics.predicted_positions import predicted
+from wavetank.physics.reactions import push_back
 from wavetank.solids.distance import SolidSet, lift, rotate, signed_distance, to_local, vec3
 
 
@@ -46,7 +47,9 @@ def apply_friction(
                     share = solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12)
                     if k >= solids.tank_count and value.w < c.h:
                         share += c.calming_at_solids * qd.max(0.0, 1.0 - slip.norm_sqr() * c.slow_at_solids)
-                    v -= slip * qd.min(1.0, share)
+                    change = slip * qd.min(1.0, share)
+                    v -= change
+                    push_back(solids, k, p - n * value.w, -change * (c.dt / scratch.weight[i]))
             held = particles.v[i]
             for axis in qd.static(range(held.n)):
                 held[axis] = v[axis]

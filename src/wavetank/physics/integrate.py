@@ -28,15 +28,23 @@ def accelerate(particles: Particles, i, v, c: Coefficients):
     particles.v[i] = v
 
 
+@qd.func
+def mass_of(particles: Particles, i, rows: qd.template()):
+    """Mass of particle i over that of the heaviest fluid; before the first step nobody has told."""
+    weight = rows[particles.material[i]][0]
+    return 1.0 / weight if weight > 0.0 else 1.0
+
+
 @qd.kernel(fastcache=True)
 def predict(
-    particles: Particles, grid: Grid, solids: SolidSet, c: Coefficients, count: qd.i32, searched: qd.template(),
+    particles: Particles, grid: Grid, solids: SolidSet, rows: qd.types.ndarray(), c: Coefficients, count: qd.i32,
+    searched: qd.template(),
 ):  # fmt: skip
     """Accelerate, move freely (Algorithm 1, lines 2-3), mark what is near, stay out of it, and find the cell.
 
     With gravity acts the share of the grid's pressure that is carried on (`grid_pressure/correction.py`). Where solids
-    are not `searched` there are only the walls of the tank. In no time, dt = 0, particles stay where they are, wherever
-    that is.
+    are not `searched` there are only the walls of the tank; with 2, bodies feel what they stop. In no time, dt = 0,
+    particles stay where they are, wherever that is.
     """
     for turn in range(turns(grid, count)):
         gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
@@ -72,7 +80,8 @@ def predict(
                 if qd.static(searched):
                     near |= near_bodies(lift(x), lift(p), solids, c.h)
                     if near >> solids.tank_count != 0 and c.dt > 0.0:
-                        p = flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap), x)
+                        mass = mass_of(particles, i, rows) if qd.static(searched == 2) else 0.0
+                        p = flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap, mass), x)
                 particles.near[i] = near
                 predict_at(particles, i, p)
                 grid.cell[i] = cell_of(grid, p, c.h)

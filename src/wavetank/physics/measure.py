@@ -16,7 +16,7 @@ from wavetank.physics.world import World
 def update_densities(world: World, params: Parameters) -> None:
     """Measure the densities [kg/m^3] of `world` as it stands. The order of particles changes, the motion does not."""
     c, count, kinds = coefficients(params, 0.0), world.count, blend(world.materials, params)
-    predict(world.particles, world.grid, world.solids, c, count, int(world.has_solids))
+    predict(world.particles, world.grid, world.solids, world.fluids.rows, c, count, int(world.has_solids))
     sort_particles(world.particles, world.spare, world.grid, count)
     world.swap()
     world.grid = find_neighbors(world.particles, world.grid, c, count)

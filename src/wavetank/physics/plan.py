@@ -21,7 +21,7 @@ class Plan:
 
     kinds: Blend  # the fluids
     method: int  # smoothing kernel: its place in KERNELS
-    searched: int  # whether there are solids besides the walls of the tank
+    searched: int  # 1 where there are solids besides the walls of the tank, 2 where some of them are bodies
     correction: int  # of the first iteration, with artificial pressure or without: its place in CORRECTIONS
     later_correction: int  # of the others
     parts: int  # iterations with artificial pressure
@@ -42,7 +42,7 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
     return Plan(
         kinds=kinds,
         method=method_number(params),
-        searched=int(world.has_solids),
+        searched=world.searched,
         correction=correction,
         # Beside the grid, which carries the water, all of it comes at once: it keeps packings even, and costs a fifth.
         later_correction=0 if on_grid else correction,

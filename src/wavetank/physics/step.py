@@ -37,7 +37,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     c = coefficients(params, dt, speed_limit, carries=plan.carried, parts=plan.parts)
     world.keep_viscosity(plan.is_viscous)
 
-    predict(world.particles, world.grid, world.solids, c, world.count, plan.searched)  # 1-4
+    predict(world.particles, world.grid, world.solids, world.fluids.rows, c, world.count, plan.searched)  # 1-4
 
     sort_particles(world.particles, world.spare, world.grid, world.count)  # 5-7
     world.swap()
@@ -71,7 +71,7 @@ def act_on_fluids(world: World, plan: Plan, params: Parameters, c: Coefficients)
     if plan.is_viscous:
         solve_viscosity(world, plan.kinds, params, c, params.viscosity_iterations)
     if plan.is_tense or plan.is_viscous:
-        keep_out_of_solids(world.particles, world.solids, c, world.count)
+        keep_out_of_solids(world.particles, world.scratch, world.solids, c, world.count)
 
 
 def correct_on_grid(world: World, plan: Plan, params: Parameters, c: Coefficients) -> None:
@@ -96,7 +96,7 @@ def find_multipliers(world: World, plan: Plan, c: Coefficients, *, first: bool) 
 def apply_corrections(world: World, plan: Plan, c: Coefficients, *, first: bool) -> None:
     """Move the predicted positions by what the multipliers say, outside of solids; ice stays."""
     correct_positions(
-        world.spare, world.particles, world.scratch, world.grid, world.solids, c, world.count,
+        world.spare, world.particles, world.scratch, world.grid, world.solids, world.walls, c, world.count,
         plan.method, plan.correction if first else plan.later_correction, plan.kinds.mixed, plan.searched,
     )  # fmt: skip
     world.exchange("px", "py", "pz")

@@ -18,6 +18,7 @@ from wavetank.device.state import (
     without_viscosity,
 )  # fmt: skip
 from wavetank.foundation.materials import Material
+from wavetank.physics.bodies import Pieces
 from wavetank.physics.foam.pool import Pool
 from wavetank.solids.distance import SolidSet
 
@@ -41,12 +42,18 @@ class World:
     solids_version: int = 0  # changes with each motion of the solids
     room_version: int = -1  # of the solids when the grid was last told which room they leave
     known: dict[tuple[Any, ...], Any] = dataclasses.field(default_factory=dict)  # see `exchanged`
+    pieces: Pieces | None = None  # of the bodies, where there are any
     pool: Pool | None = None  # of spray, foam and bubbles; made when the first are
 
     @property
     def has_solids(self) -> bool:
         """Whether there is anything solid besides the walls of the tank, which are planes and need no search."""
         return bool(self.solids.count > self.solids.tank_count)
+
+    @property
+    def searched(self) -> int:
+        """What particles look for besides the walls of the tank: 0 nothing, 1 solids, 2 solids that feel them."""
+        return 0 if not self.has_solids else 2 if self.pieces else 1
 
     @property
     def remembers_viscosity(self) -> bool:

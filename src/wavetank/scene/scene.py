@@ -22,6 +22,7 @@ from wavetank.foundation.replacing import replacing
 from wavetank.scene.fluids import AnyFluid, Points
 from wavetank.scene.forces import AnyForce
 from wavetank.scene.goal import Goal
+from wavetank.scene.joints import AnyJoint, check_joints
 from wavetank.solids.shapes import AnySolid, HalfSpace
 from wavetank.solids.solid import Solid
 
@@ -62,6 +63,7 @@ class Scene(Parameters):
     fluids: Annotated[list[AnyFluid], BeforeValidator(lambda v: _tagged(v, "block"))] = []
     materials: list[Material] = []
     solids: Annotated[list[AnySolid], BeforeValidator(lambda v: _tagged(v, "box"))] = []
+    joints: list[AnyJoint] = []
     forces: list[AnyForce] = []
     goal: Goal | None = None
 
@@ -107,7 +109,12 @@ class Scene(Parameters):
 
     def _vectors(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         yield "gravity", self.gravity
-        for kind, members in (("fluids", self.fluids), ("solids", self.solids), ("forces", self.forces)):
+        for kind, members in (
+            ("fluids", self.fluids),
+            ("solids", self.solids),
+            ("joints", self.joints),
+            ("forces", self.forces),
+        ):
             for number, member in enumerate(members):
                 for name, vector in member.vectors():
                     yield f"{kind}[{number}].{name}", tuple(vector)
@@ -142,11 +149,12 @@ class Scene(Parameters):
                 )
 
     def _check_names(self) -> None:
-        for kind, members in (("solids", self.solids), ("materials", self.materials)):
+        for kind, members in (("solids", self.solids), ("joints", self.joints), ("materials", self.materials)):
             names = [member.name for member in members if member.name]
             twice = next((name for name in names if names.count(name) > 1), None)
             if twice is not None:
                 raise ValueError(f"{kind}: the name {twice!r} is used twice; a name must be unique.")
+        check_joints(self.joints, {solid.name: solid.is_body for solid in self.solids if solid.name})
         if any(not material.name for material in self.materials):
             raise ValueError("materials: every material needs a name, so that a fluid can ask for it.")
         known = [material.name for material in self.materials]

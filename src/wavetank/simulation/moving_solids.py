@@ -34,6 +34,8 @@ class MovingSolids:
         self.poses: list[Pose] = [(solid.origin, solid.quaternion) for solid in self.members]
         self.targets: dict[int, Pose] = {}  # at the end of the next frame
         self.growing: dict[int, tuple[float, float]] = {}  # age and time to grow [s]
+        self.passing: dict[int, tuple[Pose, Pose]] = {}  # begin and end of a time step, of bodies
+        self.feeling: dict[int, tuple[np.ndarray, float]] = {}  # centre of mass [m] and `SolidSet.unit`, of bodies
         self.version = 0  # of what is on the device
         self.rebuild()
 
@@ -43,6 +45,10 @@ class MovingSolids:
         self.has_friction = self.friction > 0.0 or any(solid.friction for solid in self.members)
         self.reaches = [solid.reach() for solid in self.members]
         self.walls = [solid.program()[0] for solid in self.members[: self.tank_count]]
+        units = np.zeros(max(len(self.members), 1), np.float32)
+        for number, (_, unit) in self.feeling.items():
+            units[number] = unit
+        upload(self.device.unit, units)
         self._resize()
         self._upload(0.0, 0.0)
 
@@ -64,7 +70,7 @@ class MovingSolids:
 
         for column in (self.members, self.names, self.poses):
             del column[number]
-        self.targets, self.growing = without(self.targets), without(self.growing)
+        self.targets, self.growing, self.feeling = without(self.targets), without(self.growing), {}
         self.rebuild()
 
     def find_free_places(self, scene: Scene, places: np.ndarray, particles: Particles) -> np.ndarray:
@@ -117,7 +123,7 @@ class MovingSolids:
 
         No two versions of any world's solids have the same number.
         """
-        if not self.targets:
+        if not self.targets and not self.passing:
             return self.version
         self._upload(begin, end)
         resting = all(
@@ -133,6 +139,8 @@ class MovingSolids:
         """End a frame: what was aimed at is where the solids are."""
         for number, target in self.targets.items():
             self.poses[number] = target
+        # A body that is not moved any more is free.
+        self.targets = {number: target for number, target in self.targets.items() if number not in self.feeling}
 
     def grow(self, duration: float) -> None:
         """Let new solids swell for `duration` [s]."""
@@ -153,22 +161,37 @@ class MovingSolids:
         self.version = next(_versions)
         if not self.poses:
             return
-        where = [self.targets.get(number, pose) for number, pose in enumerate(self.poses)]
-        pairs = list(zip(self.poses, where, strict=True))
         (old_at, old_turn), (at, turn) = (
-            (
-                np.array([a[0] + share * (b[0] - a[0]) for a, b in pairs]),
-                np.array([interpolate(a[1], b[1], share) for a, b in pairs]),
-            )
-            for share in (begin, end)
+            [np.array(column) for column in zip(*self._instant(share, last), strict=True)]
+            for last, share in enumerate((begin, end))
         )
         sweep = [np.linalg.norm(at - old_at, axis=1), 2.0 * np.linalg.norm(turn - old_turn, axis=1)]
         device = self.device
         for array, values in (
             (device.old_position, old_at), (device.old_rotation, old_turn), (device.position, at),
-            (device.rotation, turn), (device.plane, self._planes(at, turn)), (device.sweep, np.stack(sweep, axis=1)),
+            (device.rotation, turn), (device.center, self._centers(at, turn)),
+            (device.plane, self._planes(at, turn)), (device.sweep, np.stack(sweep, axis=1)),
         ):  # fmt: skip
             upload(array, values.astype(np.float32))
+
+    def between(self, number: int, target: Pose, share: float) -> Pose:
+        """Return the pose of a solid at a `share` of the frame in which it reaches a target."""
+        (position, rotation), (there, turn) = self.poses[number], target
+        return position + share * (there - position), interpolate(rotation, turn, share)
+
+    def _instant(self, share: float, last: int) -> list[Pose]:
+        """Return all poses at a `share` of the frame; those of bodies at the begin of a time step, or its `last`."""
+        poses = [self.between(k, self.targets.get(k, pose), share) for k, pose in enumerate(self.poses)]
+        for number, ends in self.passing.items():
+            poses[number] = ends[last]
+        return poses
+
+    def _centers(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """Return where the centres of mass are at these poses, [n, 3]."""
+        centers = positions.copy()
+        for number, (center, _) in self.feeling.items():
+            centers[number] = positions[number] + turned(rotations[number], center)
+        return centers
 
     def _planes(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Return (normal, offset) of the tank's walls at these poses, [tank_count, 4]: the distance is n x + b."""

@@ -15,6 +15,7 @@ from wavetank.device.state import Fluids, Walls, new_particles, new_scratch, vec
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import LIVE, refuse_assignment
 from wavetank.physics import population
+from wavetank.physics.bodies import Retry
 from wavetank.physics.foam.pool import pool_from, pool_rows
 from wavetank.physics.foam.update import load_kernels, update_foam
 from wavetank.physics.grid_pressure.coarse_grid import new_levels
@@ -28,6 +29,7 @@ from wavetank.scene.scene import MAX_PARTICLES, Scene
 from wavetank.simulation import limits
 from wavetank.simulation import snapshot as snapshots
 from wavetank.simulation.arrays import check_newcomers
+from wavetank.simulation.bodies import MOST_TRIES, Bodies
 from wavetank.simulation.contents import Contents
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.ledger import Ledger
@@ -52,6 +54,8 @@ class Simulation(Contents):
         self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
         self.pushed: list[Force] = []  # these in the next one only
         self.ledger = Ledger()
+        self.bodies = Bodies(self.scene, self.solids)
+        self._retry = Retry()
         self._fill(len(positions))
         free = self.solids.find_free_places(self.scene, positions, self.world.particles)
         self.add(positions[free], velocities[free], materials=self.scene.kinds()[free])
@@ -80,6 +84,7 @@ class Simulation(Contents):
             count=0,
             has_friction=self.solids.has_friction,
             levels=new_levels(size, h) if size else [],
+            pieces=self.bodies.cut(),
         )
         self.ledger.capacity, self._outdated = capacity, True
 
@@ -137,11 +142,14 @@ class Simulation(Contents):
         parts = self.time_steps = whole(self._steps_in(duration))
         self.solids.grow(duration)
         for part in range(parts):
+            if self.bodies:
+                self.bodies.advance(duration / parts, (part + 1) / parts, limit)
             self.world.solids_version = self.solids.move_to(part / parts, (part + 1) / parts)
             if self.count:
                 for force in self._acting:
                     force.apply(self.world.particles, self.count, duration / parts, self.time + duration * part / parts)
-                step(self.world, self.scene, duration / parts, limit)
+                self._step(duration / parts, limit)
+        self.solids.passing.clear()
         self.solids.move_to(0.0, 1.0)
         update_foam(self.world, self.scene, duration, self.frame_number)
         self.pushed = []
@@ -151,6 +159,20 @@ class Simulation(Contents):
         self.ledger.time += duration
         self.ledger.frame_number += 1
         self._outdated = True
+
+    def _step(self, dt: float, limit: float) -> None:
+        """Take a time step; where bodies are pushed harder than they were, take it again while they yield."""
+        if not self.bodies:
+            step(self.world, self.scene, dt, limit)
+            return
+        self._retry.keep(self.world.particles, self.scene.dim, self.count)
+        for turn in range(MOST_TRIES):
+            step(self.world, self.scene, dt, limit)
+            self.bodies.feel(self.world, dt)
+            if turn + 1 == MOST_TRIES or not self.bodies.yielded(dt):
+                break
+            self._retry.restore(self.world.particles, self.count)
+            self.world.solids_version = self.solids.move_to(0.0, 1.0)
 
     @property
     def _acting(self) -> tuple[Force, ...]:
@@ -172,6 +194,15 @@ class Simulation(Contents):
         angle about z [rad]; None keeps what is. A solid without a name is called "solid 1" and so on.
         """
         self.solids.aim(name, position, rotation, self.scene.dim)
+
+    def hold(self, name: str, held: bool = True) -> None:
+        """Let the body `name` stay where it is, or is moved to by `move`; with `held` = False let it go."""
+        body = self.bodies[name]
+        solids = [*self.scene.solids]
+        number = body.number - self.solids.tank_count
+        solids[number] = body.solid = solids[number].model_copy(update={"held": held})
+        self.solids.members[body.number] = body.solid
+        self.scene.assign("solids", solids)
 
     def add_solid(self, solid: Solid, grow: float = 0.0) -> str:
         """Put a solid into the world and return its name.
@@ -195,6 +226,13 @@ class Simulation(Contents):
         self._renew_solids()
 
     def _renew_solids(self) -> None:
+        memories = {name: (body.memory(), body.velocity, body.angular_velocity) for name, body in self.bodies.items()}
+        self.bodies = Bodies(self.scene, self.solids)
+        for name in memories.keys() & set(self.bodies):
+            body, (memory, velocity, angular_velocity) = self.bodies[name], memories[name]
+            body.recall(memory)
+            body.velocity, body.angular_velocity = velocity, angular_velocity
+        self.world.pieces = self.bodies.cut()
         self.world.solids, self.world.has_friction = self.solids.device, self.solids.has_friction
         self._outdated = True
 
@@ -270,7 +308,8 @@ class Simulation(Contents):
 
     def snapshot(self) -> Snapshot:
         """Return this instant as host arrays, for `resume`."""
-        return snapshots.take_snapshot(self.scene, self.world, self.solids, self.ledger)
+        taken = snapshots.take_snapshot(self.scene, self.world, self.solids, self.ledger)
+        return dataclasses.replace(taken, arrays=taken.arrays | self.bodies.arrays())
 
     def resume(self, snapshot: Snapshot) -> None:
         """Go back (or on) to an instant; parameters and forces stay as they are now."""
@@ -283,6 +322,7 @@ class Simulation(Contents):
         self.ledger.capacity = before.capacity
         self.ledger.next_id = max(self.ledger.next_id, before.next_id)
         snapshots.put_particles(snapshot, self.scene, self.world, self.ledger.capacity)
+        self.bodies.resume(snapshot.arrays)
 
     def clone(self) -> "Simulation":
         """Return a world of its own that goes on from here to the same bits, with the same forces and parameters."""

@@ -93,13 +93,14 @@ def put_particles(snapshot: Snapshot, scene: Scene, world: World, capacity: int)
 
 
 def digest(snapshot: Snapshot) -> str:
-    """Return the hex SHA-256 of an instant: time, particles ordered by id, foam, poses of solids, to the last bit."""
+    """Return the hex SHA-256 of an instant: time, particles by id, foam, poses, bodies, to the last bit."""
     order = np.argsort(snapshot.arrays["id"], kind="stable")
     particles = {name: snapshot.arrays[name][order] for name in TOLD}
     foam = {name: rows for name, rows in sorted(snapshot.arrays.items()) if name.startswith("foam_")}
     poses = {f"pose {number}": np.concatenate(pose) for number, pose in enumerate(snapshot.poses)}
     whole = hashlib.sha256()
-    for name, values in ({"time": np.float64(snapshot.time)} | particles | foam | poses).items():
+    memory = {name: rows for name, rows in snapshot.arrays.items() if name == "bodies_memory"}
+    for name, values in ({"time": np.float64(snapshot.time)} | particles | foam | poses | memory).items():
         whole.update(f"{name} {values.shape}".encode() + values.tobytes())
     return whole.hexdigest()
 
@@ -171,7 +172,10 @@ def read_snapshot(path: str | Path, solids: Any) -> tuple[Snapshot, str]:
             numbers=Numbers(**{field.name: int(numbers[field.name]) for field in dataclasses.fields(Numbers)}),
             arrays={
                 name: data[name]
-                for name in (*ARRAYS, *(name for name in data if name == VISCOUS or name.startswith("foam_")))
+                for name in (
+                    *ARRAYS,
+                    *(name for name in data if name == VISCOUS or name.startswith(("foam_", "bodies_"))),
+                )
             },
             solids=members,
             names=about["names"],

@@ -61,8 +61,14 @@ def grids():
     return 1 << 16
 
 
-STACK, UNION, INTERSECTION, DIFFERENCE, GRIDS = (
-    code.fn() for code in (deepest, union, intersection, difference, grids)
+@qd.func
+def parts():
+    """Numbers that each solid has in `SolidSet.reaction`."""
+    return 13
+
+
+PARTS, STACK, UNION, INTERSECTION, DIFFERENCE, GRIDS = (
+    code.fn() for code in (parts, deepest, union, intersection, difference, grids)
 )
 
 
@@ -196,6 +202,9 @@ class SolidSet:
     old_rotation: qd.types.ndarray()  # vec4 [solids], at its start
     plane: qd.types.ndarray()  # vec4 [solids]: walls of the tank as planes (n, b) at the end, distance n x + b [1, m]
     sweep: qd.types.ndarray()  # vec2 [solids]: way of the origin [m] and of a point 1 m away in the substep
+    center: qd.types.ndarray()  # vec3 [solids], m: centre of mass at the end of the substep
+    unit: qd.types.ndarray()  # f32 [solids], 1/m: of the sums in `reaction`; 0 where a solid feels nothing
+    reaction: qd.types.ndarray()  # i32 [13 solids]: what the water does to each, see `physics/reactions.py`
     grid: qd.types.ndarray()  # i32 vec4 [grids]: number of its first sample, numbers of nodes along x, y, z
     samples: qd.types.ndarray()  # f32: for each grid its cell edge, then the distances at its nodes, x fastest; m
     count: qd.i32

@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from wavetank.foundation.model import Model, Number, Quaternion
+from wavetank.foundation.model import Model, Number, Positive, Quaternion, Vector
 from wavetank.foundation.rotations import product, turned, unit_quaternion
 
 Floats = Sequence[float] | np.ndarray
+Rates = tuple[Number, Number, Number]
 ENDLESS = 1.0e5  # half size [m] of what has no end
 
 
@@ -35,6 +36,29 @@ class Solid(Model):
     name: str = ""
     rotation: Quaternion | Number = (1.0, 0.0, 0.0, 0.0)  # (w, x, y, z), or an angle about z [rad]
     friction: Annotated[Number, Field(ge=0, le=1)] | None = None  # the scene's friction where None
+    density: Positive | None = None  # kg/m^3: a density or a mass makes a solid a body that water moves
+    mass: Positive | None = None  # kg, in a 2-D world of a metre's length of it
+    hollow: bool = False  # whether its mass lies in its surface
+    held: bool = False  # whether a body stays where it is (or is moved to) until it is let go
+    velocity: Vector | None = None  # m/s, of a body's centre of mass at the start
+    angular_velocity: Rates | Number | None = None  # rad/s, of a body at the start; about z where one number
+    restitution: Annotated[Number, Field(ge=0, le=1)] = 0.2  # share of the speed that a body bounces back with
+
+    @model_validator(mode="after")
+    def _is_body_or_not(self) -> "Solid":
+        if self.density is not None and self.mass is not None:
+            raise ValueError(f"a body has a density or a mass, not both; density = {self.density}, mass = {self.mass}.")
+        if self.is_body:
+            return self
+        for name in ("hollow", "held", "velocity", "angular_velocity"):
+            if getattr(self, name):
+                raise ValueError(f"{name} is for bodies; give this solid a density or a mass as well.")
+        return self
+
+    @property
+    def is_body(self) -> bool:
+        """Whether water and other solids move this."""
+        return self.density is not None or self.mass is not None
 
     @property
     def origin(self) -> np.ndarray:

@@ -132,7 +132,7 @@ def move(
             later = medium + slip * a.bubble_keep - 2.0 * pull * a.bubble_gain
             target = x + a.dt * medium + slip * a.bubble_path - 2.0 * pull * a.bubble_bend
         near = bodies_in_reach(lift(x), lift(target), solids, c.wall_gap) | ((1 << solids.tank_count) - 1)
-        out = stopped(lift(x), lift(target), near, solids, c.wall_gap)
+        out = stopped(lift(x), lift(target), near, solids, c.wall_gap, 0.0)
         if (out - lift(target)).norm_sqr() > 0.0:
             target = flattened(out, x)
             later = (target - x) / a.dt

@@ -37,14 +37,16 @@ nothing; of two cells in a row the mean counts, as a single one of four or eight
 """
 
 import dataclasses
+import math
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls, remembered
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
+from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
-from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, gaps_at
+from wavetank.physics.grid_pressure.room import LEAST_OPEN, below_roof, close_slit, find_room, gaps_at, in_part
 from wavetank.physics.grid_pressure.surface import carried_share, depth_at
 from wavetank.physics.mixture import Blend
 from wavetank.physics.pairs import column
@@ -73,6 +75,8 @@ SUPPORTED = 0.5  # d: depth from which on the grid carries a particle in full, t
 FADE = 1.0  # d: by how much higher it carries nothing
 MISSING = 1.0 / 3.0  # of a wall's answer, over what it gives: all of what lacks, docs/notebook/grid-pressure.md
 FULL = 0.97  # fill that cells without gaps have at least, also where few rows of particles do not match them
+SLIT = 0.7  # fill of a cell that touches a solid, as far as its tents can tell
+CLOSING = 0.5  # of what lacks, in a step
 GAP_SHARE = 6.0  # by which errors are less, of what lacks there
 
 
@@ -89,6 +93,8 @@ class Errors:
     full: qd.f32  # fill of cells without gaps
     gap_share: qd.f32  # by which errors are less, of what lacks there
     least_open: qd.f32  # share of a cell
+    slit: qd.f32  # fill from which on there is no slit
+    closing: qd.f32  # 1/m^2: what lacks is closed by in a step, over the stiffness M
     least_theta: qd.f32  # of an edge
 
 
@@ -249,6 +255,16 @@ def gather(
         if qd.static(mixed):
             mass = taken(grid.mass_sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
             grid.density[n] = qd.max(mass, 1) / qd.cast(qd.max(total, 1), qd.f32)
+    if qd.static(searched):
+        qd.loop_config(serialize=bool(few))
+        for n in range(grid.nx * grid.ny * grid.nz):
+            surely = below_roof(grid, n) if grid.room[n] >= 1.0 else 0.0
+            grid.gaps[n] = grid.fill[n] + surely * qd.max(1.0 - grid.fill[n], 0.0)
+            grid.slope_y[n] = surely
+        qd.loop_config(serialize=bool(few))
+        for n in range(grid.nx * grid.ny * grid.nz):
+            surely = in_part(grid, n) if grid.room[n] > 0.0 and grid.room[n] < 1.0 else grid.slope_y[n]
+            close_slit(grid, n, surely, e.slit)
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.gaps[n] = gaps_at(grid, n, e.full)
@@ -263,6 +279,8 @@ def gather(
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
         grid.rhs[n] = e.scale * total / qd.max(grid.room[n], e.least_open)
+        if qd.static(searched):
+            grid.rhs[n] -= grid.slope_x[n] * e.closing
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
         couple_nodes(grid, piece, e.least_theta)
@@ -352,6 +370,9 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     solve_levels(world.levels)
     push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing)
     move_particles(finest, world.particles, cells, world.solids, c, remembered(push), count, few)
+    if world.pieces:
+        acting = (1.0 - carried(c.dt, params.frame_time)) * max(math.hypot(*params.gravity), 1e-6) * c.dt**2
+        push_on_grid(world, stiffness, stiffness / acting)
 
 
 def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
@@ -359,6 +380,7 @@ def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
     volume = params.spacing**params.dim / (grid.dx * grid.dy * grid.dz) / UNIT
     return remembered(Errors(
         unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness, inner_from=INNER[0],
-        inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN,
+        inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT,
+        closing=CLOSING * params.grid_pressure / stiffness,
         least_theta=LEAST_THETA,
     ))  # fmt: skip

@@ -30,6 +30,52 @@ def gaps_at(grid: CoarseGrid, n, full):
 
 
 @qd.func
+def is_water(fill):
+    """How surely there is water without air at a node, from 0 to 1, by its fill."""
+    return qd.min(qd.max(5.0 * (fill - 0.7), 0.0), 1.0)
+
+
+@qd.func
+def below_roof(grid: CoarseGrid, n):
+    """How surely what lacks at an open node `n` is a slit between water on one side and a solid on the other."""
+    surely = 0.0
+    for axis in qd.static(range(3)):
+        if grid.nz > 1 or axis < 2:
+            for side in qd.static((-1, 1)):
+                c = coordinates(grid, n)
+                c[axis] += side
+                roof = nearest(grid, c)
+                c[axis] -= 2 * side
+                water = nearest(grid, c)
+                if grid.room[roof] < 1.0 and grid.room[water] >= 1.0:
+                    surely = qd.max(surely, is_water(grid.fill[water]))
+    return surely
+
+
+@qd.func
+def in_part(grid: CoarseGrid, n):
+    """The same for a node whose cell a solid takes a part of: where all open nodes beside it, see `gaps`, are full."""
+    emptiest = 2.0
+    for axis in qd.static(range(3)):
+        if grid.nz > 1 or axis < 2:
+            for side in qd.static((-1, 1)):
+                c = coordinates(grid, n)
+                c[axis] += side
+                at = nearest(grid, c)
+                if grid.room[at] >= 1.0:
+                    emptiest = qd.min(emptiest, grid.gaps[at])
+    return is_water(emptiest) if emptiest < 2.0 else 0.0
+
+
+@qd.func
+def close_slit(grid: CoarseGrid, n, surely, full):
+    """Count node `n` as full, as far as it is `surely` water, and keep what lacks up to `full` in `slope_x`."""
+    fill = grid.fill[n]
+    grid.slope_x[n] = surely * qd.max(full - fill, 0.0)
+    grid.fill[n] = fill + surely * qd.max(1.0 - fill, 0.0)
+
+
+@qd.func
 def open_share(grid: CoarseGrid, solids: SolidSet, n):
     """Share of the cell of node `n` that no solid takes."""
     c = coordinates(grid, n)

@@ -87,10 +87,10 @@ class Mesh(Solid):
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
         return [("center", self.center)]
 
-    def grid(self, spacing: float) -> DistanceGrid:
-        """Return the distances to this mesh for particles of that spacing [m], in its own frame.
+    def surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corners [n, 3], m, in the solid's frame, and the faces [m, 3], int.
 
-        Raises `WavetankError` for a mesh that cannot be read, is not closed or too large.
+        Raises `WavetankError` for a mesh that cannot be read.
         """
         triangles = self._triangles()
         points = triangles.vertices.astype(np.float64)
@@ -99,9 +99,18 @@ class Mesh(Solid):
         edges = np.ptp(points, axis=0)
         if not isinstance(self.size, float) and edges.min() < FLAT:
             raise WavetankError(f"{self._label()} is flat; a mesh without a depth needs size as one number.")
-        factor = self.size if isinstance(self.size, float) else np.array(self.size) / edges
+        factor: Any = self.size if isinstance(self.size, float) else np.array(self.size) / edges
+        return points * factor, triangles.faces
+
+    def grid(self, spacing: float) -> DistanceGrid:
+        """Return the distances to this mesh for particles of that spacing [m], in its own frame.
+
+        Raises `WavetankError` for a mesh that cannot be read, is not closed or too large.
+        """
+        triangles = self._triangles()
+        points, _ = self.surface()
         key = f"{triangles.digest} {self.up} {self.size} {self.thickness}"
-        return grid_of(points * factor, triangles.faces, spacing, self.thickness, key, self.name or self._label())
+        return grid_of(points, triangles.faces, spacing, self.thickness, key, self.name or self._label())
 
     def _triangles(self) -> Triangles:
         try:

@@ -1,0 +1,110 @@
+"""What the pressure of the whole tank does to bodies.
+
+The force on a body is the integral of the pressure over its surface, which is that of the pressure's slope over its
+volume (Gauss) for whatever field continues the pressure into the body. So the multipliers are continued there, straight
+on from the water and from the air around, and each small piece of the body is pushed as the water would be that it took
+the place of: Archimedes' principle, piece by piece. Pieces are those of a lattice about as fine as the particles.
+
+    code      meaning                                                     unit
+    stage     how many nodes it is to where pressure is known             1
+    volume    of a piece, over that of a particle                         1
+"""
+
+import math
+
+from wavetank.device.compiler import qd
+from wavetank.device.state import CoarseGrid, Particles
+from wavetank.physics.bodies import Pieces
+from wavetank.physics.boundary import flattened
+from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, tents
+from wavetank.physics.grid_pressure.surface import along
+from wavetank.physics.reactions import add_to_body, immersion, of_grid
+from wavetank.physics.world import World
+from wavetank.solids.distance import SolidSet, parts, rotate, vec3
+
+FARTHEST = 24  # nodes into a body that the pressure is continued
+
+
+@qd.kernel(fastcache=True)
+def mark_known(grid: CoarseGrid):
+    """Mark where the pressure is known: where there is room."""
+    for n in range(grid.nx * grid.ny * grid.nz):
+        grid.slope_z[n] = 0.0 if grid.room[n] > 0.0 else 1e9
+
+
+@qd.kernel(fastcache=True)
+def continue_pressure(grid: CoarseGrid, turn: qd.i32):
+    """Continue multipliers by one node, from those that are known since an earlier `turn`."""
+    for n in range(grid.nx * grid.ny * grid.nz):
+        if grid.slope_z[n] > turn:
+            lam, weight = 0.0, 0.0
+            for axis in qd.static(range(3)):
+                if grid.nz > 1 or axis < 2:
+                    for side in qd.static((-1, 1)):
+                        nodes = along(grid, n, axis, side)
+                        if nodes[0] > 0:
+                            m = n + nodes[1]
+                            if grid.slope_z[m] < turn:
+                                value = grid.lam[m]
+                                if nodes[0] > 1:
+                                    if grid.slope_z[m + nodes[1]] < turn:
+                                        value += value - grid.lam[m + nodes[1]]
+                                lam += qd.min(value, 0.0)
+                                weight += 1.0
+            if weight > 0.0:
+                grid.lam[n] = lam / weight
+                grid.slope_z[n] = turn
+
+
+@qd.func
+def value_at(values: qd.template(), grid: CoarseGrid, at, x: qd.template()):
+    """A field of the nodes at a place in the world, a plane's beyond the last nodes."""
+    dim = qd.static(x.n)
+    s = in_cells(grid, flattened(at, x))
+    last = vec3(grid.nx - 2, grid.ny - 2, grid.nz - 2)
+    low = qd.max(qd.min(qd.floor(s), last), 0.0)
+    nodes = corners(grid, qd.cast(low, qd.i32), dim)
+    weights = tents(s - low, dim)
+    total = 0.0
+    for c in qd.static(range(2**dim)):
+        total += weights[c] * values[nodes[c]]
+    return total
+
+
+@qd.kernel(fastcache=True)
+def push_bodies(
+    grid: CoarseGrid, pieces: Pieces, solids: SolidSet, particles: Particles, stiffness: qd.f32,
+    per_lambda: qd.f32,
+):  # fmt: skip
+    """Push each piece of each body as the water that it took the place of, by the difference between its faces.
+
+    From piece to piece these differences add up to what is at the surface, whatever the field between is. `per_lambda`
+    [1/m] makes a multiplier the depth of water at rest.
+    """
+    for number in range(pieces.count):
+        k = pieces.solid[number]
+        dim = qd.static(particles.x[0].n)
+        turn = solids.rotation[k]
+        at = solids.position[k] + rotate(turn, pieces.place[number])
+        slope = vec3(0.0, 0.0, 0.0)
+        for axis in qd.static(range(dim)):
+            half = vec3(0.0, 0.0, 0.0)
+            half[axis] = 0.5 * pieces.edges[number][axis]
+            way = rotate(turn, half)
+            ahead = value_at(grid.lam, grid, at + way, particles.x[0])
+            slope[axis] = (ahead - value_at(grid.lam, grid, at - way, particles.x[0])) / pieces.edges[number][axis]
+        push = rotate(turn, slope) * (stiffness * pieces.volume[number])
+        add_to_body(solids, k, of_grid(), at, push)
+        depth = -per_lambda * value_at(grid.lam, grid, at, particles.x[0])
+        wet = qd.min(qd.max(2.0 * depth / grid.dy, 0.0), 1.0) * pieces.volume[number]
+        qd.atomic_add(solids.reaction[parts() * k + immersion()], qd.cast(qd.round(solids.unit[k] * wet), qd.i32))
+
+
+def push_on_grid(world: World, stiffness: float, per_lambda: float) -> None:
+    """Let the pressure that the finest grid has push the bodies; a body is no deeper than `FARTHEST` nodes."""
+    grid, pieces = world.levels[0], world.pieces
+    assert pieces is not None, "there are no bodies"
+    mark_known(grid)
+    for turn in range(1, min(FARTHEST, math.ceil(pieces.reach / min(grid.dx, grid.dy)) + 1) + 1):
+        continue_pressure(grid, turn)
+    push_bodies(grid, pieces, world.solids, world.particles, stiffness, per_lambda)

@@ -1,0 +1,48 @@
+"""What the water does to bodies: the exact opposite of what these do to it.
+
+Whatever moves a particle at a solid, its share of the density (Eq. 6 with the wall's gradient), contact, friction and
+viscous drag, moves it by some way within a step. The opposite, times the particle's mass, is what the solid is pushed
+by; times the lever arm about its centre of mass, what it is turned by. Sums are of whole numbers, so that the order in
+which threads come does not matter and runs repeat bit for bit; a body's unit is as fine as the number of particles that
+can press on it allows (`simulation/bodies.py`).
+
+    code      meaning                                                                unit
+    push      way that a particle was moved by, times its mass                       m, heaviest particle's mass
+    reaction  sums for each solid, `PARTS` numbers: push, turn, the grid's push      1/unit
+              and turn, and the share of the solid that is under water
+"""
+
+from wavetank.device.compiler import qd
+from wavetank.solids.distance import SolidSet, parts
+
+
+@qd.func
+def of_grid():
+    """Where those of the grid begin."""
+    return 6
+
+
+@qd.func
+def immersion():
+    """Where the share under water is."""
+    return 12
+
+
+OF_GRID, IMMERSION = (number.fn() for number in (of_grid, immersion))
+
+
+@qd.func
+def add_to_body(solids: SolidSet, k, first, at, push):
+    """Add a push [m] and its turn about the centre of mass, over the body's reach [m], to the sums from `first` on."""
+    turn = (at - solids.center[k]).cross(push) / solids.reach[k]
+    for axis in qd.static(range(3)):
+        at_axis = parts() * k + first + axis
+        qd.atomic_add(solids.reaction[at_axis], qd.cast(qd.round(solids.unit[k] * push[axis]), qd.i32))
+        qd.atomic_add(solids.reaction[at_axis + 3], qd.cast(qd.round(solids.unit[k] * turn[axis]), qd.i32))
+
+
+@qd.func
+def push_back(solids: SolidSet, k, at, push):
+    """Let solid `k` feel the opposite of what pushed a particle at `at`, if it is a body."""
+    if solids.unit[k] > 0.0:
+        add_to_body(solids, k, 0, at, -push)

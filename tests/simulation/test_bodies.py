@@ -1,0 +1,222 @@
+"""Bodies: what water does to them is the opposite of what they do to it (Newton's third law), and they float as deep as
+Archimedes says."""
+
+import numpy as np
+import pytest
+
+import wavetank as wt
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.rotations import turned
+
+pytest.importorskip("rapier3d")
+
+WIDE, DEEP, D = 0.96, 0.4, 0.04
+
+
+def pool(*solids, spacing=D, **more) -> wt.Simulation:
+    block = wt.Block(lower=(0, 0, 0), upper=(WIDE, DEEP, WIDE))
+    tank = wt.Tank(size=(WIDE, 0.9, WIDE))
+    return wt.Simulation(wt.Scene(spacing=spacing, tank=tank, fluids=[block], solids=[*solids], **more))
+
+
+def level(sim: wt.Simulation, displaced: float) -> float:
+    """Height of the surface [m] from volumes."""
+    area = np.prod(sim.scene.tank.size) / sim.scene.tank.size[1]
+    return (sim.count * sim.scene.spacing**sim.scene.dim + displaced) / area
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.5, 0.8])
+def test_a_box_floats_as_deep_as_archimedes_says(ratio):
+    """Draft = density ratio times height; at rest it does not jitter."""
+    tall = 0.2
+    sim = pool(wt.Box(name="box", center=(0.48, DEEP + tall * (0.5 - ratio), 0.48), size=(0.32, tall, 0.32),
+                      density=1000.0 * ratio))  # fmt: skip
+    box, heights, speeds = sim.bodies["box"], [], []
+    for frame in range(240):
+        sim.step()
+        if frame >= 180:
+            heights.append(box.position[1])
+            speeds.append(np.linalg.norm(box.velocity))
+    draft = level(sim, ratio * 0.32 * tall * 0.32) - (np.mean(heights) - 0.5 * tall)
+    assert draft == pytest.approx(ratio * tall, abs=0.3 * D)
+    assert box.force[1] == pytest.approx(9.81 * box.mass, rel=0.05)
+    assert np.sqrt(np.mean(np.square(speeds))) < 0.01
+
+
+def test_a_disc_floats_in_a_plane():
+    """The same in 2-D, where a body has the mass of a metre of it."""
+    scene = wt.Scene(
+        spacing=0.02, tank=wt.Tank(size=(1.0, 0.8)), fluids=[wt.Block(lower=(0, 0), upper=(1.0, 0.4))],
+        solids=[wt.Sphere(name="disc", center=(0.5, 0.42), radius=0.12, density=500)],
+    )  # fmt: skip
+    sim = wt.Simulation(scene)
+    disc = sim.bodies["disc"]
+    assert disc.mass == pytest.approx(500 * np.pi * 0.12**2, rel=2e-3)
+    heights = []
+    for frame in range(300):
+        sim.step()
+        if frame > 200:
+            heights.append(disc.position[1])
+    surface = level(sim, 0.5 * np.pi * 0.12**2)
+    assert np.mean(heights) == pytest.approx(surface, abs=0.02)
+
+
+def test_momentum_goes_from_water_to_body():
+    """Without gravity the sum of momenta and of their moments stays, and energy does not rise."""
+    scene = wt.Scene(
+        spacing=0.03, gravity=(0, 0, 0), calming=0,
+        fluids=[wt.Block(lower=(-0.2, -0.2, -0.2), upper=(0.2, 0.2, 0.2), velocity=(1, 0, 0))],
+        solids=[
+            wt.Box(name="box", center=(0.4, 0.05, 0), size=(0.2, 0.2, 0.2), density=600, rotation=(0.9, 0.1, 0.3, 0.2))
+        ],
+    )  # fmt: skip
+    sim, mass = wt.Simulation(scene), 1000 * 0.03**3
+    body = sim.bodies["box"]
+
+    def sums():
+        x, v = sim.positions.astype(float), sim.velocities.astype(float)
+        owed = body.impulse - body.early  # which the body has got, and shows in the next step
+        turn = np.array([turned(body.rotation, axis) for axis in np.eye(3)]).T
+        momentum = body.mass * body.velocity + owed[:3]
+        angular = np.cross(body.center, momentum) + turn @ body.dry.tensor @ turn.T @ body.angular_velocity + owed[3:]
+        energy = 0.5 * mass * (v**2).sum() + 0.5 * body.mass * (body.velocity**2).sum()
+        return mass * v.sum(axis=0) + momentum, mass * np.cross(x, v).sum(axis=0) + angular, energy
+
+    momentum, angular, energy = sums()
+    for _ in range(60):
+        sim.step()
+    assert body.velocity[0] > 0.3, "the water has hit it"
+    after, turned_after, energy_after = sums()
+    whole = np.linalg.norm(momentum)
+    assert np.linalg.norm(after - momentum) < 1e-3 * whole
+    assert np.linalg.norm(turned_after - angular) < 1e-3 * whole * 0.4
+    assert energy_after < energy
+
+
+def test_a_heavy_body_sinks_and_a_fast_light_one_does_not_fly_off():
+    """8 times as heavy as water: to the floor. A tenth: added mass must not make it explode (Causin et al. 2005)."""
+    sim = pool(
+        wt.Box(name="iron", center=(0.25, 0.5, 0.25), size=(0.16, 0.16, 0.16), density=8000),
+        wt.Sphere(name="cork", center=(0.65, 0.62, 0.65), radius=0.12, density=100, velocity=(0, -2, 0)),
+    )
+    highest = 0.0
+    for _ in range(150):
+        sim.step()
+        highest = max(highest, sim.bodies["cork"].position[1])
+    assert sim.bodies["iron"].position[1] == pytest.approx(0.08, abs=0.01)
+    assert np.linalg.norm(sim.bodies["iron"].velocity) < 0.02
+    assert highest < 0.8
+    assert 0.35 < sim.bodies["cork"].position[1] < 0.65
+
+
+def test_a_world_with_bodies_goes_on_to_the_same_bits(tmp_path):
+    """From a file, as a copy, and after going back."""
+    sim = pool(
+        wt.Box(name="box", center=(0.4, 0.55, 0.4), size=(0.2, 0.2, 0.2), density=400, rotation=(0.9, 0.2, 0.1, 0.3)),
+        wt.Sphere(name="ball", center=(0.7, 0.6, 0.7), radius=0.1, density=700),
+        spacing=0.05,
+    )
+    for _ in range(25):
+        sim.step()
+    sim.save(tmp_path / "state.npz")
+    others = [wt.Simulation.restore(tmp_path / "state.npz"), sim.clone()]
+    instant = sim.snapshot()
+    for world in (sim, *others):
+        for _ in range(20):
+            world.step()
+    assert {world.digest() for world in others} == {sim.digest()}
+    end = sim.digest()
+    sim.resume(instant)
+    for _ in range(20):
+        sim.step()
+    assert sim.digest() == end
+
+
+def test_bodies_are_held_moved_and_let_go():
+    """A body that is moved is as unyielding as any solid; let go, it falls."""
+    sim = pool(wt.Box(name="box", center=(0.48, 0.7, 0.48), size=(0.2, 0.2, 0.2), density=500, held=True))
+    for _ in range(10):
+        sim.step()
+    assert sim.bodies["box"].position.tolist() == pytest.approx([0.48, 0.7, 0.48], abs=1e-6)
+    sim.move("box", position=(0.48, 0.72, 0.48))
+    sim.step()
+    assert sim.bodies["box"].position[1] == pytest.approx(0.72, abs=1e-6)
+    sim.hold("box", False)
+    for _ in range(10):
+        sim.step()
+    assert sim.bodies["box"].velocity[1] < 0.0
+    sim.bodies["box"].velocity = (0.0, 3.0, 0.0)
+    sim.step()
+    assert sim.bodies["box"].velocity[1] > 2.0
+    with pytest.raises(WavetankError, match="velocity = .* of body 'box' must be 3 finite numbers"):
+        sim.bodies["box"].velocity = (0.0, np.nan, 0.0)
+    with pytest.raises(WavetankError, match="no body named 'bow'; bodies: box"):
+        _ = sim.bodies["bow"]
+
+
+def test_bodies_come_and_go():
+    """Another one is added while the first floats, and the first is taken away."""
+    sim = pool(wt.Box(name="box", center=(0.3, 0.45, 0.3), size=(0.16, 0.16, 0.16), density=500))
+    sim.step()
+    sim.add_solid(wt.Sphere(name="ball", center=(0.7, 0.7, 0.7), radius=0.1, density=700))
+    for _ in range(6):
+        sim.step()
+    assert list(sim.bodies) == ["box", "ball"]
+    assert sim.bodies["ball"].velocity[1] == pytest.approx(-9.81 * 6 / 60, rel=0.05)
+    sim.remove_solid("box")
+    sim.step()
+    assert list(sim.bodies) == ["ball"]
+
+
+def test_joints_hold():
+    """A pendulum's rope keeps its length, a hinge its place, a motor its speed, a slider its line."""
+    tank = wt.Tank(size=(2.0, 2.0, 2.0))
+    sim = wt.Simulation(wt.Scene(
+        spacing=0.1, tank=tank, fluids=[wt.Block(lower=(0, 0, 0), upper=(2, 0.2, 2))],
+        solids=[
+            wt.Sphere(name="bob", center=(1.5, 1.5, 1.0), radius=0.1, density=3000),
+            wt.Box(name="wheel", center=(0.5, 1.2, 0.5), size=(0.6, 0.1, 0.2), density=500),
+            wt.Box(name="gate", center=(1.0, 1.4, 0.3), size=(0.2, 0.2, 0.1), density=500),
+        ],
+        joints=[
+            wt.Rope(first="bob", at=(1.5, 1.5, 1.0), to=(1.0, 1.5, 1.0)),
+            wt.Hinge(first="wheel", at=(0.5, 1.2, 0.5), axis=(0, 0, 1), speed=2.0),
+            wt.Slider(first="gate", at=(1.0, 1.4, 0.3), axis=(0, 1, 0), limits=(-0.3, 0.0)),
+        ],
+    ))  # fmt: skip
+    lengths, lowest = [], 2.0
+    for _ in range(60):
+        sim.step()
+        lengths.append(float(np.linalg.norm(sim.bodies["bob"].position - (1.0, 1.5, 1.0))))
+        lowest = min(lowest, sim.bodies["bob"].position[1])
+    assert max(lengths) < 0.51
+    assert lowest < 1.05
+    assert sim.bodies["wheel"].position.tolist() == pytest.approx([0.5, 1.2, 0.5], abs=2e-3)
+    assert sim.bodies["wheel"].angular_velocity[2] == pytest.approx(2.0, rel=0.02)
+    assert sim.bodies["gate"].position.tolist() == pytest.approx([1.0, 1.1, 0.3], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("solids", "joints", "what"),
+    [
+        ([{"center": (0.5, 0.5, 0.5), "size": (0.1,) * 3, "density": 1, "mass": 1}], [], "density or a mass, not both"),
+        ([{"center": (0.5, 0.5, 0.5), "size": (0.1,) * 3, "held": True}], [], "held is for bodies"),
+        ([{"center": (0.5, 0.5, 0.5), "size": (0.1,) * 3, "mass": 0}], [], "mass = 0"),
+        ([], [{"kind": "hinge", "first": "door", "at": (0, 0, 0)}], "joints\\[0\\].first = 'door' is no solid"),
+        (
+            [{"name": "a", "center": (0.5, 0.5, 0.5), "size": (0.1,) * 3}],
+            [{"kind": "weld", "first": "a", "at": (0, 0, 0)}],
+            "neither of them a body",
+        ),
+        (
+            [{"name": "a", "center": (0.5, 0.5, 0.5), "size": (0.1,) * 3, "mass": 1}],
+            [{"kind": "slider", "first": "a", "at": (0, 0, 0), "axis": (0, 0, 0)}],
+            "has no direction",
+        ),
+    ],
+)  # fmt: skip
+def test_what_is_no_body_and_no_joint_is_said(solids, joints, what):
+    """One sentence: what, where, what is allowed."""
+    with pytest.raises(WavetankError, match=what) as said:
+        wt.Scene.parse({"spacing": 0.05, "tank": {"size": (1, 1, 1)}, "solids": solids, "joints": joints})
+    assert "\n" not in str(said.value)
