@@ -22,9 +22,9 @@ from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Tank
 from wavetank.simulation.simulation import Simulation
 
-QUICK = ["still-tank", "column", "martin-moyce", "lobovsky", "standing-wave", "elliptical-drop", "drop", "energy", "momentum",
-         "rest", "seeds", "layers", "lock-exchange", "shear-wave", "gravity-current", "buckling", "tension-drop",
-         "calm-vorticity"]  # fmt: skip
+QUICK = ["still-tank", "column", "martin-moyce", "lobovsky", "standing-wave", "elliptical-drop", "drop", "energy",
+         "momentum", "rest", "seeds", "layers", "lock-exchange", "shear-wave", "gravity-current", "buckling",
+         "tension-drop", "calm-vorticity"]  # fmt: skip
 
 
 #: Figures that do not reach their bounds yet (docs/method.md, "What is still open"), kept from getting worse.

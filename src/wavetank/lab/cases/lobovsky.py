@@ -1,8 +1,8 @@
 """Two columns of water released by a fast gate: fronts on the floor, arrival at the far wall, levels at four probes.
 
 Lobovsky, Botia-Vera, Castellana, Mas-Soler and Souto-Iglesias 2014, J. Fluids Struct. 48, 407-434,
-doi:10.1016/j.jfluidstructs.2014.03.009: a reservoir 600 mm long in a tank of 1610 x 150 mm, filled 300 or 600 mm high. A
-weight lifts the gate within tens of milliseconds (median 3.46 and 4.53 m/s), and time counts from when it first moves.
+doi:10.1016/j.jfluidstructs.2014.03.009: a reservoir 600 mm long in a tank of 1610 x 150 mm, filled 300 or 600 mm high.
+A weight lifts the gate within tens of milliseconds (median 3.46 and 4.53 m/s); time counts from when it first moves.
 The gate is part of the case: a plate two spacings thick that rises at that speed. Water shoots out below it, and what
 leads is thinner and slower than what a column free from the first moment on would send ahead; that is shown as well.
 
@@ -50,7 +50,7 @@ class Run:
 
     def slope(self, past: float, until: float) -> float:
         """Return the speed of the front in sqrt(g H) between two T, by least squares."""
-        chosen = (self.T >= past) & (self.T <= until)
+        chosen = (past <= self.T) & (until >= self.T)
         return float(np.polyfit(self.T[chosen], self.X[chosen], 1)[0])
 
     def error(self, table: dict[str, np.ndarray]) -> float:
@@ -84,7 +84,8 @@ def follow(height: float, d: float, dim: int, until: float, arch: str, *, gate: 
     """Let the column go until T = `until`."""
     sim, rate = Simulation(scene(height, d, dim, gate=gate), arch), math.sqrt(GRAVITY / height)
     across, area = round(DEPTH / d) if dim == 3 else 1, 4 * d * DEPTH ** (dim - 2)
-    T, X = [], []
+    T: list[float] = []
+    X: list[float] = []
     levels: dict[str, list[float]] = {name: [] for name in PROBES}
     while not T or T[-1] < until:
         x = sim.positions
