@@ -31,6 +31,7 @@ class Plan:
     is_thick: bool  # so much that they carry on what pressed them
     is_rubbed: bool  # walls or solids hold sliding back
     is_smoothed: bool  # velocities are drawn to each other
+    is_central: bool  # along the line between particles, which in the open leaves angular momentum alone
     on_grid: bool  # errors of the whole tank are removed on a grid
     carried: float  # share of that pressure which is carried on
 
@@ -53,6 +54,7 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         is_thick=thick,
         is_rubbed=world.has_friction or (world.has_solids and params.calming > 0.0),
         is_smoothed=params.viscosity > 0.0 or params.calming > 0.0,
+        is_central=not (world.levels or kinds.mixed),
         on_grid=on_grid,
         # What thick fluids carry on has been shortened to their share already.
         carried=carried(dt, params.frame_time) if on_grid else float(thick),

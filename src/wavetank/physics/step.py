@@ -10,6 +10,7 @@ import math
 from wavetank.device.state import Coefficients
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids
+from wavetank.physics.central_xsph import apply_central_xsph, pack_multipliers
 from wavetank.physics.coefficients import coefficients, in_iteration, relaxations
 from wavetank.physics.density_constraint import (
     correct_positions,
@@ -108,12 +109,16 @@ def smooth_and_confine(world: World, plan: Plan, c: Coefficients) -> None:
     """Apply XSPH viscosity and vorticity confinement, both of the velocities as they are before either."""
     particles, spare, scratch, grid, count = world.particles, world.spare, world.scratch, world.grid, world.count
     mixed = plan.kinds.mixed and plan.is_smoothed
-    if plan.turning or not mixed:
+    if plan.turning or not (mixed or plan.is_central):
         apply_xsph(spare, particles, scratch, grid, c, count, plan.method, plan.turning)
     if mixed:
         packed = world.fluids.array("packed")
         pack_weights(packed, particles, scratch, count)
         apply_mixed_xsph(spare, particles, packed, grid, c, count, plan.method)
+    elif plan.is_central:
+        packed = world.fluids.array("packed")
+        pack_multipliers(packed, particles, scratch, count)
+        apply_central_xsph(spare, particles, packed, grid, c, count, plan.method)
     world.exchange("v")
     if plan.turning:
         confine_vorticity(world.particles, scratch, grid, c, count, plan.method)
