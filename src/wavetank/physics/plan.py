@@ -7,12 +7,14 @@ import numpy as np
 
 from wavetank.foundation.params import Parameters
 from wavetank.physics.coefficients import correction_number, method_number
-from wavetank.physics.dynamic_viscosity.implicit_viscosity import carried_share, is_thick, is_viscous
+from wavetank.physics.dynamic_viscosity.implicit_viscosity import carried_share, is_thick, is_viscous, thick_share
 from wavetank.physics.grid_pressure.correction import carried
 from wavetank.physics.mixture import Blend, blend
 from wavetank.physics.tension import substeps_for
 from wavetank.physics.time_step import pool_depth, steps_needed
 from wavetank.physics.world import World
+
+SOLIDS_IN_THICK = 3.0  # the constraint alone makes way for them, a few spacings far; docs/notebook/viscosity.md
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,6 +31,7 @@ class Plan:
     is_tense: bool  # fluids have surface tension
     is_viscous: bool  # fluids have viscosity that matters
     is_thick: bool  # so much that they carry on what pressed them
+    held: float  # how far it holds pushes back, from 0 to 1
     is_rubbed: bool  # walls or solids hold sliding back
     is_smoothed: bool  # velocities are drawn to each other
     is_central: bool  # along the line between particles, which in the open leaves angular momentum alone
@@ -52,6 +55,7 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         is_tense=kinds.surface_tension > 0.0,
         is_viscous=is_viscous(kinds, params, dt),
         is_thick=thick,
+        held=thick_share(kinds, params),
         is_rubbed=world.has_friction or (world.has_solids and params.calming > 0.0),
         is_smoothed=params.viscosity > 0.0 or params.calming > 0.0,
         is_central=not (world.levels or kinds.mixed),
@@ -88,6 +92,11 @@ def steps_in(
     needed = steps_needed(params, duration, speed, depth, on_grid=on_grid, forced=forced, carried=carried_on)
     capillary = substeps_for(kinds, params.dim, params.support, params.spacing, duration)
     return max(needed, min(capillary, params.largest_substeps))
+
+
+def pace_of_solids(world: World, params: Parameters) -> float:
+    """Return how many times as fast solids count for the time step as they are, where thick fluids are in their way."""
+    return 1.0 + (SOLIDS_IN_THICK - 1.0) * thick_share(blend(world.materials, params), params)
 
 
 def capillary_speed(world: World, params: Parameters) -> float:

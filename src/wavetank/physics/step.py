@@ -35,7 +35,7 @@ from wavetank.physics.xsph_viscosity import apply_mixed_xsph, apply_xsph
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
     """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
     plan = plan_step(world, params, dt)
-    c = coefficients(params, dt, speed_limit, carries=plan.carried, parts=plan.parts)
+    c = coefficients(params, dt, speed_limit, carries=plan.carried, parts=plan.parts, held=plan.held)
     world.keep_viscosity(plan.is_viscous)
 
     predict(world.particles, world.grid, world.solids, c, world.count, plan.searched)  # 1-4
