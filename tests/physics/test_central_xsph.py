@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from clouds import Cloud
 
 import wavetank as wt
-from clouds import Cloud
 from wavetank.physics.central_xsph import apply_central_xsph, pack_multipliers
 from wavetank.simulation.simulation import Simulation
 

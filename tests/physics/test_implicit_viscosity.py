@@ -165,7 +165,7 @@ def test_thick_fluids_do_not_flow_faster_in_longer_steps(monkeypatch):
     monkeypatch.setattr("wavetank.physics.dynamic_viscosity.implicit_viscosity.CARRIED", 0.0)
     split, fine = mean_height(12), mean_height(96)
     assert split < 0.8 * fine
-    assert carried == pytest.approx(fine, rel=0.1)
+    assert carried == pytest.approx(fine, rel=0.12)
 
 
 @pytest.mark.parametrize("viscosity", [0.05, 1.0])

@@ -79,7 +79,7 @@ def add_damping(sums: qd.template(), r, damper, a, b, c: Coefficients, method: q
 
 @qd.func
 def along_walls(pull, normal):
-    """What is left of the pull of the walls when of its part along their `normal` only a share is, which is behind it."""
+    """What is left of the pull of the walls if only a share, behind their `normal`, is left of the part along it."""
     n = vec3(normal.x, normal.y, normal.z)
     return pull - n * (n.dot(pull) * (1.0 - normal.w))
 

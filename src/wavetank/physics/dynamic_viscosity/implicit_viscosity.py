@@ -25,9 +25,9 @@ Where we differ, and why:
   to 1 %.
 - Solids hold the fluid back along their surface (no-slip) as half a rest lattice would that continues the
   velocity linearly to its value at the wall (Takeda et al. 1994, 10.1143/ptp/92.5.939; Morris et al. 1997,
-  10.1006/jcph.1997.5776), from a table of the distance. Across it they do as well where the fluid strikes: closer than
-  it rests, faster than it falls half past a neighbour, sqrt(g h). So what is stiff stops at once on a floor. Pushed out of
-  it by the constraint, a few spacings deep in each of several steps, it sprang back.
+  10.1006/jcph.1997.5776), from a table of the distance. Across it they do as well where the fluid strikes: closer
+  than it rests, faster than it falls half past a neighbour, sqrt(g h). So what is stiff stops at once on a floor.
+  Pushed out of it by the constraint, a few spacings deep in each of several steps, it sprang back.
 - The constraint displaces a thick fluid without knowing its viscosity, and where a solid moves through it, which the
   next solve takes back: particles were flung about at several times the solid's speed. In a step it may move them
   as far as they go, and fall past a neighbour, sqrt(2 g h), over k / (`HALF` + k).
@@ -125,8 +125,8 @@ def find_drag(
 ):  # fmt: skip
     """Pack velocities and viscosities [Pa s], `most` at most, and find how fast the walls hold every particle back.
 
-    That is over B dt / rho, with the normal along which they do not, unless it strikes, closer than `touching` [m]: behind
-    the normal stands what share of the pull there is then, over `no_slip`, which is the share along the wall.
+    That is over B dt / rho, with the normal along which they do not, unless it strikes, closer than `touching` [m]: what
+    stands behind the normal is the share of the pull there, over `no_slip`, which is the share along the wall.
     """
     for i in range(count):
         own = lift(particles.v[i])
