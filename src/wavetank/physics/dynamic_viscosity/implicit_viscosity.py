@@ -125,8 +125,8 @@ def find_drag(
 ):  # fmt: skip
     """Pack velocities and viscosities [Pa s], `most` at most, and find how fast the walls hold every particle back.
 
-    That is over B dt / rho, with the normal along which they do not, unless it strikes, closer than `touching` [m]: what
-    stands behind the normal is the share of the pull there, over `no_slip`, which is the share along the wall.
+    That is over B dt / rho, with the normal along which they do not, unless it strikes, closer than `touching` [m]:
+    what stands behind the normal is the share of the pull there, over `no_slip`, which is the share along the wall.
     """
     for i in range(count):
         own = lift(particles.v[i])
