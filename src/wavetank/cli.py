@@ -18,8 +18,8 @@ console = Console(stderr=True)
 
 CASE_NAMES = (
     "buckling, calm-vorticity, coiling, column, cup, drop, elliptical-drop, energy, gravity-current, layers, "
-    "lock-exchange, martin-moyce, momentum, resolution, rest, seeds, shear-wave, standing-wave, still-tank, "
-    "tension-drop"
+    "lobovsky, lock-exchange, martin-moyce, momentum, resolution, rest, seeds, shear-wave, standing-wave, "
+    "still-tank, tension-drop"
 )
 Cases = Annotated[list[str], typer.Argument(metavar="[CASE]...", help=f"Of {CASE_NAMES}; all but rest without one.")]
 SceneName = Annotated[str, typer.Argument(help="A bundled scene or the path of a TOML file.")]

@@ -165,7 +165,7 @@ def test_thick_fluids_do_not_flow_faster_in_longer_steps(monkeypatch):
     monkeypatch.setattr("wavetank.physics.dynamic_viscosity.implicit_viscosity.CARRIED", 0.0)
     split, fine = mean_height(12), mean_height(96)
     assert split < 0.8 * fine
-    assert carried == pytest.approx(fine, rel=0.1)
+    assert carried == pytest.approx(fine, rel=0.12)
 
 
 @pytest.mark.parametrize("viscosity", [0.05, 1.0])
@@ -265,3 +265,56 @@ def test_too_many_pairs_are_told_in_one_sentence(monkeypatch):
     )
     with pytest.raises(wt.WavetankError, match="particles of viscous fluids are too many.*use a larger spacing"):
         sim.step()
+
+
+@pytest.mark.parametrize(("viscosity", "dim"), [(1e3, 2), (1e4, 2), (1e6, 2), (1e5, 3)])
+def test_dough_that_falls_does_not_bounce(viscosity, dim):
+    """A body so stiff stops at once (Re < 0.1); it sprang back by a tenth of its fall, out of the floor."""
+    d, n, fall = 0.01, 20 if dim == 2 else 8, 0.3
+    lower = np.array([2 * n * d, fall, 2 * n * d])[:dim]
+    sim = Simulation(
+        wt.Scene(spacing=d, gravity=(0, -9.81, 0)[:dim], rest_density=1400, dynamic_viscosity=viscosity,
+                 tank=wt.Tank(size=(5 * n * d, fall + 2 * n * d, 5 * n * d)[:dim]),
+                 fluids=[wt.Block(lower=tuple(lower), upper=tuple(lower + n * d))])
+    )  # fmt: skip
+    sim.advance(math.sqrt(2.0 * fall / 9.81) - 0.02)
+    assert sim.velocities[:, 1].mean() < -2.0
+    lowest, rise = math.inf, 0.0
+    for _ in range(80):
+        sim.advance(1 / 240)
+        height = float(sim.positions[:, 1].mean(dtype=float))
+        lowest = min(lowest, height)
+        rise = max(rise, height - lowest)
+    assert rise < 0.01 * fall
+    assert abs(sim.velocities[:, 1].mean()) < 0.2
+    assert sim.positions[:, 1].min() > 0.2 * d
+
+
+@pytest.mark.parametrize("viscosity", [1e4, 1e6])
+def test_a_paddle_does_not_fling_dough(viscosity):
+    """Nothing drives the dough but the paddle: it was flung at five times its speed, as fast as the tank allows."""
+    d, speed, x = 0.02, 1.0, 0.3
+    paddle = wt.Box(name="paddle", center=(x, 0.25), size=(0.04, 0.5))
+    sim = Simulation(
+        wt.Scene(spacing=d, gravity=(0, -9.81), rest_density=1400, dynamic_viscosity=viscosity,
+                 tank=wt.Tank(size=(1.0, 0.6)), solids=[paddle], fluids=[wt.Block(lower=(0, 0), upper=(1.0, 0.2))])
+    )  # fmt: skip
+    sim.advance(0.2)
+    for _ in range(20):
+        x += speed / 60
+        sim.move("paddle", position=(x, 0.25))
+        sim.advance(1 / 60)
+        assert np.linalg.norm(sim.velocities, axis=1).max() < 1.9 * speed
+    assert np.percentile(sim.densities, 99) < 1.6 * 1400
+
+
+def test_without_no_slip_a_body_still_stops_on_the_floor_and_slides():
+    """`no_slip` = 0 is of the drag along the wall; across it the fluid is held all the same."""
+    block = wt.Block(lower=(0.2, 0.3), upper=(0.4, 0.5), velocity=(1.0, 0.0))
+    sim = Simulation(
+        wt.Scene(spacing=0.01, gravity=(0, -9.81), rest_density=1400, dynamic_viscosity=1e4, no_slip=0.0,
+                 tank=wt.Tank(size=(1.5, 0.7)), fluids=[block])
+    )  # fmt: skip
+    sim.advance(math.sqrt(2.0 * 0.3 / 9.81) + 0.05)
+    assert abs(sim.velocities[:, 1].mean()) < 0.2
+    assert sim.velocities[:, 0].mean() == pytest.approx(1.0, abs=0.1)

@@ -220,6 +220,8 @@ class Coefficients:
     tensile: qd.f32  # m^2, artificial pressure of one iteration over w(dq)^n
     tensile_exponent: qd.f32
     largest_correction: qd.f32  # m, of one iteration
+    held_push: qd.f32  # m: the same for thick fluids at rest, 0 where none are; and how much more for every m/s
+    held_time: qd.f32  # s
     viscosity: qd.f32  # share per substep
     calming: qd.f32  # share per substep of what is slow, over that of the viscosity
     slow: qd.f32  # s^2/m^2: inverse square of the speed below which motion past neighbours is slow

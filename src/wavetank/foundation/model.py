@@ -1,12 +1,15 @@
 """Validated plain data: pydantic models whose errors are one sentence that a user can act on."""
 
 import difflib
+import functools
 import math
 from typing import Annotated, Any, cast
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic._internal._model_construction import ModelMetaclass
 from pydantic.fields import FieldInfo
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from wavetank.foundation.errors import WavetankError
 
@@ -16,6 +19,7 @@ Vector = tuple[Number, Number] | tuple[Number, Number, Number]
 Size = tuple[Positive, Positive] | tuple[Positive, Positive, Positive]
 Quaternion = tuple[Number, Number, Number, Number]
 
+LIST = "a list of numbers, as [0, -9.81, 0]"
 METRES = "m"  # marks the fields of a scene that are lengths: `Scene.scaled` multiplies these and nothing else
 Length = Annotated[Positive, METRES]
 Place = Annotated[Vector, METRES]
@@ -37,9 +41,26 @@ class _OneSentence(ModelMetaclass):
 
 
 class Model(BaseModel, metaclass=_OneSentence):
-    """Strictly validated data: unknown keys are refused, assignments are checked."""
+    """Strictly validated data: unknown keys are refused, assignments are checked, true and false are no numbers."""
 
     model_config = ConfigDict(extra="forbid", validate_assignment=True, arbitrary_types_allowed=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_truth_for_numbers(cls, table: Any) -> Any:
+        for name, value in table.items() if isinstance(table, dict) else ():
+            refused = _truth_for_a_number(cls, name, value)
+            if refused:
+                raise refused
+        return table
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set a field to what is valid, like any other attribute of a model."""
+        refused = _truth_for_a_number(type(self), name, value)
+        if refused:
+            details = InitErrorDetails(type=refused, loc=(), input=value)
+            raise ValidationError.from_exception_data(type(self).__name__, [details])
+        super().__setattr__(name, value)
 
     @classmethod
     def parse(cls, table: dict[str, Any], origin: str = "", **context: Any) -> Any:
@@ -51,6 +72,37 @@ class Model(BaseModel, metaclass=_OneSentence):
             return cls.model_validate(table, context=context)
         except ValidationError as report:
             raise WavetankError((f"{origin}: " if origin else "") + sentence(report, cls)) from None
+
+
+def _truth_in(value: Any) -> str:
+    """Say whether a value "is" true or false, has them "among" its elements, or, with nothing, neither."""
+    if isinstance(value, bool | np.bool_):
+        return "is"
+    if isinstance(value, np.ndarray):
+        return "among" if value.dtype == bool else ""
+    return "among" if isinstance(value, list | tuple) and any(map(_truth_in, value)) else ""
+
+
+@functools.cache
+def _numbers(model: type[BaseModel], name: str) -> str:
+    """Say what numbers a field is for, if for any, and neither for true and false nor for anything."""
+    field = model.model_fields.get(name)
+    kinds = _types(field.annotation) if field else []
+    if bool in kinds or Any in kinds:
+        return ""
+    return "a number" if float in kinds else "a whole number" if int in kinds else ""
+
+
+def _truth_for_a_number(model: type[BaseModel], name: str, value: Any) -> PydanticCustomError | None:
+    """Return the error where a field for numbers is given true or false, which pydantic takes for 1 and 0."""
+    found = _truth_in(value)
+    allowed = _numbers(model, name) if found else ""
+    if not allowed:
+        return None
+    allowed = LIST if found == "among" else allowed
+    return PydanticCustomError(
+        "truth", "true and false are no numbers", {"name": name, "value": value, "allowed": allowed}
+    )
 
 
 def is_length(field: FieldInfo) -> bool:
@@ -74,6 +126,9 @@ def sentence(report: ValidationError, model: type[BaseModel]) -> str:
         return f"unknown key {key!r} (value {shown}); {hint}"
     if kind == "missing":
         return f"{key} is missing; it is required."
+    if kind == "truth":
+        key = ".".join(filter(None, (_key(error["loc"]), limits["name"])))
+        return f"{key} = {_short(limits['value'])} is not allowed; it must be {limits['allowed']}."
     if kind == "value_error":
         return str(limits.get("error", error["msg"]))
     allowed = {
@@ -87,7 +142,7 @@ def sentence(report: ValidationError, model: type[BaseModel]) -> str:
         "int_parsing": "a whole number",
         "int_type": "a whole number",
         "int_from_float": "a whole number",
-        "tuple_type": "a list of numbers, as [0, -9.81, 0]",
+        "tuple_type": LIST,
         "bool_parsing": "true or false",
         "bool_type": "true or false",
         "union_tag_invalid": "one of {expected_tags}",

@@ -24,11 +24,12 @@ CALM = 0.1  # of sqrt(g / h), the rate of the shortest waves: water that turns s
 
 
 def coefficients(
-    params: Parameters, dt: float, speed_limit: float = math.inf, *, carries: float = 0.0, parts: int = 0
-) -> Coefficients:
+    params: Parameters, dt: float, speed_limit: float = math.inf, *, carries: float = 0.0, parts: int = 0,
+    held: float = 0.0,
+) -> Coefficients:  # fmt: skip
     """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here.
 
-    Artificial pressure comes in so many `parts`, one an iteration where 0.
+    Artificial pressure comes in so many `parts`, one an iteration where 0. Pushes of thick fluids are `held` back.
     """
     h, gravity = params.support * params.spacing, (*params.gravity, 0.0)
     rest = rest_lattice(params.kernel, params.dim, params.support)
@@ -39,6 +40,8 @@ def coefficients(
     tensile *= dt / params.frame_time * min(1.0, math.hypot(*params.gravity) / EARTH)
     viscosity = min(1.0, params.viscosity * REFERENCE_RATE * dt)
     calming = 1.0 - (1.0 - params.calming) ** (dt / params.frame_time)
+    # Of what an iteration may move a particle by: as fast as it goes, and as it falls past a neighbour.
+    pace = dt / params.iterations / held if held > 0.0 else 0.0
     # Without gravity nothing is slow: there is no speed to compare with.
     slow = 1.0 / max(math.hypot(*params.gravity) * params.spacing, 1e-30)
     return remembered(
@@ -59,6 +62,8 @@ def coefficients(
             tensile=tensile,
             tensile_exponent=params.tensile_exponent,
             largest_correction=h / params.iterations,
+            held_push=pace * math.sqrt(2.0 * math.hypot(*params.gravity) * h),
+            held_time=pace,
             viscosity=viscosity,
             calming=max(0.0, calming - viscosity),
             slow=slow / SLOW**2,

@@ -188,7 +188,10 @@ def correct_positions(
                 if qd.static(mixed):
                     dp *= scratch.weight[i]
                 # Within one substep a particle must not run past the solids that were marked for it.
-                short = qd.min(1.0, c.largest_correction / qd.max(dp.norm(), 1e-12))
+                most = c.largest_correction
+                if c.held_push > 0.0:  # thick fluids: see dynamic_viscosity/implicit_viscosity.py
+                    most = qd.min(most, c.held_push + c.held_time * particles.v[i].norm())
+                short = qd.min(1.0, most / qd.max(dp.norm(), 1e-12))
                 before = lift(p)
                 p += dp * short
                 if near != 0:

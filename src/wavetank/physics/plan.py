@@ -7,12 +7,14 @@ import numpy as np
 
 from wavetank.foundation.params import Parameters
 from wavetank.physics.coefficients import correction_number, method_number
-from wavetank.physics.dynamic_viscosity.implicit_viscosity import carried_share, is_thick, is_viscous
+from wavetank.physics.dynamic_viscosity.implicit_viscosity import carried_share, is_thick, is_viscous, thick_share
 from wavetank.physics.grid_pressure.correction import carried
 from wavetank.physics.mixture import Blend, blend
 from wavetank.physics.tension import substeps_for
 from wavetank.physics.time_step import pool_depth, steps_needed
 from wavetank.physics.world import World
+
+SOLIDS_IN_THICK = 3.0  # the constraint alone makes way for them, a few spacings far; docs/notebook/viscosity.md
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,8 +31,10 @@ class Plan:
     is_tense: bool  # fluids have surface tension
     is_viscous: bool  # fluids have viscosity that matters
     is_thick: bool  # so much that they carry on what pressed them
+    held: float  # how far it holds pushes back, from 0 to 1
     is_rubbed: bool  # walls or solids hold sliding back
     is_smoothed: bool  # velocities are drawn to each other
+    is_central: bool  # along the line between particles, which in the open leaves angular momentum alone
     on_grid: bool  # errors of the whole tank are removed on a grid
     carried: float  # share of that pressure which is carried on
 
@@ -51,8 +55,10 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         is_tense=kinds.surface_tension > 0.0,
         is_viscous=is_viscous(kinds, params, dt),
         is_thick=thick,
+        held=thick_share(kinds, params),
         is_rubbed=world.has_friction or (world.has_solids and params.calming > 0.0),
         is_smoothed=params.viscosity > 0.0 or params.calming > 0.0,
+        is_central=not (world.levels or kinds.mixed),
         on_grid=on_grid,
         # What thick fluids carry on has been shortened to their share already.
         carried=carried(dt, params.frame_time) if on_grid else float(thick),
@@ -86,6 +92,11 @@ def steps_in(
     needed = steps_needed(params, duration, speed, depth, on_grid=on_grid, forced=forced, carried=carried_on)
     capillary = substeps_for(kinds, params.dim, params.support, params.spacing, duration)
     return max(needed, min(capillary, params.largest_substeps))
+
+
+def pace_of_solids(world: World, params: Parameters) -> float:
+    """Return how many times as fast solids count for the time step as they are, where thick fluids are in their way."""
+    return 1.0 + (SOLIDS_IN_THICK - 1.0) * thick_share(blend(world.materials, params), params)
 
 
 def capillary_speed(world: World, params: Parameters) -> float:

@@ -10,6 +10,7 @@ import math
 from wavetank.device.state import Coefficients
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids
+from wavetank.physics.central_xsph import apply_central_xsph, pack_multipliers
 from wavetank.physics.coefficients import coefficients, in_iteration, relaxations
 from wavetank.physics.density_constraint import (
     correct_positions,
@@ -34,7 +35,7 @@ from wavetank.physics.xsph_viscosity import apply_mixed_xsph, apply_xsph
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
     """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
     plan = plan_step(world, params, dt)
-    c = coefficients(params, dt, speed_limit, carries=plan.carried, parts=plan.parts)
+    c = coefficients(params, dt, speed_limit, carries=plan.carried, parts=plan.parts, held=plan.held)
     world.keep_viscosity(plan.is_viscous)
 
     predict(world.particles, world.grid, world.solids, world.fluids.rows, c, world.count, plan.searched)  # 1-4
@@ -108,12 +109,16 @@ def smooth_and_confine(world: World, plan: Plan, c: Coefficients) -> None:
     """Apply XSPH viscosity and vorticity confinement, both of the velocities as they are before either."""
     particles, spare, scratch, grid, count = world.particles, world.spare, world.scratch, world.grid, world.count
     mixed = plan.kinds.mixed and plan.is_smoothed
-    if plan.turning or not mixed:
+    if plan.turning or not (mixed or plan.is_central):
         apply_xsph(spare, particles, scratch, grid, c, count, plan.method, plan.turning)
     if mixed:
         packed = world.fluids.array("packed")
         pack_weights(packed, particles, scratch, count)
         apply_mixed_xsph(spare, particles, packed, grid, c, count, plan.method)
+    elif plan.is_central:
+        packed = world.fluids.array("packed")
+        pack_multipliers(packed, particles, scratch, count)
+        apply_central_xsph(spare, particles, packed, grid, c, count, plan.method)
     world.exchange("v")
     if plan.turning:
         confine_vorticity(world.particles, scratch, grid, c, count, plan.method)

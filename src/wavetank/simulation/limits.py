@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wavetank.physics.plan import capillary_speed, steps_in
+from wavetank.physics.plan import capillary_speed, pace_of_solids, steps_in
 from wavetank.physics.time_step import largest_speed
 from wavetank.physics.world import World
 from wavetank.scene.forces import Force
@@ -19,7 +19,8 @@ def count_steps(
 ) -> float:
     """Return how many time steps make up `duration` [s], no whole number."""
     box = (np.zeros(scene.dim), np.array(scene.tank.size)) if scene.tank else ledger.start_box
-    speed = max(_solid_speed(scene, solids, duration), largest_speed(world.particles, world.count))
+    solid = pace_of_solids(world, scene) * _solid_speed(scene, solids, duration)
+    speed = max(solid, largest_speed(world.particles, world.count))
     speed += duration * sum(force.largest_acceleration() for force in forces)
     return steps_in(world, scene, duration, speed, box, forced=bool(forces))
 

@@ -11,6 +11,7 @@ from wavetank.lab.cases import (
     energy,
     gravity_current,
     layers,
+    lobovsky,
     lock_exchange,
     martin_moyce,
     momentum,
@@ -25,7 +26,8 @@ from wavetank.lab.cases import (
 from wavetank.lab.cases.case import Case
 
 CASES: tuple[Case, ...] = (
-    still_tank.CASE, column.CASE, martin_moyce.CASE, standing_wave.CASE, elliptical_drop.CASE, drop.CASE, energy.CASE,
-    rest.CASE, momentum.CASE, cup.CASE, seeds.CASE, resolution.CASE, layers.CASE, lock_exchange.CASE, shear_wave.CASE,
-    gravity_current.CASE, buckling.CASE, coiling.CASE, tension_drop.CASE, calm_vorticity.CASE,
+    still_tank.CASE, column.CASE, martin_moyce.CASE, lobovsky.CASE, standing_wave.CASE, elliptical_drop.CASE,
+    drop.CASE, energy.CASE, rest.CASE, momentum.CASE, cup.CASE, seeds.CASE, resolution.CASE, layers.CASE,
+    lock_exchange.CASE, shear_wave.CASE, gravity_current.CASE, buckling.CASE, coiling.CASE, tension_drop.CASE,
+    calm_vorticity.CASE,
 )  # fmt: skip

@@ -13,6 +13,10 @@ of half the paper's depth stands for all of it.
 Front: going out from the back wall in steps of d, the last place where a quarter of one layer of particles is left;
 the foremost particle of that water, and half a spacing. Loose drops ahead do not count. Height: the 98th percentile
 of y for x < 4 d.
+
+Their column was held by a diaphragm of paper, and its front is 13 % behind ours. As much as that (13.9 %, with
+the best shift of time 5.3 %) it is, for a square column, behind the one that Lobovsky et al. released with a fast gate,
+which ours follows to 1 to 3 % (`lobovsky.py`). The front as it is has therefore no bound; with a shift it has.
 """
 
 import math
@@ -73,10 +77,10 @@ def run(quick: bool, arch: str) -> Outcome:
     shift, lagged = _best_shift(T, fronts, z_table)
     tau_table, H_table = (column[h_table["tau"] <= tau[-1] + 1e-6] for column in (h_table["tau"], h_table["H"]))
     height_error = np.interp(tau_table, tau, heights) - H_table
-    bounds = (5.0, 4.0, 0.1) if quick else (2.5, 2.0, 0.07)
+    shifted, lowered = (4.0, 0.1) if quick else (3.0, 0.07)
     figures = [
-        Figure("front, rms error", _rms(0.0, T, fronts, z_table), "% of Z", None, bounds[0], "Table 2", SOURCE),
-        Figure("front, rms error, best time shift", lagged, "% of Z", None, bounds[1], "Table 2", SOURCE),
+        Figure("front, rms error", _rms(0.0, T, fronts, z_table), "% of Z", reference="Table 2", source=SOURCE),
+        Figure("front, rms error, best time shift", lagged, "% of Z", None, shifted, "Table 2", SOURCE),
         Figure("that shift, measured minus computed", shift / z_rate * 1e3, "ms", reference="0", source=SOURCE),
         Figure(
             "front of 98 % of the water, rms error",
@@ -87,7 +91,7 @@ def run(quick: bool, arch: str) -> Outcome:
             "Table 2",
             SOURCE,
         ),
-        Figure("height, largest error", float(np.abs(height_error).max()), "", None, bounds[2], "Table 6", SOURCE),
+        Figure("height, largest error", float(np.abs(height_error).max()), "", None, lowered, "Table 6", SOURCE),
         Figure("height, mean error", float(height_error.mean()), "", reference="Table 6", source=SOURCE),
     ]
 

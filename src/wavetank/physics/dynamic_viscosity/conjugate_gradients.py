@@ -46,7 +46,7 @@ class Damping:
 
     pairs: qd.types.ndarray()  # f32 [8 * places in the lists], Pa s/m^2: mu_ij f(q) / r^2 of each pair, its damper
     drag: qd.types.ndarray()  # vec4 [capacity]: of the walls, and its rate
-    normal: qd.types.ndarray()  # vec4 [capacity]: of the wall along which they do not, if it is one
+    normal: qd.types.ndarray()  # vec4 [capacity]: of the wall, if it is one, and the share of the drag along it
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -79,9 +79,9 @@ def add_damping(sums: qd.template(), r, damper, a, b, c: Coefficients, method: q
 
 @qd.func
 def along_walls(pull, normal):
-    """What is left of the pull of the walls without its part along their `normal`."""
+    """What is left of the pull of the walls if only a share, behind their `normal`, is left of the part along it."""
     n = vec3(normal.x, normal.y, normal.z)
-    return pull - n * n.dot(pull)
+    return pull - n * (n.dot(pull) * (1.0 - normal.w))
 
 
 @qd.kernel(fastcache=True)

@@ -25,7 +25,12 @@ Where we differ, and why:
   to 1 %.
 - Solids hold the fluid back along their surface (no-slip) as half a rest lattice would that continues the
   velocity linearly to its value at the wall (Takeda et al. 1994, 10.1143/ptp/92.5.939; Morris et al. 1997,
-  10.1006/jcph.1997.5776), from a table of the distance.
+  10.1006/jcph.1997.5776), from a table of the distance. Across it they do as well where the fluid strikes: closer
+  than it rests, faster than it falls half past a neighbour, sqrt(g h). So what is stiff stops at once on a floor.
+  Pushed out of it by the constraint, a few spacings deep in each of several steps, it sprang back.
+- The constraint displaces a thick fluid without knowing its viscosity, and where a solid moves through it, which the
+  next solve takes back: particles were flung about at several times the solid's speed. In a step it may move them
+  as far as they go, and fall past a neighbour, sqrt(2 g h), over k / (`HALF` + k).
 - Viscosity acts before the constraint, so that what pressure adds to the motion is damped in the next step only. That
   made honey flow a fifth too fast at any affordable step. A thick fluid therefore begins a step with the share w of
   what pressed it in the last one, and only the change comes afterwards: the incremental projection of Goda 1979
@@ -51,11 +56,11 @@ from wavetank.physics.integrate import accelerate, free_motion
 from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import MAX_ENTRIES
 from wavetank.physics.pairs import keep_pairs
-from wavetank.physics.predicted_positions import predicted
+from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.smoothing import TABLE_SIZE, interpolated, rest_points
 from wavetank.physics.teams import end_team, first_team, turns
 from wavetank.physics.world import World
-from wavetank.solids.distance import SolidSet, lift, signed_distance, vec4
+from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3, vec4
 
 STIFFER = 3.0  # times as stiff as the rest lattice: water in motion, and the drag of walls
 WORTH = 1e-5  # smallest kappa - 1 on the rest lattice for which a substep solves anything
@@ -64,6 +69,8 @@ THICK = 1.0  # `thickness` in a usual step above which pressure is carried on; o
 CARRIED, HALF = 0.83, 10.0  # largest share of the pressure that is carried on; `thickness` with half of it
 LARGEST = 5.0  # of gravity, that is carried on
 AGAIN = 6.0  # times the push of the same step, that is carried on; at rest it is `CARRIED` / (1 - `CARRIED`) = 4.9
+TOUCHING = 0.5  # d: closer to a wall than at rest, what strikes it is held back along the normal as well
+SLIPS = 1e-9  # least share of the drag along a wall, where there should be none
 NEAREST = 0.25  # d: closer to a wall than this its drag grows no further
 
 
@@ -114,11 +121,12 @@ def damper(square, a, b, c: Coefficients):
 def find_drag(
     packed: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles,
     rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients,
-    no_slip: qd.f32, most: qd.f32, count: qd.i32,
+    no_slip: qd.f32, most: qd.f32, touching: qd.f32, count: qd.i32,
 ):  # fmt: skip
     """Pack velocities and viscosities [Pa s], `most` at most, and find how fast the walls hold every particle back.
 
-    That is over B dt / rho, with the normal along which they do not.
+    That is over B dt / rho, with the normal along which they do not, unless it strikes, closer than `touching` [m]:
+    what stands behind the normal is the share of the pull there, over `no_slip`, which is the share along the wall.
     """
     for i in range(count):
         own = lift(particles.v[i])
@@ -129,15 +137,19 @@ def find_drag(
         free = vec4(0.0, 0.0, 0.0, 0.0)
         if near != 0:
             p = lift(predicted(particles, i))
+            fast = qd.sqrt(vec3(c.gravity_x, c.gravity_y, c.gravity_z).norm() * c.h)
             walls = 0
             for k in range(solids.count):
                 if is_near(near, k) == 1:
                     value = signed_distance(solids, k, p)
                     if value.w < c.h:
                         share = interpolated(table, value.w / c.h)
-                        v = surface_velocity(solids, k, p, c.dt) * share
+                        moving = surface_velocity(solids, k, p, c.dt)
+                        v = moving * share
                         pull += vec4(v.x, v.y, v.z, share)
                         free = vec4(value.x, value.y, value.z, 0.0)
+                        if value.w < touching and (own - moving).dot(vec3(value.x, value.y, value.z)) < -fast:
+                            free[3] = 1.0 / no_slip
                         walls += 1
             if walls > 1:  # in a corner the fluid is held in every direction
                 free = vec4(0.0, 0.0, 0.0, 0.0)
@@ -167,8 +179,13 @@ def guess_velocities(velocities: qd.types.ndarray(), particles: Particles, c: Co
 
 
 @qd.kernel(fastcache=True)
-def take_velocities(particles: Particles, packed: qd.types.ndarray(), c: Coefficients, count: qd.i32):
-    """Adopt the velocities that were found, and move the predicted positions with them."""
+def take_velocities(
+    particles: Particles, packed: qd.types.ndarray(), normal: qd.types.ndarray(), c: Coefficients, count: qd.i32,
+):  # fmt: skip
+    """Adopt the velocities that were found, and move the predicted positions with them.
+
+    What strikes a wall was predicted to stop there already: its prediction begins anew, or it would be stopped twice.
+    """
     for i in range(count):
         before = particles.v[i]
         v = before
@@ -176,6 +193,8 @@ def take_velocities(particles: Particles, packed: qd.types.ndarray(), c: Coeffic
             v[k] = packed[i][k]
         particles.viscous[i] = (v - before) * (1.0 - particles.frozen[i]) / c.dt
         accelerate(particles, i, v, c)
+        if particles.near[i] != 0 and normal[i].w > 0.0:
+            predict_at(particles, i, free_motion(particles.x[i], v, c))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -248,16 +267,17 @@ def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficie
     dampers = fluids.pairs(grid)
     find_drag(
         packed, drag, normal, particles, fluids.rows, world.solids, fluids.arrays["drag table"], c,
-        params.no_slip, largest, count,
+        max(params.no_slip, SLIPS), largest, TOUCHING * params.spacing, count,
     )  # fmt: skip
     find_dampers(dampers, packed, particles, grid, c, count)
     guess_velocities(packed, particles, c, count)
     if stiffest > STIFF:
-        rotate_guess(particles, packed, dampers, grid, c, RIGID / SHEARED[dim], FORGET, count)
+        full = 0.5 * dim * stiffness(dim, ratio)
+        rotate_guess(particles, packed, dampers, grid, c, RIGID / SHEARED[dim], FORGET, full, count)
         guess_velocities(packed, particles, c, count)
     damping = fluids.together(Damping, dampers, drag, normal)
     number = solve(world, damping, packed, c, rate, iterations(min(stiffest, STIFFEST), most))
-    take_velocities(particles, packed, c, count)
+    take_velocities(particles, packed, normal, c, count)
     return number
 
 
@@ -268,12 +288,17 @@ def carry_on(world: World, kinds: Blend, params: Parameters, c: Coefficients) ->
     carry_pressure(world.particles, world.fluids.rows, c, carrying, world.count)
 
 
-def carried_share(kinds: Blend, params: Parameters) -> float:
-    """Return the share of what presses them in a frame that all fluids carry on, the thinnest of them included."""
+def thick_share(kinds: Blend, params: Parameters) -> float:
+    """Return how thick all fluids are, the thinnest of them included: k / (`HALF` + k) of its `thickness` k."""
     if not is_thick(kinds, params):
         return 0.0
     thick = usual_thickness(min(fluid.viscosity / fluid.density for fluid in kinds.fluids.values()), params)
-    return CARRIED * thick / (HALF + thick)
+    return thick / (HALF + thick)
+
+
+def carried_share(kinds: Blend, params: Parameters) -> float:
+    """Return the share of what presses them in a frame that all fluids carry on, the thinnest of them included."""
+    return CARRIED * thick_share(kinds, params)
 
 
 def iterations(stiffest: float, most: int) -> int:

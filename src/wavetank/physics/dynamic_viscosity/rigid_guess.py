@@ -20,6 +20,10 @@ Only what turns as a whole is turned. In simple shear half the motion is a rotat
 stays where it is, and so it does where particles jostle: the angle falls with (strain rate / omega)^2, which is 1 in
 simple shear, and is nothing from 1 / `RIGID` on. What else it does to the body while it turns, the start does not know:
 it forgets what it has, by 1 / (1 + `FORGET` |omega| dt / 2). Without that the torques left over add up again, slower.
+
+What has been torn off forgets as well, the faster the fewer neighbours it has left: forces that pulled it as a part of
+something larger do not sum up to nothing any more, and that a fragment moves as a whole is what iterations come to
+last. A lone particle beside a paddle was accelerated by it for ever.
 """
 
 from wavetank.device.compiler import qd
@@ -60,13 +64,21 @@ def add_rotation(sums: qd.template(), r, damper, a, b, c: Coefficients, method: 
 
 
 @qd.func
-def angular_velocity(sums, gate):
-    """Return omega as far as the fluid turns as a whole, of a particle's sums; `gate` is RIGID / SHEARED."""
-    omega = vec3(0.0, 0.0, 0.0)
+def trace_of(sums):
+    """sum_j D m^2 of a particle's sums."""
     dim = qd.static(2 if sums.n == 5 else 3)
     trace = 0.0
     for k in qd.static(range(dim)):
         trace += sums[qd.static((1 if dim == 2 else 3) + dim * k - k * (k - 1) // 2)]
+    return trace
+
+
+@qd.func
+def angular_velocity(sums, gate):
+    """Return omega as far as the fluid turns as a whole, of a particle's sums; `gate` is RIGID / SHEARED."""
+    omega = vec3(0.0, 0.0, 0.0)
+    dim = qd.static(2 if sums.n == 5 else 3)
+    trace = trace_of(sums)
     if trace > 0.0:
         share = sums / trace
         if qd.static(dim == 2):
@@ -87,9 +99,12 @@ def angular_velocity(sums, gate):
 @qd.kernel(fastcache=True)
 def rotate_guess(
     particles: Particles, velocities: qd.types.ndarray(), dampers: qd.types.ndarray(), grid: Grid, c: Coefficients,
-    gate: qd.f32, forget: qd.f32, count: qd.i32,
+    gate: qd.f32, forget: qd.f32, full: qd.f32, count: qd.i32,
 ):  # fmt: skip
-    """Turn what viscosity did in the last step with the `velocities` that particles have moved with since."""
+    """Turn what viscosity did in the last step with the `velocities` that particles have moved with since.
+
+    Behind those stand the viscosities. Whoever has less than half of the `full` sum of weights of neighbours forgets.
+    """
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
             sums = qd.Matrix.zero(qd.f32, qd.static(5 if particles.v[team].n == 2 else 10), grid.lanes)
@@ -98,8 +113,10 @@ def rotate_guess(
                 turned = particles.viscous[i]
                 own = lift(turned)
                 a = vec3(own.x, own.y, own.z)
-                half = 0.5 * c.dt * angular_velocity(column(sums, i - team * grid.lanes), gate)
+                found = column(sums, i - team * grid.lanes)
+                half = 0.5 * c.dt * angular_velocity(found, gate)
                 a += 2.0 / (1.0 + half.norm_sqr()) * half.cross(a + half.cross(a))
+                a *= qd.min(1.0, 2.0 * trace_of(found) / qd.max(velocities[i][3] * full, 1e-20))
                 for k in qd.static(range(turned.n)):
                     turned[k] = a[k] / (1.0 + forget * half.norm())
                 particles.viscous[i] = turned
