@@ -6,7 +6,11 @@ import pytest
 
 import wavetank as wt
 from wavetank.foundation import model
+from wavetank.scene.drains import Drain
+from wavetank.scene.emitters import Emitter
+from wavetank.scene.gauges import Gauge
 from wavetank.scene.scene import Tank, scene_schema
+from wavetank.solids.motion import Keyframe, Motion
 
 TANK = {"size": (1.0, 1.0, 1.0)}
 BLOCK = {"lower": (0, 0, 0), "upper": (0.5, 0.5, 0.5)}
@@ -175,9 +179,10 @@ def test_every_number_of_a_scene_is_a_length_or_known_not_to_be():
     """Who adds a field says which: see `model.METRES`."""
     others = {
         "velocity", "velocities", "rotation", "friction", "normal", "share", "drag", "strength", "speed", "axis",
-        "duration", "acceleration", "frequency", "phase",
+        "duration", "acceleration", "frequency", "phase", "tilt", "tilt_axis", "direction", "side", "flow", "spread",
+        "start", "suction", "time",
     }  # fmt: skip
-    models = {Tank, *model._MODEL_OF_TAG.values()}
+    models = {Tank, Emitter, Drain, Gauge, Motion, Keyframe, *model._MODEL_OF_TAG.values()}
     assert len(models) > 20
     for kind in models:
         for name, field in kind.model_fields.items():

@@ -1,6 +1,7 @@
 """Validated plain data: pydantic models whose errors are one sentence that a user can act on."""
 
 import difflib
+import functools
 import math
 from typing import Annotated, Any, cast
 
@@ -56,6 +57,13 @@ class Model(BaseModel, metaclass=_OneSentence):
 def is_length(field: FieldInfo) -> bool:
     """Say whether a field holds lengths [m]."""
     return METRES in field.metadata or any(METRES in getattr(t, "__metadata__", ()) for t in _types(field.annotation))
+
+
+@functools.cache
+def numeric_fields(model: type[BaseModel]) -> tuple[str, ...]:
+    """Name the fields of a model that hold numbers or vectors of numbers, and nothing else."""
+    types = {name: _types(field.annotation) for name, field in model.model_fields.items()}
+    return tuple(name for name, known in types.items() if float in known and not {str, dict, list} & {*known} - {float})
 
 
 def sentence(report: ValidationError, model: type[BaseModel]) -> str:

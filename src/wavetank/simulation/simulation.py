@@ -25,6 +25,7 @@ from wavetank.physics.time_step import filled_share, whole
 from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import MAX_PARTICLES, Scene
+from wavetank.scene.schedule import changes_gravity, gravity_at
 from wavetank.simulation import limits
 from wavetank.simulation import snapshot as snapshots
 from wavetank.simulation.arrays import check_newcomers
@@ -33,11 +34,15 @@ from wavetank.simulation.frame import Frame
 from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.simulation.snapshot import Snapshot
+from wavetank.simulation.sources import Sources, check_places
 from wavetank.solids.solid import Solid
 
 
 class Simulation(Contents):
     """Water that moves. See `Scene` for what it is made of."""
+
+    gravity_by_hand: tuple[float, ...] | None  # m/s^2, in place of what changes by itself
+    notes: list[str]  # what a person should know, one sentence each; whoever shows them takes them away
 
     def __init__(self, scene: Scene, arch: str = "cpu") -> None:
         compiler.start(arch)
@@ -48,7 +53,10 @@ class Simulation(Contents):
     def reset(self) -> None:
         """Put everything back to the start of the scene."""
         positions, velocities = self.scene.particles()
-        self.solids = MovingSolids(self._walls(), self.scene.solids, self.scene.friction, self.scene.spacing)
+        scene = self.scene
+        self.solids = MovingSolids(self._walls(), scene.solids, scene.friction, scene.spacing, scene.start_time)
+        self.sources, self.notes = Sources(scene), []
+        self.gravity_by_hand = None
         self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
         self.pushed: list[Force] = []  # these in the next one only
         self.ledger = Ledger()
@@ -59,6 +67,7 @@ class Simulation(Contents):
         self.ledger.start_box = (box.min(axis=0), box.max(axis=0))
         self.seconds_per_frame = math.nan  # that the last frame took to compute
         self.time_steps = 1  # of the last frame
+        check_places(self)
 
     def _fill(self, capacity: int) -> None:
         """Make an empty world with room for `capacity` particles."""
@@ -133,19 +142,24 @@ class Simulation(Contents):
 
     def _advance_frame(self, duration: float) -> None:
         began = time.perf_counter()
+        self.solids.follow(self.time, duration)
+        self.pushed += self.sources.forces(self.scene, self.time, duration)
         limit = self._speed_limit(duration)
         parts = self.time_steps = whole(self._steps_in(duration))
         self.solids.grow(duration)
         for part in range(parts):
             self.world.solids_version = self.solids.move_to(part / parts, (part + 1) / parts)
             if self.count:
-                for force in self._acting:
-                    force.apply(self.world.particles, self.count, duration / parts, self.time + duration * part / parts)
-                step(self.world, self.scene, duration / parts, limit)
+                start, dt = self.time + duration * part / parts, duration / parts
+                for force in self._acting_at(start + 0.5 * dt):
+                    force.apply(self.world.particles, self.count, dt, start)
+                step(self.world, self._scene_at(start + 0.5 * dt), dt, limit)
         self.solids.move_to(0.0, 1.0)
-        update_foam(self.world, self.scene, duration, self.frame_number)
+        update_foam(self.world, self._scene_at(self.time + 0.5 * duration), duration, self.frame_number)
         self.pushed = []
         self.solids.arrive()
+        if self.sources:
+            self.sources.act(self, self.time, duration)
         compiler.synchronize()
         self.seconds_per_frame = time.perf_counter() - began
         self.ledger.time += duration
@@ -157,11 +171,26 @@ class Simulation(Contents):
         """The forces of the next frame."""
         return (*self.forces, *self.pushed)
 
+    def _acting_at(self, time: float) -> tuple[Force, ...]:
+        """The same with their numbers at `time` [s] of the water."""
+        return tuple(force.at(time + self.scene.start_time) for force in self._acting)
+
+    def _scene_at(self, time: float) -> Scene:
+        """The scene with gravity as it is at `time` [s] of the water."""
+        if not changes_gravity(self.scene):
+            return self.scene
+        now = self.gravity_by_hand or gravity_at(self.scene, time)
+        return self.scene.model_copy(update={"gravity": now})
+
     def _steps_in(self, duration: float) -> float:
-        return limits.count_steps(self.world, self.scene, self.solids, self.ledger, self._acting, duration)
+        middle = self.time + 0.5 * duration
+        scene, acting = self._scene_at(middle), self._acting_at(middle)
+        return limits.count_steps(self.world, scene, self.solids, self.ledger, acting, duration)
 
     def _speed_limit(self, duration: float) -> float:
-        return limits.find_speed_limit(self.world, self.scene, self.solids, self.ledger, self._acting, duration)
+        middle = self.time + 0.5 * duration
+        scene, acting = self._scene_at(middle), self._acting_at(middle)
+        return limits.find_speed_limit(self.world, scene, self.solids, self.ledger, acting, duration)
 
     # --- solids ---
 
@@ -172,6 +201,17 @@ class Simulation(Contents):
         angle about z [rad]; None keeps what is. A solid without a name is called "solid 1" and so on.
         """
         self.solids.aim(name, position, rotation, self.scene.dim)
+
+    def release(self, name: str, within: float = 0.5) -> None:
+        """Give the solid `name` that `move` has taken back to its own motion, which it joins within so long [s].
+
+        "gravity" gives gravity back to its expressions and to the tilt of the tank. Raises `WavetankError` for a solid
+        without a motion.
+        """
+        if name == "gravity" and name not in self.solids.names:
+            self.gravity_by_hand = None
+        else:
+            self.solids.release(name, self.time, within)
 
     def add_solid(self, solid: Solid, grow: float = 0.0) -> str:
         """Put a solid into the world and return its name.
@@ -270,7 +310,8 @@ class Simulation(Contents):
 
     def snapshot(self) -> Snapshot:
         """Return this instant as host arrays, for `resume`."""
-        return snapshots.take_snapshot(self.scene, self.world, self.solids, self.ledger)
+        snapshot = snapshots.take_snapshot(self.scene, self.world, self.solids, self.ledger)
+        return dataclasses.replace(snapshot, sources=self.sources.plain() if self.sources else {})
 
     def resume(self, snapshot: Snapshot) -> None:
         """Go back (or on) to an instant; parameters and forces stay as they are now."""
@@ -283,6 +324,8 @@ class Simulation(Contents):
         self.ledger.capacity = before.capacity
         self.ledger.next_id = max(self.ledger.next_id, before.next_id)
         snapshots.put_particles(snapshot, self.scene, self.world, self.ledger.capacity)
+        self.sources = Sources(self.scene)
+        self.sources.read(snapshot.sources)
 
     def clone(self) -> "Simulation":
         """Return a world of its own that goes on from here to the same bits, with the same forces and parameters."""
@@ -291,6 +334,7 @@ class Simulation(Contents):
         copy.scene = self.scene.model_copy(deep=True)
         copy.resume(dataclasses.replace(self.snapshot(), solids=[*copy.scene.solids]))
         copy.forces, copy.pushed = deepcopy((self.forces, self.pushed))
+        copy.gravity_by_hand = self.gravity_by_hand
         return copy
 
     def digest(self) -> str:
@@ -302,12 +346,16 @@ class Simulation(Contents):
     def __getattr__(self, name: str) -> Any:
         """Read a parameter of the scene."""
         if name in LIVE:
-            return getattr(self.scene, name)
+            return getattr(self._scene_at(self.time) if name == "gravity" else self.scene, name)
         raise AttributeError(f"'Simulation' object has no attribute {name!r}")
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Set an attribute; a live parameter is checked and holds from the next substep on."""
-        if name in LIVE:
+        if name == "gravity" and changes_gravity(self.scene):
+            trial = self.scene.model_copy(update={"gravity_track": None})
+            trial.assign(name, value)
+            self.gravity_by_hand = trial.gravity
+        elif name in LIVE:
             self.scene.assign(name, value)
         else:
             if name not in self.__dict__ and not hasattr(type(self), name):

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from wavetank.foundation.model import Model, Number, Quaternion
 from wavetank.foundation.rotations import product, turned, unit_quaternion
+from wavetank.solids.motion import AnyMotion, shorthand
 
 Floats = Sequence[float] | np.ndarray
 ENDLESS = 1.0e5  # half size [m] of what has no end
@@ -35,6 +36,12 @@ class Solid(Model):
     name: str = ""
     rotation: Quaternion | Number = (1.0, 0.0, 0.0, 0.0)  # (w, x, y, z), or an angle about z [rad]
     friction: Annotated[Number, Field(ge=0, le=1)] | None = None  # the scene's friction where None
+    motion: AnyMotion = None  # how it moves by itself; see `motion.py`
+
+    @model_validator(mode="before")
+    @classmethod
+    def _expressed(cls, values: Any) -> Any:
+        return shorthand(values, ("center", "point"))
 
     @property
     def origin(self) -> np.ndarray:

@@ -93,15 +93,25 @@ class Mesh(Solid):
         Raises `WavetankError` for a mesh that cannot be read, is not closed or too large.
         """
         triangles = self._triangles()
-        points = triangles.vertices.astype(np.float64)
+        key = f"{triangles.digest} {self.up} {self.size} {self.thickness}"
+        return grid_of(self._vertices(), triangles.faces, spacing, self.thickness, key, self.name or self._label())
+
+    def corners(self) -> np.ndarray:
+        """Return the corners of the triangles [m] in the mesh's own frame, [m, 3, 3], as seen from outside."""
+        result: np.ndarray = self._vertices()[self._triangles().faces]
+        return result
+
+    def _vertices(self) -> np.ndarray:
+        """Return the vertices [m] in the mesh's own frame, [n, 3]."""
+        points = self._triangles().vertices.astype(np.float64)
         if self.up in _UP:
             points = points @ np.reshape(_UP[self.up], (3, 3)).T
         edges = np.ptp(points, axis=0)
         if not isinstance(self.size, float) and edges.min() < FLAT:
             raise WavetankError(f"{self._label()} is flat; a mesh without a depth needs size as one number.")
         factor = self.size if isinstance(self.size, float) else np.array(self.size) / edges
-        key = f"{triangles.digest} {self.up} {self.size} {self.thickness}"
-        return grid_of(points * factor, triangles.faces, spacing, self.thickness, key, self.name or self._label())
+        result: np.ndarray = points * factor
+        return result
 
     def _triangles(self) -> Triangles:
         try:

@@ -1,0 +1,359 @@
+"""Emitters and drains at work, at the end of every frame: drains first, as what they took may come out again.
+
+Rows leave a mouth when the volume of a row has passed through it; where a row is at the end of the frame follows from
+when it left: it has flown freely since. Flow is right to a row, whatever the frames are. What finds no room, because
+water stands in the mouth, is owed and comes as soon as there is.
+
+    code     symbol   meaning                                                       unit
+    phase             rows that have left, less those that came; 0 to 1             1
+    age               time since a row left                                         s
+    pitch             distance of rows at rest density                              m
+"""
+
+import dataclasses
+import math
+from typing import Any, Protocol
+
+import numpy as np
+
+from wavetank.device.compiler import download
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.rotations import turned
+from wavetank.physics.world import World
+from wavetank.scene.drains import Drain
+from wavetank.scene.emitters import Emitter, unit_vector
+from wavetank.scene.forces import Attract, Force
+from wavetank.scene.forces.jet import Jet, opening_of
+from wavetank.scene.gauges import Gauge
+from wavetank.scene.mouths import Mouth, frame_of
+from wavetank.scene.scene import Scene
+from wavetank.scene.schedule import gravity_at
+
+GAP = 0.45  # d: room that new particles have from others; water under pressure comes into the mouth behind a jet
+PATIENCE = 0.5  # s: flow of so long is owed at most; the rest is given up, and said
+HELD = 2.5  # d: so far from the mouth a jet is held at its speed
+REACH = 4.0  # radii: how far the suction of a drain is felt
+
+
+class Water(Protocol):
+    """What sources need of a running world; `Simulation` has it."""
+
+    scene: Scene
+    world: World
+    notes: list[str]
+    time_steps: int
+
+    @property
+    def count(self) -> int:
+        """Number of particles."""
+
+    def add(self, positions: Any, velocities: Any = None, dyes: Any = None, materials: Any = None) -> np.ndarray:
+        """Add particles; return their ids."""
+
+    def remove(self, ids: Any) -> int:
+        """Remove the particles with these ids; return how many there were."""
+
+    def remove_inside(self, start: np.ndarray, end: np.ndarray, radius: float) -> int:
+        """Remove the particles within `radius` [m] of a segment; return how many."""
+
+    def free_places(self, places: np.ndarray, gap: float, wall: float) -> np.ndarray:
+        """Say which places keep these distances [m] to particles and solids."""
+
+
+@dataclasses.dataclass
+class Source:
+    """What is known of one emitter or drain besides the scene."""
+
+    phase: float = 0.0  # rows, or particles of a drain
+    owed: int = 0  # particles that found no room yet
+    total: int = 0  # particles that came, or went
+    withheld: int = 0  # particles that were given up
+    flows: bool = False  # whether an emitter lets water out
+    store: int = 0  # particles that a drain took and no emitter has let out again
+
+
+def rows_due(way: float, more: float, pitch: float) -> tuple[np.ndarray, float]:
+    """Return how far [m] each of the rows is that leave while the jet goes `more` [m], and how far the next one is.
+
+    `way` is what this returned last.
+    """
+    way += more
+    rows = int(way / pitch)
+    way -= rows * pitch
+    return way + pitch * np.arange(rows), way
+
+
+class Sources:
+    """The emitters and drains of a world."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.emitters = [Source() for _ in scene.emitters]
+        self.drains = [Source() for _ in scene.drains]
+        self.said: set[str] = set()  # notes that were given
+
+    def __bool__(self) -> bool:
+        return bool(self.emitters or self.drains)
+
+    def forces(self, scene: Scene, time: float, duration: float) -> list[Force]:
+        """Return what drains pull and jets push with in a frame that begins at `time` [s]."""
+        clock, found = time + scene.start_time + 0.5 * duration, list[Force]()
+        for drain in (drain.at(clock) for drain in scene.drains):
+            if drain.suction and acts(drain, time, duration):
+                found.append(suction_of(drain))
+        for emitter, source in zip(scene.emitters, self.emitters, strict=True):
+            if source.flows and emitter.mesh is None and acts(emitter, time, duration):
+                found.append(jet_of(scene, emitter.at(clock), time + 0.5 * duration))
+        return found
+
+    def act(self, sim: Water, time: float, duration: float) -> None:
+        """Let water go and come, at the end of a frame of `duration` [s] that began at `time` [s]."""
+        for number, source in enumerate(self.drains):
+            self._drain(sim, sim.scene.drains[number], source, time, duration)
+        for number, source in enumerate(self.emitters):
+            self._emit(sim, number, source, time, duration)
+
+    def figures(self) -> dict[str, int]:
+        """Return how many particles came, went and found no room, for `Simulation.stats`."""
+        return {
+            "emitted": sum(source.total for source in self.emitters),
+            "drained": sum(source.total for source in self.drains),
+            "withheld": sum(source.withheld for source in self.emitters),
+        }
+
+    def plain(self) -> dict[str, Any]:
+        """Return what a file holds of this."""
+        return {
+            "emitters": [dataclasses.asdict(source) for source in self.emitters],
+            "drains": [dataclasses.asdict(source) for source in self.drains],
+        }
+
+    def read(self, plain: dict[str, Any]) -> None:
+        """Take what `plain` wrote; what is missing begins anew."""
+        for name in ("emitters", "drains"):
+            for source, row in zip(getattr(self, name), plain.get(name, []), strict=False):
+                source.__dict__.update(row)
+
+    # --- drains ---
+
+    def _drain(self, sim: Water, drain: Drain, source: Source, time: float, duration: float) -> None:
+        clock = time + sim.scene.start_time
+        drain = drain.at(clock + 0.5 * duration)
+        first, last = span(drain, time, time + duration)
+        if last <= first or not sim.count:
+            return
+        scene, most = sim.scene, sim.count
+        if drain.flow is not None:
+            unit = 1.0 if scene.dim == 2 else 1e-3
+            source.phase += drain.flow * unit * (last - first) / scene.spacing**scene.dim
+            most = int(source.phase)
+        if drain.level is not None:
+            most = min(most, max(0, -missing(sim, drain, drain.level)))
+        taken = take(sim, drain, most) if most else 0
+        source.total += taken
+        source.store += taken
+        if drain.flow is not None:  # what was not there to be taken is not made up for
+            source.phase = min(source.phase - taken, 1.0)
+
+    # --- emitters ---
+
+    def _emit(self, sim: Water, number: int, source: Source, time: float, duration: float) -> None:
+        emitter = sim.scene.emitters[number]
+        first, last = span(emitter, time, time + duration)
+        if last <= first:
+            return
+        scene, spacing = sim.scene, sim.scene.spacing
+        now = emitter.at(0.5 * (first + last) + scene.start_time)
+        mouth = now.mouth(spacing)
+        volume = len(mouth) * spacing**scene.dim
+        rows = now.rate(mouth) * (last - first) / volume
+        source.flows = rows > 0.0
+        if not source.flows:
+            return
+        shares, source.phase = rows_due(source.phase, rows, 1.0)
+        keep = self._allowed(sim, now, mouth, len(shares), source)
+        if keep < len(shares):
+            shares, source.owed, source.flows = shares[len(shares) - keep :], 0, keep > 0
+        ages = duration - (last - time) + shares / rows * (last - first)
+        x, v = flown(sim, emitter, mouth, time + duration, ages)
+        patience = max(len(mouth), math.ceil(now.rate(mouth) * PATIENCE / spacing**scene.dim))
+        came = self._put(sim, now, x, v, len(x)) if len(x) else 0
+        source.owed += len(x) - came
+        if source.owed:  # a row in the mouth, wherever there is room by now
+            x, v = flown(sim, emitter, mouth, time + duration, np.zeros(1))
+            late = self._put(sim, now, x, v, source.owed)
+            source.owed -= late
+            came += late
+        if source.owed > patience:
+            source.withheld += source.owed - patience
+            source.owed = patience
+            self._say(sim, f"{_name(emitter, number)} is blocked by water or a solid: less comes out than it should.")
+        source.total += came
+        if emitter.feed:
+            self._fed(scene, emitter).store -= came
+
+    def _allowed(self, sim: Water, emitter: Emitter, mouth: Mouth, rows: int, source: Source) -> int:
+        """Return how many of the rows that are due may come, by what feeds them, the level and the room there is."""
+        n, allowed = len(mouth), rows
+        if emitter.feed:
+            allowed = min(allowed, (self._fed(sim.scene, emitter).store - source.owed) // n)
+        if emitter.level is not None and rows:
+            allowed = min(allowed, math.ceil(missing(sim, emitter, emitter.level) / n))
+        most = sim.scene.most_particles
+        if most is not None and sim.scene.when_full == "stop" and sim.count + n * allowed > most:
+            fit = max(0, (most - sim.count) // n)
+            source.withheld += n * (allowed - fit)
+            allowed = fit
+            self._say(sim, f"There are {sim.count:,} particles and most_particles = {most:,}: emitters wait for room.")
+        return max(0, allowed)
+
+    def _put(self, sim: Water, emitter: Emitter, x: np.ndarray, v: np.ndarray, most: int) -> int:
+        """Add the particles that have room, at most so many, and return how many; the world's oldest may go for it."""
+        scene = sim.scene
+        free = np.flatnonzero(sim.free_places(x, GAP * scene.spacing, scene.wall_gap * scene.spacing))[:most]
+        if not len(free):
+            return 0
+        full = 0 if scene.most_particles is None else sim.count + len(free) - scene.most_particles
+        if full > 0 and scene.when_full == "recycle":
+            ids = download(sim.world.particles.id)[: sim.count]
+            sim.remove(np.sort(ids)[:full])
+        kinds = None
+        if emitter.material is not None:
+            names = [material.name for material in scene.materials]
+            kinds = np.full(len(free), 1 + names.index(emitter.material), np.int32)
+        sim.add(x[free], v[free], np.full(len(free), emitter.dye_number, np.int32), kinds)
+        return len(free)
+
+    def _fed(self, scene: Scene, emitter: Emitter) -> Source:
+        return self.drains[[drain.name for drain in scene.drains].index(emitter.feed)]
+
+    def _say(self, sim: Water, sentence: str) -> None:
+        if sentence.split(":")[-1] not in self.said:
+            self.said.add(sentence.split(":")[-1])
+            sim.notes.append(sentence)
+
+
+def check_places(sim: Water) -> None:
+    """Raise `WavetankError` where an emitter begins inside of a solid or outside of the tank."""
+    scene = sim.scene
+    for number, emitter in enumerate(scene.emitters):
+        now = emitter.at(scene.start_time)
+        x, _ = flown(sim, emitter, now.mouth(scene.spacing), 0.0, np.zeros(1))
+        size = scene.tank.size if scene.tank else None
+        inside = np.ones(len(x), bool) if size is None else np.all((x >= 0.0) & (x <= np.array(size)), axis=1)
+        if not (sim.free_places(x, 0.0, scene.wall_gap * scene.spacing) & inside).any():
+            raise WavetankError(
+                f"emitters[{number}] is inside of a solid or outside of the tank, and nothing can come out; move its "
+                "position to where there is room, or turn its direction."
+            )
+
+
+def acts(source: Emitter | Drain, time: float, duration: float) -> bool:
+    """Say whether an emitter or a drain acts in a frame."""
+    first, last = span(source, time, time + duration)
+    return last > first
+
+
+def span(source: Emitter | Drain, begin: float, end: float) -> tuple[float, float]:
+    """Return the part of the time from `begin` to `end` [s] in which this acts; of no length where it does not."""
+    stop = math.inf if source.duration is None else source.start + source.duration
+    first = min(max(begin, source.start), end)
+    return first, max(first, min(end, stop))
+
+
+def take(sim: Water, drain: Drain, most: int | None = None) -> int:
+    """Remove the particles that a drain takes, at most so many, and return how many."""
+    if drain.shape == "sphere" and (most is None or most >= sim.count):
+        assert drain.center is not None
+        assert drain.radius is not None
+        center = np.array([*drain.center, 0.0][:3], float)
+        return sim.remove_inside(center, center, drain.radius)
+    most = sim.count if most is None else most
+    x = download(sim.world.particles.x)[: sim.count].astype(np.float64)
+    depth = drain.depths(x, sim.scene.spacing)
+    chosen = np.flatnonzero(np.isfinite(depth))
+    if not len(chosen) or most <= 0:
+        return 0
+    ids = download(sim.world.particles.id)[: sim.count]
+    if len(chosen) > most:
+        order = np.lexsort((ids[chosen], depth[chosen]))
+        chosen = chosen[order[:most]]
+    return sim.remove(ids[chosen])
+
+
+def suction_of(drain: Drain) -> Attract:
+    """Return the pull of a drain."""
+    assert drain.center is not None
+    assert drain.radius is not None
+    return Attract(center=drain.center, radius=REACH * drain.radius, strength=drain.suction, drag=0.0)
+
+
+def jet_of(scene: Scene, emitter: Emitter, time: float) -> Jet:
+    """Return what holds the speed of a jet in the mouth at `time` [s]."""
+    mouth, dim = emitter.mouth(scene.spacing), scene.dim
+    middle, axes = _placed(emitter, dim, time + scene.start_time)
+    g = np.zeros(3)
+    g[:dim] = gravity_at(scene, time)
+    half = (mouth.half[0] + 0.5 * scene.spacing, mouth.half[1] + 0.5 * scene.spacing)
+    return Jet(opening=opening_of(
+        middle, axes, half, is_round=int(emitter.shape in ("disc", "ring")), length=HELD * scene.spacing,
+        speed=emitter.pace(mouth) * math.cos(emitter.spread), fall=float(g @ axes[2]),
+    ))  # fmt: skip
+
+
+def missing(sim: Water, source: Emitter | Drain, level: float) -> int:
+    """Return how many particles are missing to the level [m]; what is too much is negative."""
+    scene, gauge = sim.scene, source.gauge
+    x = download(sim.world.particles.x)[: sim.count].astype(np.float64)
+    if gauge is None:
+        size = scene.tank.size if scene.tank else (1.0,) * scene.dim
+        gauge = Gauge.parse({"lower": (0.0,) * scene.dim, "upper": size})
+    lack = (level - gauge.level(x, scene.spacing)) * gauge.base() / scene.spacing**scene.dim
+    return math.floor(lack + 0.5)
+
+
+def flown(
+    sim: Water, emitter: Emitter, mouth: Mouth, end: float, ages: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return positions and velocities at the time `end` [s], [n, dim], of the rows that left so long before."""
+    scene = sim.scene
+    xs, vs = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    g, dt = np.zeros(3), scene.frame_time / max(sim.time_steps, 1)
+    g[: scene.dim] = gravity_at(scene, end)
+    for age in ages.tolist():
+        left = end - age + scene.start_time
+        then = emitter.at(left)
+        speed = then.pace(mouth)
+        middle, axes = _placed(then, scene.dim, left)
+        earlier, _ = _placed(then, scene.dim, max(0.0, left - dt)) if then.motion else (middle, axes)
+        ways = mouth.ways @ axes
+        if then.mesh is not None and then.direction is not None:
+            ways = np.tile(unit_vector(then.direction), (len(mouth), 1))
+        # Velocities of a step are those of its middle: x goes on by v + g dt, v included, in the next one.
+        own = speed * ways + ((middle - earlier) / dt if left > dt else 0.0)
+        # The middle of a row that has left as a whole passed the mouth when half of it had.
+        flight = age + 0.5 * mouth.pitch / speed
+        xs.append(middle + mouth.places @ axes + own * flight + 0.5 * g * flight**2)
+        vs.append(own + g * (flight - 0.5 * dt))
+    dim = scene.dim
+    return np.concatenate(xs)[:, :dim].astype(np.float32), np.concatenate(vs)[:, :dim].astype(np.float32)
+
+
+def _placed(emitter: Emitter, dim: int, clock: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middle of the mouth [m] and its frame at a time of the scene's clock [s]."""
+    rest = np.zeros(3)
+    rest[:dim] = emitter.middle
+    axes = np.eye(3)
+    if emitter.mesh is None:
+        assert emitter.direction is not None
+        side = None if emitter.side is None else np.array(emitter.side, float)
+        axes = frame_of(unit_vector(emitter.direction), dim, side)
+    if emitter.mesh is not None:
+        axes = np.stack([turned(emitter.mesh.quaternion, row) for row in axes])
+    if emitter.motion is not None:
+        rest, turn = emitter.motion.path().pose(clock, (rest, np.array([1.0, 0.0, 0.0, 0.0])))
+        axes = np.stack([turned(turn, row) for row in axes])
+    return rest, axes
+
+
+def _name(emitter: Emitter, number: int) -> str:
+    return f"The emitter {emitter.name or number + 1!r}"
