@@ -45,7 +45,7 @@ class Emitter(Timed):
     spread: Annotated[Number, Field(ge=0, le=1.4)] = 0.0  # rad between the axis and the water from the rim
     start: Annotated[Number, Field(ge=0)] = 0.0  # s
     duration: Positive | None = None  # s; without an end where None
-    material: str | None = None  # one of the scene's materials; that of the first fluid where None
+    material: str | None = None  # one of the scene's materials; the scene's own parameters where None
     dye: str = ""  # '#rrggbb'
     feed: str = ""  # name of a drain: only what that took comes out
     level: Annotated[Number | None, METRES] = None  # m: acts while the water of the gauge stands lower

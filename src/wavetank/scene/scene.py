@@ -336,7 +336,7 @@ def _set_values(value: Any, scale: float = 1.0) -> Any:
     for name, plain in result.pop("over_time", {}).items():
         result[name] = scaled(plain, scale) if scale != 1.0 and is_length(type(value).model_fields[name]) else plain
     if scale != 1.0 and "flow" in result:
-        result["flow"] = scaled(result["flow"], scale**value.flow_power)
+        result["flow"] = scaled(result["flow"], scale**value.flow_power)  # type: ignore[attr-defined]
     return result
 
 

@@ -54,6 +54,11 @@ class Timetable(Model):
             raise ValueError(text if text.startswith("gravity") else f"gravity: {text}") from None
         return {**values, "gravity": np.atleast_1d(track(tidy)(0.0)).tolist(), "gravity_track": tidy}
 
+    def is_timed(self: Any) -> bool:
+        """Say whether anything here comes, goes or changes at times of its own."""
+        own = self.emitters or self.drains or changes_gravity(self) or any(force.over_time for force in self.forces)
+        return bool(own or any(solid.motion for solid in self.solids))
+
     def check_sources(self) -> None:
         """Check what emitters ask for of drains; raises `ValueError`."""
         known = [drain.name for drain in self.drains if drain.name]

@@ -102,7 +102,7 @@ class Session(SessionState):
             hand.pass_time(duration)
             self.let_act(hand, tool.hold, hand, duration)
         self.carry_solids(duration)
-        self.sim.advance(duration)
+        self._advance(duration)
         if not self.sim.pushed:  # else too little time has passed for a frame, and they still wait for it
             self.commanded = []
         self.ticks += 1
@@ -113,6 +113,17 @@ class Session(SessionState):
         if self.history.wants(self.sim.time):
             self.history.keep(self.sim.snapshot())
         return duration
+
+    def _advance(self, duration: float) -> None:
+        """Let the water move; where an expression of the scene has no value time stops, and a note says why."""
+        try:
+            self.sim.advance(duration)
+        except WavetankError as error:
+            self.paused, self.steps_left = True, 0
+            self.note(str(error))
+        for sentence in self.sim.notes:
+            self.note(sentence)
+        self.sim.notes.clear()
 
     def turn(self) -> bool:
         """Carry out what waits and compute a frame if one is due; say whether anything happened."""

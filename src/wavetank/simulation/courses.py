@@ -51,6 +51,10 @@ class Courses:
         self.began, self.duration = time, duration
         self.returning = {name: back for name, back in self.returning.items() if time < back.time + back.within}
 
+    def has(self, name: str) -> bool:
+        """Say whether a solid has a motion."""
+        return name in self._paths
+
     def follows(self, name: str) -> bool:
         """Say whether a solid goes where its motion says."""
         return name in self._paths and name not in self.held

@@ -119,6 +119,10 @@ class MovingSolids:
             if number in self.targets or not _equal(self.poses[number], target):
                 self.targets[number] = target
 
+    def moves_itself(self, name: str) -> bool:
+        """Say whether a solid has a motion, be it held or not."""
+        return self.courses.has(name)
+
     def release(self, name: str, time: float, within: float) -> None:
         """Give a solid back to its motion."""
         number = self.find(name)

@@ -96,21 +96,23 @@ class Sources:
 
     def forces(self, scene: Scene, time: float, duration: float) -> list[Force]:
         """Return what drains pull and jets push with in a frame that begins at `time` [s]."""
-        clock, found = time + scene.start_time + 0.5 * duration, list[Force]()
+        begin, found = time + scene.start_time, list[Force]()
+        clock = begin + 0.5 * duration
         for drain in (drain.at(clock) for drain in scene.drains):
-            if drain.suction and acts(drain, time, duration):
+            if drain.suction and acts(drain, begin, duration):
                 found.append(suction_of(drain))
         for emitter, source in zip(scene.emitters, self.emitters, strict=True):
-            if source.flows and emitter.mesh is None and acts(emitter, time, duration):
-                found.append(jet_of(scene, emitter.at(clock), time + 0.5 * duration))
+            if source.flows and emitter.mesh is None and acts(emitter, begin, duration):
+                found.append(jet_of(scene, emitter.at(clock), clock))
         return found
 
     def act(self, sim: Water, time: float, duration: float) -> None:
         """Let water go and come, at the end of a frame of `duration` [s] that began at `time` [s]."""
+        begin = time + sim.scene.start_time
         for number, source in enumerate(self.drains):
-            self._drain(sim, sim.scene.drains[number], source, time, duration)
+            self._drain(sim, sim.scene.drains[number], source, begin, begin + duration)
         for number, source in enumerate(self.emitters):
-            self._emit(sim, number, source, time, duration)
+            self._emit(sim, number, source, begin, begin + duration)
 
     def figures(self) -> dict[str, int]:
         """Return how many particles came, went and found no room, for `Simulation.stats`."""
@@ -135,10 +137,9 @@ class Sources:
 
     # --- drains ---
 
-    def _drain(self, sim: Water, drain: Drain, source: Source, time: float, duration: float) -> None:
-        clock = time + sim.scene.start_time
-        drain = drain.at(clock + 0.5 * duration)
-        first, last = span(drain, time, time + duration)
+    def _drain(self, sim: Water, drain: Drain, source: Source, begin: float, end: float) -> None:
+        drain = drain.at(0.5 * (begin + end))
+        first, last = span(drain, begin, end)
         if last <= first or not sim.count:
             return
         scene, most = sim.scene, sim.count
@@ -156,13 +157,13 @@ class Sources:
 
     # --- emitters ---
 
-    def _emit(self, sim: Water, number: int, source: Source, time: float, duration: float) -> None:
+    def _emit(self, sim: Water, number: int, source: Source, begin: float, end: float) -> None:
         emitter = sim.scene.emitters[number]
-        first, last = span(emitter, time, time + duration)
+        first, last = span(emitter, begin, end)
         if last <= first:
             return
         scene, spacing = sim.scene, sim.scene.spacing
-        now = emitter.at(0.5 * (first + last) + scene.start_time)
+        now = emitter.at(0.5 * (first + last))
         mouth = now.mouth(spacing)
         volume = len(mouth) * spacing**scene.dim
         rows = now.rate(mouth) * (last - first) / volume
@@ -173,13 +174,13 @@ class Sources:
         keep = self._allowed(sim, now, mouth, len(shares), source)
         if keep < len(shares):
             shares, source.owed, source.flows = shares[len(shares) - keep :], 0, keep > 0
-        ages = duration - (last - time) + shares / rows * (last - first)
-        x, v = flown(sim, emitter, mouth, time + duration, ages)
+        ages = end - last + shares / rows * (last - first)
+        x, v = flown(sim, emitter, mouth, end, ages)
         patience = max(len(mouth), math.ceil(now.rate(mouth) * PATIENCE / spacing**scene.dim))
         came = self._put(sim, now, x, v, len(x)) if len(x) else 0
         source.owed += len(x) - came
         if source.owed:  # a row in the mouth, wherever there is room by now
-            x, v = flown(sim, emitter, mouth, time + duration, np.zeros(1))
+            x, v = flown(sim, emitter, mouth, end, np.zeros(1))
             late = self._put(sim, now, x, v, source.owed)
             source.owed -= late
             came += late
@@ -216,10 +217,8 @@ class Sources:
         if full > 0 and scene.when_full == "recycle":
             ids = download(sim.world.particles.id)[: sim.count]
             sim.remove(np.sort(ids)[:full])
-        kinds = None
-        if emitter.material is not None:
-            names = [material.name for material in scene.materials]
-            kinds = np.full(len(free), 1 + names.index(emitter.material), np.int32)
+        names = [None, *(material.name for material in scene.materials)]
+        kinds = np.full(len(free), names.index(emitter.material), np.int32)
         sim.add(x[free], v[free], np.full(len(free), emitter.dye_number, np.int32), kinds)
         return len(free)
 
@@ -237,7 +236,7 @@ def check_places(sim: Water) -> None:
     scene = sim.scene
     for number, emitter in enumerate(scene.emitters):
         now = emitter.at(scene.start_time)
-        x, _ = flown(sim, emitter, now.mouth(scene.spacing), 0.0, np.zeros(1))
+        x, _ = flown(sim, emitter, now.mouth(scene.spacing), scene.start_time, np.zeros(1))
         size = scene.tank.size if scene.tank else None
         inside = np.ones(len(x), bool) if size is None else np.all((x >= 0.0) & (x <= np.array(size)), axis=1)
         if not (sim.free_places(x, 0.0, scene.wall_gap * scene.spacing) & inside).any():
@@ -247,9 +246,9 @@ def check_places(sim: Water) -> None:
             )
 
 
-def acts(source: Emitter | Drain, time: float, duration: float) -> bool:
-    """Say whether an emitter or a drain acts in a frame."""
-    first, last = span(source, time, time + duration)
+def acts(source: Emitter | Drain, begin: float, duration: float) -> bool:
+    """Say whether an emitter or a drain acts in a frame that begins when the scene's clock shows `begin` [s]."""
+    first, last = span(source, begin, begin + duration)
     return last > first
 
 
@@ -287,12 +286,12 @@ def suction_of(drain: Drain) -> Attract:
     return Attract(center=drain.center, radius=REACH * drain.radius, strength=drain.suction, drag=0.0)
 
 
-def jet_of(scene: Scene, emitter: Emitter, time: float) -> Jet:
-    """Return what holds the speed of a jet in the mouth at `time` [s]."""
+def jet_of(scene: Scene, emitter: Emitter, clock: float) -> Jet:
+    """Return what holds the speed of a jet in the mouth when the scene's clock shows `clock` [s]."""
     mouth, dim = emitter.mouth(scene.spacing), scene.dim
-    middle, axes = _placed(emitter, dim, time + scene.start_time)
+    middle, axes = _placed(emitter, dim, clock)
     g = np.zeros(3)
-    g[:dim] = gravity_at(scene, time)
+    g[:dim] = gravity_at(scene, clock - scene.start_time)
     half = (mouth.half[0] + 0.5 * scene.spacing, mouth.half[1] + 0.5 * scene.spacing)
     return Jet(opening=opening_of(
         middle, axes, half, is_round=int(emitter.shape in ("disc", "ring")), length=HELD * scene.spacing,
@@ -314,13 +313,13 @@ def missing(sim: Water, source: Emitter | Drain, level: float) -> int:
 def flown(
     sim: Water, emitter: Emitter, mouth: Mouth, end: float, ages: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Return positions and velocities at the time `end` [s], [n, dim], of the rows that left so long before."""
+    """Return positions and velocities, [n, dim], of the rows that left so long [s] before the clock shows `end`."""
     scene = sim.scene
     xs, vs = [np.zeros((0, 3))], [np.zeros((0, 3))]
     g, dt = np.zeros(3), scene.frame_time / max(sim.time_steps, 1)
-    g[: scene.dim] = gravity_at(scene, end)
+    g[: scene.dim] = gravity_at(scene, end - scene.start_time)
     for age in ages.tolist():
-        left = end - age + scene.start_time
+        left = end - age
         then = emitter.at(left)
         speed = then.pace(mouth)
         middle, axes = _placed(then, scene.dim, left)
