@@ -132,7 +132,9 @@ class MovingSolids:
         """Return the largest speed [m/s] at which any solid moves through the tank in a frame of `duration` [s]."""
         fastest = 0.0
         for number in self.targets:
-            reach = self.reaches[number] if tank_size is None else float(np.linalg.norm(tank_size))
+            reach = self.reaches[number]
+            if tank_size is not None:  # what is endless is felt as far as the tank is large
+                reach = min(reach, float(np.linalg.norm(tank_size)))
             parts = PARTS if self.courses.follows(self.names[number]) else 1
             between = [self._pose_at(number, part / parts) for part in range(1, parts)]
             poses = [self.poses[number], *between, self.targets[number]]

@@ -29,7 +29,8 @@ from wavetank.scene.mouths import Mouth, frame_of
 from wavetank.scene.scene import Scene
 from wavetank.scene.schedule import gravity_at
 
-GAP = 0.45  # d: room that new particles have from others; water under pressure comes into the mouth behind a jet
+GAP = 0.8  # d: room that new particles have from others
+PRESSED = 0.45  # d: the same for those that water under pressure has kept waiting, more than a row
 PATIENCE = 0.5  # s: flow of so long is owed at most; the rest is given up, and said
 HELD = 2.5  # d: so far from the mouth a jet is held at its speed
 REACH = 4.0  # radii: how far the suction of a drain is felt
@@ -177,11 +178,12 @@ class Sources:
         ages = end - last + shares / rows * (last - first)
         x, v = flown(sim, emitter, mouth, end, ages)
         patience = max(len(mouth), math.ceil(now.rate(mouth) * PATIENCE / spacing**scene.dim))
-        came = self._put(sim, now, x, v, len(x)) if len(x) else 0
+        gap = PRESSED if source.owed > len(mouth) else GAP
+        came = self._put(sim, now, x, v, gap) if len(x) else 0
         source.owed += len(x) - came
-        if source.owed:  # a row in the mouth, wherever there is room by now
+        if source.owed:  # in the mouth, wherever there is room by now
             x, v = flown(sim, emitter, mouth, end, np.zeros(1))
-            late = self._put(sim, now, x, v, source.owed)
+            late = self._put(sim, now, x, v, gap, source.owed)
             source.owed -= late
             came += late
         if source.owed > patience:
@@ -207,10 +209,12 @@ class Sources:
             self._say(sim, f"There are {sim.count:,} particles and most_particles = {most:,}: emitters wait for room.")
         return max(0, allowed)
 
-    def _put(self, sim: Water, emitter: Emitter, x: np.ndarray, v: np.ndarray, most: int) -> int:
+    def _put(
+        self, sim: Water, emitter: Emitter, x: np.ndarray, v: np.ndarray, gap: float, most: int | None = None
+    ) -> int:  # fmt: skip
         """Add the particles that have room, at most so many, and return how many; the world's oldest may go for it."""
         scene = sim.scene
-        free = np.flatnonzero(sim.free_places(x, GAP * scene.spacing, scene.wall_gap * scene.spacing))[:most]
+        free = np.flatnonzero(sim.free_places(x, gap * scene.spacing, scene.wall_gap * scene.spacing))[:most]
         if not len(free):
             return 0
         full = 0 if scene.most_particles is None else sim.count + len(free) - scene.most_particles
