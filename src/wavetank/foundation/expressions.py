@@ -139,9 +139,8 @@ def _call(node: ast.Call, name: str, text: str) -> Value:
     function, least, most = FUNCTIONS[name]
     if node.keywords or not least <= len(node.args) <= most:
         asked = f"{least}" if least == most else f"{least} to {most}"
-        raise WavetankError(
-            f"{name} in {shown(text)} takes {asked} numbers in brackets, as in {name}({_example(least)})."
-        )
+        asked += " numbers" if most > 1 else " number"
+        raise WavetankError(f"{name} in {shown(text)} takes {asked} in brackets, as in {name}({_example(least)}).")
     arguments = [_value_of(argument, text) for argument in node.args]
     return lambda t: function(*(argument(t) for argument in arguments))
 

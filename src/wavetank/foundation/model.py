@@ -112,10 +112,10 @@ def sentence(report: ValidationError, model: type[BaseModel]) -> str:
 
 def _key(location: tuple[str | int, ...]) -> str:
     text = ""
-    for part in location:
+    for number, part in enumerate(location, 1):
         if isinstance(part, int):
             text += f"[{part}]"
-        elif part.startswith(("tuple[", "constrained-")) or part in _SHAPE_TAGS:
+        elif part.startswith(("tuple[", "constrained-")) or (part in _SHAPE_TAGS and number < len(location)):
             continue
         else:
             text += f".{part}" if text else part

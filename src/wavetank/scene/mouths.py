@@ -169,10 +169,14 @@ def _mouth_of(text: str, spacing: float, spread: float, dim: int) -> Mouth:
     return Mouth(places, ways, area, spacing**dim * len(points) / area, half)
 
 
-@functools.lru_cache(maxsize=16)
 def mouth_of_mesh(mesh: Mesh, spacing: float) -> Mouth:
     """Return a mouth that is the surface of a mesh; water leaves along its normals."""
-    corners = mesh.corners()
+    return _mouth_of_mesh(mesh.path, mesh.data, mesh.size, mesh.up, spacing)
+
+
+@functools.lru_cache(maxsize=16)
+def _mouth_of_mesh(path: str, data: str, size: Any, up: Any, spacing: float) -> Mouth:
+    corners = Mesh(path=path, data=data, size=size, up=up, center=(0.0, 0.0, 0.0)).corners()
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = 0.5 * np.linalg.norm(sides, axis=1)
     area = float(areas.sum())

@@ -92,7 +92,10 @@ class Session(SessionState):
     def frame_duration(self) -> float:
         """Seconds of water in a frame [s]; slow motion has shorter ones, as long as they hold a good time step."""
         longest = self.sim.scene.frame_time * min(1.0, max(self.speed, 1.0 / MOST_PARTS), 1.0 / self.frame_parts)
-        return self.sim.full_steps_time(longest) if self.fills_frames else longest
+        try:
+            return self.sim.full_steps_time(longest) if self.fills_frames else longest
+        except WavetankError:  # the frame itself will say it
+            return longest
 
     def tick(self) -> float:
         """Compute one frame, with what the hands do to it, and return the seconds of water in it [s]."""

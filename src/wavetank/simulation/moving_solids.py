@@ -163,6 +163,7 @@ class MovingSolids:
         """End a frame: what was aimed at is where the solids are."""
         for number, target in self.targets.items():
             self.poses[number] = target
+        self.courses.duration = 0.0
 
     def grow(self, duration: float) -> None:
         """Let new solids swell for `duration` [s]."""
@@ -201,7 +202,12 @@ class MovingSolids:
     def _pose_at(self, number: int, share: float) -> Pose:
         """Return where a solid is after a share of the present frame: on its course, or on the straight way."""
         (place, turn), (goal, goal_turn) = self.poses[number], self.targets.get(number, self.poses[number])
-        if number in self.targets and 0.0 < share < 1.0 and self.courses.follows(self.names[number]):
+        if (
+            self.courses.duration
+            and 0.0 < share < 1.0
+            and number in self.targets
+            and self.courses.follows(self.names[number])
+        ):
             return self.courses.pose(self.names[number], self.courses.began + share * self.courses.duration)
         return place + share * (goal - place), interpolate(turn, goal_turn, share)
 

@@ -124,6 +124,7 @@ class Simulation(Contents):
 
     def full_steps_time(self, duration: float) -> float:
         """Return the time [s] up to `duration` that time steps of full length fill; see `time_step.filled_share`."""
+        self.solids.follow(self.time, duration)
         return duration * filled_share(self._steps_in(duration))
 
     def frames(self, seconds: float, fps: float = 60.0) -> Iterator[Frame]:

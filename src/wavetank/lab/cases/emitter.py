@@ -27,7 +27,8 @@ SPLASH = 4  # s, until the waves are gone that the first water of the tap makes
 
 def run(quick: bool, arch: str) -> Outcome:
     """Let a jet run for 2 s and a tank fill and drain for 60 s, in 3-D and 2-D (quick: 1 s, 8 s, coarser)."""
-    figures, series = [], {}
+    figures: list[Figure] = []
+    series: dict[str, list[float]] = {}
     spacing = {3: 0.025 if quick else 0.02, 2: 0.01}
     for dim in (3, 2):
         own, flights = jet(dim, spacing[dim], 1.0 if quick else 2.0, arch)
@@ -72,9 +73,10 @@ def jet(dim: int, spacing: float, seconds: float, arch: str) -> tuple[list[Figur
     """Measure a jet that leaves a wall level and falls to a floor that swallows it."""
     size = (1.4, 0.9, 0.4)[:dim]
     emitter = mouth(dim, RADIUS, (0.0, HEIGHT, 0.2), (1.0, 0.0, 0.0), SPEED)
-    floor = Drain(lower=(0.0,) * dim, upper=tuple(0.08 if k == 1 else edge for k, edge in enumerate(size)))
+    floor = Drain(lower=(0.0,) * dim, upper=tuple(0.16 if k == 1 else edge for k, edge in enumerate(size)))
     sim = Simulation(Scene(spacing=spacing, tank=Tank(size=size), emitters=[emitter], drains=[floor], foam=0.0), arch)
-    times, volumes, worst, crossings = [], [], [], {fall: [] for fall in FALLS}
+    times, volumes, worst = [], [], []
+    crossings: dict[float, list[float]] = {fall: [] for fall in FALLS}
     while sim.time < seconds - 1e-6:
         sim.step()
         stats = sim.stats()
@@ -125,8 +127,8 @@ def settled_error(dim: int, spacing: float, seconds: float, arch: str) -> list[F
 def tap_and_drain(dim: int, spacing: float, seconds: float, arch: str) -> tuple[list[Figure], dict[str, list[float]]]:
     """Measure the level of a tank that a tap fills as fast as a drain empties it."""
     size = (0.6, 0.5, 0.3)[:dim]
-    tap = mouth(dim, 0.03, (0.15, 0.45, 0.15), (0.0, -1.0, 0.0), 1.0)
-    flow = area_of(dim, 0.03) / (1.0 if dim == 2 else 1e-3)
+    tap = mouth(dim, 0.03, (0.15, 0.3, 0.15), (0.0, -1.0, 0.0), 0.6)
+    flow = 0.6 * area_of(dim, 0.03) / (1.0 if dim == 2 else 1e-3)
     drain = Drain(center=(0.5, 0.0, 0.15)[:dim], radius=0.05, direction=(0.0, 1.0, 0.0)[:dim], flow=flow)
     block = Block(lower=(0.0,) * dim, upper=tuple(DEPTH if k == 1 else edge for k, edge in enumerate(size)))
     scene = Scene(spacing=spacing, tank=Tank(size=size), fluids=[block], emitters=[tap], drains=[drain], foam=0.0)
