@@ -1,12 +1,12 @@
 """Emitters and drains at work, at the end of every frame: drains first, as what they took may come out again.
 
-Rows leave a mouth when the volume of a row has passed through it; where a row is at the end of the frame follows from
-when it left: it has flown freely since. Flow is right to a row, whatever the frames are. What finds no room, because
-water stands in the mouth, is owed and comes as soon as there is.
+Each place in a mouth lets a particle out whenever the volume of a row has passed, neighbours by turns. Where it is at
+the end of the frame follows from when it left: it has flown freely since. Flow is right to a particle, whatever the
+frames are. What finds no room, because water stands in the mouth, is owed and comes as soon as there is.
 
     code     symbol   meaning                                                       unit
-    phase             rows that have left, less those that came; 0 to 1             1
-    age               time since a row left                                         s
+    phase             share of a row that has passed since the last whole one       1
+    age               time since a particle left                                    s
     pitch             distance of rows at rest density                              m
 """
 
@@ -65,7 +65,7 @@ class Water(Protocol):
 class Source:
     """What is known of one emitter or drain besides the scene."""
 
-    phase: float = 0.0  # rows, or particles of a drain
+    phase: float = 0.0  # of a row, or particles of a drain
     owed: int = 0  # particles that found no room yet
     total: int = 0  # particles that came, or went
     withheld: int = 0  # particles that were given up
@@ -82,6 +82,39 @@ def rows_due(way: float, more: float, pitch: float) -> tuple[np.ndarray, float]:
     rows = int(way / pitch)
     way -= rows * pitch
     return way + pitch * np.arange(rows), way
+
+
+@dataclasses.dataclass(frozen=True)
+class Due:
+    """Particles that leave a mouth, those that left first in front."""
+
+    place: np.ndarray  # int [n]: where in the mouth
+    age: np.ndarray  # since they left: in rows, or in seconds
+
+    def first(self, number: int) -> "Due":
+        """Return those that left first."""
+        return Due(self.place[:number], self.age[:number])
+
+    def aged(self, since: float, interval: float) -> "Due":
+        """Return the same with ages in seconds, where rows take an `interval` [s] each and all ended `since` [s]."""
+        return Due(self.place, since + interval * self.age)
+
+
+def particles_due(mouth: Mouth, phase: float, rows: float) -> tuple[Due, float]:
+    """Return the particles that leave while so many `rows` pass a mouth, with ages in rows, and the next phase."""
+    after = phase + rows
+    whole = np.floor(after - mouth.phases).astype(int)
+    number = whole - np.floor(phase - mouth.phases).astype(int)
+    place = np.repeat(np.arange(len(mouth)), number)
+    earlier = np.arange(len(place)) - np.repeat(np.cumsum(number) - number, number)
+    age = after - mouth.phases[place] - (whole[place] - earlier)
+    order = np.lexsort((place, -age))
+    return Due(place[order], age[order]), after - math.floor(after)
+
+
+def row(mouth: Mouth) -> Due:
+    """Return a particle in each place, just out."""
+    return Due(np.arange(len(mouth)), np.zeros(len(mouth)))
 
 
 class Sources:
@@ -171,18 +204,17 @@ class Sources:
         source.flows = rows > 0.0
         if not source.flows:
             return
-        shares, source.phase = rows_due(source.phase, rows, 1.0)
-        keep = self._allowed(sim, now, mouth, len(shares), source)
-        if keep < len(shares):
-            shares, source.owed, source.flows = shares[len(shares) - keep :], 0, keep > 0
-        ages = end - last + shares / rows * (last - first)
-        x, v = flown(sim, emitter, mouth, end, ages)
+        due, source.phase = particles_due(mouth, source.phase, rows)
+        keep = self._allowed(sim, now, len(due.place), source)
+        if keep < len(due.place):
+            due, source.owed, source.flows = due.first(keep), 0, keep > 0
+        x, v = flown(sim, emitter, mouth, end, due.aged(end - last, (last - first) / rows))
         patience = max(len(mouth), math.ceil(now.rate(mouth) * PATIENCE / spacing**scene.dim))
         gap = PRESSED if source.owed > len(mouth) else GAP
         came = self._put(sim, now, x, v, gap) if len(x) else 0
         source.owed += len(x) - came
         if source.owed:  # in the mouth, wherever there is room by now
-            x, v = flown(sim, emitter, mouth, end, np.zeros(1))
+            x, v = flown(sim, emitter, mouth, end, row(mouth))
             late = self._put(sim, now, x, v, gap, source.owed)
             source.owed -= late
             came += late
@@ -194,17 +226,17 @@ class Sources:
         if emitter.feed:
             self._fed(scene, emitter).store -= came
 
-    def _allowed(self, sim: Water, emitter: Emitter, mouth: Mouth, rows: int, source: Source) -> int:
-        """Return how many of the rows that are due may come, by what feeds them, the level and the room there is."""
-        n, allowed = len(mouth), rows
+    def _allowed(self, sim: Water, emitter: Emitter, due: int, source: Source) -> int:
+        """Return how many of the particles that are due may come, by what feeds them, the level and the room."""
+        allowed = due
         if emitter.feed:
-            allowed = min(allowed, (self._fed(sim.scene, emitter).store - source.owed) // n)
-        if emitter.level is not None and rows:
-            allowed = min(allowed, math.ceil(missing(sim, emitter, emitter.level) / n))
+            allowed = min(allowed, self._fed(sim.scene, emitter).store - source.owed)
+        if emitter.level is not None and due:
+            allowed = min(allowed, missing(sim, emitter, emitter.level))
         most = sim.scene.most_particles
-        if most is not None and sim.scene.when_full == "stop" and sim.count + n * allowed > most:
-            fit = max(0, (most - sim.count) // n)
-            source.withheld += n * (allowed - fit)
+        if most is not None and sim.scene.when_full == "stop" and sim.count + allowed > most:
+            fit = max(0, most - sim.count)
+            source.withheld += allowed - fit
             allowed = fit
             self._say(sim, f"There are {sim.count:,} particles and most_particles = {most:,}: emitters wait for room.")
         return max(0, allowed)
@@ -240,7 +272,8 @@ def check_places(sim: Water) -> None:
     scene = sim.scene
     for number, emitter in enumerate(scene.emitters):
         now = emitter.at(scene.start_time)
-        x, _ = flown(sim, emitter, now.mouth(scene.spacing), scene.start_time, np.zeros(1))
+        mouth = now.mouth(scene.spacing)
+        x, _ = flown(sim, emitter, mouth, scene.start_time, row(mouth))
         size = scene.tank.size if scene.tank else None
         inside = np.ones(len(x), bool) if size is None else np.all((x >= 0.0) & (x <= np.array(size)), axis=1)
         if not (sim.free_places(x, 0.0, scene.wall_gap * scene.spacing) & inside).any():
@@ -314,31 +347,35 @@ def missing(sim: Water, source: Emitter | Drain, level: float) -> int:
     return math.floor(lack + 0.5)
 
 
-def flown(
-    sim: Water, emitter: Emitter, mouth: Mouth, end: float, ages: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Return positions and velocities, [n, dim], of the rows that left so long [s] before the clock shows `end`."""
+def flown(sim: Water, emitter: Emitter, mouth: Mouth, end: float, due: Due) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions and velocities, [n, dim], of particles that left at their ages [s] before the clock shows `end`.
+
+    They have flown freely since.
+    """
     scene = sim.scene
-    xs, vs = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    x, v = np.zeros((len(due.place), 3)), np.zeros((len(due.place), 3))
     g, dt = np.zeros(3), scene.frame_time / max(sim.time_steps, 1)
     g[: scene.dim] = gravity_at(scene, end - scene.start_time)
-    for age in ages.tolist():
-        left = end - age
+    for age in np.unique(due.age).tolist():
+        chosen = due.age == age
+        left, places = end - age, due.place[chosen]
         then = emitter.at(left)
-        speed = then.pace(mouth)
+        speed = max(then.pace(mouth), 1e-3 * mouth.pitch / dt)
         middle, axes = _placed(then, scene.dim, left)
         earlier, _ = _placed(then, scene.dim, max(0.0, left - dt)) if then.motion else (middle, axes)
-        ways = mouth.ways @ axes
+        ways = mouth.ways[places] @ axes
         if then.mesh is not None and then.direction is not None:
-            ways = np.tile(unit_vector(then.direction), (len(mouth), 1))
+            ways = np.tile(unit_vector(then.direction), (len(places), 1))
+        carried = (middle - earlier) / dt if left > dt else np.zeros(3)
+        own = speed * ways + carried
+        # What has left as a whole is half out of the mouth in front of it, and has fallen since its middle came out.
+        fallen = age + min(
+            0.5 * mouth.pitch / speed, 0.5 * math.sqrt(mouth.pitch / max(float(np.linalg.norm(g)), 1e-9))
+        )
+        x[chosen] = middle + mouth.places[places] @ axes + 0.5 * mouth.pitch * ways + own * age + 0.5 * g * fallen**2
         # Velocities of a step are those of its middle: x goes on by v + g dt, v included, in the next one.
-        own = speed * ways + ((middle - earlier) / dt if left > dt else 0.0)
-        # The middle of a row that has left as a whole passed the mouth when half of it had.
-        flight = age + 0.5 * mouth.pitch / speed
-        xs.append(middle + mouth.places @ axes + own * flight + 0.5 * g * flight**2)
-        vs.append(own + g * (flight - 0.5 * dt))
-    dim = scene.dim
-    return np.concatenate(xs)[:, :dim].astype(np.float32), np.concatenate(vs)[:, :dim].astype(np.float32)
+        v[chosen] = own + g * (fallen - 0.5 * dt)
+    return x[:, : scene.dim].astype(np.float32), v[:, : scene.dim].astype(np.float32)
 
 
 def _placed(emitter: Emitter, dim: int, clock: float) -> tuple[np.ndarray, np.ndarray]:
