@@ -75,6 +75,12 @@ def changes_gravity(scene: Any) -> bool:
     return scene.gravity_track is not None or (scene.tank is not None and scene.tank.is_tilted)
 
 
+def with_gravity(scene: Any, gravity: tuple[float, ...]) -> Any:
+    """Return the scene with that gravity [m/s^2] for good, in a tank that stands upright."""
+    tank = scene.tank and scene.tank.model_copy(update={"tilt": 0.0, "over_time": {}})
+    return scene.model_copy(update={"gravity": gravity, "gravity_track": None, "tank": tank})
+
+
 def gravity_at(scene: Any, time: float) -> tuple[float, ...]:
     """Return gravity [m/s^2] in the frame of the tank at `time` [s] of the water; raises `WavetankError`."""
     clock = time + scene.start_time

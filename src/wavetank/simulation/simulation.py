@@ -25,7 +25,7 @@ from wavetank.physics.time_step import filled_share, whole
 from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import MAX_PARTICLES, Scene
-from wavetank.scene.schedule import changes_gravity, gravity_at
+from wavetank.scene.schedule import changes_gravity, gravity_at, with_gravity
 from wavetank.simulation import limits
 from wavetank.simulation import snapshot as snapshots
 from wavetank.simulation.arrays import check_newcomers
@@ -367,7 +367,8 @@ class Simulation(Contents):
 
     def save(self, path: str | Path) -> None:
         """Write the whole state to an .npz file, replaced in one move; `restore` continues from it exactly."""
-        snapshots.write_snapshot(path, self.snapshot(), self.scene.model_dump_json(exclude={"fluids"}))
+        scene = self.scene if self.gravity_by_hand is None else with_gravity(self.scene, self.gravity_by_hand)
+        snapshots.write_snapshot(path, self.snapshot(), scene.model_dump_json(exclude={"fluids"}))
 
     @classmethod
     def restore(cls, path: str | Path, arch: str = "cpu") -> "Simulation":
