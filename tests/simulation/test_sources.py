@@ -7,6 +7,7 @@ import pytest
 
 import wavetank as wt
 from wavetank.scene.mouths import MOST_IN_A_ROW, mouth_of
+from wavetank.simulation.jets import outlines
 
 FLAT = wt.Tank(size=(1.0, 0.8))
 
@@ -236,3 +237,18 @@ def test_sources_go_to_a_file_and_back_and_scale():
     big = scene.scaled(2.0)
     assert (big.emitters[0].width, big.emitters[0].level, big.emitters[0].at(1.0).speed) == (0.2, 0.6, 2.0)
     assert big.drains[0].at(1.0).flow == pytest.approx(0.2)  # a slit twice as wide at the same speed
+
+
+def test_mouths_are_outlined_where_they_are():
+    """What page and window draw over the picture: closed lines, at the pose of the moment."""
+    moved = wt.Emitter(position=(0.3, 0.5, 0.3), direction=(0, 0, 2), size=(0.2, 0.1), speed=1,
+                       motion={"position": ["0.3 + t", 0.5, 0.3]})  # fmt: skip
+    drain = wt.Drain(center=(0.5, 0, 0.3), radius=0.1, direction=(0, 1, 0))
+    scene = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1, 1, 1)), emitters=[moved], drains=[drain])
+    (first, mouth), (second, hole) = outlines(scene, 0.2)
+    assert (first, second) == ("emitter", "drain")
+    assert mouth.min(axis=0) == pytest.approx([0.4, 0.45, 0.3])
+    assert mouth.max(axis=0) == pytest.approx([0.6, 0.55, 0.3])
+    assert np.array_equal(mouth[0], mouth[-1])
+    assert np.linalg.norm(hole - [0.5, 0, 0.3], axis=1) == pytest.approx(0.1)
+    assert hole[:, 1] == pytest.approx(0.0)

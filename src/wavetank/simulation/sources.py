@@ -3,11 +3,7 @@
 Each place in a mouth lets a particle out whenever the volume of a row has passed, neighbours by turns. Where it is at
 the end of the frame follows from when it left: it has flown freely since. Flow is right to a particle, whatever the
 frames are. What finds no room, because water stands in the mouth, is owed and comes as soon as there is.
-
-    code     symbol   meaning                                                       unit
-    phase             share of a row that has passed since the last whole one       1
-    age               time since a particle left                                    s
-    pitch             distance of rows at rest density                              m
+`jets.py` has what leaves a mouth.
 """
 
 import dataclasses
@@ -18,21 +14,17 @@ import numpy as np
 
 from wavetank.device.compiler import download
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.rotations import turned
 from wavetank.physics.world import World
 from wavetank.scene.drains import Drain
-from wavetank.scene.emitters import Emitter, unit_vector
+from wavetank.scene.emitters import Emitter
 from wavetank.scene.forces import Attract, Force
-from wavetank.scene.forces.jet import Jet, opening_of
 from wavetank.scene.gauges import Gauge
-from wavetank.scene.mouths import Mouth, frame_of
 from wavetank.scene.scene import Scene
-from wavetank.scene.schedule import gravity_at
+from wavetank.simulation.jets import flown, jet_of, particles_due, row
 
 GAP = 0.8  # d: room that new particles have from others
 PRESSED = 0.45  # d: the same for those that water under pressure has kept waiting, more than a row
 PATIENCE = 0.5  # s: flow of so long is owed at most; the rest is given up, and said
-HELD = 2.5  # d: so far from the mouth a jet is held at its speed
 REACH = 4.0  # radii: how far the suction of a drain is felt
 
 
@@ -84,39 +76,6 @@ def rows_due(way: float, more: float, pitch: float) -> tuple[np.ndarray, float]:
     return way + pitch * np.arange(rows), way
 
 
-@dataclasses.dataclass(frozen=True)
-class Due:
-    """Particles that leave a mouth, those that left first in front."""
-
-    place: np.ndarray  # int [n]: where in the mouth
-    age: np.ndarray  # since they left: in rows, or in seconds
-
-    def first(self, number: int) -> "Due":
-        """Return those that left first."""
-        return Due(self.place[:number], self.age[:number])
-
-    def aged(self, since: float, interval: float) -> "Due":
-        """Return the same with ages in seconds, where rows take an `interval` [s] each and all ended `since` [s]."""
-        return Due(self.place, since + interval * self.age)
-
-
-def particles_due(mouth: Mouth, phase: float, rows: float) -> tuple[Due, float]:
-    """Return the particles that leave while so many `rows` pass a mouth, with ages in rows, and the next phase."""
-    after = phase + rows
-    whole = np.floor(after - mouth.phases).astype(int)
-    number = whole - np.floor(phase - mouth.phases).astype(int)
-    place = np.repeat(np.arange(len(mouth)), number)
-    earlier = np.arange(len(place)) - np.repeat(np.cumsum(number) - number, number)
-    age = after - mouth.phases[place] - (whole[place] - earlier)
-    order = np.lexsort((place, -age))
-    return Due(place[order], age[order]), after - math.floor(after)
-
-
-def row(mouth: Mouth) -> Due:
-    """Return a particle in each place, just out."""
-    return Due(np.arange(len(mouth)), np.zeros(len(mouth)))
-
-
 class Sources:
     """The emitters and drains of a world."""
 
@@ -166,8 +125,8 @@ class Sources:
     def read(self, plain: dict[str, Any]) -> None:
         """Take what `plain` wrote; what is missing begins anew."""
         for name in ("emitters", "drains"):
-            for source, row in zip(getattr(self, name), plain.get(name, []), strict=False):
-                source.__dict__.update(row)
+            for source, numbers in zip(getattr(self, name), plain.get(name, []), strict=False):
+                source.__dict__.update(numbers)
 
     # --- drains ---
 
@@ -208,13 +167,13 @@ class Sources:
         keep = self._allowed(sim, now, len(due.place), source)
         if keep < len(due.place):
             due, source.owed, source.flows = due.first(keep), 0, keep > 0
-        x, v = flown(sim, emitter, mouth, end, due.aged(end - last, (last - first) / rows))
+        x, v = flown(scene, emitter, mouth, due.aged(end - last, (last - first) / rows), end, _step(sim))
         patience = max(len(mouth), math.ceil(now.rate(mouth) * PATIENCE / spacing**scene.dim))
         gap = PRESSED if source.owed > len(mouth) else GAP
         came = self._put(sim, now, x, v, gap) if len(x) else 0
         source.owed += len(x) - came
         if source.owed:  # in the mouth, wherever there is room by now
-            x, v = flown(sim, emitter, mouth, end, row(mouth))
+            x, v = flown(scene, emitter, mouth, row(mouth), end, _step(sim))
             late = self._put(sim, now, x, v, gap, source.owed)
             source.owed -= late
             came += late
@@ -273,7 +232,7 @@ def check_places(sim: Water) -> None:
     for number, emitter in enumerate(scene.emitters):
         now = emitter.at(scene.start_time)
         mouth = now.mouth(scene.spacing)
-        x, _ = flown(sim, emitter, mouth, scene.start_time, row(mouth))
+        x, _ = flown(scene, emitter, mouth, row(mouth), scene.start_time, _step(sim))
         size = scene.tank.size if scene.tank else None
         inside = np.ones(len(x), bool) if size is None else np.all((x >= 0.0) & (x <= np.array(size)), axis=1)
         if not (sim.free_places(x, 0.0, scene.wall_gap * scene.spacing) & inside).any():
@@ -323,19 +282,6 @@ def suction_of(drain: Drain) -> Attract:
     return Attract(center=drain.center, radius=REACH * drain.radius, strength=drain.suction, drag=0.0)
 
 
-def jet_of(scene: Scene, emitter: Emitter, clock: float) -> Jet:
-    """Return what holds the speed of a jet in the mouth when the scene's clock shows `clock` [s]."""
-    mouth, dim = emitter.mouth(scene.spacing), scene.dim
-    middle, axes = _placed(emitter, dim, clock)
-    g = np.zeros(3)
-    g[:dim] = gravity_at(scene, clock - scene.start_time)
-    half = (mouth.half[0] + 0.5 * scene.spacing, mouth.half[1] + 0.5 * scene.spacing)
-    return Jet(opening=opening_of(
-        middle, axes, half, is_round=int(emitter.shape in ("disc", "ring")), length=HELD * scene.spacing,
-        speed=emitter.pace(mouth) * math.cos(emitter.spread), fall=float(g @ axes[2]),
-    ))  # fmt: skip
-
-
 def missing(sim: Water, source: Emitter | Drain, level: float) -> int:
     """Return how many particles are missing to the level [m]; what is too much is negative."""
     scene, gauge = sim.scene, source.gauge
@@ -347,52 +293,9 @@ def missing(sim: Water, source: Emitter | Drain, level: float) -> int:
     return math.floor(lack + 0.5)
 
 
-def flown(sim: Water, emitter: Emitter, mouth: Mouth, end: float, due: Due) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions and velocities, [n, dim], of particles that left at their ages [s] before the clock shows `end`.
-
-    They have flown freely since.
-    """
-    scene = sim.scene
-    x, v = np.zeros((len(due.place), 3)), np.zeros((len(due.place), 3))
-    g, dt = np.zeros(3), scene.frame_time / max(sim.time_steps, 1)
-    g[: scene.dim] = gravity_at(scene, end - scene.start_time)
-    for age in np.unique(due.age).tolist():
-        chosen = due.age == age
-        left, places = end - age, due.place[chosen]
-        then = emitter.at(left)
-        speed = max(then.pace(mouth), 1e-3 * mouth.pitch / dt)
-        middle, axes = _placed(then, scene.dim, left)
-        earlier, _ = _placed(then, scene.dim, max(0.0, left - dt)) if then.motion else (middle, axes)
-        ways = mouth.ways[places] @ axes
-        if then.mesh is not None and then.direction is not None:
-            ways = np.tile(unit_vector(then.direction), (len(places), 1))
-        carried = (middle - earlier) / dt if left > dt else np.zeros(3)
-        own = speed * ways + carried
-        # What has left as a whole is half out of the mouth in front of it, and has fallen since its middle came out.
-        fallen = age + min(
-            0.5 * mouth.pitch / speed, 0.5 * math.sqrt(mouth.pitch / max(float(np.linalg.norm(g)), 1e-9))
-        )
-        x[chosen] = middle + mouth.places[places] @ axes + 0.5 * mouth.pitch * ways + own * age + 0.5 * g * fallen**2
-        # Velocities of a step are those of its middle: x goes on by v + g dt, v included, in the next one.
-        v[chosen] = own + g * (fallen - 0.5 * dt)
-    return x[:, : scene.dim].astype(np.float32), v[:, : scene.dim].astype(np.float32)
-
-
-def _placed(emitter: Emitter, dim: int, clock: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middle of the mouth [m] and its frame at a time of the scene's clock [s]."""
-    rest = np.zeros(3)
-    rest[:dim] = emitter.middle
-    axes = np.eye(3)
-    if emitter.mesh is None:
-        assert emitter.direction is not None
-        side = None if emitter.side is None else np.array(emitter.side, float)
-        axes = frame_of(unit_vector(emitter.direction), dim, side)
-    if emitter.mesh is not None:
-        axes = np.stack([turned(emitter.mesh.quaternion, row) for row in axes])
-    if emitter.motion is not None:
-        rest, turn = emitter.motion.path().pose(clock, (rest, np.array([1.0, 0.0, 0.0, 0.0])))
-        axes = np.stack([turned(turn, row) for row in axes])
-    return rest, axes
+def _step(sim: Water) -> float:
+    """Return the length of a time step [s], as far as the last frame tells."""
+    return sim.scene.frame_time / max(sim.time_steps, 1)
 
 
 def _name(emitter: Emitter, number: int) -> str:
