@@ -89,7 +89,13 @@ def test_everything_survives_a_round_trip(tmp_path):
     np.testing.assert_array_equal(again.particles()[1], first.particles()[1])
 
 
-@pytest.mark.parametrize("name", [name.removesuffix("-2d") for name in wt.bundled_scenes() if name.endswith("-2d")])
+def twins() -> list[str]:
+    """Scenes that are flat as well; what moves by itself or comes and goes has other shapes and sizes there."""
+    flat = [name for name in wt.bundled_scenes() if name.endswith("-2d")]
+    return [name.removesuffix("-2d") for name in flat if not wt.Scene.load(name).is_timed()]
+
+
+@pytest.mark.parametrize("name", twins())
 def test_twins_differ_in_the_third_number_alone(name):
     def numbers(which: str) -> list[str]:
         import importlib.resources

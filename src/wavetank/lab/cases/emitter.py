@@ -46,10 +46,12 @@ def run(quick: bool, arch: str) -> Outcome:
         for dim, mark in ((3, "o"), (2, "s")):
             y = HEIGHT - np.array(FALLS)
             left.plot(series[f"range_{dim}d"], y, mark, color=BLUE, ms=4, label=f"{dim}-D jet")
-            times, level = series[f"time_{dim}d"], np.array(series[f"level_{dim}d"])
-            right.plot(times, 100.0 * (level - 1.0), color=BLUE if dim == 3 else RED, lw=0.8, label=f"{dim}-D tank")
+            times, level = (np.array(series[f"{name}_{dim}d"]) for name in ("time", "level"))
+            means = np.convolve(level, np.ones(60) / 60, "valid")  # of a second
+            color = BLUE if dim == 3 else RED
+            right.plot(times[59:], 100.0 * (means - 1.0), color=color, lw=0.8, label=f"{dim}-D tank")
         left.set(xlabel="x [m]", ylabel="height [m]", ylim=(0, None))
-        right.set(xlabel="time [s]", ylabel="level, error [%]", ylim=(-2, 2))
+        right.set(xlabel="time [s]", ylabel="level of a second, error [%]", ylim=(-2, 2))
         for axis in (left, right):
             axis.legend(frameon=False)
             tidy(axis)
