@@ -13,10 +13,14 @@ from typing import TYPE_CHECKING, Any
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import PARAMETERS, PRESETS
 from wavetank.foundation.version import VERSION
+from wavetank.scene.drains import Drain
+from wavetank.scene.emitters import Emitter
 from wavetank.scene.fluids import Ball, Block, Points
+from wavetank.scene.gauges import Gauge
 from wavetank.scene.joints import BallJoint, Hinge, Rope, Slider, Spring, Weld
 from wavetank.scene.scene import Scene, Tank, bundled_scenes
 from wavetank.solids.meshes.mesh import Mesh
+from wavetank.solids.motion import Keyframe, Motion, sampled
 from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
 
 if TYPE_CHECKING:
@@ -32,9 +36,9 @@ __version__ = VERSION
 
 __all__ = [
     "PARAMETERS", "PRESETS", "Ball", "BallJoint", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference",
-    "HalfSpace", "Hinge", "Intersection", "Mesh", "Points", "Recording", "Rope", "Scene", "Session", "Simulation",
-    "Slider", "Sphere", "Spring", "Tank", "Union", "WavetankError", "Weld", "__version__", "bundled_scenes",
-    "commands", "render", "replay", "show",
+    "Drain", "Emitter", "Gauge", "HalfSpace", "Hinge", "Intersection", "Keyframe", "Mesh", "Motion", "Points",
+    "Recording", "Rope", "Scene", "Session", "Simulation", "Slider", "Sphere", "Spring", "Tank", "Union",
+    "WavetankError", "Weld", "__version__", "bundled_scenes", "commands", "render", "replay", "sampled", "show",
 ]  # fmt: skip
 
 #: what needs the kernels' sources is imported when it is first used: data alone should load fast

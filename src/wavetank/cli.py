@@ -17,7 +17,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 console = Console(stderr=True)
 
 CASE_NAMES = (
-    "buckling, calm-vorticity, coiling, column, cup, drop, elliptical-drop, energy, gravity-current, layers, "
+    "buckling, calm-vorticity, coiling, column, cup, drop, elliptical-drop, emitter, energy, gravity-current, layers, "
     "lobovsky, lock-exchange, martin-moyce, momentum, resolution, rest, seeds, shear-wave, standing-wave, "
     "still-tank, tension-drop"
 )

@@ -110,6 +110,13 @@ def is_length(field: FieldInfo) -> bool:
     return METRES in field.metadata or any(METRES in getattr(t, "__metadata__", ()) for t in _types(field.annotation))
 
 
+@functools.cache
+def numeric_fields(model: type[BaseModel]) -> tuple[str, ...]:
+    """Name the fields of a model that hold numbers or vectors of numbers, and nothing else."""
+    types = {name: _types(field.annotation) for name, field in model.model_fields.items()}
+    return tuple(name for name, known in types.items() if float in known and not {str, dict, list} & {*known} - {float})
+
+
 def sentence(report: ValidationError, model: type[BaseModel]) -> str:
     """Say the most telling error of `report` in one line: key, value, what is allowed."""
     errors = report.errors(include_url=False)
@@ -159,10 +166,10 @@ def sentence(report: ValidationError, model: type[BaseModel]) -> str:
 
 def _key(location: tuple[str | int, ...]) -> str:
     text = ""
-    for part in location:
+    for number, part in enumerate(location, 1):
         if isinstance(part, int):
             text += f"[{part}]"
-        elif part.startswith(("tuple[", "constrained-")) or part in _SHAPE_TAGS:
+        elif part.startswith(("tuple[", "constrained-")) or (part in _SHAPE_TAGS and number < len(location)):
             continue
         else:
             text += f".{part}" if text else part

@@ -250,6 +250,7 @@ class _Summary:
             "scene": self.sim.scene.title,
             "arch": self.sim.arch,
             "interrupted": self.interrupted,
+            **({"notes": [*self.sim.notes]} if self.sim.notes else {}),
             "seconds_of_water": self.sim.time - self.begin,
             "energy_start": energies[0],
             "worst": {

@@ -10,6 +10,7 @@ from wavetank.scene.scene import bundled_levels
 from wavetank.session.game import Game
 from wavetank.session.scores import keep_score, key_of, scores
 from wavetank.session.session import Session
+from wavetank.simulation.jets import outlines
 
 Place = list[float]  # u, v: shares of a picture's width and height
 
@@ -66,18 +67,30 @@ class Hud:
             said.append(f"Best: {best['stars']} star{'s' * (best['stars'] > 1)}, {mark}.")
         return " ".join(said)
 
-    def regions(self, size: tuple[int, int]) -> list[dict[str, list[Place]]]:
-        """Return the corners and the outline of each region, as shares of a picture of `size` [px]."""
+    def regions(self, size: tuple[int, int]) -> list[dict[str, Any]]:
+        """Return the corners and the outline of each region, as shares of a picture of `size` [px].
+
+        Behind those of the game come the mouths of emitters and drains, which have a `mark` and no corners.
+        """
         game = self.session.game
         places = [] if game is None else [self._corners(aim.lower, aim.upper, size) for aim in game.goal.aims]
-        return [{"corners": corners, "outline": _hull(corners)} for corners in places]
+        regions: list[dict[str, Any]] = [{"corners": corners, "outline": _hull(corners)} for corners in places]
+        for mark, points in outlines(self.session.sim.scene, self.session.sim.time):
+            seen = self._in_picture(points, size)
+            if seen:
+                regions.append({"corners": [], "outline": seen, "mark": mark})
+        return regions
 
     def _corners(self, lower: Any, upper: Any, size: tuple[int, int]) -> list[Place]:
         flat = len(lower) == 2
         ends = [(a, b) for a, b in zip(lower, upper, strict=True)] + ([(0.0,)] if flat else [])
         # x runs fastest, so that corner k lies at the upper end of axis j where bit j of k is set.
         corners = np.array([point[::-1] for point in itertools.product(*ends[::-1])])
-        places = self.session.camera.project(corners, *size)[:, :2] / size
+        return self._in_picture(corners, size)
+
+    def _in_picture(self, points: np.ndarray, size: tuple[int, int]) -> list[Place]:
+        """Return points in space [m] as shares of a picture, none where one of them is behind the eye."""
+        places = self.session.camera.project(points, *size)[:, :2] / size
         seen = all(math.isfinite(part) for part in places.reshape(-1))
         return [[round(float(u), 5), round(float(v), 5)] for u, v in places] if seen else []
 

@@ -18,7 +18,10 @@ from wavetank.view.style import QUALITIES, Style, quality_named
 
 USUAL_TIME = 0.5  # s: when a scene is shown unless told
 #: the same for bundled scenes whose best moment is another one
-SHOWN_AT = {"still-tank": 1.0, "still-tank-2d": 1.0, "drop": 0.42, "drop-2d": 0.35, "obstacle-tank": 0.62, "knot": 0.35}
+SHOWN_AT = {
+    "still-tank": 1.0, "still-tank-2d": 1.0, "drop": 0.42, "drop-2d": 0.35, "obstacle-tank": 0.62, "knot": 0.35,
+    "fountain": 2.0, "fountain-2d": 1.5, "sluice": 2.0, "sluice-2d": 1.5, "wave-machine": 3.5, "wave-machine-2d": 3.5,
+}  # fmt: skip
 
 
 def take(

@@ -19,10 +19,12 @@ from wavetank.foundation.materials import COLORS, Material, Properties
 from wavetank.foundation.model import Edges, Model, is_length, sentence
 from wavetank.foundation.params import PRESETS, QUALITIES, Parameters
 from wavetank.foundation.replacing import replacing
+from wavetank.foundation.tracks import scaled
 from wavetank.scene.fluids import AnyFluid, Points
 from wavetank.scene.forces import AnyForce
 from wavetank.scene.goal import Goal
 from wavetank.scene.joints import AnyJoint, check_joints
+from wavetank.scene.schedule import Tilted, Timetable
 from wavetank.solids.shapes import AnySolid, HalfSpace
 from wavetank.solids.solid import Solid
 
@@ -30,7 +32,7 @@ MAX_PARTICLES = 100_000_000
 _TOLERANCE = 1e-6  # of a spacing: how far a fluid may reach beyond a wall by rounding
 
 
-class Tank(Model):
+class Tank(Tilted):
     """The container: its inner size [m], the lower corner at the origin. Two numbers make a 2-D world."""
 
     size: Edges
@@ -53,7 +55,7 @@ def _tagged(values: Any, default: str) -> Any:
     return [{"shape": default, **v} if isinstance(v, dict) and "shape" not in v else v for v in values]
 
 
-class Scene(Parameters):
+class Scene(Timetable, Parameters):
     """A world as data. Lengths in metres, y up; parameters of `params.py` are keys of the scene itself."""
 
     title: str = ""
@@ -70,7 +72,7 @@ class Scene(Parameters):
     @model_validator(mode="before")
     @classmethod
     def _from_preset(cls, values: Any) -> Any:
-        return {**_chosen(values), **values} if isinstance(values, dict) else values
+        return cls.spread_gravity({**_chosen(values), **values}) if isinstance(values, dict) else values
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":
@@ -88,6 +90,7 @@ class Scene(Parameters):
         self._check_count()
         self._check_inside()
         self._check_names()
+        self.check_sources()
         return self
 
     def assign(self, name: str, value: Any) -> None:
@@ -109,14 +112,11 @@ class Scene(Parameters):
 
     def _vectors(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         yield "gravity", self.gravity
-        for kind, members in (
-            ("fluids", self.fluids),
-            ("solids", self.solids),
-            ("joints", self.joints),
-            ("forces", self.forces),
-        ):
-            for number, member in enumerate(members):
-                for name, vector in member.vectors():
+        for kind in ("fluids", "solids", "joints", "forces", "emitters", "drains"):
+            for number, member in enumerate(getattr(self, kind)):
+                motion = getattr(member, "motion", None)
+                moving = [(f"motion.{name}", vector) for name, vector in motion.vectors()] if motion else []
+                for name, vector in [*member.vectors(), *moving]:
                     yield f"{kind}[{number}].{name}", tuple(vector)
         for name, vector in self.goal.vectors() if self.goal else ():
             yield f"goal.{name}", tuple(vector)
@@ -149,8 +149,8 @@ class Scene(Parameters):
                 )
 
     def _check_names(self) -> None:
-        for kind, members in (("solids", self.solids), ("joints", self.joints), ("materials", self.materials)):
-            names = [member.name for member in members if member.name]
+        for kind in ("solids", "joints", "materials", "emitters", "drains"):
+            names = [member.name for member in getattr(self, kind) if member.name]
             twice = next((name for name in names if names.count(name) > 1), None)
             if twice is not None:
                 raise ValueError(f"{kind}: the name {twice!r} is used twice; a name must be unique.")
@@ -159,6 +159,7 @@ class Scene(Parameters):
             raise ValueError("materials: every material needs a name, so that a fluid can ask for it.")
         known = [material.name for material in self.materials]
         askers = [(f"fluids[{number}]", fluid.material) for number, fluid in enumerate(self.fluids)]
+        askers += [(f"emitters[{number}]", emitter.material) for number, emitter in enumerate(self.emitters)]
         askers += [
             (f"goal.aims[{k}]", aim.material or None) for k, aim in enumerate(self.goal.aims if self.goal else [])
         ]
@@ -291,6 +292,8 @@ class Scene(Parameters):
     def _table(self, scale: float) -> dict[str, Any]:
         """Return `table` with every length multiplied by `scale`."""
         result = _set_values(self, scale) | {name: getattr(self, name) for name in _chosen(self.__dict__)}
+        if "gravity_track" in result:
+            result["gravity"] = result.pop("gravity_track")
         return {key: result[key] for key in sorted(result, key=lambda k: isinstance(result[k], list | dict))}
 
     def changed(self, **values: Any) -> "Scene":
@@ -331,12 +334,13 @@ def _set_values(value: Any, scale: float = 1.0) -> Any:
         default = None if isinstance(member, np.ndarray) else field.default
         if name in ("shape", "kind") or (member is not None and (isinstance(member, np.ndarray) or member != default)):
             plain = _set_values(member, scale)
-            result[name] = _multiplied(plain, scale) if scale != 1.0 and is_length(field) else plain
+            result[name] = scaled(plain, scale) if scale != 1.0 and is_length(field) else plain
+    # What changes with time is written where it was given.
+    for name, plain in result.pop("over_time", {}).items():
+        result[name] = scaled(plain, scale) if scale != 1.0 and is_length(type(value).model_fields[name]) else plain
+    if scale != 1.0 and "flow" in result:
+        result["flow"] = scaled(result["flow"], scale**value.flow_power)  # type: ignore[attr-defined]
     return result
-
-
-def _multiplied(lengths: Any, scale: float) -> Any:
-    return [_multiplied(part, scale) for part in lengths] if isinstance(lengths, list) else lengths * scale
 
 
 def bundled_scenes() -> list[str]:

@@ -92,7 +92,10 @@ class Session(SessionState):
     def frame_duration(self) -> float:
         """Seconds of water in a frame [s]; slow motion has shorter ones, as long as they hold a good time step."""
         longest = self.sim.scene.frame_time * min(1.0, max(self.speed, 1.0 / MOST_PARTS), 1.0 / self.frame_parts)
-        return self.sim.full_steps_time(longest) if self.fills_frames else longest
+        try:
+            return self.sim.full_steps_time(longest) if self.fills_frames else longest
+        except WavetankError:  # the frame itself will say it
+            return longest
 
     def tick(self) -> float:
         """Compute one frame, with what the hands do to it, and return the seconds of water in it [s]."""
@@ -102,7 +105,7 @@ class Session(SessionState):
             hand.pass_time(duration)
             self.let_act(hand, tool.hold, hand, duration)
         self.carry_solids(duration)
-        self.sim.advance(duration)
+        self._advance(duration)
         if not self.sim.pushed:  # else too little time has passed for a frame, and they still wait for it
             self.commanded = []
         self.ticks += 1
@@ -113,6 +116,17 @@ class Session(SessionState):
         if self.history.wants(self.sim.time):
             self.history.keep(self.sim.snapshot())
         return duration
+
+    def _advance(self, duration: float) -> None:
+        """Let the water move; where an expression of the scene has no value time stops, and a note says why."""
+        try:
+            self.sim.advance(duration)
+        except WavetankError as error:
+            self.paused, self.steps_left = True, 0
+            self.note(str(error))
+        for sentence in self.sim.notes:
+            self.note(sentence)
+        self.sim.notes.clear()
 
     def turn(self) -> bool:
         """Carry out what waits and compute a frame if one is due; say whether anything happened."""

@@ -49,6 +49,8 @@ class SessionState:
                 "allowed in a session: use a larger spacing or less fluid."
             )
         sim = Simulation(scene, self.arch)
+        if scene.emitters:
+            sim.scene.assign("most_particles", min(scene.most_particles or self.most_particles, self.most_particles))
         sim.load_kernels()
         game = Game(scene.goal, sim.frame(measured=False)) if scene.goal else None
         self.scene, self.sim, self.game = scene, sim, game
@@ -125,14 +127,19 @@ class SessionState:
     def present_scene(self) -> Scene:
         """Return what there is now as a scene: the water as points, the solids where they are; without tools' own."""
         sim, frame = self.sim, self.sim.frame()
+        held = sim.solids.courses.held
         pairs = list(zip(sim.solids.members, sim.solids.names, sim.solids.poses, strict=True))[sim.solids.tank_count :]
         solids = [
-            moved(solid, *pose).model_copy(update={"name": name})
+            moved(solid, *pose).model_copy(update={"name": name} | ({"motion": None} if name in held else {}))
             for solid, name, pose in pairs
             if not name.startswith(TOOL_SOLID)
         ]
         fluids = [Points(positions=frame.positions, velocities=frame.velocities)] if sim.count else []
-        return sim.scene.changed(fluids=fluids, solids=solids)
+        return sim.scene.changed(
+            fluids=fluids,
+            solids=solids,
+            **({"start_time": sim.scene.start_time + sim.time} if sim.scene.is_timed() else {}),
+        )
 
     def carry_solids(self, duration: float) -> None:
         """Bring the solids that commands carry as far as they get in a frame of `duration` [s]."""

@@ -26,19 +26,21 @@ from typing_extensions import override
 from wavetank.device.compiler import download, upload
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import product, turned, unit_quaternion
-from wavetank.physics.bodies import Pieces, new_pieces
+from wavetank.physics.bodies import Pieces, Retry, new_pieces
 from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED, carried
 from wavetank.physics.mixture import blend
 from wavetank.physics.reactions import IMMERSION, OF_GRID
+from wavetank.physics.step import step as take_step
 from wavetank.physics.world import World
 from wavetank.scene.scene import Scene
 from wavetank.simulation.added_mass import added_mass
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shape_of
 from wavetank.simulation.joints import new_joint
-from wavetank.simulation.moving_solids import MovingSolids, Pose
+from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.solids.distance import PARTS
 from wavetank.solids.mass import Ruler, inertia_of, water_of
+from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
 TOLERANCE = 0.1  # of sqrt(g d), or of the fastest body: change of a body's velocity that is worth a second step
@@ -66,6 +68,7 @@ class Bodies(Mapping[str, Body]):
         self.scene, self.solids, self.dim = scene, solids, scene.dim
         self.members: list[Body] = []
         self.fastest = 0.0  # m/s
+        self.retry = Retry()
         self.joints: dict[str, Any] = {}
         solids.feeling, solids.passing = {}, {}
         if not any(solid.is_body for solid in solids.members):
@@ -172,8 +175,8 @@ class Bodies(Mapping[str, Body]):
             impulse[:3] += body.dry.mass * gravity * (body.lasted or dt)
             self._push(body, impulse)
             self._limit(body)
-        for number, target in self.solids.targets.items():
-            pose = self._isometry(*self.solids.between(number, target, share))
+        for number in self.solids.targets:
+            pose = self._isometry(*self.solids.between(number, share))
             self.world.rigid_bodies[self.handles[number]].set_next_kinematic_position(pose)
         self.world.integration_parameters.dt = dt
         self.world.step()
@@ -196,6 +199,23 @@ class Bodies(Mapping[str, Body]):
             spin[:2] = 0.0
         body.rigid().linvel = (velocity[:3] + impulse[:3] / (body.dry.mass + added)).tolist()
         body.rigid().angvel = (velocity[3:] + turned(rotation, spin)).tolist()
+
+    def step(self, world: World, scene: Scene, dt: float, fastest: float, part: tuple[float, float]) -> None:
+        """Let the water take a step of `dt` [s], which is that `part` of a frame.
+
+        Where bodies are pushed harder than they were, it is taken again while they yield.
+        """
+        if not self.members:
+            take_step(world, scene, dt, fastest)
+            return
+        self.retry.keep(world.particles, self.dim, world.count)
+        for turn in range(MOST_TRIES):
+            take_step(world, scene, dt, fastest)
+            self.feel(world, dt)
+            if turn + 1 == MOST_TRIES or not self.yielded(dt):
+                break
+            self.retry.restore(world.particles, world.count)
+            world.solids_version = self.solids.move_to(*part)
 
     def feel(self, world: World, dt: float) -> None:
         """Take what the water did to the bodies in a step of `dt` [s]."""
@@ -280,6 +300,16 @@ class Bodies(Mapping[str, Body]):
         return self.engine.Isometry3([*map(float, position)], self.engine.Rotation3(*map(float, rotation)))
 
     # --- states ---
+
+    def renewed(self) -> "Bodies":
+        """Return the bodies that there are now that solids have come or gone; the others go on as they were."""
+        bodies = Bodies(self.scene, self.solids)
+        for body in bodies.members:
+            before = next((other for other in self.members if other.name == body.name), None)
+            if before is not None:
+                body.recall(before.memory())
+                body.velocity, body.angular_velocity = before.velocity, before.angular_velocity
+        return bodies
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return all that decides how the bodies go on, for a snapshot."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import turned
-from wavetank.simulation.moving_solids import Pose
 from wavetank.solids.mass import Inertia
+from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface

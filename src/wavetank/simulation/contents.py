@@ -12,6 +12,7 @@ from wavetank.scene.scene import Scene
 from wavetank.simulation.arrays import check_rows, largest_norm, put_by_id
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.ledger import Ledger
+from wavetank.simulation.sources import Sources
 
 
 class Contents:
@@ -20,6 +21,7 @@ class Contents:
     scene: Scene
     world: World
     ledger: Ledger
+    sources: Sources
     time_steps: int  # of the last frame
     seconds_per_frame: float  # that the last frame took to compute
     _outdated: bool  # whether the water moved since its densities were measured
@@ -112,6 +114,7 @@ class Contents:
             **figures,
             **{KINDS[kind]: int(np.sum(frame.foam_kinds == kind)) for kind in (1, 2, 3)},
             "foaming": int(frame.foaming.sum()),
+            **(self.sources.figures() if self.sources else {}),
             "substeps": self.time_steps,
             "milliseconds_per_frame": 1e3 * self.seconds_per_frame,
         }

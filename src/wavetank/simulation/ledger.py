@@ -18,6 +18,7 @@ class Ledger:
     fastest_start: float = 0.0  # m/s, of any particle when it came
     fastest_solid: float = 0.0  # m/s, of any solid so far
     fastest_force: float = 0.0  # m/s that forces can have given
+    steepest: float = 0.0  # m^2/s^2: half the square of the speed of the longest fall that gravity gave so far
     start_box: tuple[np.ndarray, np.ndarray] = dataclasses.field(
         default_factory=lambda: (np.zeros(3), np.zeros(3))
     )  # m, lower and upper corner of the particles at the start
@@ -35,5 +36,6 @@ class Ledger:
     def read(cls, numbers: dict[str, Any]) -> "Ledger":
         """Return what `plain` wrote; raises `KeyError` where a number is missing."""
         lower, upper = numbers["start_box"]
-        known = {field.name: numbers[field.name] for field in dataclasses.fields(cls)}
+        known = {field.name: numbers[field.name] for field in dataclasses.fields(cls) if field.name != "steepest"}
+        known["steepest"] = numbers.get("steepest", 0.0)  # states of before have none
         return cls(**{**known, "start_box": (np.array(lower), np.array(upper))})

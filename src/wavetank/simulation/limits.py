@@ -38,7 +38,10 @@ def find_speed_limit(
     ledger.fastest_solid = max(ledger.fastest_solid, _solid_speed(scene, solids, duration))
     ledger.fastest_force = max(ledger.fastest_force, sum(force.largest_speed() for force in forces))
     fall = sum(2.0 * abs(g) * edge for g, edge in zip(scene.gravity, scene.tank.size, strict=True))
-    fastest = math.sqrt(fall + ledger.fastest_start**2) + 2.0 * ledger.fastest_solid + ledger.fastest_force
+    ledger.steepest = max(ledger.steepest, 0.5 * fall)  # what gravity was a moment ago is still in the water
+    fastest = (
+        math.sqrt(2.0 * ledger.steepest + ledger.fastest_start**2) + 2.0 * ledger.fastest_solid + ledger.fastest_force
+    )
     return scene.speed_limit * max(fastest + capillary_speed(world, scene), 1e-6)
 
 

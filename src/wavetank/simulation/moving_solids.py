@@ -14,24 +14,31 @@ from wavetank.foundation.rotations import interpolate, turned, unit_quaternion
 from wavetank.physics.population import free_places
 from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene
+from wavetank.simulation.courses import Courses
 from wavetank.solids import shapes
+from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
-Pose = tuple[np.ndarray, np.ndarray]  # position [m], shape [3], and rotation (w, x, y, z)
 SMALLEST = 0.02  # size at which a growing solid starts, of its full size
+PARTS = 4  # of a frame, in which the speed of a solid on a course is looked at
 _versions = itertools.count(1)
 
 
 class MovingSolids:
     """Solids by name; the first `tank_count` are the walls of the tank."""
 
-    def __init__(self, walls: Sequence[Solid], others: Sequence[Solid], friction: float, spacing: float) -> None:
+    def __init__(
+        self, walls: Sequence[Solid], others: Sequence[Solid], friction: float, spacing: float, start: float = 0.0
+    ) -> None:
         self.tank_count, self.friction, self.spacing = len(walls), friction, spacing
         self.members = [*walls, *others]
         self.names: list[str] = []
         for solid in self.members:
             self.names.append(self._free_name(solid.name))
         self.poses: list[Pose] = [(solid.origin, solid.quaternion) for solid in self.members]
+        self.courses = Courses(self.members, self.names, start)
+        for name in self.courses.names():
+            self.poses[self.names.index(name)] = self.courses.pose(name, 0.0)
         self.targets: dict[int, Pose] = {}  # at the end of the next frame
         self.growing: dict[int, tuple[float, float]] = {}  # age and time to grow [s]
         self.passing: dict[int, tuple[Pose, Pose]] = {}  # begin and end of a time step, of bodies
@@ -57,6 +64,7 @@ class MovingSolids:
         self.members.append(solid)
         self.names.append(self._free_name(solid.name))
         self.poses.append((solid.origin, solid.quaternion))
+        self.courses.add(solid, self.names[-1])
         if grow > 0.0:
             self.growing[len(self.members) - 1] = (0.0, grow)
         self.rebuild()
@@ -68,6 +76,7 @@ class MovingSolids:
         def without(numbered: dict[int, Any]) -> dict[int, Any]:
             return {k - (k > number): value for k, value in numbered.items() if k != number}
 
+        self.courses.forget(self.names[number])
         for column in (self.members, self.names, self.poses):
             del column[number]
         self.targets, self.growing, self.feeling = without(self.targets), without(self.growing), {}
@@ -97,6 +106,7 @@ class MovingSolids:
     def aim(self, name: str, position: Sequence[float] | None, rotation: Any, dim: int) -> None:
         """Set the pose that a solid reaches at the end of the next frame; None keeps what is."""
         number = self.find(name)
+        self.courses.hold(name)
         old_position, old_rotation = self.targets.get(number, self.poses[number])
         point = np.array(old_position, float)
         if position is not None:
@@ -106,14 +116,38 @@ class MovingSolids:
             point[:dim] = values
         self.targets[number] = (point, old_rotation if rotation is None else unit_quaternion(rotation))
 
+    def follow(self, time: float, duration: float) -> None:
+        """Let the solids that move by themselves aim at where they are after the frame of `duration` [s]."""
+        courses = self.courses
+        courses.begin_frame(time, duration)
+        for name in courses.names():
+            number, target = self.names.index(name), courses.pose(name, time + duration)
+            if number in self.targets or not _equal(self.poses[number], target):
+                self.targets[number] = target
+
+    def moves_itself(self, name: str) -> bool:
+        """Say whether a solid has a motion, be it held or not."""
+        return self.courses.has(name)
+
+    def release(self, name: str, time: float, within: float) -> None:
+        """Give a solid back to its motion."""
+        number = self.find(name)
+        self.courses.release(name, time, within, self.targets.get(number, self.poses[number]))
+
     def largest_speed(self, duration: float, tank_size: Sequence[float] | None) -> float:
         """Return the largest speed [m/s] at which any solid moves through the tank in a frame of `duration` [s]."""
         fastest = 0.0
-        for number, (position, rotation) in self.targets.items():
-            old_position, old_rotation = self.poses[number]
-            turn = 2.0 * math.acos(min(1.0, abs(float(old_rotation @ rotation))))
-            reach = self.reaches[number] if tank_size is None else float(np.linalg.norm(tank_size))
-            fastest = max(fastest, (float(np.linalg.norm(position - old_position)) + turn * reach) / duration)
+        for number in self.targets:
+            reach = self.reaches[number]
+            if tank_size is not None:  # what is endless is felt as far as the tank is large
+                reach = min(reach, float(np.linalg.norm(tank_size)))
+            parts = PARTS if self.courses.follows(self.names[number]) else 1
+            between = [self.between(number, part / parts) for part in range(1, parts)]
+            poses = [self.poses[number], *between, self.targets[number]]
+            for (old_position, old_rotation), (position, rotation) in itertools.pairwise(poses):
+                turn = 2.0 * math.acos(min(1.0, abs(float(old_rotation @ rotation))))
+                way = float(np.linalg.norm(position - old_position)) + turn * reach
+                fastest = max(fastest, way * parts / duration)
         for number, (_, time) in self.growing.items():
             fastest = max(fastest, min(self.reaches[number], 1e3) / time)
         return fastest
@@ -126,11 +160,7 @@ class MovingSolids:
         if not self.targets and not self.passing:
             return self.version
         self._upload(begin, end)
-        resting = all(
-            np.array_equal(a, b)
-            for number, target in self.targets.items()
-            for a, b in zip(self.poses[number], target, strict=True)
-        )
+        resting = all(_equal(self.poses[number], target) for number, target in self.targets.items())
         if begin == 0.0 and resting:
             self.targets = {}
         return self.version
@@ -141,6 +171,7 @@ class MovingSolids:
             self.poses[number] = target
         # A body that is not moved any more is free.
         self.targets = {number: target for number, target in self.targets.items() if number not in self.feeling}
+        self.courses.duration = 0.0
 
     def grow(self, duration: float) -> None:
         """Let new solids swell for `duration` [s]."""
@@ -174,14 +205,21 @@ class MovingSolids:
         ):  # fmt: skip
             upload(array, values.astype(np.float32))
 
-    def between(self, number: int, target: Pose, share: float) -> Pose:
-        """Return the pose of a solid at a `share` of the frame in which it reaches a target."""
-        (position, rotation), (there, turn) = self.poses[number], target
-        return position + share * (there - position), interpolate(rotation, turn, share)
+    def between(self, number: int, share: float) -> Pose:
+        """Return where a solid is after a share of the present frame: on its course, or on the straight way."""
+        (place, turn), (goal, goal_turn) = self.poses[number], self.targets.get(number, self.poses[number])
+        if (
+            self.courses.duration
+            and 0.0 < share < 1.0
+            and number in self.targets
+            and self.courses.follows(self.names[number])
+        ):
+            return self.courses.pose(self.names[number], self.courses.began + share * self.courses.duration)
+        return place + share * (goal - place), interpolate(turn, goal_turn, share)
 
     def _instant(self, share: float, last: int) -> list[Pose]:
         """Return all poses at a `share` of the frame; those of bodies at the begin of a time step, or its `last`."""
-        poses = [self.between(k, self.targets.get(k, pose), share) for k, pose in enumerate(self.poses)]
+        poses = [self.between(number, share) for number in range(len(self.poses))]
         for number, ends in self.passing.items():
             poses[number] = ends[last]
         return poses
@@ -208,6 +246,10 @@ class MovingSolids:
         while not name or name in self.names:
             name, number = f"solid {number}", number + 1
         return name
+
+
+def _equal(a: Pose, b: Pose) -> bool:
+    return np.array_equal(a[0], b[0]) and np.array_equal(a[1], b[1])
 
 
 def _touch(solid: Solid, lower: np.ndarray, upper: np.ndarray) -> bool:

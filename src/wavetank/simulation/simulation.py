@@ -15,31 +15,34 @@ from wavetank.device.state import Fluids, Walls, new_particles, new_scratch, vec
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import LIVE, refuse_assignment
 from wavetank.physics import population
-from wavetank.physics.bodies import Retry
 from wavetank.physics.foam.pool import pool_from, pool_rows
 from wavetank.physics.foam.update import load_kernels, update_foam
 from wavetank.physics.grid_pressure.coarse_grid import new_levels
 from wavetank.physics.neighbors import list_room, new_grid
 from wavetank.physics.smoothing import half_space_table
-from wavetank.physics.step import step
 from wavetank.physics.time_step import filled_share, whole
 from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import MAX_PARTICLES, Scene
+from wavetank.scene.schedule import changes_gravity, gravity_at, with_gravity
 from wavetank.simulation import limits
 from wavetank.simulation import snapshot as snapshots
 from wavetank.simulation.arrays import check_newcomers
-from wavetank.simulation.bodies import MOST_TRIES, Bodies
+from wavetank.simulation.bodies import Bodies
 from wavetank.simulation.contents import Contents
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.simulation.snapshot import Snapshot
+from wavetank.simulation.sources import Sources, check_places
 from wavetank.solids.solid import Solid
 
 
 class Simulation(Contents):
     """Water that moves. See `Scene` for what it is made of."""
+
+    gravity_by_hand: tuple[float, ...] | None  # m/s^2, in place of what changes by itself
+    notes: list[str]  # what a person should know, one sentence each; whoever shows them takes them away
 
     def __init__(self, scene: Scene, arch: str = "cpu") -> None:
         compiler.start(arch)
@@ -50,12 +53,14 @@ class Simulation(Contents):
     def reset(self) -> None:
         """Put everything back to the start of the scene."""
         positions, velocities = self.scene.particles()
-        self.solids = MovingSolids(self._walls(), self.scene.solids, self.scene.friction, self.scene.spacing)
+        scene = self.scene
+        self.solids = MovingSolids(self._walls(), scene.solids, scene.friction, scene.spacing, scene.start_time)
+        self.sources, self.notes = Sources(scene), []
+        self.gravity_by_hand = None
         self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
         self.pushed: list[Force] = []  # these in the next one only
         self.ledger = Ledger()
         self.bodies = Bodies(self.scene, self.solids)
-        self._retry = Retry()
         self._fill(len(positions))
         free = self.solids.find_free_places(self.scene, positions, self.world.particles)
         self.add(positions[free], velocities[free], materials=self.scene.kinds()[free])
@@ -63,6 +68,7 @@ class Simulation(Contents):
         self.ledger.start_box = (box.min(axis=0), box.max(axis=0))
         self.seconds_per_frame = math.nan  # that the last frame took to compute
         self.time_steps = 1  # of the last frame
+        check_places(self)
 
     def _fill(self, capacity: int) -> None:
         """Make an empty world with room for `capacity` particles."""
@@ -120,6 +126,7 @@ class Simulation(Contents):
 
     def full_steps_time(self, duration: float) -> float:
         """Return the time [s] up to `duration` that time steps of full length fill; see `time_step.filled_share`."""
+        self.solids.follow(self.time, duration)
         return duration * filled_share(self._steps_in(duration))
 
     def frames(self, seconds: float, fps: float = 60.0) -> Iterator[Frame]:
@@ -138,6 +145,8 @@ class Simulation(Contents):
 
     def _advance_frame(self, duration: float) -> None:
         began = time.perf_counter()
+        self.solids.follow(self.time, duration)
+        self.pushed += self.sources.forces(self.scene, self.time, duration)
         limit = self._speed_limit(duration)
         parts = self.time_steps = whole(self._steps_in(duration))
         self.solids.grow(duration)
@@ -146,44 +155,50 @@ class Simulation(Contents):
                 self.bodies.advance(duration / parts, (part + 1) / parts, limit)
             self.world.solids_version = self.solids.move_to(part / parts, (part + 1) / parts)
             if self.count:
-                for force in self._acting:
-                    force.apply(self.world.particles, self.count, duration / parts, self.time + duration * part / parts)
-                self._step(duration / parts, limit)
+                start, dt = self.time + duration * part / parts, duration / parts
+                for force in self._acting_at(start + 0.5 * dt):
+                    force.apply(self.world.particles, self.count, dt, start)
+                self.bodies.step(
+                    self.world, self._scene_at(start + 0.5 * dt), dt, limit, (part / parts, (part + 1) / parts)
+                )
         self.solids.passing.clear()
         self.solids.move_to(0.0, 1.0)
-        update_foam(self.world, self.scene, duration, self.frame_number)
+        update_foam(self.world, self._scene_at(self.time + 0.5 * duration), duration, self.frame_number)
         self.pushed = []
         self.solids.arrive()
+        if self.sources:
+            self.sources.act(self, self.time, duration)
         compiler.synchronize()
         self.seconds_per_frame = time.perf_counter() - began
         self.ledger.time += duration
         self.ledger.frame_number += 1
         self._outdated = True
 
-    def _step(self, dt: float, limit: float) -> None:
-        """Take a time step; where bodies are pushed harder than they were, take it again while they yield."""
-        if not self.bodies:
-            step(self.world, self.scene, dt, limit)
-            return
-        self._retry.keep(self.world.particles, self.scene.dim, self.count)
-        for turn in range(MOST_TRIES):
-            step(self.world, self.scene, dt, limit)
-            self.bodies.feel(self.world, dt)
-            if turn + 1 == MOST_TRIES or not self.bodies.yielded(dt):
-                break
-            self._retry.restore(self.world.particles, self.count)
-            self.world.solids_version = self.solids.move_to(0.0, 1.0)
-
     @property
     def _acting(self) -> tuple[Force, ...]:
         """The forces of the next frame."""
         return (*self.forces, *self.pushed)
 
+    def _acting_at(self, time: float) -> tuple[Force, ...]:
+        """The same with their numbers at `time` [s] of the water."""
+        return tuple(force.at(time + self.scene.start_time) for force in self._acting)
+
+    def _scene_at(self, time: float) -> Scene:
+        """The scene with gravity as it is at `time` [s] of the water."""
+        if not changes_gravity(self.scene):
+            return self.scene
+        now = self.gravity_by_hand or gravity_at(self.scene, time)
+        return self.scene.model_copy(update={"gravity": now})
+
     def _steps_in(self, duration: float) -> float:
-        return limits.count_steps(self.world, self.scene, self.solids, self.ledger, self._acting, duration)
+        middle = self.time + 0.5 * duration
+        scene, acting = self._scene_at(middle), self._acting_at(middle)
+        return limits.count_steps(self.world, scene, self.solids, self.ledger, acting, duration)
 
     def _speed_limit(self, duration: float) -> float:
-        return limits.find_speed_limit(self.world, self.scene, self.solids, self.ledger, self._acting, duration)
+        middle = self.time + 0.5 * duration
+        scene, acting = self._scene_at(middle), self._acting_at(middle)
+        return limits.find_speed_limit(self.world, scene, self.solids, self.ledger, acting, duration)
 
     # --- solids ---
 
@@ -198,11 +213,19 @@ class Simulation(Contents):
     def hold(self, name: str, held: bool = True) -> None:
         """Let the body `name` stay where it is, or is moved to by `move`; with `held` = False let it go."""
         body = self.bodies[name]
-        solids = [*self.scene.solids]
-        number = body.number - self.solids.tank_count
-        solids[number] = body.solid = solids[number].model_copy(update={"held": held})
-        self.solids.members[body.number] = body.solid
-        self.scene.assign("solids", solids)
+        body.solid = self.solids.members[body.number] = body.solid.model_copy(update={"held": held})
+        self.scene.assign("solids", self.solids.members[self.solids.tank_count :])
+
+    def release(self, name: str, within: float = 0.5) -> None:
+        """Give the solid `name` that `move` has taken back to its own motion, which it joins within so long [s].
+
+        "gravity" gives gravity back to its expressions and to the tilt of the tank. Raises `WavetankError` for a solid
+        without a motion.
+        """
+        if name == "gravity" and name not in self.solids.names:
+            self.gravity_by_hand = None
+        else:
+            self.solids.release(name, self.time, within)
 
     def add_solid(self, solid: Solid, grow: float = 0.0) -> str:
         """Put a solid into the world and return its name.
@@ -226,12 +249,7 @@ class Simulation(Contents):
         self._renew_solids()
 
     def _renew_solids(self) -> None:
-        memories = {name: (body.memory(), body.velocity, body.angular_velocity) for name, body in self.bodies.items()}
-        self.bodies = Bodies(self.scene, self.solids)
-        for name in memories.keys() & set(self.bodies):
-            body, (memory, velocity, angular_velocity) = self.bodies[name], memories[name]
-            body.recall(memory)
-            body.velocity, body.angular_velocity = velocity, angular_velocity
+        self.bodies = self.bodies.renewed()
         self.world.pieces = self.bodies.cut()
         self.world.solids, self.world.has_friction = self.solids.device, self.solids.has_friction
         self._outdated = True
@@ -309,7 +327,8 @@ class Simulation(Contents):
     def snapshot(self) -> Snapshot:
         """Return this instant as host arrays, for `resume`."""
         taken = snapshots.take_snapshot(self.scene, self.world, self.solids, self.ledger)
-        return dataclasses.replace(taken, arrays=taken.arrays | self.bodies.arrays())
+        sources = self.sources.plain() if self.sources else {}
+        return dataclasses.replace(taken, arrays=taken.arrays | self.bodies.arrays(), sources=sources)
 
     def resume(self, snapshot: Snapshot) -> None:
         """Go back (or on) to an instant; parameters and forces stay as they are now."""
@@ -323,6 +342,8 @@ class Simulation(Contents):
         self.ledger.next_id = max(self.ledger.next_id, before.next_id)
         snapshots.put_particles(snapshot, self.scene, self.world, self.ledger.capacity)
         self.bodies.resume(snapshot.arrays)
+        self.sources = Sources(self.scene)
+        self.sources.read(snapshot.sources)
 
     def clone(self) -> "Simulation":
         """Return a world of its own that goes on from here to the same bits, with the same forces and parameters."""
@@ -331,6 +352,7 @@ class Simulation(Contents):
         copy.scene = self.scene.model_copy(deep=True)
         copy.resume(dataclasses.replace(self.snapshot(), solids=[*copy.scene.solids]))
         copy.forces, copy.pushed = deepcopy((self.forces, self.pushed))
+        copy.gravity_by_hand = self.gravity_by_hand
         return copy
 
     def digest(self) -> str:
@@ -342,12 +364,16 @@ class Simulation(Contents):
     def __getattr__(self, name: str) -> Any:
         """Read a parameter of the scene."""
         if name in LIVE:
-            return getattr(self.scene, name)
+            return getattr(self._scene_at(self.time) if name == "gravity" else self.scene, name)
         raise AttributeError(f"'Simulation' object has no attribute {name!r}")
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Set an attribute; a live parameter is checked and holds from the next substep on."""
-        if name in LIVE:
+        if name == "gravity" and changes_gravity(self.scene):
+            trial = self.scene.model_copy(update={"gravity_track": None})
+            trial.assign(name, value)
+            self.gravity_by_hand = trial.gravity
+        elif name in LIVE:
             self.scene.assign(name, value)
         else:
             if name not in self.__dict__ and not hasattr(type(self), name):
@@ -358,7 +384,8 @@ class Simulation(Contents):
 
     def save(self, path: str | Path) -> None:
         """Write the whole state to an .npz file, replaced in one move; `restore` continues from it exactly."""
-        snapshots.write_snapshot(path, self.snapshot(), self.scene.model_dump_json(exclude={"fluids"}))
+        scene = self.scene if self.gravity_by_hand is None else with_gravity(self.scene, self.gravity_by_hand)
+        snapshots.write_snapshot(path, self.snapshot(), scene.model_dump_json(exclude={"fluids"}))
 
     @classmethod
     def restore(cls, path: str | Path, arch: str = "cpu") -> "Simulation":

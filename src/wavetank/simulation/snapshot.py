@@ -18,7 +18,8 @@ from wavetank.physics.foam.pool import pool_from, pool_rows
 from wavetank.physics.world import World
 from wavetank.scene.scene import Scene
 from wavetank.simulation.ledger import Ledger
-from wavetank.simulation.moving_solids import MovingSolids, Pose
+from wavetank.simulation.moving_solids import MovingSolids
+from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
 ARRAYS = LASTING  # of the particles, in device order
@@ -48,6 +49,8 @@ class Snapshot:
     poses: list[Pose]  # of all solids, the walls of the tank first, as names, targets and growing
     targets: dict[int, Pose]
     growing: dict[int, tuple[float, float]]
+    courses: dict[str, Any]  # of solids that move by themselves, which a hand holds and which are on their way back
+    sources: dict[str, Any] = dataclasses.field(default_factory=dict)  # of emitters and drains
 
     @property
     def time(self) -> float:
@@ -67,15 +70,16 @@ def take_snapshot(scene: Scene, world: World, solids: MovingSolids, ledger: Ledg
         arrays={name: download(getattr(particles, name))[: world.count].copy() for name in names}
         | pool_rows(pool, scene.dim),
         solids=[*scene.solids], names=[*solids.names], poses=[*solids.poses], targets={**solids.targets},
-        growing={**solids.growing},
+        growing={**solids.growing}, courses=solids.courses.plain(),
     )  # fmt: skip
 
 
 def restore_solids(scene: Scene, walls: list[Solid], snapshot: Snapshot) -> MovingSolids:
     """Return the solids of an instant, where they were."""
-    solids = MovingSolids(walls, snapshot.solids, scene.friction, scene.spacing)
+    solids = MovingSolids(walls, snapshot.solids, scene.friction, scene.spacing, scene.start_time)
     solids.names, solids.poses = [*snapshot.names], [*snapshot.poses]
     solids.targets, solids.growing = {**snapshot.targets}, {**snapshot.growing}
+    solids.courses.read(snapshot.courses)
     solids.rebuild()
     return solids
 
@@ -102,6 +106,8 @@ def digest(snapshot: Snapshot) -> str:
     memory = {name: rows for name, rows in snapshot.arrays.items() if name == "bodies_memory"}
     for name, values in ({"time": np.float64(snapshot.time)} | particles | foam | poses | memory).items():
         whole.update(f"{name} {values.shape}".encode() + values.tobytes())
+    if snapshot.sources:
+        whole.update(json.dumps(snapshot.sources, sort_keys=True).encode())
     return whole.hexdigest()
 
 
@@ -153,6 +159,8 @@ def write_snapshot(path: str | Path, snapshot: Snapshot, scene: str) -> None:
         "poses": [_pose_list(pose) for pose in snapshot.poses],
         "targets": {k: _pose_list(pose) for k, pose in snapshot.targets.items()},
         "growing": snapshot.growing,
+        "courses": snapshot.courses,
+        "sources": snapshot.sources,
     }
     with replacing(path) as partial, partial.open("wb") as file:
         np.savez(file, format=2, scene=scene, about=json.dumps(about), allow_pickle=False, **snapshot.arrays)
@@ -182,6 +190,8 @@ def read_snapshot(path: str | Path, solids: Any) -> tuple[Snapshot, str]:
             poses=[_pose(row) for row in about["poses"]],
             targets={int(k): _pose(row) for k, row in about["targets"].items()},
             growing={int(k): (age, time) for k, (age, time) in about["growing"].items()},
+            courses=about.get("courses", {}),
+            sources=about.get("sources", {}),
         )
     except OSError as error:
         raise WavetankError(f"{path}: the state cannot be read: {error.strerror or error}.") from None

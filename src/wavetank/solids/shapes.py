@@ -185,6 +185,12 @@ class _SetOperation(Solid):
     center: Place = (0.0, 0.0, 0.0)
     parts: Annotated[list["AnySolid"], Field(min_length=2)]
 
+    @model_validator(mode="after")
+    def _moves_as_a_whole(self) -> "_SetOperation":
+        if any(part.motion is not None for part in self.parts):
+            raise ValueError("parts of a solid have no motion of their own; give the motion to the whole.")
+        return self
+
     @property
     def origin(self) -> np.ndarray:
         return point_in_space(self.center)

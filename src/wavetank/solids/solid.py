@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from wavetank.foundation.model import Model, Number, Positive, Quaternion, Vector
 from wavetank.foundation.rotations import product, turned, unit_quaternion
+from wavetank.solids.motion import AnyMotion, shorthand
 
 Floats = Sequence[float] | np.ndarray
 Rates = tuple[Number, Number, Number]
@@ -43,6 +44,13 @@ class Solid(Model):
     velocity: Vector | None = None  # m/s, of a body's centre of mass at the start
     angular_velocity: Rates | Number | None = None  # rad/s, of a body at the start; about z where one number
     restitution: Annotated[Number, Field(ge=0, le=1)] = 0.2  # share of the speed that a body bounces back with
+
+    motion: AnyMotion = None  # how it moves by itself; see `motion.py`
+
+    @model_validator(mode="before")
+    @classmethod
+    def _expressed(cls, values: Any) -> Any:
+        return shorthand(values, ("center", "point"))
 
     @model_validator(mode="after")
     def _is_body_or_not(self) -> "Solid":

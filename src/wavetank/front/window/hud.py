@@ -1,5 +1,6 @@
 """A level: what is asked and how it stands, its regions over the picture, and what became of it."""
 
+import itertools
 from typing import Any
 
 from imgui_bundle import ImVec2, imgui
@@ -17,7 +18,8 @@ Box = tuple[float, float, float, float]  # x, y, width, height [px]
 
 
 def draw_game(desk: Desk, box: Box) -> None:
-    """Draw what there is of a game over the picture."""
+    """Draw the mouths of emitters and drains, and what there is of a game, over the picture."""
+    _mouths(desk, box)
     game = desk.game
     if game is None:
         return
@@ -59,6 +61,19 @@ def _regions(desk: Desk, game: dict[str, Any], box: Box) -> None:
         draw.add_rect_filled(ImVec2(left - 10, bottom - size.y - 6), low_corner, ink(color), 20.0)
         with heading(em):
             draw.add_text(ImVec2(left - 2, bottom - size.y - 3), ink("#ffffff"), aim["label"])
+    draw.pop_clip_rect()
+
+
+def _mouths(desk: Desk, box: Box) -> None:
+    """Outline where water comes from and where it goes; drains are dashed."""
+    draw, (x, y, width, height) = imgui.get_window_draw_list(), box
+    draw.push_clip_rect(ImVec2(x, y), ImVec2(x + width, y + height), True)
+    for region in desk.shown.regions:
+        points = [ImVec2(x + u * width, y + v * height) for u, v in region["outline"]]
+        dashed = region.get("mark") == "drain"
+        for number, (a, b) in enumerate(itertools.pairwise(points) if "mark" in region else ()):
+            if not (dashed and number % 2):
+                draw.add_line(a, b, ink(TEXT, 0.7), 1.5)
     draw.pop_clip_rect()
 
 

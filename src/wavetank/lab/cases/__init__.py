@@ -8,6 +8,7 @@ from wavetank.lab.cases import (
     cup,
     drop,
     elliptical_drop,
+    emitter,
     energy,
     gravity_current,
     layers,
@@ -29,5 +30,5 @@ CASES: tuple[Case, ...] = (
     still_tank.CASE, column.CASE, martin_moyce.CASE, lobovsky.CASE, standing_wave.CASE, elliptical_drop.CASE,
     drop.CASE, energy.CASE, rest.CASE, momentum.CASE, cup.CASE, seeds.CASE, resolution.CASE, layers.CASE,
     lock_exchange.CASE, shear_wave.CASE, gravity_current.CASE, buckling.CASE, coiling.CASE, tension_drop.CASE,
-    calm_vorticity.CASE,
+    calm_vorticity.CASE, emitter.CASE,
 )  # fmt: skip

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from wavetank.device.state import Particles
-from wavetank.foundation.model import Model
+from wavetank.foundation.timed import Timed
 
 
-class Force(Model):
+class Force(Timed):
     """Something beside gravity that accelerates particles."""
 
     def apply(self, particles: Particles, count: int, dt: float, time: float) -> None:

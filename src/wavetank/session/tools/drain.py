@@ -4,9 +4,10 @@ from typing import ClassVar
 
 from typing_extensions import override
 
-from wavetank.scene.forces import Attract
+from wavetank.scene.drains import Drain as Sink
 from wavetank.session.tools.hand import Hand
 from wavetank.session.tools.tool import Tool, option
+from wavetank.simulation.sources import suction_of, take
 
 
 class Drain(Tool):
@@ -25,5 +26,6 @@ class Drain(Tool):
     @override
     def hold(self, hand: Hand, duration: float) -> None:
         place, radius = hand.look().point, hand.radius(self.radius)
-        hand.sim.remove_inside(place, place, 0.5 * radius)
-        hand.sim.push(Attract(center=hand.flat(place), radius=2.0 * radius, strength=9.81 * self.suction, drag=0.0))
+        sink = Sink(center=hand.flat(place), radius=0.5 * radius, suction=9.81 * self.suction)
+        take(hand.sim, sink)
+        hand.sim.push(suction_of(sink))

@@ -40,3 +40,8 @@ class Grab(Tool):
     def hold(self, hand: Hand, duration: float) -> None:
         if self._held in hand.sim.solids.names and self._offset is not None:
             carry(hand.sim, self._held, hand.point + self._offset, None, self.pace * hand.speed * duration)
+
+    @override
+    def end(self, hand: Hand) -> None:
+        if self._held in hand.sim.solids.names and hand.sim.solids.moves_itself(self._held):
+            hand.sim.release(self._held)

@@ -6,8 +6,10 @@ import numpy as np
 from pydantic import PrivateAttr
 from typing_extensions import override
 
+from wavetank.scene.mouths import disc_rows, line_rows
 from wavetank.session.tools.hand import Hand
 from wavetank.session.tools.tool import Color, Tool, dye_of, option
+from wavetank.simulation.sources import rows_due
 
 GAP, WALL = 0.9, 0.5  # d: room that new particles have from others and from walls
 MOST_LAYERS = 8  # in a frame
@@ -57,17 +59,16 @@ class Pour(Tool):
     @override
     def hold(self, hand: Hand, duration: float) -> None:
         spacing, speed = hand.spacing, self.speed * hand.speed
-        self._way += speed * duration
-        layers = int(self._way / spacing)
-        self._way -= layers * spacing
-        if not layers or self._nozzle is None:
+        steps, self._way = rows_due(self._way, speed * duration, spacing)
+        if not len(steps) or self._nozzle is None:
             return
         ahead = np.array([0.0, -1.0, 0.0])
         if self.aim == "ahead":
             ahead = np.array([1.0, 0.0, 0.0]) if hand.sim.scene.dim == 2 else hand.direction
         disc = self._disc(hand, ahead)
-        steps = self._way + spacing * np.arange(min(layers, MOST_LAYERS))
-        places = (self._nozzle + disc[None] + steps[:, None, None] * ahead).reshape(-1, 3)[:, : hand.sim.scene.dim]
+        places = (self._nozzle + disc[None] + steps[:MOST_LAYERS, None, None] * ahead).reshape(-1, 3)[
+            :, : hand.sim.scene.dim
+        ]
         places = places.astype(np.float32)
         places = places[hand.sim.free_places(places, GAP * spacing, WALL * spacing)]
         if hand.sim.count + len(places) > hand.most_particles:
@@ -82,10 +83,6 @@ class Pour(Tool):
         side /= np.linalg.norm(side)
         up = np.cross(side, ahead)
         half = 0.5 * max(self.width * hand.size, hand.spacing)
-        n = int(half / hand.spacing)
-        row = hand.spacing * np.arange(-n, n + 1)
         if hand.sim.scene.dim == 2:
-            return row[:, None] * side
-        a, b = (grid.reshape(-1) for grid in np.meshgrid(row, row))
-        round_ = a**2 + b**2 <= half**2
-        return a[round_, None] * side + b[round_, None] * up
+            return line_rows(half, hand.spacing)[:, None] * side
+        return disc_rows(half, hand.spacing) @ np.stack([side, up])

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import PrivateAttr
 from typing_extensions import override
 
+from wavetank.scene.schedule import changes_gravity
 from wavetank.session.tools.hand import Hand
 from wavetank.session.tools.tool import Tool, option
 
@@ -26,7 +27,7 @@ class Tilt(Tool):
 
     @override
     def begin(self, hand: Hand) -> None:
-        self._upright = tuple(hand.sim.scene.gravity)
+        self._upright = tuple(hand.sim.gravity)
 
     @override
     def move(self, hand: Hand) -> None:
@@ -46,5 +47,9 @@ class Tilt(Tool):
 
     @override
     def end(self, hand: Hand) -> None:
-        if self._upright is not None and not self.stay:
+        if self._upright is None or self.stay:
+            return
+        if changes_gravity(hand.sim.scene):
+            hand.sim.release("gravity")
+        else:
             hand.sim.gravity = self._upright

@@ -87,30 +87,38 @@ class Mesh(Solid):
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
         return [("center", self.center)]
 
-    def surface(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corners [n, 3], m, in the solid's frame, and the faces [m, 3], int.
-
-        Raises `WavetankError` for a mesh that cannot be read.
-        """
-        triangles = self._triangles()
-        points = triangles.vertices.astype(np.float64)
-        if self.up in _UP:
-            points = points @ np.reshape(_UP[self.up], (3, 3)).T
-        edges = np.ptp(points, axis=0)
-        if not isinstance(self.size, float) and edges.min() < FLAT:
-            raise WavetankError(f"{self._label()} is flat; a mesh without a depth needs size as one number.")
-        factor: Any = self.size if isinstance(self.size, float) else np.array(self.size) / edges
-        return points * factor, triangles.faces
-
     def grid(self, spacing: float) -> DistanceGrid:
         """Return the distances to this mesh for particles of that spacing [m], in its own frame.
 
         Raises `WavetankError` for a mesh that cannot be read, is not closed or too large.
         """
         triangles = self._triangles()
-        points, _ = self.surface()
         key = f"{triangles.digest} {self.up} {self.size} {self.thickness}"
-        return grid_of(points, triangles.faces, spacing, self.thickness, key, self.name or self._label())
+        return grid_of(self._vertices(), triangles.faces, spacing, self.thickness, key, self.name or self._label())
+
+    def surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corners [n, 3], m, in the solid's frame, and the faces [m, 3], int.
+
+        Raises `WavetankError` for a mesh that cannot be read.
+        """
+        return self._vertices(), self._triangles().faces
+
+    def corners(self) -> np.ndarray:
+        """Return the corners of the triangles [m] in the mesh's own frame, [m, 3, 3], as seen from outside."""
+        result: np.ndarray = self._vertices()[self._triangles().faces]
+        return result
+
+    def _vertices(self) -> np.ndarray:
+        """Return the vertices [m] in the mesh's own frame, [n, 3]."""
+        points = self._triangles().vertices.astype(np.float64)
+        if self.up in _UP:
+            points = points @ np.reshape(_UP[self.up], (3, 3)).T
+        edges = np.ptp(points, axis=0)
+        if not isinstance(self.size, float) and edges.min() < FLAT:
+            raise WavetankError(f"{self._label()} is flat; a mesh without a depth needs size as one number.")
+        factor = self.size if isinstance(self.size, float) else np.array(self.size) / edges
+        result: np.ndarray = points * factor
+        return result
 
     def _triangles(self) -> Triangles:
         try:

@@ -13,7 +13,8 @@ function drawRegions() {
   if (now === outlined) return;
   outlined = now;
   drawing.replaceChildren(); names.replaceChildren();
-  regions.forEach(({ corners: points, outline }, k) => {
+  regions.forEach(({ corners: points, outline, mark }, k) => {
+    if (mark) return drawing.append(svg("polygon", { points: outline.map((p) => p.join()).join(" "), class: mark, "vector-effect": "non-scaling-stroke" }));
     const aim = game?.aims[k];
     if (!points.length || !aim) return;
     const kind = aim.forbids ? "forbidden" : aim.progress >= 1 ? "met" : "wanted";

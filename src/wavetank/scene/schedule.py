@@ -1,0 +1,94 @@
+"""What of a scene changes with time: gravity, by itself or because the tank is tilted.
+
+A tilted tank is computed in its own frame, where gravity is turned the other way. That is all of it as long as the tank
+turns slowly: what a fast turn adds, Coriolis, centrifugal and Euler forces, is left out.
+"""
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.model import Model, Number
+from wavetank.foundation.rotations import turned
+from wavetank.foundation.timed import Timed
+from wavetank.foundation.tracks import checked_track, track, varies
+from wavetank.scene.drains import Drain
+from wavetank.scene.emitters import Emitter
+
+
+class Tilted(Timed):
+    """What a tank has that leans: gravity is turned the other way, and the picture stays as it is."""
+
+    tilt: Number = 0.0  # rad about the axis
+    tilt_axis: tuple[Number, Number, Number] = (0.0, 0.0, 1.0)
+
+    @property
+    def is_tilted(self) -> bool:
+        """Whether it stands, or at some time will stand, otherwise than upright."""
+        return bool(self.tilt or "tilt" in self.over_time)
+
+
+class Timetable(Model):
+    """What of a scene comes, goes and changes by itself."""
+
+    emitters: list[Emitter] = []
+    drains: list[Drain] = []
+    most_particles: Annotated[int, Field(ge=1)] | None = None  # that emitters may fill the world with
+    when_full: Literal["stop", "recycle"] = "stop"  # what emitters do then: wait, or take the oldest particles
+    start_time: Annotated[Number, Field(ge=0)] = 0.0  # s: t of all expressions and keyframes when the water starts
+    gravity_track: Any = None  # what gravity does over time; made from expressions or keyframes in its place
+
+    @staticmethod
+    def spread_gravity(values: dict[str, Any]) -> dict[str, Any]:
+        """Let expressions or keyframes of gravity mean its track; `gravity` is then its value at t = 0."""
+        plain = values.get("gravity")
+        if not (callable(plain) or varies(plain)):
+            return values
+        try:
+            size = None if callable(plain) else len(np.atleast_1d(track(plain)(0.0)))
+            tidy = checked_track(plain, "gravity", size)
+        except WavetankError as error:
+            text = str(error)
+            raise ValueError(text if text.startswith("gravity") else f"gravity: {text}") from None
+        return {**values, "gravity": np.atleast_1d(track(tidy)(0.0)).tolist(), "gravity_track": tidy}
+
+    def is_timed(self: Any) -> bool:
+        """Say whether anything here comes, goes or changes at times of its own."""
+        own = self.emitters or self.drains or changes_gravity(self) or any(force.over_time for force in self.forces)
+        return bool(own or any(solid.motion for solid in self.solids))
+
+    def check_sources(self) -> None:
+        """Check what emitters ask for of drains; raises `ValueError`."""
+        known = [drain.name for drain in self.drains if drain.name]
+        for number, emitter in enumerate(self.emitters):
+            if emitter.feed and emitter.feed not in known:
+                raise ValueError(
+                    f"emitters[{number}].feed = {emitter.feed!r} is not the name of a drain; "
+                    f"they are: {', '.join(known) or 'none; add one under [[drains]]'}."
+                )
+
+
+def changes_gravity(scene: Any) -> bool:
+    """Say whether the gravity of a scene changes with time, or is not the one that it names."""
+    return scene.gravity_track is not None or (scene.tank is not None and scene.tank.is_tilted)
+
+
+def with_gravity(scene: Any, gravity: tuple[float, ...]) -> Any:
+    """Return the scene with that gravity [m/s^2] for good, in a tank that stands upright."""
+    tank = scene.tank and scene.tank.model_copy(update={"tilt": 0.0, "over_time": {}})
+    return scene.model_copy(update={"gravity": gravity, "gravity_track": None, "tank": tank})
+
+
+def gravity_at(scene: Any, time: float) -> tuple[float, ...]:
+    """Return gravity [m/s^2] in the frame of the tank at `time` [s] of the water; raises `WavetankError`."""
+    clock = time + scene.start_time
+    g = np.zeros(3)
+    g[: scene.dim] = scene.gravity if scene.gravity_track is None else track(scene.gravity_track)(clock)
+    if scene.tank is not None and scene.tank.is_tilted:
+        tank = scene.tank.at(clock)
+        axis = np.array(tank.tilt_axis, float)
+        half = -0.5 * tank.tilt
+        g = turned(np.concatenate([[np.cos(half)], np.sin(half) * axis / np.linalg.norm(axis)]), g)
+    return tuple(g[: scene.dim].tolist())

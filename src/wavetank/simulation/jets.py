@@ -1,0 +1,133 @@
+"""Jets: which particles leave a mouth in a frame, where they are at its end, and what holds them in the mouth.
+
+code     symbol   meaning                                                       unit
+phase             share of a row that has passed since the last whole one       1
+age               time since a particle left                                    s
+pitch             distance of rows at rest density                              m
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+
+from wavetank.foundation.rotations import turned
+from wavetank.scene.emitters import Emitter, unit_vector
+from wavetank.scene.forces.jet import Jet, opening_of
+from wavetank.scene.mouths import Mouth, frame_of
+from wavetank.scene.scene import Scene
+from wavetank.scene.schedule import gravity_at
+
+HELD = 2.5  # d: so far from the mouth a jet is held at its speed
+
+
+@dataclasses.dataclass(frozen=True)
+class Due:
+    """Particles that leave a mouth, those that left first in front."""
+
+    place: np.ndarray  # int [n]: where in the mouth
+    age: np.ndarray  # since they left: in rows, or in seconds
+
+    def first(self, number: int) -> "Due":
+        """Return those that left first."""
+        return Due(self.place[:number], self.age[:number])
+
+    def aged(self, since: float, interval: float) -> "Due":
+        """Return the same with ages in seconds, where rows take an `interval` [s] each and all ended `since` [s]."""
+        return Due(self.place, since + interval * self.age)
+
+
+def particles_due(mouth: Mouth, phase: float, rows: float) -> tuple[Due, float]:
+    """Return the particles that leave while so many `rows` pass a mouth, with ages in rows, and the next phase."""
+    after = phase + rows
+    whole = np.floor(after - mouth.phases).astype(int)
+    number = whole - np.floor(phase - mouth.phases).astype(int)
+    place = np.repeat(np.arange(len(mouth)), number)
+    earlier = np.arange(len(place)) - np.repeat(np.cumsum(number) - number, number)
+    age = after - mouth.phases[place] - (whole[place] - earlier)
+    order = np.lexsort((place, -age))
+    return Due(place[order], age[order]), after - math.floor(after)
+
+
+def row(mouth: Mouth) -> Due:
+    """Return a particle in each place, just out."""
+    return Due(np.arange(len(mouth)), np.zeros(len(mouth)))
+
+
+def flown(
+    scene: Scene, emitter: Emitter, mouth: Mouth, due: Due, end: float, dt: float
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return positions and velocities, [n, dim], of particles that left at their ages [s] before the clock shows `end`.
+
+    They have flown freely since; `dt` [s] is the length of a time step.
+    """
+    x, v = np.zeros((len(due.place), 3)), np.zeros((len(due.place), 3))
+    g = np.zeros(3)
+    g[: scene.dim] = gravity_at(scene, end - scene.start_time)
+    for age in np.unique(due.age).tolist():
+        chosen = due.age == age
+        left, places = end - age, due.place[chosen]
+        then = emitter.at(left)
+        speed = max(then.pace(mouth), 1e-3 * mouth.pitch / dt)
+        middle, axes = placed(then, scene.dim, left)
+        earlier, _ = placed(then, scene.dim, max(0.0, left - dt)) if then.motion else (middle, axes)
+        ways = mouth.ways[places] @ axes
+        if then.mesh is not None and then.direction is not None:
+            ways = np.tile(unit_vector(then.direction), (len(places), 1))
+        carried = (middle - earlier) / dt if left > dt else np.zeros(3)
+        own = speed * ways + carried
+        # What has left as a whole is half out of the mouth in front of it, and has fallen since its middle came out.
+        fallen = age + min(
+            0.5 * mouth.pitch / speed, 0.5 * math.sqrt(mouth.pitch / max(float(np.linalg.norm(g)), 1e-9))
+        )
+        x[chosen] = middle + mouth.places[places] @ axes + 0.5 * mouth.pitch * ways + own * age + 0.5 * g * fallen**2
+        # Velocities of a step are those of its middle: x goes on by v + g dt, v included, in the next one.
+        v[chosen] = own + g * (fallen - 0.5 * dt)
+    return x[:, : scene.dim].astype(np.float32), v[:, : scene.dim].astype(np.float32)
+
+
+def placed(emitter: Emitter, dim: int, clock: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middle of the mouth [m] and its frame at a time of the scene's clock [s]."""
+    rest = np.zeros(3)
+    rest[:dim] = emitter.middle
+    axes = np.eye(3)
+    if emitter.mesh is None:
+        assert emitter.direction is not None
+        side = None if emitter.side is None else np.array(emitter.side, float)
+        axes = frame_of(unit_vector(emitter.direction), dim, side)
+    if emitter.mesh is not None:
+        axes = np.stack([turned(emitter.mesh.quaternion, row) for row in axes])
+    if emitter.motion is not None:
+        rest, turn = emitter.motion.path().pose(clock, (rest, np.array([1.0, 0.0, 0.0, 0.0])))
+        axes = np.stack([turned(turn, row) for row in axes])
+    return rest, axes
+
+
+def jet_of(scene: Scene, emitter: Emitter, clock: float) -> Jet:
+    """Return what holds the speed of a jet in the mouth when the scene's clock shows `clock` [s]."""
+    mouth, dim = emitter.mouth(scene.spacing), scene.dim
+    middle, axes = placed(emitter, dim, clock)
+    g = np.zeros(3)
+    g[:dim] = gravity_at(scene, clock - scene.start_time)
+    half = (mouth.half[0] + 0.5 * scene.spacing, mouth.half[1] + 0.5 * scene.spacing)
+    return Jet(opening=opening_of(
+        middle, axes, half, is_round=int(emitter.shape in ("disc", "ring")), length=HELD * scene.spacing,
+        speed=emitter.pace(mouth) * math.cos(emitter.spread), fall=float(g @ axes[2]),
+    ))  # fmt: skip
+
+
+def outlines(scene: Scene, time: float) -> list[tuple[str, np.ndarray]]:
+    """Return the mouths of emitters and of drains in walls at `time` [s], each a closed line of points [n, 3] [m]."""
+    found, clock, turn = list[tuple[str, np.ndarray]](), time + scene.start_time, np.linspace(0.0, math.tau, 25)
+    circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)], float)
+    for emitter in (emitter.at(clock) for emitter in scene.emitters if emitter.mesh is None):
+        middle, axes = placed(emitter, scene.dim, clock)
+        edge = circle if emitter.shape in ("disc", "ring") else corners
+        found.append(("emitter", middle + (edge * emitter.mouth(scene.spacing).half) @ axes[:2]))
+    for drain in (drain.at(clock) for drain in scene.drains if drain.shape == "mouth"):
+        assert drain.radius is not None
+        axes = frame_of(unit_vector(drain.direction), scene.dim)
+        flat = circle * (1.0, 0.0 if scene.dim == 2 else 1.0)
+        found.append(("drain", np.array([*(drain.center or ()), 0.0][:3], float) + drain.radius * flat @ axes[:2]))
+    return found

@@ -1,0 +1,254 @@
+"""Emitters and drains in a running world. Flows, ranges and levels: `wavetank validate emitter`."""
+
+import math
+
+import numpy as np
+import pytest
+
+import wavetank as wt
+from wavetank.scene.mouths import MOST_IN_A_ROW, mouth_of
+from wavetank.simulation.jets import outlines
+
+FLAT = wt.Tank(size=(1.0, 0.8))
+
+
+def jet(**fields):
+    return wt.Emitter(**{"position": (0.0, 0.6), "direction": (1, 0), "width": 0.1, "speed": 1.5} | fields)
+
+
+def world(*emitters, **fields) -> wt.Simulation:
+    scene = {"spacing": 0.025, "tank": FLAT, "foam": 0.0, "emitters": [*emitters]}
+    return wt.Simulation(wt.Scene(**scene | fields))
+
+
+@pytest.mark.parametrize(
+    ("shape", "area"),
+    [
+        ({"shape": "disc", "radius": 0.05}, math.pi * 0.05**2),
+        ({"shape": "disc", "radius": 0.013}, math.pi * 0.013**2),
+        ({"shape": "ring", "radius": 0.09, "inner_radius": 0.05}, math.pi * (0.09**2 - 0.05**2)),
+        ({"shape": "ring", "radius": 0.09, "inner_radius": 0.08}, math.pi * (0.09**2 - 0.08**2)),
+        ({"shape": "rectangle", "size": (0.13, 0.07)}, 0.13 * 0.07),
+    ],
+)
+def test_a_row_has_the_volume_of_its_particles_and_no_clumps(shape, area):
+    d = 0.02
+    mouth = mouth_of(shape, d, 0.0, 3)
+    assert len(mouth) * d**3 == pytest.approx(area * mouth.pitch)
+    assert mouth.area == pytest.approx(area)
+    if area > 3 * d**2:
+        assert mouth.pitch == pytest.approx(d, rel=0.25)
+        gaps = np.linalg.norm(mouth.places[:, None] - mouth.places[None], axis=2) + 9 * np.eye(len(mouth))
+        assert gaps.min() > 0.8 * d
+
+
+def test_a_row_of_too_many_particles_is_refused():
+    with pytest.raises(wt.WavetankError, match=f"at most {MOST_IN_A_ROW:,} are allowed"):
+        mouth_of({"shape": "disc", "radius": 1.0}, 0.005, 0.0, 3)
+
+
+@pytest.mark.parametrize(
+    "emitter",
+    [
+        wt.Emitter(position=(0.3, 0.5, 0.3), direction=(1, 1, 0), radius=0.05, flow=12.0),
+        wt.Emitter(position=(0.3, 0.5, 0.3), direction=(0, 0, 1), size=(0.1, 0.06), speed=1.0),
+        wt.Emitter(position=(0.3, 0.5, 0.3), direction=(0, -1, 0), radius=0.08, inner_radius=0.05, speed=1, spread=0.2),
+        wt.Emitter(position=(0.3, 0.5, 0.3), direction=(0, 1, 0), radius=0.1, speed=2.0, flow=8.0),  # a shower
+        wt.Emitter(mesh=wt.Mesh(path="wavetank/knot.obj", center=(0.3, 0.4, 0.3), size=0.3), speed=0.05),
+    ],
+    ids=["flow", "rectangle", "ring", "shower", "mesh"],
+)  # fmt: skip
+def test_flow_is_right_within_a_row(emitter):
+    d = 0.02
+    sim = wt.Simulation(wt.Scene(spacing=d, tank=wt.Tank(size=(0.6, 0.8, 0.6)), emitters=[emitter], foam=0.0))
+    mouth = emitter.mouth(d)
+    for frames in (13, 17):
+        for _ in range(frames):
+            sim.step()
+        asked = emitter.rate(mouth) * sim.time / d**3
+        assert abs(sim.count - asked) <= 0.5 * len(mouth) + 1
+    assert sim.stats()["withheld"] == 0
+    assert sim.stats()["density_error_mean"] < 0.01
+
+
+def test_what_an_emitter_lets_out_flies_as_it_should():
+    """In free flight: v = u + g t, and the mouth's own motion comes on top."""
+    sim = world(jet(width=0.025, speed=1.0, motion={"position": [0.1, "0.3 + 0.8*t"]}, duration=0.1))
+    sim.advance(0.25)
+    left = 0.1 + (sim.positions[:, 0] - 0.1) * 0  # x of the mouth
+    flight = (sim.positions[:, 0] - left) / 1.0
+    assert sim.velocities[:, 0] == pytest.approx(1.0, abs=0.02)
+    assert sim.velocities[:, 1] == pytest.approx(0.8 - 9.81 * flight, abs=0.15)
+    assert sim.count == pytest.approx(0.1 * 0.025 / 0.025**2, abs=1)
+
+
+def test_start_duration_material_and_dye():
+    oil = (
+        wt.scene_material(name="oil", density=900) if hasattr(wt, "scene_material") else {"name": "oil", "density": 900}
+    )
+    sim = world(jet(start=0.1, duration=0.2, material="oil", dye="#ff0000"), materials=[oil])
+    sim.advance(0.1)
+    assert sim.count == 0
+    sim.advance(0.4)
+    assert sim.count == pytest.approx(0.2 * 0.15 / 0.025**2, abs=4)
+    arrays = sim.snapshot().arrays
+    assert set(arrays["material"].tolist()) == {1}
+    assert set(arrays["dye"].tolist()) == {127 << 24 | 0xFF0000}
+
+
+def test_sources_repeat_to_the_last_bit_and_from_a_file(tmp_path):
+    drain = wt.Drain(name="sump", lower=(0.5, 0.0), upper=(1.0, 0.1), flow=0.1)
+    parts = {"fluids": [wt.Block(lower=(0, 0), upper=(1, 0.2))], "drains": [drain]}
+    emitters = [jet(speed="1 + sin(5*t)"), jet(position=(0.3, 0.7), direction=(0, -1), speed=0.7, feed="sump")]
+    sim = world(*emitters, **parts)
+    sim.advance(0.31)
+    sim.save(tmp_path / "state.npz")
+    snapshot = sim.snapshot()
+    sim.advance(0.3)
+    whole = sim.digest()
+    again = wt.Simulation.restore(tmp_path / "state.npz")
+    again.advance(0.3)
+    assert again.digest() == whole
+    assert again.stats()["emitted"] == sim.stats()["emitted"]
+    there, clone = sim.positions, sim.clone()
+    assert clone.digest() == whole
+    sim.resume(snapshot)  # ids are for life: who comes now is someone else, at the same place
+    sim.advance(0.3)
+    assert np.array_equal(sim.positions, there)
+    clone.advance(0.1)
+    sim.advance(0.1)
+    assert np.array_equal(sim.positions, clone.positions)
+
+
+def test_water_that_goes_round_stays():
+    drain = wt.Drain(name="sump", lower=(0.5, 0.0), upper=(1.0, 0.1), flow=0.15)
+    sim = world(jet(feed="sump"), fluids=[wt.Block(lower=(0, 0), upper=(1, 0.2))], drains=[drain])
+    count = sim.count
+    for _ in range(90):
+        sim.step()
+        store = sim.sources.drains[0].store
+        assert sim.count + store == count
+        assert 0 <= store < 16
+    assert sim.stats()["emitted"] > 200
+
+
+def test_a_full_world_stops_or_recycles_and_says_so():
+    stopped = world(jet(), most_particles=100)
+    stopped.advance(1.0)
+    assert stopped.count == 100
+    assert stopped.stats()["withheld"] > 50
+    assert len(stopped.notes) == 1
+    assert "most_particles = 100" in stopped.notes[0]
+    recycled = world(jet(), most_particles=100, when_full="recycle")
+    recycled.advance(1.0)
+    assert recycled.count == 100
+    ids = recycled.snapshot().arrays["id"]
+    assert recycled.stats()["emitted"] == pytest.approx(0.15 / 0.025**2, abs=4)
+    assert recycled.stats()["withheld"] == 0
+    assert ids.min() == recycled.stats()["emitted"] - 100
+
+
+def test_an_emitter_under_water_brings_all_that_it_should():
+    """The mouth is at the bottom of a pool whose pressure fills it whenever it can."""
+    mouth = wt.Emitter(position=(0.5, 0.0), direction=(0, 1), width=0.1, speed=1.0)
+    sim = world(mouth, fluids=[wt.Block(lower=(0, 0), upper=(1, 0.3))], spacing=0.02)
+    sim.advance(1.0)
+    assert sim.stats()["emitted"] == pytest.approx(0.1 / 0.02**2, abs=15)
+    assert sim.stats()["density_error_mean"] < 0.01
+
+
+def test_an_emitter_that_is_blocked_says_so():
+    keys = [{"time": 0, "position": [0.5, 0.1]}, {"time": 0.2, "position": [0.1, 0.6]}]
+    lid = wt.Box(name="lid", center=(0.15, 0.6), size=(0.2, 0.2), motion=keys)
+    sim = world(jet(name="hose"), solids=[lid])
+    sim.advance(1.5)
+    assert sim.stats()["withheld"] > 50
+    assert sim.notes == ["The emitter 'hose' is blocked by water or a solid: less comes out than it should."]
+
+
+def test_levels_are_kept():
+    gauge = wt.Gauge(lower=(0.0, 0.0), upper=(1.0, 0.8))
+    fill = wt.Emitter(position=(0.2, 0.7), direction=(0, -1), width=0.1, speed=1.0, level=0.25, gauge=gauge)
+    sim = world(fill, fluids=[wt.Block(lower=(0, 0), upper=(1, 0.2))])
+    sim.advance(1.5)
+    assert sim.count == pytest.approx(0.25 / 0.025**2, abs=4)
+    empty = wt.Drain(lower=(0.8, 0.0), upper=(1.0, 0.1), level=0.15)
+    sim = world(fluids=[wt.Block(lower=(0, 0), upper=(1, 0.2))], drains=[empty])
+    sim.advance(1.5)
+    assert sim.count == pytest.approx(0.15 / 0.025**2, abs=1)
+
+
+def test_drains_take_what_they_say():
+    block = wt.Block(lower=(0, 0), upper=(1, 0.3))
+    slow = world(fluids=[block], drains=[wt.Drain(center=(0.5, 0), radius=0.2, flow=0.1, start=0.1, duration=0.5)])
+    count = slow.count
+    slow.advance(1.0)
+    assert count - slow.count == pytest.approx(0.1 * 0.5 / 0.025**2, abs=1)
+    mouth = world(fluids=[block], drains=[wt.Drain(center=(0.5, 0), radius=0.05, direction=(0, 1))])
+    mouth.advance(0.5)
+    gone = count - mouth.count
+    assert 20 < gone < 0.1 * 0.5 * math.sqrt(2 * 9.81 * 0.3) / 0.025**2  # less than Torricelli's jet of that width
+    kill = wt.Drain(shape="outside", lower=(0, 0), upper=(0.6, 0.8))
+    sim = world(fluids=[wt.Block(lower=(0, 0), upper=(0.4, 0.4))], drains=[kill])
+    for _ in range(40):
+        sim.step()
+        assert sim.positions[:, 0].max() <= 0.6
+    assert 0 < sim.stats()["drained"] == 256 - sim.count
+
+
+@pytest.mark.parametrize(
+    ("make", "complaint"),
+    [
+        (lambda: jet(speed=None), "give speed .* or flow"),
+        (lambda: jet(flow=1.0), "the mouth passes 0.15 m.2/s at most, and flow is 1"),
+        (lambda: jet(direction=(0, 0)), "has no direction"),
+        (lambda: wt.Emitter(position=(0, 0, 0), direction=(1, 0, 0), width=0.1, speed=1), "shape is line"),
+        (lambda: wt.Emitter(direction=(1, 0), width=0.1, speed=1), "a line needs position"),
+        (lambda: wt.Emitter(position=(0, 0, 0), direction=(1, 0, 0), radius=1, inner_radius=2, speed=1), "less than"),
+        (lambda: jet(dye="red"), "write it as '#rrggbb'"),
+        (lambda: jet(speed=-1), "speed = -1 is not allowed; it must be a number greater than 0"),
+        (lambda: jet(speed="sin(t)"), "greater than 0"),
+        (lambda: jet(sped=1), "did you mean 'speed'"),
+        (lambda: wt.Drain(center=(0, 0)), "a sphere needs radius"),
+        (lambda: wt.Drain(lower=(0, 0), upper=(0, 1)), "must be greater than that of lower"),
+        (lambda: wt.Drain(lower=(0, 0), upper=(1, 1), suction=3), "suction needs a center"),
+        (lambda: world(jet(feed="sump")), "feed = 'sump' is not the name of a drain"),
+        (lambda: world(jet(position=(1.5, 0.5))), r"emitters\[0\] is inside of a solid or outside of the tank"),
+        (lambda: world(jet(), solids=[wt.Box(center=(0.0, 0.6), size=(0.3, 0.3))]), "is inside of a solid"),
+        (lambda: world(jet(position=(0, 0.6, 0))), "in a 2-D world its shape is line"),
+        (lambda: world(jet(material="oil")), r"emitters\[0\].material = 'oil' is not one"),
+        (lambda: world(jet(name="a"), jet(name="a")), "the name 'a' is used twice"),
+    ],
+)  # fmt: skip
+def test_what_is_no_source_is_told_in_one_sentence(make, complaint):
+    with pytest.raises(wt.WavetankError, match=complaint) as told:
+        make()
+    assert "\n" not in str(told.value)
+
+
+def test_sources_go_to_a_file_and_back_and_scale():
+    gauge = wt.Gauge(lower=(0, 0), upper=(1, 1))
+    scene = wt.Scene(
+        spacing=0.05, tank=wt.Tank(size=(1, 1)), most_particles=5000, when_full="recycle",
+        emitters=[jet(speed="1 + t", level=0.3, gauge=gauge, feed="d")],
+        drains=[wt.Drain(name="d", center=(0.5, 0.5), radius=0.1, flow="0.1*t")],
+    )  # fmt: skip
+    assert wt.Scene.from_text(scene.text()) == scene
+    big = scene.scaled(2.0)
+    assert (big.emitters[0].width, big.emitters[0].level, big.emitters[0].at(1.0).speed) == (0.2, 0.6, 2.0)
+    assert big.drains[0].at(1.0).flow == pytest.approx(0.2)  # a slit twice as wide at the same speed
+
+
+def test_mouths_are_outlined_where_they_are():
+    """What page and window draw over the picture: closed lines, at the pose of the moment."""
+    moved = wt.Emitter(position=(0.3, 0.5, 0.3), direction=(0, 0, 2), size=(0.2, 0.1), speed=1,
+                       motion={"position": ["0.3 + t", 0.5, 0.3]})  # fmt: skip
+    drain = wt.Drain(center=(0.5, 0, 0.3), radius=0.1, direction=(0, 1, 0))
+    scene = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1, 1, 1)), emitters=[moved], drains=[drain])
+    (first, mouth), (second, hole) = outlines(scene, 0.2)
+    assert (first, second) == ("emitter", "drain")
+    assert mouth.min(axis=0) == pytest.approx([0.4, 0.45, 0.3])
+    assert mouth.max(axis=0) == pytest.approx([0.6, 0.55, 0.3])
+    assert np.array_equal(mouth[0], mouth[-1])
+    assert np.linalg.norm(hole - [0.5, 0, 0.3], axis=1) == pytest.approx(0.1)
+    assert hole[:, 1] == pytest.approx(0.0)
