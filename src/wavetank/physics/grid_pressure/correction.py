@@ -44,7 +44,7 @@ from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
 from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
-from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, gaps_at
+from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, gaps_at, open_tents
 from wavetank.physics.grid_pressure.surface import carried_share, depth_at
 from wavetank.physics.mixture import Blend
 from wavetank.physics.pairs import column
@@ -126,7 +126,7 @@ def parts_of(grid: CoarseGrid, cells: Grid):
 @qd.func
 def add_fill(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, team, part, unit, count,
-    mixed: qd.template(),
+    searched: qd.template(), mixed: qd.template(),
 ):  # fmt: skip
     """Add the tents of a team's particles to the sums of a `part`, and those over their weights where `mixed`."""
     lanes = qd.static(cells.lanes)
@@ -139,6 +139,8 @@ def add_fill(
         s = in_cells(grid, predicted(particles, first + lane))
         nodes = corners(grid, qd.floor(s, qd.i32), dim)
         weights = tents(s - qd.floor(s), dim)
+        if qd.static(searched):
+            weights = open_tents(grid, nodes, weights)
         for k in qd.static(range(2**dim)):
             w = unit * weights[k]
             at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
@@ -199,6 +201,8 @@ def add_errors(
         s = in_cells(grid, predicted(particles, first + lane))
         nodes = corners(grid, qd.floor(s, qd.i32), dim)
         weights = tents(s - qd.floor(s), dim)
+        if qd.static(searched):
+            weights = open_tents(grid, nodes, weights)
         filled = 0.0
         for k in qd.static(range(2**dim)):
             filled += weights[k] * grid.fill[nodes[k]]
@@ -240,7 +244,7 @@ def gather(
     for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
         for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
-            add_fill(grid, particles, scratch, cells, team, grid.alone * part_of(turn), e.unit, count, mixed)
+            add_fill(grid, particles, scratch, cells, team, grid.alone * part_of(turn), e.unit, count, searched, mixed)
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
@@ -262,16 +266,16 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.rhs[n] = e.scale * total / qd.max(grid.room[n], e.least_open)
+        grid.rhs[n] = e.scale * total
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
         couple_nodes(grid, piece, e.least_theta)
 
 
 @qd.func
-def slope_across(coupled, edge, difference):
+def slope_across(coupled, area, edge, difference):
     """Derivative of lambda [m] across a face, told from 0 where the face leads into water."""
-    return coupled * edge * difference + (1e-30 if coupled > 0.0 else 0.0)
+    return coupled / area * edge * difference + 1e-30 if coupled > 0.0 else 0.0
 
 
 @qd.func
@@ -304,9 +308,9 @@ def move_particles(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         lam = grid.lam[n]
-        grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
-        grid.slope_y[n] = slope_across(grid.wy[n], grid.dy, grid.lam[n + grid.nx] - lam)
-        grid.slope_z[n] = slope_across(grid.wz[n], grid.dz, grid.lam[n + grid.nx * grid.ny] - lam)
+        grid.slope_x[n] = slope_across(grid.wx[n], grid.area_x[n], grid.dx, grid.lam[n + 1] - lam)
+        grid.slope_y[n] = slope_across(grid.wy[n], grid.area_y[n], grid.dy, grid.lam[n + grid.nx] - lam)
+        grid.slope_z[n] = slope_across(grid.wz[n], grid.area_z[n], grid.dz, grid.lam[n + grid.nx * grid.ny] - lam)
     for turn in range(turns(cells, count)):
         for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
             first = team * cells.lanes
