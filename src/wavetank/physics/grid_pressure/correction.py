@@ -71,7 +71,7 @@ DAMPING = 0.1  # of a frame: the length of a step that damps as much, docs/noteb
 LARGEST_CARRIED = 1.2  # of gravity
 SUPPORTED = 0.5  # d: depth from which on the grid carries a particle in full, that of the top layer at rest
 FADE = 1.0  # d: by how much higher it carries nothing
-MISSING = 1.0 / 3.0  # of a wall's answer, over what it gives: all of what lacks, docs/notebook/grid-pressure.md
+MISSING = 0.5  # of a wall's answer, over what it gives: what lacks, docs/notebook/calm.md
 FULL = 0.97  # fill that cells without gaps have at least, also where few rows of particles do not match them
 GAP_SHARE = 6.0  # by which errors are less, of what lacks there
 
