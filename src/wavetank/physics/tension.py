@@ -111,7 +111,7 @@ def adhesion_table(dim: int, ratio: float) -> np.ndarray:
 def largest_tension(fluid: Properties, dim: int, ratio: float, d: float, dt: float) -> float:
     """Return the tension [N/m] whose bonds turn the stiffest particle by `TURN` in a step of `dt` [s].
 
-    A wall that pulls more than half of what the fluid itself does makes particles stiffer, by `WETTED` times the excess.
+    A wall that pulls more than half as much as the fluid does makes particles stiffer, by `WETTED` times the excess.
     """
     flat = flat_surface(dim, ratio)
     stiffness = flat.stiffness * (1.0 + WETTED * max(0.0, math.cos(math.radians(fluid.contact_angle))))
