@@ -31,10 +31,7 @@ def filled(level, heights) -> None:
     """Water up to `heights` [cells] in every column of a 2-D level, and no solid."""
     rows = np.arange(level.ny)[:, None]
     fill = np.clip(np.asarray(heights)[None, :] - rows, 0.0, 1.0)
-    whole, inside_x, inside_y = np.ones_like(fill), np.ones_like(fill), np.ones_like(fill)
-    inside_x[:, -1] = inside_y[-1] = 0.0
-    given = ((level.fill, fill), (level.room, whole), (level.density, whole))
-    for array, values in (*given, (level.area_x, inside_x), (level.area_y, inside_y)):
+    for array, values in ((level.fill, fill), (level.room, np.ones_like(fill)), (level.density, np.ones_like(fill))):
         whole = array.to_numpy()
         whole[: values.size] = values.ravel()
         array.from_numpy(whole)
@@ -251,8 +248,8 @@ def inner(level, name: str) -> np.ndarray:
     return getattr(level, name).to_numpy()[:nodes].reshape(level.nz, level.ny, level.nx)
 
 
-def test_cells_and_faces_are_as_open_as_a_box_leaves_them():
-    """Against overlaps of intervals, for a box that matches no cell: through a cell must flow what a face lets in."""
+def test_cells_are_as_open_as_a_box_leaves_them():
+    """Against overlaps of intervals, for a box that matches no cell; what is near it is not clear of solids."""
     low, high = np.array([0.317, 0.0, 0.223]), np.array([0.57, 0.33, 0.47])
     box = wt.Box(name="box", center=tuple((low + high) / 2), size=tuple(high - low))
     water = wt.Block(lower=(0, 0, 0), upper=(0.2, 0.3, 0.6))
@@ -267,14 +264,8 @@ def test_cells_and_faces_are_as_open_as_a_box_leaves_them():
     room = 1.0 - z[:, None, None] * y[None, :, None] * x[None, None, :]
     is_open = room > coarse_pressure.LEAST_OPEN
     np.testing.assert_allclose(inner(level, "room")[is_open], room[is_open], atol=0.06)
-    above = level.dy * np.arange(1, level.ny)
-    through = ((above > low[1]) & (above < high[1])).astype(float)
-    area = 1.0 - z[:, None, None] * through[None, :, None] * x[None, None, :]
-    leads = is_open[:, 1:] & is_open[:, :-1] & (area > coarse_pressure.LEAST_OPEN)
-    found = inner(level, "area_y")
-    np.testing.assert_allclose(found[:, :-1][leads], area[leads], atol=0.06)
-    assert ((area[leads] > 0.2) & (area[leads] < 0.8)).any() and not found[:, -1].any()
-    assert not found[:, :-1][~(is_open[:, 1:] & is_open[:, :-1])].any()
+    near = inner(level, "clear") == 0.0
+    assert near[room < 0.999].all() and not near.all()
 
 
 def test_water_beside_a_solid_fills_its_cells():

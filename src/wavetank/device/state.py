@@ -89,14 +89,11 @@ class CoarseGrid:
     mass_sums: qd.types.ndarray()  # i32 [parts * nodes]: of the tents times densities, where these differ
     room: qd.types.ndarray()  # f32 [nodes]: share of the cell that no solid takes, 0 where next to nothing is left
     clear: qd.types.ndarray()  # f32 [nodes]: 1 where no solid is within two cells, else 0
-    area_x: qd.types.ndarray()  # f32 [nodes]: open share of the face to the next node along x
-    area_y: qd.types.ndarray()  # likewise
-    area_z: qd.types.ndarray()  # likewise
     fill: qd.types.ndarray()  # f32 [nodes]: water over room
     gaps: qd.types.ndarray()  # f32 [nodes]: share of the room that is free between rows of particles
     depth: qd.types.ndarray()  # f32 [nodes], m: depth below the surface that the volume of the water has
     density: qd.types.ndarray()  # f32 [nodes]: mean density over that of the heaviest fluid
-    rhs: qd.types.ndarray()  # f32 [nodes]: density error over the stiffness, of the room, over the cell
+    rhs: qd.types.ndarray()  # f32 [nodes]: mean density error over the stiffness
     wx: qd.types.ndarray()  # f32 [nodes], 1/m^2: coupling with the next node along x
     wy: qd.types.ndarray()  # likewise
     wz: qd.types.ndarray()  # likewise

@@ -31,8 +31,8 @@ Where we differ, and why:
   what pressed it in the last one, and only the change comes afterwards: the incremental projection of Goda 1979
   (10.1016/0021-9991(79)90088-3; Guermond et al. 2006, 10.1016/j.cma.2005.10.010). w = `CARRIED` k / (`HALF` + k) of the
   `thickness` k: thin water carries nothing here, it would keep its noise. docs/notebook/viscosity.md has the figures.
-- At rest nearly all of it is carried on (`CALM`). With a fifth left out, honey begins each step falling, walls hold that
-  back, and so carried a third of its weight: it crept up the walls and down between them, for ever.
+- At rest nearly all of it is carried on (`CALM`). With a fifth left out, honey began each step falling; as walls hold
+  that back, they bore a third of its weight: it crept up them, and down between them, for ever.
 """
 
 import dataclasses

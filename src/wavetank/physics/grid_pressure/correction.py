@@ -71,7 +71,7 @@ DAMPING = 0.1  # of a frame: the length of a step that damps as much, docs/noteb
 LARGEST_CARRIED = 1.2  # of gravity
 SUPPORTED = 0.5  # d: depth from which on the grid carries a particle in full, that of the top layer at rest
 FADE = 1.0  # d: by how much higher it carries nothing
-MISSING = 0.5  # of a wall's answer, over what it gives: what lacks, docs/notebook/calm.md
+MISSING = 1.0 / 3.0  # of a wall's answer, over what it gives: all of what lacks, docs/notebook/grid-pressure.md
 FULL = 0.97  # fill that cells without gaps have at least, also where few rows of particles do not match them
 GAP_SHARE = 6.0  # by which errors are less, of what lacks there
 
@@ -266,16 +266,16 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.rhs[n] = e.scale * total
+        grid.rhs[n] = e.scale * total / qd.max(grid.room[n], e.least_open)
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
         couple_nodes(grid, piece, e.least_theta)
 
 
 @qd.func
-def slope_across(coupled, area, edge, difference):
+def slope_across(coupled, edge, difference):
     """Derivative of lambda [m] across a face, told from 0 where the face leads into water."""
-    return coupled / area * edge * difference + 1e-30 if coupled > 0.0 else 0.0
+    return coupled * edge * difference + (1e-30 if coupled > 0.0 else 0.0)
 
 
 @qd.func
@@ -308,9 +308,9 @@ def move_particles(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         lam = grid.lam[n]
-        grid.slope_x[n] = slope_across(grid.wx[n], grid.area_x[n], grid.dx, grid.lam[n + 1] - lam)
-        grid.slope_y[n] = slope_across(grid.wy[n], grid.area_y[n], grid.dy, grid.lam[n + grid.nx] - lam)
-        grid.slope_z[n] = slope_across(grid.wz[n], grid.area_z[n], grid.dz, grid.lam[n + grid.nx * grid.ny] - lam)
+        grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
+        grid.slope_y[n] = slope_across(grid.wy[n], grid.dy, grid.lam[n + grid.nx] - lam)
+        grid.slope_z[n] = slope_across(grid.wz[n], grid.dz, grid.lam[n + grid.nx * grid.ny] - lam)
     for turn in range(turns(cells, count)):
         for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
             first = team * cells.lanes

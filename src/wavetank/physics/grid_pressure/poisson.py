@@ -8,8 +8,7 @@ time step before: pressures that are carried over make water pulse (docs/noteboo
     code    symbol     meaning                                                      unit
     fill    f          water in the tent of a node, over the room that it has       1
     theta              distance of the surface from the water's node, in edges      1
-    wx      w          coupling with the next node along x, A / (theta dx^2 rho)    1/m^2
-    area    A          open share of a face                                         1
+    wx      w          coupling with the next node along x, 1 / (theta dx^2 rho)    1/m^2
     lam     lambda     multiplier                                                   m^2
 """
 
@@ -54,10 +53,10 @@ def block_threads():
 
 
 @qd.func
-def coupling(grid: CoarseGrid, n, m, area, edge, least_theta):
+def coupling(grid: CoarseGrid, n, m, edge, least_theta):
     """What the face between the nodes `n` and `m` couples them with [1/m^2]: 0 into solids and between air and air.
 
-    It is the open `area` over the density, that of the heaviest fluid being 1, and over the square of the distance.
+    It is the inverse of the density, that of the heaviest fluid being 1, over the square of the distance.
     """
     a = qd.min(grid.fill[n], 1.0) - 0.5
     b = qd.min(grid.fill[m], 1.0) - 0.5
@@ -66,7 +65,8 @@ def coupling(grid: CoarseGrid, n, m, area, edge, least_theta):
     # Light fluid gives way more: the inverse of the mean density, and of that of the water where there is air.
     mean = 0.5 * (grid.density[n] + grid.density[m])
     density = qd.select(a <= 0.0, grid.density[m], qd.select(b <= 0.0, grid.density[n], mean))
-    return qd.select(qd.max(a, b) > 0.0, area / qd.max(theta * edge * edge * density, 1e-12), 0.0)
+    is_open = qd.min(qd.max(a, b), qd.min(grid.room[n], grid.room[m])) > 0.0
+    return qd.select(is_open, 1.0 / qd.max(theta * edge * edge * density, 1e-12), 0.0)
 
 
 @qd.func
@@ -88,14 +88,13 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta):
     for lane in range(grid.width):
         x = first + lane
         n = begin + x
-        before_x = qd.select(x > 0, n - 1, rim)
-        wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, rim), grid.area_x[n], grid.dx, least_theta)
-        wy = coupling(grid, n, after_y + x, grid.area_y[n], grid.dy, least_theta)
-        wz = coupling(grid, n, after_z + x, grid.area_z[n], grid.dz, least_theta)
+        wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, rim), grid.dx, least_theta)
+        wy = coupling(grid, n, after_y + x, grid.dy, least_theta)
+        wz = coupling(grid, n, after_z + x, grid.dz, least_theta)
         diagonal = wx + wy + wz
-        diagonal += coupling(grid, n, before_x, grid.area_x[before_x], grid.dx, least_theta)
-        diagonal += coupling(grid, n, before_y + x, grid.area_y[before_y + x], grid.dy, least_theta)
-        diagonal += coupling(grid, n, before_z + x, grid.area_z[before_z + x], grid.dz, least_theta)
+        diagonal += coupling(grid, n, qd.select(x > 0, n - 1, rim), grid.dx, least_theta)
+        diagonal += coupling(grid, n, before_y + x, grid.dy, least_theta)
+        diagonal += coupling(grid, n, before_z + x, grid.dz, least_theta)
         is_water = qd.min(grid.fill[n] - 0.5, qd.min(grid.room[n], diagonal)) > 0.0
         found[0, lane] = wx
         found[1, lane] = wy
@@ -237,25 +236,18 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
     fy = fine.ny // coarse.ny
     fz = fine.nz // coarse.nz
     room, fill, rhs, density = 0.0, 0.0, 0.0, 0.0
-    area_x, area_y, area_z = 0.0, 0.0, 0.0
     for z in range(c[2] * fz, c[2] * fz + fz):
         for y in range(c[1] * fy, c[1] * fy + fy):
             row = fine.nx * (y + fine.ny * z)
             for m in range(row + c[0] * fx, row + c[0] * fx + fx):
                 room += fine.room[m]
                 fill += fine.fill[m] * fine.room[m]
-                rhs += fine.rhs[m]
+                rhs += fine.rhs[m] * fine.room[m]
                 density += fine.density[m] * fine.fill[m] * fine.room[m]
-                area_x += fine.area_x[m] if m == row + c[0] * fx + fx - 1 else 0.0
-                area_y += fine.area_y[m] if y == c[1] * fy + fy - 1 else 0.0
-                area_z += fine.area_z[m] if z == c[2] * fz + fz - 1 else 0.0
     coarse.room[n] = room / (fx * fy * fz)
     coarse.density[n] = density / fill if fill > 0.0 else 1.0
     coarse.fill[n] = fill / qd.max(room, 1e-6)
-    coarse.rhs[n] = rhs / (fx * fy * fz)
-    coarse.area_x[n] = area_x / (fy * fz)
-    coarse.area_y[n] = area_y / (fx * fz)
-    coarse.area_z[n] = area_z / (fx * fy)
+    coarse.rhs[n] = rhs / qd.max(room, 1e-6)
 
 
 @qd.kernel(fastcache=True)

@@ -59,7 +59,7 @@ def place_of(grid: CoarseGrid, c):
 
 @qd.func
 def free_share(solids: SolidSet, center, edges):
-    """Share of a box around `center` with these `edges` [m], 0 for a face across that axis, that no solid takes.
+    """Share of a box around `center` with these `edges` [m], in a 2-D world the last one 0, that no solid takes.
 
     A box that a surface may cross is divided in parts, in each of which surfaces count as planes.
     """
@@ -109,28 +109,9 @@ def clear_at(grid: CoarseGrid, n):
     return 1.0 if room >= 1.0 else 0.0
 
 
-@qd.func
-def open_area(grid: CoarseGrid, solids: SolidSet, n, axis: qd.template(), searched: qd.template()):
-    """Share of the face between node `n` and the next along `axis` that is open: 0 into solids and out of the tank."""
-    c = coordinates(grid, n)
-    area = 1.0 if c[axis] + 1 < qd.Vector([grid.nx, grid.ny, grid.nz])[axis] else 0.0
-    if qd.static(searched):
-        if area > 0.0:
-            center = c + 0.5
-            center[axis] += 0.5
-            edges = place_of(grid, vec3(1.0, 1.0, 1.0))
-            edges[axis] = 0.0
-            stride = qd.Vector([1, grid.nx, grid.nx * grid.ny])[axis]
-            if qd.min(grid.room[n], grid.room[n + stride]) > 0.0:
-                area = free_share(solids, place_of(grid, center), edges)
-            else:
-                area = 0.0
-    return area
-
-
 @qd.kernel(fastcache=True)
 def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: qd.template()):
-    """Find which share of each cell and face is open where solids are `searched`; else the tank ends where cells do."""
+    """Find which share of each cell is open where solids are `searched`; else the tank ends where the cells do."""
     for n in range(grid.nx * grid.ny * grid.nz):
         room = 1.0
         if qd.static(searched):
@@ -141,9 +122,3 @@ def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: 
         if qd.static(searched):
             clear = clear_at(grid, n)
         grid.clear[n] = clear
-        area_x = open_area(grid, solids, n, 0, searched)
-        area_y = open_area(grid, solids, n, 1, searched)
-        area_z = open_area(grid, solids, n, 2, searched)
-        grid.area_x[n] = area_x if area_x >= least_open else 0.0
-        grid.area_y[n] = area_y if area_y >= least_open else 0.0
-        grid.area_z[n] = area_z if area_z >= least_open else 0.0
