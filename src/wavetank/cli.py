@@ -21,9 +21,7 @@ CASE_NAMES = (
     "lock-exchange, martin-moyce, momentum, resolution, rest, seeds, shear-wave, standing-wave, still-tank, "
     "tension-drop"
 )
-Cases = Annotated[
-    list[str], typer.Argument(metavar="[CASE]...", help=f"Of {CASE_NAMES}; all but rest and creep without one.")
-]
+Cases = Annotated[list[str], typer.Argument(metavar="[CASE]...", help=f"{CASE_NAMES}; not rest, creep without one.")]
 SceneName = Annotated[str, typer.Argument(help="A bundled scene or the path of a TOML file.")]
 Settings = Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="Set a key of the scene.")]
 Arch = Annotated[str, typer.Option(help="Back end: cpu, gpu (the best there is), cuda, vulkan, metal, amdgpu.")]
