@@ -17,11 +17,11 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 console = Console(stderr=True)
 
 CASE_NAMES = (
-    "buckling, calm-vorticity, coiling, column, cup, drop, elliptical-drop, emitter, energy, gravity-current, layers, "
-    "lobovsky, lock-exchange, martin-moyce, momentum, resolution, rest, seeds, shear-wave, standing-wave, "
+    "buckling, calm-vorticity, coiling, column, creep, cup, drop, elliptical-drop, emitter, energy, gravity-current, "
+    "layers, lobovsky, lock-exchange, martin-moyce, momentum, resolution, rest, seeds, shear-wave, standing-wave, "
     "still-tank, tension-drop"
 )
-Cases = Annotated[list[str], typer.Argument(metavar="[CASE]...", help=f"Of {CASE_NAMES}; all but rest without one.")]
+Cases = Annotated[list[str], typer.Argument(metavar="[CASE]...", help=f"{CASE_NAMES}; not rest, creep without one.")]
 SceneName = Annotated[str, typer.Argument(help="A bundled scene or the path of a TOML file.")]
 Settings = Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="Set a key of the scene.")]
 Arch = Annotated[str, typer.Option(help="Back end: cpu, gpu (the best there is), cuda, vulkan, metal, amdgpu.")]

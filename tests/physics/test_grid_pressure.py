@@ -242,6 +242,46 @@ def test_threads_together_solve_what_one_does(monkeypatch):
     np.testing.assert_array_equal(*found)
 
 
+def inner(level, name: str) -> np.ndarray:
+    """A quantity of the nodes of a finest level, [z, y, x]."""
+    nodes = level.nx * level.ny * level.nz
+    return getattr(level, name).to_numpy()[:nodes].reshape(level.nz, level.ny, level.nx)
+
+
+def test_cells_are_as_open_as_a_box_leaves_them():
+    """Against overlaps of intervals, for a box that matches no cell; what is near it is not clear of solids."""
+    low, high = np.array([0.317, 0.0, 0.223]), np.array([0.57, 0.33, 0.47])
+    box = wt.Box(name="box", center=tuple((low + high) / 2), size=tuple(high - low))
+    water = wt.Block(lower=(0, 0, 0), upper=(0.2, 0.3, 0.6))
+    sim = Simulation(wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6, 0.6)), fluids=[water], solids=[box]))
+    sim.step()
+    level = sim.world.levels[0]
+    covered = []
+    for count, edge, begin, end in zip((level.nx, level.ny, level.nz), (level.dx, level.dy, level.dz), low, high):
+        first = edge * np.arange(count)
+        covered.append(np.clip(np.minimum(first + edge, end) - np.maximum(first, begin), 0.0, None) / edge)
+    x, y, z = covered
+    room = 1.0 - z[:, None, None] * y[None, :, None] * x[None, None, :]
+    is_open = room > coarse_pressure.LEAST_OPEN
+    np.testing.assert_allclose(inner(level, "room")[is_open], room[is_open], atol=0.06)
+    near = inner(level, "clear") == 0.0
+    assert near[room < 0.999].all() and not near.all()
+
+
+def test_water_beside_a_solid_fills_its_cells():
+    """Tents lose nothing to the cells that a solid takes, as they lose nothing to what is behind a wall of the tank."""
+    d = 0.05
+    box = wt.Box(name="box", center=(0.6, 0.2, 0.4), size=(0.4, 0.4, 0.4))
+    water = wt.Block(lower=(0, 0, 0), upper=(1.2, 0.6, 0.8))
+    sim = Simulation(wt.Scene(spacing=d, tank=wt.Tank(size=(1.2, 0.8, 0.8)), fluids=[water], solids=[box]))
+    sim.step()
+    level = sim.world.levels[0]
+    fill, room = inner(level, "fill"), inner(level, "room")
+    inside = (slice(None), slice(0, int(0.45 / level.dy)), slice(None))
+    assert fill[inside][room[inside] == 1.0].min() > 0.95
+    assert fill[room == 0.0].max() == 0.0 and (room == 0.0).any()
+
+
 def test_the_room_that_solids_leave_follows_them():
     """It is found anew when solids move, swell, come and go, and not while they rest."""
     water = wt.Block(lower=(0, 0, 0), upper=(1.0, 0.3, 0.6))

@@ -318,3 +318,18 @@ def test_without_no_slip_a_body_still_stops_on_the_floor_and_slides():
     sim.advance(math.sqrt(2.0 * 0.3 / 9.81) + 0.05)
     assert abs(sim.velocities[:, 1].mean()) < 0.2
     assert sim.velocities[:, 0].mean() == pytest.approx(1.0, abs=0.1)
+
+
+def test_honey_at_rest_does_not_creep_up_its_walls():
+    """Walls bear nothing of its weight: pressure does, from the start of each step on (hydrostatics)."""
+    honey = {"name": "honey", "density": 1400.0, "viscosity": 70.0}
+    block = {"lower": [0.015, 0], "upper": [0.045, 0.05], "material": "honey"}
+    sim = Simulation(wt.Scene.parse(
+        {"spacing": 0.002, "tank": {"size": [0.06, 0.06]}, "materials": [honey], "fluids": [block]}
+    ))  # fmt: skip
+    sim.advance(3.0)
+    start, height = sim.positions.astype(float), sim.positions[:, 1].mean()
+    sim.advance(2.0)
+    moved = np.linalg.norm(sim.positions - start, axis=1) / 2.0
+    assert moved.max() < 0.002
+    assert sim.positions[:, 1].mean() == pytest.approx(height, rel=2e-3)

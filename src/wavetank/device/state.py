@@ -88,6 +88,7 @@ class CoarseGrid:
     sums: qd.types.ndarray()  # i32 [parts * nodes]: of the tents of particles, then of these times density errors
     mass_sums: qd.types.ndarray()  # i32 [parts * nodes]: of the tents times densities, where these differ
     room: qd.types.ndarray()  # f32 [nodes]: share of the cell that no solid takes, 0 where next to nothing is left
+    clear: qd.types.ndarray()  # f32 [nodes]: 1 where no solid is within two cells, else 0
     fill: qd.types.ndarray()  # f32 [nodes]: water over room
     gaps: qd.types.ndarray()  # f32 [nodes]: share of the room that is free between rows of particles
     depth: qd.types.ndarray()  # f32 [nodes], m: depth below the surface that the volume of the water has

@@ -36,6 +36,7 @@ import numpy as np
 
 from wavetank.device.compiler import qd, upload
 from wavetank.device.state import MARGIN, Coefficients, Grid, Particles, Scratch, remembered, scalars
+from wavetank.foundation.materials import Properties
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import is_near
 from wavetank.physics.integrate import accelerate
@@ -53,6 +54,8 @@ CALIBRATION = {2: 1.35, 3: 0.62}
 QUIET = 0.2  # of the top layer's |g|: what is less is no surface
 #: How far a particle with all bonds of that tension may turn in a step [rad]; at 2 a drop in the plane hardly swings.
 TURN = 1.4
+#: What a wall that is wetted adds to the stiffness: with less, drops of water on walls of 0 and 60 degrees boil.
+WETTED = 2.0
 MEAN_COSINE = {2: 1.0 / math.pi, 3: 0.25}  # of max(cos, 0) over all directions
 
 
@@ -105,16 +108,20 @@ def adhesion_table(dim: int, ratio: float) -> np.ndarray:
     return table
 
 
-def largest_tension(density: float, dim: int, ratio: float, d: float, dt: float) -> float:
-    """Return the tension [N/m] whose bonds turn the stiffest particle by `TURN` in a step of `dt` [s]."""
+def largest_tension(fluid: Properties, dim: int, ratio: float, d: float, dt: float) -> float:
+    """Return the tension [N/m] whose bonds turn the stiffest particle by `TURN` in a step of `dt` [s].
+
+    A wall that pulls more than half as much as the fluid does makes particles stiffer, by `WETTED` times the excess.
+    """
     flat = flat_surface(dim, ratio)
-    return density * d**3 * (TURN * ratio / dt) ** 2 / (flat.bond * flat.stiffness)
+    stiffness = flat.stiffness * (1.0 + WETTED * max(0.0, math.cos(math.radians(fluid.contact_angle))))
+    return fluid.density * d**3 * (TURN * ratio / dt) ** 2 / (flat.bond * stiffness)
 
 
 def limited_tensions(kinds: Blend, dim: int, ratio: float, d: float, dt: float) -> dict[int, float]:
     """Return the tension [N/m] of each material, limited for a time step of `dt` [s]."""
     return {
-        number: min(fluid.surface_tension, largest_tension(fluid.density, dim, ratio, d, dt))
+        number: min(fluid.surface_tension, largest_tension(fluid, dim, ratio, d, dt))
         for number, fluid in kinds.fluids.items()
     }
 
@@ -122,8 +129,7 @@ def limited_tensions(kinds: Blend, dim: int, ratio: float, d: float, dt: float) 
 def substeps_for(kinds: Blend, dim: int, ratio: float, d: float, duration: float) -> int:
     """Return how many time steps within `duration` [s] let every fluid have its full tension."""
     shares = [
-        fluid.surface_tension / largest_tension(fluid.density, dim, ratio, d, duration)
-        for fluid in kinds.fluids.values()
+        fluid.surface_tension / largest_tension(fluid, dim, ratio, d, duration) for fluid in kinds.fluids.values()
     ]
     return max(1, math.ceil(math.sqrt(max(shares))))
 

@@ -5,6 +5,7 @@ from wavetank.lab.cases import (
     calm_vorticity,
     coiling,
     column,
+    creep,
     cup,
     drop,
     elliptical_drop,
@@ -28,7 +29,8 @@ from wavetank.lab.cases.case import Case
 
 CASES: tuple[Case, ...] = (
     still_tank.CASE, column.CASE, martin_moyce.CASE, lobovsky.CASE, standing_wave.CASE, elliptical_drop.CASE,
-    drop.CASE, energy.CASE, rest.CASE, momentum.CASE, cup.CASE, seeds.CASE, resolution.CASE, layers.CASE,
-    lock_exchange.CASE, shear_wave.CASE, gravity_current.CASE, buckling.CASE, coiling.CASE, tension_drop.CASE,
+    drop.CASE, energy.CASE, rest.CASE, creep.CASE, momentum.CASE, cup.CASE, seeds.CASE, resolution.CASE,
+    layers.CASE, lock_exchange.CASE, shear_wave.CASE, gravity_current.CASE, buckling.CASE, coiling.CASE,
+    tension_drop.CASE,
     calm_vorticity.CASE, emitter.CASE,
 )  # fmt: skip

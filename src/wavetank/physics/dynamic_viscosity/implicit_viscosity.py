@@ -36,6 +36,8 @@ Where we differ, and why:
   what pressed it in the last one, and only the change comes afterwards: the incremental projection of Goda 1979
   (10.1016/0021-9991(79)90088-3; Guermond et al. 2006, 10.1016/j.cma.2005.10.010). w = `CARRIED` k / (`HALF` + k) of the
   `thickness` k: thin water carries nothing here, it would keep its noise. docs/notebook/viscosity.md has the figures.
+- At rest nearly all of it is carried on (`CALM`). With a fifth left out, honey began each step falling; as walls hold
+  that back, they bore a third of its weight: it crept up them, and down between them, for ever.
 """
 
 import dataclasses
@@ -71,6 +73,7 @@ LARGEST = 5.0  # of gravity, that is carried on
 AGAIN = 6.0  # times the push of the same step, that is carried on; at rest it is `CARRIED` / (1 - `CARRIED`) = 4.9
 TOUCHING = 0.5  # d: closer to a wall than at rest, what strikes it is held back along the normal as well
 SLIPS = 1e-9  # least share of the drag along a wall, where there should be none
+CALM = 0.9  # share of what is not carried on that is, where nothing moves
 NEAREST = 0.25  # d: closer to a wall than this its drag grows no further
 
 
@@ -205,6 +208,7 @@ class Carrying:
     most: qd.f32  # share of the thickest
     half: qd.f32  # thickness with half of that share
     largest: qd.f32  # m/s^2
+    calm: qd.f32  # share of what is not carried on that is, where nothing moves
     again: qd.f32  # of the push of this step: what has left the floor is not pushed any more
 
 
@@ -219,8 +223,11 @@ def carry_pressure(particles: Particles, rows: qd.types.ndarray(), c: Coefficien
         pushed = predicted(particles, i) - free_motion(particles.x[i], particles.v[i], c)
         a = particles.a[i] + pushed / (c.dt * c.dt)
         thick = carrying.rate * row[0] * row[1]
-        share = carrying.most * thick / (carrying.half + thick)
-        limit = qd.min(carrying.largest, carrying.again * pushed.norm() / (c.dt * c.dt))
+        way = predicted(particles, i) - particles.x[i]
+        passed = 1.0 - carrying.calm * qd.max(0.0, 1.0 - way.norm_sqr() * c.slow / (c.dt * c.dt))
+        share = 1.0 - (1.0 - carrying.most) * passed
+        share *= thick / (carrying.half + thick)
+        limit = qd.min(carrying.largest, carrying.again / passed * pushed.norm() / (c.dt * c.dt))
         particles.a[i] = a * (share * qd.min(1.0, limit / qd.max(a.norm(), 1e-12)))
 
 
@@ -284,7 +291,7 @@ def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficie
 def carry_on(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
     """Let thick fluids carry on a share of what pressed them in this step."""
     rate, largest = thickness(1.0 / kinds.largest_density, params, c.dt), LARGEST * math.hypot(*params.gravity)
-    carrying = remembered(Carrying(rate=rate, most=CARRIED, half=HALF, largest=largest, again=AGAIN))
+    carrying = remembered(Carrying(rate=rate, most=CARRIED, half=HALF, largest=largest, again=AGAIN, calm=CALM))
     carry_pressure(world.particles, world.fluids.rows, c, carrying, world.count)
 
 

@@ -46,7 +46,15 @@ from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_s
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
-from wavetank.physics.grid_pressure.room import LEAST_OPEN, below_roof, close_slit, find_room, gaps_at, in_part
+from wavetank.physics.grid_pressure.room import (
+    LEAST_OPEN,
+    below_roof,
+    close_slit,
+    find_room,
+    gaps_at,
+    in_part,
+    open_tents,
+)
 from wavetank.physics.grid_pressure.surface import carried_share, depth_at
 from wavetank.physics.mixture import Blend
 from wavetank.physics.pairs import column
@@ -132,7 +140,7 @@ def parts_of(grid: CoarseGrid, cells: Grid):
 @qd.func
 def add_fill(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, team, part, unit, count,
-    mixed: qd.template(),
+    searched: qd.template(), mixed: qd.template(),
 ):  # fmt: skip
     """Add the tents of a team's particles to the sums of a `part`, and those over their weights where `mixed`."""
     lanes = qd.static(cells.lanes)
@@ -145,6 +153,8 @@ def add_fill(
         s = in_cells(grid, predicted(particles, first + lane))
         nodes = corners(grid, qd.floor(s, qd.i32), dim)
         weights = tents(s - qd.floor(s), dim)
+        if qd.static(searched):
+            weights = open_tents(grid, nodes, weights)
         for k in qd.static(range(2**dim)):
             w = unit * weights[k]
             at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
@@ -205,6 +215,8 @@ def add_errors(
         s = in_cells(grid, predicted(particles, first + lane))
         nodes = corners(grid, qd.floor(s, qd.i32), dim)
         weights = tents(s - qd.floor(s), dim)
+        if qd.static(searched):
+            weights = open_tents(grid, nodes, weights)
         filled = 0.0
         for k in qd.static(range(2**dim)):
             filled += weights[k] * grid.fill[nodes[k]]
@@ -246,7 +258,7 @@ def gather(
     for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
         for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
-            add_fill(grid, particles, scratch, cells, team, grid.alone * part_of(turn), e.unit, count, mixed)
+            add_fill(grid, particles, scratch, cells, team, grid.alone * part_of(turn), e.unit, count, searched, mixed)
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)

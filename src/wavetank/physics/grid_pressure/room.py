@@ -9,24 +9,86 @@ LEAST_OPEN = 0.1  # a cell that is less open is solid
 
 
 @qd.func
+def sample_parts():
+    """Parts along each edge of a cell that a surface crosses."""
+    return 4
+
+
+@qd.func
+def open_tents(grid: CoarseGrid, nodes, weights: qd.template()):
+    """The `weights` of `nodes` that have room, as shares of their sum; all of them where none has room.
+
+    Water that stands beside a solid counts at the nodes outside, as beside a wall of the tank at the nearest alone.
+    """
+    result = weights
+    total = 0.0
+    for k in qd.static(range(weights.n)):
+        result[k] = weights[k] if grid.room[nodes[k]] > 0.0 else 0.0
+        total += result[k]
+    for k in qd.static(range(weights.n)):
+        result[k] = result[k] / total if total > 1e-6 else weights[k]
+    return result
+
+
+@qd.func
 def gaps_at(grid: CoarseGrid, n, full):
     """How far even the fullest two cells in a row are from `full`, of those around node `n`.
 
     0 near solids, since what room these leave is known only roughly.
     """
-    fullest, room = 0.0, grid.room[n]
-    for axis in qd.static(range(3)):
-        for side in qd.static((-1, 1)):
-            if grid.nz > 1 or axis < 2:
-                c = coordinates(grid, n)
-                before = grid.fill[n]
-                for _ in qd.static(range(2)):
-                    c[axis] += side
-                    at = nearest(grid, c)
-                    fullest = qd.max(fullest, 0.5 * (before + grid.fill[at]))
-                    room = qd.min(room, grid.room[at])
-                    before = grid.fill[at]
-    return qd.max(full - fullest, 0.0) if room >= 1.0 else 0.0
+    fullest = 0.0
+    if grid.clear[n] > 0.0:
+        for axis in qd.static(range(3)):
+            for side in qd.static((-1, 1)):
+                if grid.nz > 1 or axis < 2:
+                    c = coordinates(grid, n)
+                    before = grid.fill[n]
+                    for _ in qd.static(range(2)):
+                        c[axis] += side
+                        at = nearest(grid, c)
+                        fullest = qd.max(fullest, 0.5 * (before + grid.fill[at]))
+                        before = grid.fill[at]
+    return qd.max(full - fullest, 0.0) if grid.clear[n] > 0.0 else 0.0
+
+
+@qd.func
+def place_of(grid: CoarseGrid, c):
+    """The place [m] with the coordinates `c` in cells from the tank's corner; z = 0 in 2-D."""
+    return vec3(c[0] * grid.dx, c[1] * grid.dy, c[2] * grid.dz if grid.nz > 1 else 0.0)
+
+
+@qd.func
+def free_share(solids: SolidSet, center, edges):
+    """Share of a box around `center` with these `edges` [m], in a 2-D world the last one 0, that no solid takes.
+
+    A box that a surface may cross is divided in parts, in each of which surfaces count as planes.
+    """
+    share = 1.0
+    radius = 0.5 * edges.norm()
+    near = 0
+    for k in range(solids.tank_count, solids.count):
+        if (center - solids.position[k]).norm() < solids.reach[k] + radius:
+            distance = signed_distance(solids, k, center).w
+            share = 0.0 if distance <= -radius else share
+            near |= qd.cast(qd.abs(distance) < radius, qd.i32)
+    if near == 1 and share > 0.0:
+        parts = qd.Vector([sample_parts() if edges[axis] > 0.0 else 1 for axis in qd.static(range(3))])
+        edge = vec3(edges.x / parts[0], edges.y / parts[1], edges.z / parts[2])
+        total = 0.0
+        for sample in range(parts[0] * parts[1] * parts[2]):
+            number = qd.Vector([sample % parts[0], sample // parts[0] % parts[1], sample // (parts[0] * parts[1])])
+            place = center
+            for axis in qd.static(range(3)):
+                place[axis] += (number[axis] + 0.5) * edge[axis] - 0.5 * edges[axis]
+            free = 1.0
+            for k in range(solids.tank_count, solids.count):
+                if free > 0.0 and (place - solids.position[k]).norm() < solids.reach[k] + radius:
+                    value = signed_distance(solids, k, place)
+                    extent = qd.abs(value.x) * edge.x + qd.abs(value.y) * edge.y + qd.abs(value.z) * edge.z
+                    free = qd.min(free, 0.5 + value.w / qd.max(extent, 1e-3 * radius))
+            total += qd.max(free, 0.0)
+        share = total / (parts[0] * parts[1] * parts[2])
+    return share if share < 0.9999 else 1.0  # rounding is no solid
 
 
 @qd.func
@@ -78,19 +140,19 @@ def close_slit(grid: CoarseGrid, n, surely, full):
 @qd.func
 def open_share(grid: CoarseGrid, solids: SolidSet, n):
     """Share of the cell of node `n` that no solid takes."""
+    return free_share(solids, place_of(grid, coordinates(grid, n) + 0.5), place_of(grid, vec3(1.0, 1.0, 1.0)))
+
+
+@qd.func
+def clear_at(grid: CoarseGrid, n):
+    """1 where no solid takes room within two cells of node `n`, diagonals included; else 0."""
     c = coordinates(grid, n)
-    center = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
-    edge = qd.min(grid.dx, grid.dy)
-    if grid.nz > 1:
-        edge = qd.min(edge, grid.dz)
-    else:
-        center.z = 0.0
     room = 1.0
-    for k in range(solids.count):
-        if k < solids.tank_count or (center - solids.position[k]).norm() < solids.reach[k] + 0.5 * edge:
-            if room > 0.0:
-                room = qd.min(room, 0.5 + signed_distance(solids, k, center).w / edge)
-    return qd.max(room, 0.0)
+    for z in range(qd.max(c[2] - 2, 0), qd.min(c[2] + 3, grid.nz)):
+        for y in range(qd.max(c[1] - 2, 0), qd.min(c[1] + 3, grid.ny)):
+            for x in range(qd.max(c[0] - 2, 0), qd.min(c[0] + 3, grid.nx)):
+                room = qd.min(room, grid.room[x + grid.nx * (y + grid.ny * z)])
+    return 1.0 if room >= 1.0 else 0.0
 
 
 @qd.kernel(fastcache=True)
@@ -101,3 +163,8 @@ def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: 
         if qd.static(searched):
             room = open_share(grid, solids, n)
         grid.room[n] = room if room >= least_open else 0.0
+    for n in range(grid.nx * grid.ny * grid.nz):
+        clear = 1.0
+        if qd.static(searched):
+            clear = clear_at(grid, n)
+        grid.clear[n] = clear
