@@ -13,8 +13,11 @@ from typing import TYPE_CHECKING, Any
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import PARAMETERS, PRESETS
 from wavetank.foundation.version import VERSION
+from wavetank.scene.filled import Filled
 from wavetank.scene.fluids import Ball, Block, Points
 from wavetank.scene.scene import Scene, Tank, bundled_scenes
+from wavetank.solids.ground.height_field import HeightField
+from wavetank.solids.ground.polygon import Polygon
 from wavetank.solids.meshes.mesh import Mesh
 from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
 
@@ -30,8 +33,8 @@ if TYPE_CHECKING:
 __version__ = VERSION
 
 __all__ = [
-    "PARAMETERS", "PRESETS", "Ball", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference", "HalfSpace",
-    "Intersection", "Mesh", "Points", "Recording", "Scene", "Session", "Simulation", "Sphere", "Tank", "Union",
+    "PARAMETERS", "PRESETS", "Ball", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference", "Filled",
+    "HalfSpace", "HeightField", "Intersection", "Mesh", "Points", "Polygon", "Recording", "Scene", "Session", "Simulation", "Sphere", "Tank", "Union",
     "WavetankError", "__version__", "bundled_scenes", "commands", "render", "replay", "show",
 ]  # fmt: skip
 

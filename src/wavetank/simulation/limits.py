@@ -18,7 +18,7 @@ def count_steps(
     world: World, scene: Scene, solids: MovingSolids, ledger: Ledger, forces: Sequence[Force], duration: float
 ) -> float:
     """Return how many time steps make up `duration` [s], no whole number."""
-    box = (np.zeros(scene.dim), np.array(scene.tank.size)) if scene.tank else ledger.start_box
+    box = scene.tank.box() if scene.tank else ledger.start_box
     speed = max(_solid_speed(scene, solids, duration), largest_speed(world.particles, world.count))
     speed += duration * sum(force.largest_acceleration() for force in forces)
     return steps_in(world, scene, duration, speed, box, forced=bool(forces))

@@ -29,6 +29,7 @@ from wavetank.simulation import limits
 from wavetank.simulation import snapshot as snapshots
 from wavetank.simulation.arrays import check_newcomers
 from wavetank.simulation.contents import Contents
+from wavetank.simulation.filling import fill
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids
@@ -47,14 +48,15 @@ class Simulation(Contents):
 
     def reset(self) -> None:
         """Put everything back to the start of the scene."""
-        positions, velocities = self.scene.particles()
+        start = fill(self.scene, lambda scene: type(self)(scene, self.arch or "cpu"))
+        positions, velocities = start.particles()
         self.solids = MovingSolids(self._walls(), self.scene.solids, self.scene.friction, self.scene.spacing)
         self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
         self.pushed: list[Force] = []  # these in the next one only
         self.ledger = Ledger()
         self._fill(len(positions))
-        free = self.solids.find_free_places(self.scene, positions, self.world.particles)
-        self.add(positions[free], velocities[free], materials=self.scene.kinds()[free])
+        free = self.solids.find_free_places(start, positions, self.world.particles)
+        self.add(positions[free], velocities[free], materials=start.kinds()[free])
         box = positions[free] if free.any() else np.zeros((1, self.scene.dim))
         self.ledger.start_box = (box.min(axis=0), box.max(axis=0))
         self.seconds_per_frame = math.nan  # that the last frame took to compute
@@ -68,6 +70,7 @@ class Simulation(Contents):
         walls = Walls(vectors(2, len(table)))
         compiler.upload(walls.table, table)
         size = scene.tank.size if scene.tank else None
+        levels = new_levels(scene.tank.box(), h) if scene.tank else []
         self.world = World(
             grid=new_grid(dim, capacity, size, h, list_room(dim, scene.support)),  # first: it may be refused
             particles=new_particles(dim, capacity),
@@ -79,7 +82,7 @@ class Simulation(Contents):
             materials={},
             count=0,
             has_friction=self.solids.has_friction,
-            levels=new_levels(size, h) if size else [],
+            levels=levels,
         )
         self.ledger.capacity, self._outdated = capacity, True
 

@@ -61,8 +61,14 @@ def grids():
     return 1 << 16
 
 
-STACK, UNION, INTERSECTION, DIFFERENCE, GRIDS = (
-    code.fn() for code in (deepest, union, intersection, difference, grids)
+@qd.func
+def around():
+    """Reach [m] of a container, which is all but its hollow: pictures look through it at what it holds."""
+    return 4.0e5
+
+
+STACK, UNION, INTERSECTION, DIFFERENCE, GRIDS, AROUND = (
+    code.fn() for code in (deepest, union, intersection, difference, grids, around)
 )
 
 

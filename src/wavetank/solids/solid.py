@@ -8,6 +8,7 @@ from pydantic import Field
 
 from wavetank.foundation.model import Model, Number, Quaternion
 from wavetank.foundation.rotations import product, turned, unit_quaternion
+from wavetank.solids.distance import DIFFERENCE, DISTANCES, box_distance
 
 Floats = Sequence[float] | np.ndarray
 ENDLESS = 1.0e5  # half size [m] of what has no end
@@ -59,6 +60,10 @@ class Solid(Model):
         """Radius [m] around the origin that holds the whole solid."""
         raise NotImplementedError
 
+    def span(self) -> float:
+        """Radius [m] around the origin that holds its surface: that of a container, which has no end, is its hollow."""
+        return self.reach()
+
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
         """Name every point or size of this solid, to check that all live in one dimension."""
         return []
@@ -69,3 +74,8 @@ def point_in_space(vector: Sequence[float]) -> np.ndarray:
     point = np.zeros(3)
     point[: len(vector)] = vector
     return point
+
+
+def all_but(nodes: list[Node]) -> list[Node]:
+    """Return the program of all of space but the solid with the program `nodes`."""
+    return [Node(DISTANCES.index(box_distance), [ENDLESS] * 3), *nodes, Node(DIFFERENCE)]

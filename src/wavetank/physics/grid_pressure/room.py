@@ -34,6 +34,7 @@ def open_share(grid: CoarseGrid, solids: SolidSet, n):
     """Share of the cell of node `n` that no solid takes."""
     c = coordinates(grid, n)
     center = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
+    center += vec3(grid.x0, grid.y0, grid.z0)
     edge = qd.min(grid.dx, grid.dy)
     if grid.nz > 1:
         edge = qd.min(edge, grid.dz)
