@@ -43,8 +43,8 @@ from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scr
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
 from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
-from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
-from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, gaps_at
+from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, open_area, solve_levels
+from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, gaps_at, open_tents
 from wavetank.physics.grid_pressure.surface import carried_share, depth_at
 from wavetank.physics.mixture import Blend
 from wavetank.physics.pairs import column
@@ -124,9 +124,15 @@ def parts_of(grid: CoarseGrid, cells: Grid):
 
 
 @qd.func
+def weights_at(grid: CoarseGrid, nodes: qd.template(), s, dim: qd.template(), searched: qd.template()):
+    """Weights of the `nodes` around the place `s` [cells]: tents, which solids cut where they are `searched`."""
+    return open_tents(grid, nodes, s, dim) if qd.static(searched) else tents(s - qd.floor(s), dim)
+
+
+@qd.func
 def add_fill(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, team, part, unit, count,
-    mixed: qd.template(),
+    searched: qd.template(), mixed: qd.template(),
 ):  # fmt: skip
     """Add the tents of a team's particles to the sums of a `part`, and those over their weights where `mixed`."""
     lanes = qd.static(cells.lanes)
@@ -138,7 +144,7 @@ def add_fill(
     for lane in range(lanes):
         s = in_cells(grid, predicted(particles, first + lane))
         nodes = corners(grid, qd.floor(s, qd.i32), dim)
-        weights = tents(s - qd.floor(s), dim)
+        weights = weights_at(grid, nodes, s, dim, searched)
         for k in qd.static(range(2**dim)):
             w = unit * weights[k]
             at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
@@ -198,7 +204,7 @@ def add_errors(
     for lane in range(lanes):
         s = in_cells(grid, predicted(particles, first + lane))
         nodes = corners(grid, qd.floor(s, qd.i32), dim)
-        weights = tents(s - qd.floor(s), dim)
+        weights = weights_at(grid, nodes, s, dim, searched)
         filled = 0.0
         for k in qd.static(range(2**dim)):
             filled += weights[k] * grid.fill[nodes[k]]
@@ -240,7 +246,7 @@ def gather(
     for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
         for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
-            add_fill(grid, particles, scratch, cells, team, grid.alone * part_of(turn), e.unit, count, mixed)
+            add_fill(grid, particles, scratch, cells, team, grid.alone * part_of(turn), e.unit, count, searched, mixed)
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
@@ -262,16 +268,17 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.rhs[n] = e.scale * total / qd.max(grid.room[n], e.least_open)
+        grid.rhs[n] = e.scale * total
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
         couple_nodes(grid, piece, e.least_theta)
 
 
 @qd.func
-def slope_across(coupled, edge, difference):
-    """Derivative of lambda [m] across a face, told from 0 where the face leads into water."""
-    return coupled * edge * difference + (1e-30 if coupled > 0.0 else 0.0)
+def slope_across(grid: CoarseGrid, coupled, edge, n, m):
+    """Derivative of lambda [m] across the face from node `n` to `m`, told from 0 where it leads into water."""
+    area = qd.max(open_area(grid, n, m), 1e-3)
+    return coupled / area * edge * (grid.lam[m] - grid.lam[n]) + (1e-30 if coupled > 0.0 else 0.0)
 
 
 @qd.func
@@ -303,10 +310,9 @@ def move_particles(
     """
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
-        lam = grid.lam[n]
-        grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
-        grid.slope_y[n] = slope_across(grid.wy[n], grid.dy, grid.lam[n + grid.nx] - lam)
-        grid.slope_z[n] = slope_across(grid.wz[n], grid.dz, grid.lam[n + grid.nx * grid.ny] - lam)
+        grid.slope_x[n] = slope_across(grid, grid.wx[n], grid.dx, n, n + 1)
+        grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, n + grid.nx)
+        grid.slope_z[n] = slope_across(grid, grid.wz[n], grid.dz, n, n + grid.nx * grid.ny)
     for turn in range(turns(cells, count)):
         for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
             first = team * cells.lanes
@@ -341,7 +347,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     """
     finest, cells, count, searched = world.levels[0], world.grid, world.count, int(world.has_solids)
     if world.room_version != world.solids_version:
-        find_room(finest, world.solids, LEAST_OPEN, searched)
+        find_room(finest, world.solids, LEAST_OPEN, searched, params.dim)
         world.room_version = world.solids_version
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     few = int(not is_shared(finest))

@@ -2,10 +2,10 @@
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import coordinates, nearest
-from wavetank.solids.distance import SolidSet, signed_distance, vec3
+from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, nearest, tents
+from wavetank.solids.distance import SolidSet, signed_distance, vec3, vec4
 
-LEAST_OPEN = 0.1  # a cell that is less open is solid
+LEAST_OPEN = 0.25  # a cell that is less open is solid
 
 
 @qd.func
@@ -30,29 +30,114 @@ def gaps_at(grid: CoarseGrid, n, full):
 
 
 @qd.func
-def open_share(grid: CoarseGrid, solids: SolidSet, n):
-    """Share of the cell of node `n` that no solid takes."""
+def nearest_wall(grid: CoarseGrid, solids: SolidSet, n):
+    """(gradient, distance [m]) of the solid nearest to node `n`; far away where none is near its cell."""
     c = coordinates(grid, n)
     center = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
     center += vec3(grid.x0, grid.y0, grid.z0)
+    edge = longest_edge(grid)
+    if grid.nz == 1:
+        center.z = 0.0
+    nearest = vec4(0.0, 1.0, 0.0, 2.0 * edge)
+    for k in range(solids.tank_count, solids.count):
+        if (center - solids.position[k]).norm() < solids.reach[k] + 2.0 * edge and nearest.w > -2.0 * edge:
+            value = signed_distance(solids, k, center)
+            if value.w < nearest.w:
+                nearest = value
+    return nearest
+
+
+@qd.func
+def longest_edge(grid: CoarseGrid):
+    """Longest edge of a cell [m]."""
+    edge = qd.max(grid.dx, grid.dy)
+    if grid.nz > 1:
+        edge = qd.max(edge, grid.dz)
+    return edge
+
+
+@qd.func
+def free_of(wall, way, edge):
+    """Share that is free of a piece of a cell with that `edge` [m], a `way` from the place where the wall was asked."""
+    return qd.min(qd.max(0.5 + (wall.w + way.dot(vec3(wall.x, wall.y, wall.z))) / edge, 0.0), 1.0)
+
+
+@qd.func
+def kept_wall(grid: CoarseGrid, n):
+    """What `nearest_wall` has found."""
+    return vec4(grid.slope_x[n], grid.slope_y[n], grid.slope_z[n], grid.lam[n])
+
+
+@qd.func
+def open_share(grid: CoarseGrid, n):
+    """Share of the cell of node `n` that no solid takes."""
     edge = qd.min(grid.dx, grid.dy)
     if grid.nz > 1:
         edge = qd.min(edge, grid.dz)
-    else:
-        center.z = 0.0
-    room = 1.0
-    for k in range(solids.count):
-        if k < solids.tank_count or (center - solids.position[k]).norm() < solids.reach[k] + 0.5 * edge:
-            if room > 0.0:
-                room = qd.min(room, 0.5 + signed_distance(solids, k, center).w / edge)
-    return qd.max(room, 0.0)
+    return free_of(kept_wall(grid, n), vec3(0.0, 0.0, 0.0), edge)
+
+
+@qd.func
+def share_of_tents(grid: CoarseGrid, n, dim: qd.template()):
+    """Room that node `n` has for water, in cells: what free places count at it, as particles there would.
+
+    Pieces of half an edge in the cells around are asked. Next to nodes without room the others have their share.
+    """
+    own = coordinates(grid, n)
+    edges = vec3(grid.dx, grid.dy, grid.dz)
+    edge = 0.5 * qd.min(grid.dx, grid.dy)
+    if grid.nz > 1:
+        edge = qd.min(edge, 0.5 * grid.dz)
+    total = 0.0
+    for k in range(qd.static(6**dim)):
+        # Pieces, numbered from -3 to 2 along each axis; beyond the tank there is nothing.
+        piece = qd.Vector([k % 6 - 3, k // 6 % 6 - 3, k // 36 - 3])
+        c, way, s = own, vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+        is_in = True
+        for axis in qd.static(range(dim)):
+            place = 0.5 * piece[axis] + 0.25  # of the piece, in cells from the node
+            at = own[axis] + qd.cast(qd.floor(place + 0.5), qd.i32)
+            last = qd.Vector([grid.nx, grid.ny, grid.nz])[axis]
+            is_in = is_in and at >= 0 and at < last
+            c[axis] = at
+            s[axis] = own[axis] + place
+            way[axis] = (s[axis] - at) * edges[axis]
+        if is_in:
+            free = free_of(kept_wall(grid, nearest(grid, c)), way, edge)
+            if free > 0.0:
+                at = corners(grid, qd.floor(s, qd.i32), dim)
+                weights = open_tents(grid, at, s, dim)
+                for corner in qd.static(range(2**dim)):
+                    if at[corner] == n:
+                        total += free * weights[corner] / 2.0**dim
+    return total
+
+
+@qd.func
+def open_tents(grid: CoarseGrid, at: qd.template(), s, dim: qd.template()):
+    """Weights of the nodes `at` the corners around the place `s` [cells]; those without room leave theirs to others."""
+    weights = tents(s - qd.floor(s), dim)
+    total = 0.0
+    for k in qd.static(range(2**dim)):
+        weights[k] *= qd.cast(grid.room[at[k]] > 0.0, qd.f32)
+        total += weights[k]
+    return weights / qd.max(total, 1e-3)
 
 
 @qd.kernel(fastcache=True)
-def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: qd.template()):
-    """Find which share of each cell is open where solids are `searched`; else the tank ends where the cells do."""
-    for n in range(grid.nx * grid.ny * grid.nz):
-        room = 1.0
-        if qd.static(searched):
-            room = open_share(grid, solids, n)
-        grid.room[n] = room if room >= least_open else 0.0
+def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: qd.template(), dim: qd.template()):
+    """Find which room each node has for water where solids are `searched`; else the tank ends where the cells do."""
+    if qd.static(not searched):
+        for n in range(grid.nx * grid.ny * grid.nz):
+            grid.room[n] = 1.0
+    else:
+        for n in range(grid.nx * grid.ny * grid.nz):
+            wall = nearest_wall(grid, solids, n)
+            grid.slope_x[n], grid.slope_y[n], grid.slope_z[n], grid.lam[n] = wall.x, wall.y, wall.z, wall.w
+            grid.room[n] = qd.cast(open_share(grid, n) >= least_open, qd.f32)
+        for n in range(grid.nx * grid.ny * grid.nz):
+            grid.rhs[n] = grid.room[n]
+            if grid.room[n] > 0.0 and grid.lam[n] < 2.0 * longest_edge(grid):
+                grid.rhs[n] = share_of_tents(grid, n, dim)
+        for n in range(grid.nx * grid.ny * grid.nz):
+            grid.room[n] = grid.rhs[n]
