@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 FOLDER = Path(__file__).parent.parent / "src" / "wavetank" / "solids" / "models"
 
@@ -75,6 +76,27 @@ def vase(around: int = 96) -> tuple[np.ndarray, np.ndarray, str]:
     return turned([(float(a), float(a), float(b), 2.0) for a, b in zip(r, y, strict=True)], around, formula)
 
 
+def valley(columns: int = 161, rows: int = 121) -> np.ndarray:
+    """Return heights from 0 to 1 [rows, columns]: a high basin behind a gap, and a valley that winds down from there."""
+    x, z = np.meshgrid(np.linspace(0.0, 4.0, columns), np.linspace(-1.5, 1.5, rows))
+    middle = 0.42 * np.sin(1.7 * (x - 0.9)) * np.clip(x - 0.9, 0.0, 1.0)
+    bed = 0.52 - 0.115 * x + 0.05 * np.exp(-(((x - 1.25) / 0.16) ** 2))
+    wide = 0.62 - 0.34 * np.exp(-(((x - 1.3) / 0.3) ** 2)) + 0.10 * np.clip(x - 1.6, 0.0, 2.0)
+    across = np.abs(z - middle) / wide
+    sides = 0.42 * across**2 / (1.0 + 0.35 * across**2)
+    back = 0.5 * np.clip(0.35 - x, 0.0, 1.0) ** 2 / 0.35**2
+    rough = sum(
+        0.035 / k * np.sin(k * (3.1 * x + 1.7 * z) + k) * np.sin(k * (2.3 * z - 1.1 * x) + 2 * k) for k in (1.0, 2.1, 4.3)
+    )
+    h = bed + sides + back + rough * np.clip(across - 0.35, 0.0, 1.0)
+    return np.clip(h, 0.02, 0.98)
+
+
+def write_heights(name: str, heights: np.ndarray) -> None:
+    """Write heights from 0 to 1 as a picture of 16 bits."""
+    Image.fromarray(np.round(heights * 65535.0).astype(np.uint16)).save(FOLDER / f"{name}.png", optimize=True)
+
+
 def write(name: str, vertices: np.ndarray, faces: np.ndarray, formula: str) -> None:
     """Write an OBJ file."""
     lines = [f"# wavetank: {name}", f"# {formula}", "# made by docs/models.py, MIT licence"]
@@ -87,3 +109,4 @@ if __name__ == "__main__":
     write("knot", *knot())
     write("bathtub", *bathtub())
     write("vase", *vase())
+    write_heights("valley", valley())

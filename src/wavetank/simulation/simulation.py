@@ -17,7 +17,7 @@ from wavetank.foundation.params import LIVE, refuse_assignment
 from wavetank.physics import population
 from wavetank.physics.foam.pool import pool_from, pool_rows
 from wavetank.physics.foam.update import load_kernels, update_foam
-from wavetank.physics.grid_pressure.coarse_grid import new_levels
+from wavetank.physics.grid_pressure.coarse_grid import OPEN_CELLS, new_levels
 from wavetank.physics.neighbors import list_room, new_grid
 from wavetank.physics.smoothing import half_space_table
 from wavetank.physics.step import step
@@ -70,7 +70,7 @@ class Simulation(Contents):
         walls = Walls(vectors(2, len(table)))
         compiler.upload(walls.table, table)
         size = scene.tank.size if scene.tank else None
-        levels = new_levels(scene.tank.box(), h) if scene.tank else []
+        levels = new_levels(scene.tank.beyond(OPEN_CELLS * h), h) if scene.tank else []
         self.world = World(
             grid=new_grid(dim, capacity, size, h, list_room(dim, scene.support)),  # first: it may be refused
             particles=new_particles(dim, capacity),
@@ -146,6 +146,7 @@ class Simulation(Contents):
                     force.apply(self.world.particles, self.count, duration / parts, self.time + duration * part / parts)
                 step(self.world, self.scene, duration / parts, limit)
         self.solids.move_to(0.0, 1.0)
+        self._let_out()
         update_foam(self.world, self.scene, duration, self.frame_number)
         self.pushed = []
         self.solids.arrive()
@@ -154,6 +155,15 @@ class Simulation(Contents):
         self.ledger.time += duration
         self.ledger.frame_number += 1
         self._outdated = True
+
+    def _let_out(self) -> None:
+        """Take what has crossed an open side of the tank out of the world."""
+        if self.scene.tank is not None and self.scene.tank.open:
+            box = [np.array([*corner, far][:3]) for corner, far in zip(self.scene.tank.open_box(), (-1.0, 1.0), strict=True)]
+            marks = self.world.grid.cell  # is found anew in the next step
+            keep = population.inside_box(self.world.particles, marks, box[0], box[1], self.count)
+            if keep is not None:
+                self._keep(keep)
 
     @property
     def _acting(self) -> tuple[Force, ...]:

@@ -18,6 +18,7 @@ from wavetank.solids.distance import lift, vec3
 EDGE = 1.0  # of a cell, over the support
 PARTS = 4  # of the particles that have sums of their own, where nodes are few
 MOST_PARTS = 16  # where they are many: one for each thread, but not more
+OPEN_CELLS = 2.0  # beyond an open side of the tank, for the air there
 SMALLEST = 8  # cells along an axis that is not halved any more
 
 

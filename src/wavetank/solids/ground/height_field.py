@@ -4,6 +4,7 @@ import base64
 import binascii
 import functools
 import hashlib
+import importlib.resources
 import io
 import zipfile
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import Edges, Length, Place
 from wavetank.solids.distance import GRIDS
 from wavetank.solids.ground.outline import measure_outline
+from wavetank.solids.meshes.files import BUNDLED
 from wavetank.solids.meshes.grid import DistanceGrid, measure
 from wavetank.solids.meshes.store import grid_of
 from wavetank.solids.solid import Node, Solid, point_in_space
@@ -70,12 +72,12 @@ class HeightField(Solid):
         if self.heights is None and not self.data:
             if not self.path:
                 raise ValueError("a height field needs heights, or path, the name of a .npy file or a picture.")
-            if not context.get("files", True):
+            if not context.get("files", True) and not self.path.startswith(BUNDLED):
                 raise ValueError(
                     f"path = {self.path!r}: no file is opened from here; start with the scene's file, or save it from "
                     "Python, which puts the heights into it."
                 )
-            self.__dict__["heights"] = _read(Path(context.get("folder", "."), self.path))
+            self.__dict__["heights"] = read_heights(self.path, Path(context.get("folder", ".")))
         if self.heights is not None:
             self._check(self.heights)
             if self.heights.size > MOST_INLINE or self.path:
@@ -180,6 +182,14 @@ def surface(heights: np.ndarray, edges: tuple[float, float], bottom: float) -> t
     faces += [np.column_stack([rim, low, after]), np.column_stack([after, low, low_after])]
     faces += [np.column_stack([low_after, low, middle])]
     return np.concatenate([top, below, [(0.0, bottom, 0.0)]]), np.concatenate(faces)
+
+
+def read_heights(name: str, folder: Path) -> np.ndarray:
+    """Return the heights in a file, or in a bundled one, as in wavetank/valley.png."""
+    if name.startswith(BUNDLED):
+        with importlib.resources.as_file(importlib.resources.files("wavetank.solids") / "models" / name.removeprefix(BUNDLED)) as path:
+            return _read(path)
+    return _read(folder / name)
 
 
 def _read(path: Path) -> np.ndarray:
