@@ -88,7 +88,8 @@ def valley(columns: int = 161, rows: int = 121) -> np.ndarray:
     rough = sum(
         0.035 / k * np.sin(k * (3.1 * x + 1.7 * z) + k) * np.sin(k * (2.3 * z - 1.1 * x) + 2 * k) for k in (1.0, 2.1, 4.3)
     )
-    h = bed + sides + back + rough * np.clip(across - 0.35, 0.0, 1.0)
+    low = np.where(z > middle, 1.0 - 0.55 * np.clip((x - 1.55) / 0.5, 0.0, 1.0), 1.0)  # the near side, to look in
+    h = bed + sides * low + back + rough * np.clip(across - 0.35, 0.0, 1.0)
     return np.clip(h, 0.02, 0.98)
 
 

@@ -5,7 +5,7 @@ from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, nearest, tents
 from wavetank.solids.distance import SolidSet, signed_distance, vec3, vec4
 
-LEAST_OPEN = 0.25  # a cell that is less open is solid
+LEAST_OPEN = 0.1  # a cell that is less open is solid
 
 
 @qd.func
