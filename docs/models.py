@@ -36,7 +36,9 @@ def knot(around: int = 144, across: int = 14, tube: float = 0.62) -> tuple[np.nd
     return rings.reshape(-1, 3), quads.reshape(-1, 4), formula
 
 
-def turned(rings: list[tuple[float, float, float, float]], around: int, formula: str) -> tuple[np.ndarray, np.ndarray, str]:
+def turned(
+    rings: list[tuple[float, float, float, float]], around: int, formula: str
+) -> tuple[np.ndarray, np.ndarray, str]:
     """Return a closed surface of rings (x, z, y, power): superellipses of these half axes at that height."""
     t = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
     points = []
@@ -56,14 +58,16 @@ def turned(rings: list[tuple[float, float, float, float]], around: int, formula:
     return np.concatenate([*points, middles]), np.array(quads), formula
 
 
-def bathtub(around: int = 96, wall: float = 0.035) -> tuple[np.ndarray, np.ndarray, str]:
+def bathtub(around: int = 96, wall: float = 0.1) -> tuple[np.ndarray, np.ndarray, str]:
     """Return a bathtub, 1.6 m long, with sloping sides, a round edge and a wall that is as thick everywhere."""
     outer = [(0.62, 0.26, 0.0), (0.68, 0.31, 0.05), (0.74, 0.345, 0.2), (0.77, 0.36, 0.4), (0.785, 0.37, 0.52)]
-    edge = [(0.80, 0.385, 0.55), (0.80, 0.385, 0.57), (0.785, 0.37, 0.58)]
-    inner = [(a - wall, b - wall, max(y, wall)) for a, b, y in reversed(outer[1:])]
-    floor = [(0.62 - 0.6 * wall, 0.26 - 0.6 * wall, wall)]
+    edge = [(0.80, 0.385, 0.55), (0.80, 0.385, 0.57), (0.785, 0.37, 0.58), (0.785 - wall, 0.37 - wall, 0.58)]
+    inner = [(a - wall, b - wall, max(y, wall + 0.03)) for a, b, y in reversed(outer[2:])]
+    floor = [(0.74 - 1.3 * wall, 0.345 - 1.3 * wall, wall)]
     rings = [(a, b, y, 3.0) for a, b, y in [*outer, *edge, *inner, *floor]]
-    formula = f"superellipses |x/a|^3 + |z/b|^3 = 1 along a profile: a bathtub open above; wall {wall}; {around} steps around"
+    formula = (
+        f"superellipses |x/a|^3 + |z/b|^3 = 1 along a profile: a bathtub open above; wall {wall}; {around} steps around"
+    )
     return turned(rings, around, formula)
 
 
@@ -71,13 +75,17 @@ def vase(around: int = 96) -> tuple[np.ndarray, np.ndarray, str]:
     """Return what a vase encloses, closed above its neck: to be a container it is turned inside out."""
     y = np.linspace(0.0, 1.0, 41)
     # Foot, belly, neck and lip.
-    r = np.interp(y, [0.0, 0.03], [0.12, 0.14]) + 0.21 * np.exp(-(((y - 0.38) / 0.2) ** 2)) + 0.09 * np.clip(y - 0.85, 0, 1) / 0.15
+    r = (
+        np.interp(y, [0.0, 0.03], [0.12, 0.14])
+        + 0.21 * np.exp(-(((y - 0.38) / 0.2) ** 2))
+        + 0.09 * np.clip(y - 0.85, 0, 1) / 0.15
+    )
     formula = "r(y) = 0.14 + 0.21 exp(-((y - 0.38) / 0.2)^2) + lip: what a vase encloses, closed above"
     return turned([(float(a), float(a), float(b), 2.0) for a, b in zip(r, y, strict=True)], around, formula)
 
 
 def valley(columns: int = 161, rows: int = 121) -> np.ndarray:
-    """Return heights from 0 to 1 [rows, columns]: a high basin behind a gap, and a valley that winds down from there."""
+    """Return heights from 0 to 1 [rows, columns]: a basin behind a gap, a valley that winds down from there."""
     x, z = np.meshgrid(np.linspace(0.0, 4.0, columns), np.linspace(-1.5, 1.5, rows))
     middle = 0.42 * np.sin(1.7 * (x - 0.9)) * np.clip(x - 0.9, 0.0, 1.0)
     bed = 0.52 - 0.115 * x + 0.05 * np.exp(-(((x - 1.25) / 0.16) ** 2))
@@ -86,7 +94,8 @@ def valley(columns: int = 161, rows: int = 121) -> np.ndarray:
     sides = 0.42 * across**2 / (1.0 + 0.35 * across**2)
     back = 0.5 * np.clip(0.35 - x, 0.0, 1.0) ** 2 / 0.35**2
     rough = sum(
-        0.035 / k * np.sin(k * (3.1 * x + 1.7 * z) + k) * np.sin(k * (2.3 * z - 1.1 * x) + 2 * k) for k in (1.0, 2.1, 4.3)
+        0.035 / k * np.sin(k * (3.1 * x + 1.7 * z) + k) * np.sin(k * (2.3 * z - 1.1 * x) + 2 * k)
+        for k in (1.0, 2.1, 4.3)
     )
     low = np.where(z > middle, 1.0 - 0.55 * np.clip((x - 1.55) / 0.5, 0.0, 1.0), 1.0)  # the near side, to look in
     h = bed + sides * low + back + rough * np.clip(across - 0.35, 0.0, 1.0)

@@ -15,7 +15,8 @@ from wavetank.foundation.params import PARAMETERS, PRESETS
 from wavetank.foundation.version import VERSION
 from wavetank.scene.filled import Filled
 from wavetank.scene.fluids import Ball, Block, Points
-from wavetank.scene.scene import Scene, Tank, bundled_scenes
+from wavetank.scene.scene import Scene, bundled_scenes
+from wavetank.scene.tank import Tank
 from wavetank.solids.ground.height_field import HeightField
 from wavetank.solids.ground.polygon import Polygon
 from wavetank.solids.meshes.mesh import Mesh
@@ -34,7 +35,8 @@ __version__ = VERSION
 
 __all__ = [
     "PARAMETERS", "PRESETS", "Ball", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference", "Filled",
-    "HalfSpace", "HeightField", "Intersection", "Mesh", "Points", "Polygon", "Recording", "Scene", "Session", "Simulation", "Sphere", "Tank", "Union",
+    "HalfSpace", "HeightField", "Intersection", "Mesh", "Points", "Polygon", "Recording",
+    "Scene", "Session", "Simulation", "Sphere", "Tank", "Union",
     "WavetankError", "__version__", "bundled_scenes", "commands", "render", "replay", "show",
 ]  # fmt: skip
 

@@ -175,7 +175,7 @@ def test_every_number_of_a_scene_is_a_length_or_known_not_to_be():
     """Who adds a field says which: see `model.METRES`."""
     others = {
         "velocity", "velocities", "rotation", "friction", "normal", "share", "drag", "strength", "speed", "axis",
-        "duration", "acceleration", "frequency", "phase",
+        "duration", "acceleration", "frequency", "phase", "heights",
     }  # fmt: skip
     models = {Tank, *model._MODEL_OF_TAG.values()}
     assert len(models) > 20

@@ -31,7 +31,9 @@ class Filled(Fluid):
     @model_validator(mode="after")
     def _has_end(self) -> "Filled":
         if not np.isfinite(self._box()).all():
-            raise ValueError("inside: this shape has no end and cannot be filled; give one that has, or an intersection.")
+            raise ValueError(
+                "inside: this shape has no end and cannot be filled; give one that has, or an intersection."
+            )
         if isinstance(self.inside, Mesh) and self.inside.thickness is not None:
             raise ValueError("inside.thickness makes walls of a mesh's faces; what is to be filled is a closed mesh.")
         return self

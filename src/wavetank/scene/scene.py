@@ -108,8 +108,8 @@ class Scene(Parameters):
             )
         if self.tank is not None and np.abs(self.tank.box()).max() / self.spacing > 1e6:
             raise ValueError(
-                f"spacing = {self.spacing} divides the tank of {self.tank.size} m, or its way from the origin, into more "
-                "than 1e6 spacings; single precision cannot tell such particles apart: use a larger spacing."
+                f"spacing = {self.spacing} divides the tank of {self.tank.size} m, or its way from the origin, into "
+                "more than 1e6 spacings; single precision cannot tell such particles apart: use a larger spacing."
             )
 
     def _check_inside(self) -> None:
@@ -194,7 +194,9 @@ class Scene(Parameters):
     def has_own_place(self) -> np.ndarray:
         """Say which particles are placed one by one, as those of `Points`, bool [n], in the order of `particles`."""
         parts = zip(self.fluids, self._lattices(), strict=True)
-        return np.concatenate([np.empty(0, bool), *(np.full(len(x), isinstance(f, Points | Filled)) for f, (x, _) in parts)])
+        return np.concatenate(
+            [np.empty(0, bool), *(np.full(len(x), isinstance(f, Points | Filled)) for f, (x, _) in parts)]
+        )
 
     def particles(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions [m] and velocities [m/s], float32 [n, dim], of the fluids; a simulation leaves out those in solids.

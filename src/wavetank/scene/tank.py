@@ -9,7 +9,6 @@ from wavetank.foundation.model import Edges, Model, Place
 from wavetank.solids.shapes import HalfSpace
 from wavetank.solids.solid import Solid
 
-
 _OTHER_NAMES = {"bottom": "-y", "top": "+y"}
 
 

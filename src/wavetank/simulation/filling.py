@@ -59,7 +59,9 @@ def fill(scene: Scene, simulate: Callable[[Scene], Water]) -> Scene:
         return scene
     fluids: list[Fluid] = []
     for number, fluid in enumerate(scene.fluids):
-        fluids.append(_packed(f"fluids[{number}]", fluid, scene, fluids, simulate) if isinstance(fluid, Filled) else fluid)
+        fluids.append(
+            _packed(f"fluids[{number}]", fluid, scene, fluids, simulate) if isinstance(fluid, Filled) else fluid
+        )
     return scene.model_copy(update={"fluids": fluids})
 
 
@@ -72,7 +74,9 @@ def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulat
     s = _depths(fluid, lattice, scene, obstacles)
     chosen = np.sort(np.argsort(s, kind="stable")[:number])
     if len(chosen) < number:
-        raise WavetankError(f"{name} has no room for its {number:,} particles; use a smaller spacing or a larger shape.")
+        raise WavetankError(
+            f"{name} has no room for its {number:,} particles; use a smaller spacing or a larger shape."
+        )
     container = _inside_out(fluid.inside, scene.dim)
     solids = [solid.model_copy(update={"name": ""}) for solid in (*obstacles, container)]
     world = scene.model_copy(update={
@@ -144,8 +148,10 @@ def _to_others(points: np.ndarray, scene: Scene, obstacles: list[Solid]) -> np.n
 
 def _to_tank(points: np.ndarray, scene: Scene) -> np.ndarray:
     """Return the distance of points [n, dim] to the walls of the tank [m], less than 0 outside."""
+    assert scene.tank is not None
     lower, upper = scene.tank.box()
-    return np.minimum(points - lower, upper - points).min(axis=1)
+    distances: np.ndarray = np.minimum(points - lower, upper - points).min(axis=1)
+    return distances
 
 
 def _inside_out(solid: Solid, dim: int) -> Solid:

@@ -3,8 +3,6 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from wavetank.physics.plan import capillary_speed, steps_in
 from wavetank.physics.time_step import largest_speed
 from wavetank.physics.world import World

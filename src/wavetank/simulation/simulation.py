@@ -159,7 +159,10 @@ class Simulation(Contents):
     def _let_out(self) -> None:
         """Take what has crossed an open side of the tank out of the world."""
         if self.scene.tank is not None and self.scene.tank.open:
-            box = [np.array([*corner, far][:3]) for corner, far in zip(self.scene.tank.open_box(), (-1.0, 1.0), strict=True)]
+            box = [
+                np.array([*corner, far][:3])
+                for corner, far in zip(self.scene.tank.open_box(), (-1.0, 1.0), strict=True)
+            ]
             marks = self.world.grid.cell  # is found anew in the next step
             keep = population.inside_box(self.world.particles, marks, box[0], box[1], self.count)
             if keep is not None:

@@ -90,8 +90,8 @@ class HeightField(Solid):
         dim = len(self.size)
         if heights.ndim != dim - 1 or min(heights.shape) < 2:
             raise ValueError(
-                f"heights have shape {list(heights.shape)}; in a {dim}-D world they must have {dim - 1} dimensions of at "
-                "least 2 numbers each."
+                f"heights have shape {list(heights.shape)}; in a {dim}-D world they must have {dim - 1} dimensions of "
+                "at least 2 numbers each."
             )
         if heights.size > MOST_HEIGHTS:
             raise ValueError(
@@ -187,7 +187,9 @@ def surface(heights: np.ndarray, edges: tuple[float, float], bottom: float) -> t
 def read_heights(name: str, folder: Path) -> np.ndarray:
     """Return the heights in a file, or in a bundled one, as in wavetank/valley.png."""
     if name.startswith(BUNDLED):
-        with importlib.resources.as_file(importlib.resources.files("wavetank.solids") / "models" / name.removeprefix(BUNDLED)) as path:
+        with importlib.resources.as_file(
+            importlib.resources.files("wavetank.solids") / "models" / name.removeprefix(BUNDLED)
+        ) as path:
             return _read(path)
     return _read(folder / name)
 
@@ -207,7 +209,9 @@ def _read(path: Path) -> np.ndarray:
 
         with Image.open(path) as picture:
             if picture.width * picture.height > MOST_HEIGHTS:
-                raise ValueError(f"it has {picture.width} x {picture.height} pixels; at most {MOST_HEIGHTS:,} are allowed")
+                raise ValueError(
+                    f"it has {picture.width} x {picture.height} pixels; at most {MOST_HEIGHTS:,} are allowed"
+                )
             deep = picture.mode in ("I", "I;16", "I;16B", "I;16L", "I;16N", "F")
             values = np.asarray(picture if deep else picture.convert("L"), np.float64)
             return values if picture.mode == "F" else values / (65535.0 if deep else 255.0)

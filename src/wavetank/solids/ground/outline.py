@@ -49,7 +49,7 @@ def measure_outline(points: np.ndarray, spacing: float, name: str) -> DistanceGr
     else:
         raise WavetankError(
             f"{name} of {edges[0]:.3g} x {edges[1]:.3g} m at spacing = {spacing:g} m needs a grid of "
-            f"{counts.prod():.2g} nodes; at most {MOST_NODES:.2g} are allowed: use a larger spacing or a smaller outline."
+            f"{counts.prod():.2g} nodes; at most {MOST_NODES:.2g} are allowed: use a larger spacing."
         )
     nx, ny = map(int, counts)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
