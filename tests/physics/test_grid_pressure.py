@@ -260,7 +260,8 @@ def test_the_room_that_solids_leave_follows_them():
             sim.step()
         level = sim.world.levels[0]
         kept = level.room.to_numpy()
-        coarse_pressure.find_room(level, sim.world.solids, coarse_pressure.LEAST_OPEN, int(sim.world.has_solids), 3)
+        args = coarse_pressure.LEAST_OPEN, coarse_pressure.UNIT, int(sim.world.has_solids), 3
+        coarse_pressure.find_room(level, sim.world.solids, *args)
         np.testing.assert_array_equal(level.room.to_numpy(), kept)
         return kept
 

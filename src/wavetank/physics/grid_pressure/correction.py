@@ -347,7 +347,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     """
     finest, cells, count, searched = world.levels[0], world.grid, world.count, int(world.has_solids)
     if world.room_version != world.solids_version:
-        find_room(finest, world.solids, LEAST_OPEN, searched, params.dim)
+        find_room(finest, world.solids, LEAST_OPEN, UNIT, searched, params.dim)
         world.room_version = world.solids_version
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     few = int(not is_shared(finest))

@@ -38,9 +38,9 @@ def nearest_wall(grid: CoarseGrid, solids: SolidSet, n):
     edge = longest_edge(grid)
     if grid.nz == 1:
         center.z = 0.0
-    nearest = vec4(0.0, 1.0, 0.0, 2.0 * edge)
+    nearest = vec4(0.0, 1.0, 0.0, 4.0 * edge)
     for k in range(solids.tank_count, solids.count):
-        if (center - solids.position[k]).norm() < solids.reach[k] + 2.0 * edge and nearest.w > -2.0 * edge:
+        if (center - solids.position[k]).norm() < solids.reach[k] + 4.0 * edge and nearest.w > -2.0 * edge:
             value = signed_distance(solids, k, center)
             if value.w < nearest.w:
                 nearest = value
@@ -78,39 +78,30 @@ def open_share(grid: CoarseGrid, n):
 
 
 @qd.func
-def share_of_tents(grid: CoarseGrid, n, dim: qd.template()):
-    """Room that node `n` has for water, in cells: what free places count at it, as particles there would.
+def add_tents(grid: CoarseGrid, n, unit, dim: qd.template()):
+    """Add what free places of the cell of node `n` count at the nodes around, as particles there would, to the sums.
 
-    Pieces of half an edge in the cells around are asked. Next to nodes without room the others have their share.
+    Pieces of half an edge are asked. Next to nodes without room the others have their share.
     """
     own = coordinates(grid, n)
     edges = vec3(grid.dx, grid.dy, grid.dz)
     edge = 0.5 * qd.min(grid.dx, grid.dy)
     if grid.nz > 1:
         edge = qd.min(edge, 0.5 * grid.dz)
-    total = 0.0
-    for k in range(qd.static(6**dim)):
-        # Pieces, numbered from -3 to 2 along each axis; beyond the tank there is nothing.
-        piece = qd.Vector([k % 6 - 3, k // 6 % 6 - 3, k // 36 - 3])
-        c, way, s = own, vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
-        is_in = True
+    wall = kept_wall(grid, n)
+    for k in range(qd.static(2**dim)):
+        way, s = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
         for axis in qd.static(range(dim)):
-            place = 0.5 * piece[axis] + 0.25  # of the piece, in cells from the node
-            at = own[axis] + qd.cast(qd.floor(place + 0.5), qd.i32)
-            last = qd.Vector([grid.nx, grid.ny, grid.nz])[axis]
-            is_in = is_in and at >= 0 and at < last
-            c[axis] = at
-            s[axis] = own[axis] + place
-            way[axis] = (s[axis] - at) * edges[axis]
-        if is_in:
-            free = free_of(kept_wall(grid, nearest(grid, c)), way, edge)
-            if free > 0.0:
-                at = corners(grid, qd.floor(s, qd.i32), dim)
-                weights = open_tents(grid, at, s, dim)
-                for corner in qd.static(range(2**dim)):
-                    if at[corner] == n:
-                        total += free * weights[corner] / 2.0**dim
-    return total
+            aside = 0.5 * ((k >> axis) % 2) - 0.25  # of the piece, in cells from the node
+            s[axis] = own[axis] + aside
+            way[axis] = aside * edges[axis]
+        free = free_of(wall, way, edge)
+        if free > 0.0:
+            at = corners(grid, qd.floor(s, qd.i32), dim)
+            weights = open_tents(grid, at, s, dim)
+            for corner in qd.static(range(2**dim)):
+                amount = unit * free * weights[corner] / 2.0**dim
+                qd.atomic_add(grid.sums[at[corner]], qd.cast(qd.round(amount), qd.i32))
 
 
 @qd.func
@@ -125,8 +116,13 @@ def open_tents(grid: CoarseGrid, at: qd.template(), s, dim: qd.template()):
 
 
 @qd.kernel(fastcache=True)
-def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: qd.template(), dim: qd.template()):
-    """Find which room each node has for water where solids are `searched`; else the tank ends where the cells do."""
+def find_room(
+    grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, unit: qd.f32, searched: qd.template(), dim: qd.template()
+):  # fmt: skip
+    """Find which room each node has for water where solids are `searched`; else the tank ends where the cells do.
+
+    Sums are of whole multiples of the inverse of `unit`, so that the order of threads does not matter; 0 before.
+    """
     if qd.static(not searched):
         for n in range(grid.nx * grid.ny * grid.nz):
             grid.room[n] = 1.0
@@ -136,8 +132,9 @@ def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: 
             grid.slope_x[n], grid.slope_y[n], grid.slope_z[n], grid.lam[n] = wall.x, wall.y, wall.z, wall.w
             grid.room[n] = qd.cast(open_share(grid, n) >= least_open, qd.f32)
         for n in range(grid.nx * grid.ny * grid.nz):
-            grid.rhs[n] = grid.room[n]
-            if grid.room[n] > 0.0 and grid.lam[n] < 2.0 * longest_edge(grid):
-                grid.rhs[n] = share_of_tents(grid, n, dim)
+            if grid.lam[n] < 4.0 * longest_edge(grid) and grid.lam[n] > -longest_edge(grid):
+                add_tents(grid, n, unit, dim)
         for n in range(grid.nx * grid.ny * grid.nz):
-            grid.room[n] = grid.rhs[n]
+            if grid.room[n] > 0.0 and grid.lam[n] < 2.0 * longest_edge(grid):
+                grid.room[n] = grid.sums[n] / unit
+            grid.sums[n] = 0
