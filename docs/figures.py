@@ -113,6 +113,8 @@ def gallery(names: list[str]) -> None:
         fine = WHOLE_LAYERS.get(name, round(GALLERY_SPACING[scene.dim] * size, 4))
         scene = scene.changed(spacing=min(scene.spacing, fine))
         moment, count = SHOWN_AT.get(name, USUAL_TIME), len(scene.particles()[0])
+        if any(fluid.shape == "filled" for fluid in scene.fluids):  # what is in the way is known to a simulation
+            count = wt.Simulation(scene).count
         if name in names or not names:
             sim = wt.Simulation(scene)
             sim.advance(moment)

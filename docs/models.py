@@ -3,8 +3,9 @@
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
-FOLDER = Path(__file__).parent.parent / "src" / "wavetank" / "models"
+FOLDER = Path(__file__).parent.parent / "src" / "wavetank" / "solids" / "models"
 
 
 def knot(around: int = 144, across: int = 14, tube: float = 0.62) -> tuple[np.ndarray, np.ndarray, str]:
@@ -35,13 +36,87 @@ def knot(around: int = 144, across: int = 14, tube: float = 0.62) -> tuple[np.nd
     return rings.reshape(-1, 3), quads.reshape(-1, 4), formula
 
 
+def turned(
+    rings: list[tuple[float, float, float, float]], around: int, formula: str
+) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return a closed surface of rings (x, z, y, power): superellipses of these half axes at that height."""
+    t = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
+    points = []
+    for a, b, y, power in rings:
+        r = (np.abs(np.cos(t)) ** power + np.abs(np.sin(t)) ** power) ** (-1.0 / power)
+        points.append(np.stack([a * r * np.cos(t), np.full(around, y), b * r * np.sin(t)], axis=1))
+    quads = []
+    for k in range(len(rings) - 1):
+        for j in range(around):
+            n, m = k * around + j, k * around + (j + 1) % around
+            quads.append((n, n + around, m + around, m))
+    last, first, end = (len(rings) - 1) * around, len(rings) * around, len(rings) * around + 1
+    for j in range(around):
+        quads.append((first, j, (j + 1) % around, first))
+        quads.append((end, last + (j + 1) % around, last + j, end))
+    middles = [(0.0, rings[0][2], 0.0), (0.0, rings[-1][2], 0.0)]
+    return np.concatenate([*points, middles]), np.array(quads), formula
+
+
+def bathtub(around: int = 96, wall: float = 0.1) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return a bathtub, 1.6 m long, with sloping sides, a round edge and a wall that is as thick everywhere."""
+    outer = [(0.62, 0.26, 0.0), (0.68, 0.31, 0.05), (0.74, 0.345, 0.2), (0.77, 0.36, 0.4), (0.785, 0.37, 0.52)]
+    edge = [(0.80, 0.385, 0.55), (0.80, 0.385, 0.57), (0.785, 0.37, 0.58), (0.785 - wall, 0.37 - wall, 0.58)]
+    inner = [(a - wall, b - wall, max(y, wall + 0.03)) for a, b, y in reversed(outer[2:])]
+    floor = [(0.74 - 1.3 * wall, 0.345 - 1.3 * wall, wall)]
+    rings = [(a, b, y, 3.0) for a, b, y in [*outer, *edge, *inner, *floor]]
+    formula = (
+        f"superellipses |x/a|^3 + |z/b|^3 = 1 along a profile: a bathtub open above; wall {wall}; {around} steps around"
+    )
+    return turned(rings, around, formula)
+
+
+def vase(around: int = 96) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return what a vase encloses, closed above its neck: to be a container it is turned inside out."""
+    y = np.linspace(0.0, 1.0, 41)
+    # Foot, belly, neck and lip.
+    r = (
+        np.interp(y, [0.0, 0.03], [0.12, 0.14])
+        + 0.21 * np.exp(-(((y - 0.38) / 0.2) ** 2))
+        + 0.09 * np.clip(y - 0.85, 0, 1) / 0.15
+    )
+    formula = "r(y) = 0.14 + 0.21 exp(-((y - 0.38) / 0.2)^2) + lip: what a vase encloses, closed above"
+    return turned([(float(a), float(a), float(b), 2.0) for a, b in zip(r, y, strict=True)], around, formula)
+
+
+def valley(columns: int = 161, rows: int = 121) -> np.ndarray:
+    """Return heights from 0 to 1 [rows, columns]: a basin behind a gap, a valley that winds down from there."""
+    x, z = np.meshgrid(np.linspace(0.0, 4.0, columns), np.linspace(-1.5, 1.5, rows))
+    middle = 0.42 * np.sin(1.7 * (x - 0.9)) * np.clip(x - 0.9, 0.0, 1.0)
+    bed = 0.52 - 0.115 * x + 0.05 * np.exp(-(((x - 1.25) / 0.16) ** 2))
+    wide = 0.62 - 0.34 * np.exp(-(((x - 1.3) / 0.3) ** 2)) + 0.10 * np.clip(x - 1.6, 0.0, 2.0)
+    across = np.abs(z - middle) / wide
+    sides = 0.42 * across**2 / (1.0 + 0.35 * across**2)
+    back = 0.5 * np.clip(0.35 - x, 0.0, 1.0) ** 2 / 0.35**2
+    rough = sum(
+        0.035 / k * np.sin(k * (3.1 * x + 1.7 * z) + k) * np.sin(k * (2.3 * z - 1.1 * x) + 2 * k)
+        for k in (1.0, 2.1, 4.3)
+    )
+    low = np.where(z > middle, 1.0 - 0.55 * np.clip((x - 1.55) / 0.5, 0.0, 1.0), 1.0)  # the near side, to look in
+    h = bed + sides * low + back + rough * np.clip(across - 0.35, 0.0, 1.0)
+    return np.clip(h, 0.02, 0.98)
+
+
+def write_heights(name: str, heights: np.ndarray) -> None:
+    """Write heights from 0 to 1 as a picture of 16 bits."""
+    Image.fromarray(np.round(heights * 65535.0).astype(np.uint16)).save(FOLDER / f"{name}.png", optimize=True)
+
+
 def write(name: str, vertices: np.ndarray, faces: np.ndarray, formula: str) -> None:
     """Write an OBJ file."""
     lines = [f"# wavetank: {name}", f"# {formula}", "# made by docs/models.py, MIT licence"]
     lines += [f"v {x:.3f} {y:.3f} {z:.3f}" for x, y, z in vertices]
-    lines += ["f " + " ".join(str(corner + 1) for corner in face) for face in faces]
+    lines += ["f " + " ".join(str(corner + 1) for corner in dict.fromkeys(face)) for face in faces]
     (FOLDER / f"{name}.obj").write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
 if __name__ == "__main__":
     write("knot", *knot())
+    write("bathtub", *bathtub())
+    write("vase", *vase())
+    write_heights("valley", valley())

@@ -168,7 +168,13 @@ def test_architecture_names_every_file_and_no_other():
         else:
             told.add("/".join([*folders, name]))
     disk = {str(path.relative_to(PACKAGE)) for path in FILES if path.name != "__init__.py"}
-    disk |= {"scene/scenes/*.toml", "scene/levels/*.toml", "front/page/static/*", "solids/models/*.obj"}
+    disk |= {
+        "scene/scenes/*.toml",
+        "scene/levels/*.toml",
+        "front/page/static/*",
+        "solids/models/*.obj",
+        "solids/models/*.png",
+    }
     assert told == disk
 
 

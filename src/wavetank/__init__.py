@@ -15,10 +15,14 @@ from wavetank.foundation.params import PARAMETERS, PRESETS
 from wavetank.foundation.version import VERSION
 from wavetank.scene.drains import Drain
 from wavetank.scene.emitters import Emitter
+from wavetank.scene.filled import Filled
 from wavetank.scene.fluids import Ball, Block, Points
 from wavetank.scene.gauges import Gauge
 from wavetank.scene.joints import BallJoint, Hinge, Rope, Slider, Spring, Weld
-from wavetank.scene.scene import Scene, Tank, bundled_scenes
+from wavetank.scene.scene import Scene, bundled_scenes
+from wavetank.scene.tank import Tank
+from wavetank.solids.ground.height_field import HeightField
+from wavetank.solids.ground.polygon import Polygon
 from wavetank.solids.meshes.mesh import Mesh
 from wavetank.solids.motion import Keyframe, Motion, sampled
 from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
@@ -36,9 +40,10 @@ __version__ = VERSION
 
 __all__ = [
     "PARAMETERS", "PRESETS", "Ball", "BallJoint", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference",
-    "Drain", "Emitter", "Gauge", "HalfSpace", "Hinge", "Intersection", "Keyframe", "Mesh", "Motion", "Points",
-    "Recording", "Rope", "Scene", "Session", "Simulation", "Slider", "Sphere", "Spring", "Tank", "Union",
-    "WavetankError", "Weld", "__version__", "bundled_scenes", "commands", "render", "replay", "sampled", "show",
+    "Drain", "Emitter", "Filled", "Gauge", "HalfSpace", "HeightField", "Hinge", "Intersection", "Keyframe", "Mesh",
+    "Motion", "Points", "Polygon", "Recording", "Rope", "Scene", "Session", "Simulation", "Slider", "Sphere",
+    "Spring", "Tank", "Union", "WavetankError", "Weld", "__version__", "bundled_scenes", "commands", "render",
+    "replay", "sampled", "show",
 ]  # fmt: skip
 
 #: what needs the kernels' sources is imported when it is first used: data alone should load fast

@@ -10,7 +10,8 @@ import pytest
 from wavetank.lab.bench import counts
 from wavetank.lab.bench.scenes import sized
 from wavetank.scene.fluids import Points
-from wavetank.scene.scene import Scene, Tank
+from wavetank.scene.scene import Scene
+from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 
 SPACING = 1 / 16

@@ -19,7 +19,7 @@ from wavetank.lab.cases.packing import settled
 from wavetank.lab.cases.seeds import world
 from wavetank.lab.cases.standing_wave import AMPLITUDE, DEPTH, LENGTH, PERIOD, K, displaced
 from wavetank.scene.fluids import Points
-from wavetank.scene.scene import Tank
+from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 
 QUICK = ["still-tank", "column", "martin-moyce", "lobovsky", "standing-wave", "elliptical-drop", "drop", "energy",

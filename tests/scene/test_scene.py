@@ -9,7 +9,8 @@ from wavetank.foundation import model
 from wavetank.scene.drains import Drain
 from wavetank.scene.emitters import Emitter
 from wavetank.scene.gauges import Gauge
-from wavetank.scene.scene import Tank, scene_schema
+from wavetank.scene.scene import scene_schema
+from wavetank.scene.tank import Tank
 from wavetank.solids.motion import Keyframe, Motion
 
 TANK = {"size": (1.0, 1.0, 1.0)}
@@ -186,7 +187,8 @@ def test_every_number_of_a_scene_is_a_length_or_known_not_to_be():
     others = {
         "velocity", "velocities", "rotation", "friction", "normal", "share", "drag", "strength", "speed", "axis",
         "duration", "acceleration", "frequency", "phase", "tilt", "tilt_axis", "direction", "side", "flow", "spread",
-        "Emitter.start", "Drain.start", "suction", "time",
+        "Emitter.start", "Drain.start", "suction", "time", "heights", "density", "mass",
+        "angular_velocity", "restitution", "stiffness", "damping", "limits",
     }  # fmt: skip
     models = {Tank, Emitter, Drain, Gauge, Motion, Keyframe, *model._MODEL_OF_TAG.values()}
     assert len(models) > 20

@@ -109,6 +109,9 @@ class CoarseGrid:
     dx: qd.f32  # m: edges of a cell
     dy: qd.f32
     dz: qd.f32  # 1 in 2-D
+    x0: qd.f32  # m: lower corner
+    y0: qd.f32
+    z0: qd.f32  # 0 in 2-D
     parts: qd.i32  # of the particles that have sums of their own
     alone: Final[int]  # 1 where there are several, so that no thread waits for another, else 0
     width: Final[int]  # nodes of a row that a thread takes at once

@@ -44,7 +44,8 @@ def surface(positions: np.ndarray, scene: Scene) -> tuple[np.ndarray, np.ndarray
     )  # fmt: skip
     vertices, normals = mesh.mesh.vertices, mesh.point_attributes["normals"]
     if scene.tank is not None:
-        inside = np.clip(vertices, 0.0, np.array(scene.tank.size, np.float32))
+        lower, upper = scene.tank.box()
+        inside = np.clip(vertices, lower.astype(np.float32), upper.astype(np.float32))
         outward = vertices - inside
         beyond = np.linalg.norm(outward, axis=1) > 0.0
         normals[beyond] = outward[beyond] / np.linalg.norm(outward[beyond], axis=1, keepdims=True)

@@ -11,6 +11,7 @@ does it on threads, as every particle or place is judged by itself.
 """
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -43,6 +44,17 @@ def mark_particles(marks: qd.types.ndarray(), particles: Particles, capsule: Cap
     """Mark the particles inside with 1, the others with 0."""
     for i in range(count):
         marks[i] = qd.cast(is_inside(capsule, lift(particles.x[i])), qd.i32)
+
+
+@qd.kernel(fastcache=True)
+def mark_beyond(marks: qd.types.ndarray(), particles: Particles, lower: vec3, upper: vec3, count: qd.i32) -> qd.i32:
+    """Mark the particles outside of a box with 1, the others with 0; return how many are outside."""
+    total = 0
+    for i in range(count):
+        p = lift(particles.x[i])
+        marks[i] = qd.cast(qd.max(lower - p, p - upper).max() > 0.0, qd.i32)
+        qd.atomic_add(total, marks[i])
+    return total
 
 
 @qd.kernel(fastcache=True)
@@ -158,6 +170,17 @@ def inside_capsule(particles: Particles, count: int, start: np.ndarray, end: np.
     marks = integers(count)
     mark_particles(marks, particles, Capsule(start, end, radius), count)
     result: np.ndarray = download(marks)[:count] == 1
+    return result
+
+
+def inside_box(particles: Particles, marks: Any, lower: np.ndarray, upper: np.ndarray, count: int) -> np.ndarray | None:
+    """Say for every particle, in device order, whether it is between the corners [3], bool [count]; None for all.
+
+    `marks` is room for a number of each.
+    """
+    if not count or not mark_beyond(marks, particles, lower, upper, count):
+        return None
+    result: np.ndarray = download(marks)[:count] == 0
     return result
 
 

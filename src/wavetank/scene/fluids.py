@@ -3,7 +3,7 @@
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema, model_validator
 from typing_extensions import override
 
 from wavetank.foundation.model import METRES, Length, Model, Place, Vector, register_model
@@ -153,6 +153,5 @@ class Points(Fluid):
         return self.positions
 
 
-AnyFluid = Annotated[Block | Ball | Points, Field(discriminator="shape")]
 for _fluid in (Block, Ball, Points):
     register_model(_fluid.model_fields["shape"].default, _fluid)

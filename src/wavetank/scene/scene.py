@@ -16,36 +16,21 @@ from pydantic import BeforeValidator, ValidationError, model_validator
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.materials import COLORS, Material, Properties
-from wavetank.foundation.model import Edges, Model, is_length, sentence
+from wavetank.foundation.model import Model, is_length, sentence
 from wavetank.foundation.params import PRESETS, QUALITIES, Parameters
 from wavetank.foundation.replacing import replacing
 from wavetank.foundation.tracks import scaled
-from wavetank.scene.fluids import AnyFluid, Points
+from wavetank.scene.filled import AnyFluid, Filled
+from wavetank.scene.fluids import Points
 from wavetank.scene.forces import AnyForce
 from wavetank.scene.goal import Goal
 from wavetank.scene.joints import AnyJoint, check_joints
-from wavetank.scene.schedule import Tilted, Timetable
-from wavetank.solids.shapes import AnySolid, HalfSpace
-from wavetank.solids.solid import Solid
+from wavetank.scene.schedule import Timetable
+from wavetank.scene.tank import Tank
+from wavetank.solids.shapes import AnySolid
 
 MAX_PARTICLES = 100_000_000
 _TOLERANCE = 1e-6  # of a spacing: how far a fluid may reach beyond a wall by rounding
-
-
-class Tank(Tilted):
-    """The container: its inner size [m], the lower corner at the origin. Two numbers make a 2-D world."""
-
-    size: Edges
-
-    def walls(self) -> list[Solid]:
-        """Return the walls as half-spaces, lower and upper for each axis."""
-        result: list[Solid] = []
-        for axis, (name, edge) in enumerate(zip("xyz", self.size, strict=False)):
-            normal = tuple(float(k == axis) for k in range(len(self.size)))
-            point = tuple(edge * n for n in normal)
-            result.append(HalfSpace(name=f"tank {name} lower", point=tuple(0.0 for _ in normal), normal=normal))
-            result.append(HalfSpace(name=f"tank {name} upper", point=point, normal=tuple(-n for n in normal)))
-        return result
 
 
 def _tagged(values: Any, default: str) -> Any:
@@ -128,24 +113,24 @@ class Scene(Timetable, Parameters):
                 f"spacing = {self.spacing} makes {count:.3g} particles; "
                 f"at most {MAX_PARTICLES:,} are allowed: use a larger spacing or less fluid."
             )
-        if self.tank is not None and max(self.tank.size) / self.spacing > 1e6:
+        if self.tank is not None and np.abs(self.tank.box()).max() / self.spacing > 1e6:
             raise ValueError(
-                f"spacing = {self.spacing} divides the tank of {self.tank.size} m into more than 1e6 spacings; "
-                "single precision cannot tell such particles apart: use a larger spacing."
+                f"spacing = {self.spacing} divides the tank of {self.tank.size} m, or its way from the origin, into "
+                "more than 1e6 spacings; single precision cannot tell such particles apart: use a larger spacing."
             )
 
     def _check_inside(self) -> None:
         if self.tank is None:
             return
-        slack = _TOLERANCE * self.spacing
+        slack, (first, last) = _TOLERANCE * self.spacing, self.tank.box()
         for number, fluid in enumerate(self.fluids):
-            if isinstance(fluid, Points) and not len(fluid.positions):
-                continue
+            if isinstance(fluid, Filled) or (isinstance(fluid, Points) and not len(fluid.positions)):
+                continue  # what is filled says so itself, when its shape is measured
             lower, upper = fluid.bounds()
-            if np.any(lower < -slack) or np.any(upper > np.array(self.tank.size) + slack):
+            if np.any(lower < first - slack) or np.any(upper > last + slack):
                 raise ValueError(
                     f"fluids[{number}] reaches from {_numbers(lower)} to {_numbers(upper)}, outside the tank; "
-                    f"it must lie between {_numbers(np.zeros(self.dim))} and {_numbers(self.tank.size)}."
+                    f"it must lie between {_numbers(first)} and {_numbers(last)}."
                 )
 
     def _check_names(self) -> None:
@@ -218,7 +203,9 @@ class Scene(Timetable, Parameters):
     def has_own_place(self) -> np.ndarray:
         """Say which particles are placed one by one, as those of `Points`, bool [n], in the order of `particles`."""
         parts = zip(self.fluids, self._lattices(), strict=True)
-        return np.concatenate([np.empty(0, bool), *(np.full(len(x), isinstance(f, Points)) for f, (x, _) in parts)])
+        return np.concatenate(
+            [np.empty(0, bool), *(np.full(len(x), isinstance(f, Points | Filled)) for f, (x, _) in parts)]
+        )
 
     def particles(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions [m] and velocities [m/s], float32 [n, dim], of the fluids; a simulation leaves out those in solids.

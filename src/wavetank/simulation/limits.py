@@ -3,8 +3,6 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from wavetank.physics.plan import capillary_speed, pace_of_solids, steps_in
 from wavetank.physics.time_step import largest_speed
 from wavetank.physics.world import World
@@ -18,7 +16,7 @@ def count_steps(
     world: World, scene: Scene, solids: MovingSolids, ledger: Ledger, forces: Sequence[Force], duration: float
 ) -> float:
     """Return how many time steps make up `duration` [s], no whole number."""
-    box = (np.zeros(scene.dim), np.array(scene.tank.size)) if scene.tank else ledger.start_box
+    box = scene.tank.box() if scene.tank else ledger.start_box
     solid = pace_of_solids(world, scene) * _solid_speed(scene, solids, duration)
     speed = max(solid, largest_speed(world.particles, world.count))
     speed += duration * sum(force.largest_acceleration() for force in forces)

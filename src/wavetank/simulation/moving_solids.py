@@ -50,7 +50,7 @@ class MovingSolids:
         """Put all on the device anew, at rest where they are."""
         self.device = shapes.build(self.members, self.tank_count, self.friction, self.spacing)
         self.has_friction = self.friction > 0.0 or any(solid.friction for solid in self.members)
-        self.reaches = [solid.reach() for solid in self.members]
+        self.reaches = [solid.span() for solid in self.members]
         self.walls = [solid.program()[0] for solid in self.members[: self.tank_count]]
         units = np.zeros(max(len(self.members), 1), np.float32)
         for number, (_, unit) in self.feeling.items():

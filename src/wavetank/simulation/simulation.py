@@ -11,17 +11,12 @@ from typing import Any
 import numpy as np
 
 from wavetank.device import compiler
-from wavetank.device.state import Fluids, Walls, new_particles, new_scratch, vectors
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import LIVE, refuse_assignment
 from wavetank.physics import population
 from wavetank.physics.foam.pool import pool_from, pool_rows
 from wavetank.physics.foam.update import load_kernels, update_foam
-from wavetank.physics.grid_pressure.coarse_grid import new_levels
-from wavetank.physics.neighbors import list_room, new_grid
-from wavetank.physics.smoothing import half_space_table
 from wavetank.physics.time_step import filled_share, whole
-from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import MAX_PARTICLES, Scene
 from wavetank.scene.schedule import changes_gravity, gravity_at, with_gravity
@@ -30,9 +25,11 @@ from wavetank.simulation import snapshot as snapshots
 from wavetank.simulation.arrays import check_newcomers
 from wavetank.simulation.bodies import Bodies
 from wavetank.simulation.contents import Contents
+from wavetank.simulation.filling import fill
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids
+from wavetank.simulation.new_world import new_world
 from wavetank.simulation.snapshot import Snapshot
 from wavetank.simulation.sources import Sources, check_places
 from wavetank.solids.solid import Solid
@@ -52,8 +49,8 @@ class Simulation(Contents):
 
     def reset(self) -> None:
         """Put everything back to the start of the scene."""
-        positions, velocities = self.scene.particles()
-        scene = self.scene
+        start, scene = fill(self.scene, lambda scene: type(self)(scene, self.arch or "cpu")), self.scene
+        positions, velocities = start.particles()
         self.solids = MovingSolids(self._walls(), scene.solids, scene.friction, scene.spacing, scene.start_time)
         self.sources, self.notes = Sources(scene), []
         self.gravity_by_hand = None
@@ -62,8 +59,8 @@ class Simulation(Contents):
         self.ledger = Ledger()
         self.bodies = Bodies(self.scene, self.solids)
         self._fill(len(positions))
-        free = self.solids.find_free_places(self.scene, positions, self.world.particles)
-        self.add(positions[free], velocities[free], materials=self.scene.kinds()[free])
+        free = self.solids.find_free_places(start, positions, self.world.particles)
+        self.add(positions[free], velocities[free], materials=start.kinds()[free])
         box = positions[free] if free.any() else np.zeros((1, self.scene.dim))
         self.ledger.start_box = (box.min(axis=0), box.max(axis=0))
         self.seconds_per_frame = math.nan  # that the last frame took to compute
@@ -72,26 +69,7 @@ class Simulation(Contents):
 
     def _fill(self, capacity: int) -> None:
         """Make an empty world with room for `capacity` particles."""
-        scene, dim = self.scene, self.scene.dim
-        h = scene.support * scene.spacing
-        table = half_space_table(scene.kernel, dim, scene.support)
-        walls = Walls(vectors(2, len(table)))
-        compiler.upload(walls.table, table)
-        size = scene.tank.size if scene.tank else None
-        self.world = World(
-            grid=new_grid(dim, capacity, size, h, list_room(dim, scene.support)),  # first: it may be refused
-            particles=new_particles(dim, capacity),
-            spare=new_particles(dim, capacity),
-            scratch=new_scratch(capacity),
-            solids=self.solids.device,
-            walls=walls,
-            fluids=Fluids(capacity, rows=vectors(4, len(scene.materials) + 1)),
-            materials={},
-            count=0,
-            has_friction=self.solids.has_friction,
-            levels=new_levels(size, h) if size else [],
-            pieces=self.bodies.cut(),
-        )
+        self.world = new_world(self.scene, capacity, self.solids, self.bodies.cut())
         self.ledger.capacity, self._outdated = capacity, True
 
     def _walls(self) -> list[Solid]:
@@ -163,6 +141,7 @@ class Simulation(Contents):
                 )
         self.solids.passing.clear()
         self.solids.move_to(0.0, 1.0)
+        self._let_out()
         update_foam(self.world, self._scene_at(self.time + 0.5 * duration), duration, self.frame_number)
         self.pushed = []
         self.solids.arrive()
@@ -173,6 +152,18 @@ class Simulation(Contents):
         self.ledger.time += duration
         self.ledger.frame_number += 1
         self._outdated = True
+
+    def _let_out(self) -> None:
+        """Take what has crossed an open side of the tank out of the world."""
+        if self.scene.tank is not None and self.scene.tank.open:
+            box = [
+                np.array([*corner, far][:3])
+                for corner, far in zip(self.scene.tank.open_box(), (-1.0, 1.0), strict=True)
+            ]
+            marks = self.world.grid.cell  # is found anew in the next step
+            keep = population.inside_box(self.world.particles, marks, box[0], box[1], self.count)
+            if keep is not None:
+                self._keep(keep)
 
     @property
     def _acting(self) -> tuple[Force, ...]:

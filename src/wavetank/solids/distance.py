@@ -67,8 +67,14 @@ def parts():
     return 13
 
 
-PARTS, STACK, UNION, INTERSECTION, DIFFERENCE, GRIDS = (
-    code.fn() for code in (parts, deepest, union, intersection, difference, grids)
+@qd.func
+def around():
+    """Reach [m] of a container, which is all but its hollow: pictures look through it at what it holds."""
+    return 4.0e5
+
+
+PARTS, STACK, UNION, INTERSECTION, DIFFERENCE, GRIDS, AROUND = (
+    code.fn() for code in (parts, deepest, union, intersection, difference, grids, around)
 )
 
 

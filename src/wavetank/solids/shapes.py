@@ -31,6 +31,8 @@ from wavetank.solids.distance import (
     vec3,
     vec4,
 )  # fmt: skip
+from wavetank.solids.ground.height_field import HeightField
+from wavetank.solids.ground.polygon import Polygon
 from wavetank.solids.meshes.mesh import Mesh
 from wavetank.solids.meshes.on_device import put_grids
 from wavetank.solids.solid import ENDLESS, Node, Solid, point_in_space
@@ -254,10 +256,10 @@ class Difference(_SetOperation):
 
 
 SHAPES: tuple[type[Solid], ...] = (
-    Box, Sphere, Capsule, Cylinder, HalfSpace, Union, Intersection, Difference, Mesh,
+    Box, Sphere, Capsule, Cylinder, HalfSpace, Union, Intersection, Difference, Mesh, Polygon, HeightField,
 )  # fmt: skip
 AnySolid = Annotated[
-    Box | Sphere | Capsule | Cylinder | HalfSpace | Union | Intersection | Difference | Mesh,
+    Box | Sphere | Capsule | Cylinder | HalfSpace | Union | Intersection | Difference | Mesh | Polygon | HeightField,
     Field(discriminator="shape"),
 ]
 for _shape in SHAPES:

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from wavetank.foundation.model import Model, Number, Positive, Quaternion, Vector
 from wavetank.foundation.rotations import product, turned, unit_quaternion
+from wavetank.solids.distance import DIFFERENCE, DISTANCES, box_distance
 from wavetank.solids.motion import AnyMotion, shorthand
 
 Floats = Sequence[float] | np.ndarray
@@ -56,6 +57,8 @@ class Solid(Model):
     def _is_body_or_not(self) -> "Solid":
         if self.density is not None and self.mass is not None:
             raise ValueError(f"a body has a density or a mass, not both; density = {self.density}, mass = {self.mass}.")
+        if self.is_body and getattr(self, "invert", False):
+            raise ValueError("a container that is all but its hollow has no mass; give a body walls instead of invert.")
         if self.is_body:
             return self
         for name in ("hollow", "held", "velocity", "angular_velocity"):
@@ -91,6 +94,10 @@ class Solid(Model):
         """Radius [m] around the origin that holds the whole solid."""
         raise NotImplementedError
 
+    def span(self) -> float:
+        """Radius [m] around the origin that holds its surface: that of a container, which has no end, is its hollow."""
+        return self.reach()
+
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
         """Name every point or size of this solid, to check that all live in one dimension."""
         return []
@@ -101,3 +108,8 @@ def point_in_space(vector: Sequence[float]) -> np.ndarray:
     point = np.zeros(3)
     point[: len(vector)] = vector
     return point
+
+
+def all_but(nodes: list[Node]) -> list[Node]:
+    """Return the program of all of space but the solid with the program `nodes`."""
+    return [Node(DISTANCES.index(box_distance), [ENDLESS] * 3), *nodes, Node(DIFFERENCE)]

@@ -39,11 +39,11 @@ class Extent:
 def extent_of(scene: Any) -> Extent:
     """Return the tank of `scene`; without one the box around its fluids and solids, without those a unit box."""
     if scene.tank is not None:
-        boxes = [(np.zeros(scene.dim), np.array(scene.tank.size, float))]
+        boxes = [scene.tank.box()]
     else:
         fluids = [fluid for fluid in getattr(scene, "fluids", []) if fluid.estimate(scene.spacing) > 0.0]
         boxes = [fluid.bounds() for fluid in fluids]
-        boxes += [(s.origin - s.reach(), s.origin + s.reach()) for s in scene.solids if s.reach() < ENDLESS]
+        boxes += [(s.origin - s.span(), s.origin + s.span()) for s in scene.solids if s.span() < ENDLESS]
     boxes = boxes or [(np.zeros(scene.dim), np.ones(scene.dim))]
     lower = np.min([_in_space(low) for low, _ in boxes], axis=0)
     upper = np.max([_in_space(high) for _, high in boxes], axis=0)
@@ -66,7 +66,7 @@ def extent_of_water(frame: Any) -> Extent:
         return whole
     x = frame.positions
     boxes = [np.percentile(x, (100.0 - IN_SIGHT, IN_SIGHT), axis=0)]
-    boxes += [(s.origin - s.reach(), s.origin + s.reach()) for s in frame.scene.solids if s.reach() < ENDLESS]
+    boxes += [(s.origin - s.span(), s.origin + s.span()) for s in frame.scene.solids if s.span() < ENDLESS]
     margin = 0.04 * whole.radius
     lower = np.maximum(np.min([low for low, _ in boxes], axis=0) - margin, whole.lower)
     upper = np.minimum(np.max([high for _, high in boxes], axis=0) + margin, whole.upper)

@@ -59,7 +59,11 @@ def test_a_scene_of_several_parts_is_put_together(tmp_path):
 @pytest.mark.parametrize(
     "name, content, told",
     [
-        ("none.obj", None, r"there is no mesh file .*none.obj; bundled models are: wavetank/knot.obj"),
+        (
+            "none.obj",
+            None,
+            r"there is no mesh file .*none.obj; bundled models are: wavetank/bathtub.obj, wavetank/knot.obj",
+        ),
         ("empty.obj", "", r"empty.obj"),
         ("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", r"points.obj has no faces"),
         ("nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", r"nan.obj: vertex 0 is not finite"),
@@ -152,7 +156,9 @@ def test_commands_open_no_files(scene_file, monkeypatch):
     """A command may come from afar."""
     monkeypatch.chdir(scene_file.parent)
     session = Session(wt.Scene.load("weightless-drop").changed(spacing=0.003))
-    with pytest.raises(wt.WavetankError, match=r"path = 'thing.obj' is not a bundled model \(wavetank/knot.obj\)"):
+    with pytest.raises(
+        wt.WavetankError, match=r"path = 'thing.obj' is not a bundled model \(wavetank/bathtub.obj, wavetank/knot.obj"
+    ):
         session.apply(LoadScene(text=SCENE))
     solid = {"shape": "mesh", "path": "thing.obj", "center": (0.4, 0.4, 0.4), "size": 0.2}
     with pytest.raises(wt.WavetankError, match=r"no other file is opened from here"):
@@ -186,7 +192,7 @@ def test_a_library_that_is_missing_is_one_sentence(scene_file, monkeypatch):
 def test_grids_are_measured_once(cache, monkeypatch):
     """In memory, on disk, and again where the file in the cache is damaged or nothing can be written."""
     calls = []
-    monkeypatch.setattr(store, "measure", lambda *a: calls.append(a) or grid.measure(*a))
+    monkeypatch.setattr("wavetank.solids.meshes.mesh.measure", lambda *a: calls.append(a) or grid.measure(*a))
     solid = wt.Mesh.of(*CUBE, **PLACE)
     first = solid.grid(0.05).distances
     solid.grid(0.05)

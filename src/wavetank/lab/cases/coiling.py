@@ -20,7 +20,8 @@ from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.scene.fluids import Points
 from wavetank.scene.forces.force import Force, in_space
-from wavetank.scene.scene import Scene, Tank
+from wavetank.scene.scene import Scene
+from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 from wavetank.solids.distance import vec3
 

@@ -13,7 +13,8 @@ import numpy as np
 from wavetank.lab.cases.case import Case, Figure, Outcome, Series
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.scene.fluids import Block, Points
-from wavetank.scene.scene import Scene, Tank
+from wavetank.scene.scene import Scene
+from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 from wavetank.solids.shapes import Box, Cylinder, Difference
 

@@ -12,7 +12,8 @@ import numpy as np
 from wavetank.lab.cases.case import Case, Figure, Outcome, surface
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.scene.fluids import Ball, Block
-from wavetank.scene.scene import Scene, Tank
+from wavetank.scene.scene import Scene
+from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 
 SIZE = (0.5, 0.8, 0.5)  # m

@@ -15,7 +15,8 @@ from wavetank.scene.drains import Drain
 from wavetank.scene.emitters import Emitter
 from wavetank.scene.fluids import Block
 from wavetank.scene.gauges import Gauge
-from wavetank.scene.scene import Scene, Tank
+from wavetank.scene.scene import Scene
+from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 
 G = 9.81  # m/s^2

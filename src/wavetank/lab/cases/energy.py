@@ -14,7 +14,8 @@ from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.physics.measure import kinetic_energy, potential_energy
 from wavetank.scene.fluids import Block
-from wavetank.scene.scene import Scene, Tank
+from wavetank.scene.scene import Scene
+from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 
 

@@ -25,7 +25,8 @@ from wavetank.lab.cases.case import Case, Figure, Outcome, measured
 from wavetank.lab.cases.martin_moyce import front
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.scene.fluids import Block
-from wavetank.scene.scene import Scene, Tank
+from wavetank.scene.scene import Scene
+from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 from wavetank.solids.shapes import Box
 

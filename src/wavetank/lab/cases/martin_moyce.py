@@ -27,7 +27,8 @@ import numpy as np
 from wavetank.lab.cases.case import Case, Figure, Outcome, measured
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.scene.fluids import Block
-from wavetank.scene.scene import Scene, Tank
+from wavetank.scene.scene import Scene
+from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 
 A = 0.05715  # m

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from wavetank.scene.fluids import Points
-from wavetank.scene.scene import Scene, Tank
+from wavetank.scene.scene import Scene
+from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 
 SHAKEN, SEED = 0.3, 0  # d

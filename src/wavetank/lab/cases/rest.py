@@ -27,6 +27,8 @@ RESTLESS = {
     "weightless-drop": "a drop under tension shivers",
     "weightless-drop-2d": "a drop under tension shivers",
     "spill": "films run down the terraces",
+    "mountain-lake": "films run down the valley",
+    "vase": "particles slip along walls that lean over",
 }
 V_RMS, V_MAX, STILL, ROUGH = 0.001, 0.01, 0.02, 0.06  # m/s, m/s, m/s, d
 
@@ -66,7 +68,7 @@ def watch(name: str, seconds: float, arch: str) -> Rest:
         if number % 30:
             continue
         x = frame.positions.astype(float)
-        tops = surface(x, scene.spacing, scene.tank.size) if scene.tank else np.zeros(1)
+        tops = surface(x - scene.tank.box()[0], scene.spacing, scene.tank.size) if scene.tank else np.zeros(1)
         mass = frame.rest_densities.astype(float) * scene.spacing**scene.dim
         rest.time.append(sim.time)
         rest.v_rms.append(float(np.sqrt(np.mean(speed**2))))

@@ -14,7 +14,8 @@ import numpy as np
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.scene.fluids import Points
-from wavetank.scene.scene import Scene, Tank
+from wavetank.scene.scene import Scene
+from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 
 LENGTH, DEPTH, AMPLITUDE, GRAVITY = 2.0, 1.0, 0.06, 9.81  # m, m, m, m/s^2

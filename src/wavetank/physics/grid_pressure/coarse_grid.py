@@ -9,6 +9,8 @@ import dataclasses
 import math
 from typing import Final
 
+import numpy as np
+
 from wavetank.device.compiler import LANES, lanes, qd, threads, worth_sharing
 from wavetank.device.state import CoarseGrid, integers, scalars
 from wavetank.solids.distance import lift, vec3
@@ -16,6 +18,7 @@ from wavetank.solids.distance import lift, vec3
 EDGE = 1.0  # of a cell, over the support
 PARTS = 4  # of the particles that have sums of their own, where nodes are few
 MOST_PARTS = 16  # where they are many: one for each thread, but not more
+OPEN_CELLS = 2.0  # beyond an open side of the tank, for the air there
 SMALLEST = 8  # cells along an axis that is not halved any more
 
 
@@ -28,7 +31,7 @@ def coordinates(grid: CoarseGrid, n):
 @qd.func
 def in_cells(grid: CoarseGrid, p: qd.template()):
     """The place `p` [m] in cells, whole at nodes; 0 along an axis that the world does not have."""
-    point = lift(p)
+    point = lift(p) - vec3(grid.x0, grid.y0, grid.z0)
     return vec3(
         point.x / grid.dx - 0.5, point.y / grid.dy - 0.5, point.z / grid.dz - (0.5 if qd.static(p.n == 3) else 0.0)
     )
@@ -61,13 +64,13 @@ def nearest(grid: CoarseGrid, c):
     return x + grid.nx * (y + grid.ny * z)
 
 
-def new_levels(size: tuple[float, ...], h: float) -> list[CoarseGrid]:
-    """Allocate the grid of a tank of that `size` [m] and its coarser levels, the finest first."""
-    shape = [_divided(edge / (EDGE * h)) for edge in size]
-    levels = [_new_level(shape, size)]
+def new_levels(box: tuple[np.ndarray, np.ndarray], h: float) -> list[CoarseGrid]:
+    """Allocate the grid of a tank between the corners `box` [m] and its coarser levels, the finest first."""
+    shape = [_divided(edge / (EDGE * h)) for edge in box[1] - box[0]]
+    levels = [_new_level(shape, box)]
     while any(_can_halve(n) for n in shape):
         shape = [n // 2 if _can_halve(n) else n for n in shape]
-        levels.append(_new_level(shape, size))
+        levels.append(_new_level(shape, box))
     return levels
 
 
@@ -93,9 +96,10 @@ def _divided(cells: float) -> int:
     return max(1, round(cells / 2**halvings)) * 2**halvings
 
 
-def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
+def _new_level(shape: list[int], box: tuple[np.ndarray, np.ndarray]) -> CoarseGrid:
     nx, ny, nz = [*shape, 1][:3]
-    edges = [edge / n for edge, n in zip(size, shape, strict=True)]
+    edges = [float(edge) / n for edge, n in zip(box[1] - box[0], shape, strict=True)]
+    x0, y0, z0 = [*map(float, box[0]), 0.0][:3]
     dx, dy, dz = [*edges, 1.0][:3]
     nodes = nx * ny * nz
     rim = nodes + nx * ny + LANES  # what is beyond the last node is read, and counts nothing
@@ -105,6 +109,6 @@ def _new_level(shape: list[int], size: tuple[float, ...]) -> CoarseGrid:
     numbers = (qd.i32, qd.f32, Final[int])
     fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in numbers and name not in sums}
     return CoarseGrid(
-        **sums, **fields, nx=nx, ny=ny, nz=nz, pieces=-(-nx // piece_width()), dx=dx, dy=dy, dz=dz, parts=parts,
-        alone=int(parts > 1), width=piece_width(),
+        **sums, **fields, nx=nx, ny=ny, nz=nz, pieces=-(-nx // piece_width()), dx=dx, dy=dy, dz=dz,
+        x0=x0, y0=y0, z0=z0, parts=parts, alone=int(parts > 1), width=piece_width(),
     )  # fmt: skip

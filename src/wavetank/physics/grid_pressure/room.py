@@ -140,7 +140,8 @@ def close_slit(grid: CoarseGrid, n, surely, full):
 @qd.func
 def open_share(grid: CoarseGrid, solids: SolidSet, n):
     """Share of the cell of node `n` that no solid takes."""
-    return free_share(solids, place_of(grid, coordinates(grid, n) + 0.5), place_of(grid, vec3(1.0, 1.0, 1.0)))
+    corner = vec3(grid.x0, grid.y0, grid.z0)
+    return free_share(solids, corner + place_of(grid, coordinates(grid, n) + 0.5), place_of(grid, vec3(1.0, 1.0, 1.0)))
 
 
 @qd.func

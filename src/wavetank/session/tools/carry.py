@@ -19,8 +19,9 @@ def carry(
     where = sim.solids.poses[sim.solids.find(name)][0]
     place = np.array(goal, float)
     if inside and sim.scene.tank is not None:
-        size = np.array([*sim.scene.tank.size, 0.0][:3])
-        place = np.clip(place, 0.0, size)
+        dim = sim.scene.dim
+        place[:dim] = np.clip(place[:dim], *sim.scene.tank.box())
+        place[dim:] = 0.0
     way = place - where
     length = float(np.linalg.norm(way))
     place = where + way * min(1.0, most / max(length, 1e-12))

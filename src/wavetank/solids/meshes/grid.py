@@ -46,11 +46,14 @@ class DistanceGrid:
     cell: float  # m
 
 
-def measure(points: np.ndarray, faces: np.ndarray, spacing: float, thickness: float | None, name: str) -> DistanceGrid:
+def measure(
+    points: np.ndarray, faces: np.ndarray, spacing: float, thickness: float | None, name: str, hollow: bool = False
+) -> DistanceGrid:
     """Return the distances to the surface of `points` [n, 3], m, and `faces` [m, 3] for particles of that spacing [m].
 
-    With `thickness` [m] the solid is all within half of it of a face. Raises `WavetankError` where the grid would be
-    too large and, without `thickness`, where the surface is not closed.
+    With `thickness` [m] the solid is all within half of it of a face. With `hollow` the inside is to hold water: it is
+    what is around that gets no thinner than `THINNEST`. Raises `WavetankError` where the grid would be too large and,
+    without `thickness`, where the surface is not closed.
     """
     edges = np.ptp(points, axis=0)
     for cells in CELLS:
@@ -67,15 +70,17 @@ def measure(points: np.ndarray, faces: np.ndarray, spacing: float, thickness: fl
         )
     nx, ny, nz = map(int, counts)
     corners = (points / cell + 0.5 * (counts - 1))[faces].astype(np.float32)
-    tree = plant(corners, 0.5 * walls if walls else 0.0)
+    tree = plant(corners[:, ::-1] if hollow else corners, 0.5 * walls if walls else 0.0)
     if walls is None:
         part_faces(tree, THINNEST, len(faces))
     outer, inner = (qd.ndarray(qd.f32, shape=(nx * ny * nz,)) for _ in range(2))
     nearest_triangles(tree, outer, inner, float(download(tree.swell).max()), exact, NEARLY, nx, ny, nz)
-    distances = download(outer)
+    # What is on the side of the faces, and behind them; in a hollow it is the inside that faces look at.
+    before, behind = (-download(inner), -download(outer)) if hollow else (download(outer), download(inner))
+    distances = before
     if walls is None:
         inside = _inside(corners, (nx, ny, nz), cells, name).reshape(-1)
-        distances[inside] = download(inner)[inside]
+        distances[inside] = behind[inside]
     return DistanceGrid((distances * np.float32(cell)).reshape(nz, ny, nx), cell)
 
 

@@ -12,12 +12,12 @@ from typing_extensions import override
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import METRES, Length, Number
-from wavetank.solids.distance import GRIDS
+from wavetank.solids.distance import AROUND, GRIDS
 from wavetank.solids.meshes.files import bundled_models, read_file, read_model
-from wavetank.solids.meshes.grid import DistanceGrid
+from wavetank.solids.meshes.grid import DistanceGrid, measure
 from wavetank.solids.meshes.store import grid_of
 from wavetank.solids.meshes.triangles import Triangles
-from wavetank.solids.solid import Node, Solid, point_in_space
+from wavetank.solids.solid import Node, Solid, all_but, point_in_space
 
 FLAT = 1e-6  # of the longest edge
 _UP = {"x": (0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0), "z": (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0)}
@@ -37,6 +37,7 @@ class Mesh(Solid):
     data: Annotated[str, Field(repr=False)] = ""  # the mesh itself, made from the file; where given, no file is read
     up: Literal["x", "y", "z"] = "y"  # axis of the file that points up; STL files often have z
     thickness: Length | None = None  # make walls of the faces, for a surface that is not closed
+    invert: bool = False  # a container: all but what the mesh encloses is solid
 
     @classmethod
     def of(cls, vertices: Any, faces: Any, **fields: Any) -> "Mesh":
@@ -59,6 +60,8 @@ class Mesh(Solid):
                     "which puts the mesh into it."
                 )
             self.__dict__["data"] = read_file(Path(context.get("folder", "."), self.path)).text()
+        if self.invert and self.thickness is not None:
+            raise ValueError("invert makes a container of what a closed mesh encloses; leave out thickness.")
         if self.data:
             self._triangles()
         return self
@@ -75,10 +78,15 @@ class Mesh(Solid):
 
     @override
     def program(self) -> list[Node]:
-        return [Node(GRIDS, [1.0], mesh=self)]
+        own = Node(GRIDS, [1.0], mesh=self)
+        return all_but([own]) if self.invert else [own]
 
     @override
     def reach(self) -> float:
+        return AROUND if self.invert else self.span()
+
+    @override
+    def span(self) -> float:
         # The ball around the box: what is in the file is read by those who need it.
         edges = (self.size,) * 3 if isinstance(self.size, float) else self.size
         return 0.5 * math.hypot(*edges) + 0.5 * (self.thickness or 0.0)
@@ -87,38 +95,43 @@ class Mesh(Solid):
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
         return [("center", self.center)]
 
-    def grid(self, spacing: float) -> DistanceGrid:
-        """Return the distances to this mesh for particles of that spacing [m], in its own frame.
-
-        Raises `WavetankError` for a mesh that cannot be read, is not closed or too large.
-        """
-        triangles = self._triangles()
-        key = f"{triangles.digest} {self.up} {self.size} {self.thickness}"
-        return grid_of(self._vertices(), triangles.faces, spacing, self.thickness, key, self.name or self._label())
-
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corners [n, 3], m, in the solid's frame, and the faces [m, 3], int.
+        """Return the vertices [n, 3], m, in the solid's frame, and the faces [m, 3], int.
 
         Raises `WavetankError` for a mesh that cannot be read.
         """
-        return self._vertices(), self._triangles().faces
+        return self.vertices(), self._triangles().faces
 
     def corners(self) -> np.ndarray:
         """Return the corners of the triangles [m] in the mesh's own frame, [m, 3, 3], as seen from outside."""
-        result: np.ndarray = self._vertices()[self._triangles().faces]
+        result: np.ndarray = self.vertices()[self._triangles().faces]
         return result
 
-    def _vertices(self) -> np.ndarray:
-        """Return the vertices [m] in the mesh's own frame, [n, 3]."""
+    def vertices(self) -> np.ndarray:
+        """Return its vertices [m], float64 [n, 3], in its own frame; raises `WavetankError` for a flat mesh."""
         points = self._triangles().vertices.astype(np.float64)
         if self.up in _UP:
             points = points @ np.reshape(_UP[self.up], (3, 3)).T
         edges = np.ptp(points, axis=0)
         if not isinstance(self.size, float) and edges.min() < FLAT:
             raise WavetankError(f"{self._label()} is flat; a mesh without a depth needs size as one number.")
-        factor = self.size if isinstance(self.size, float) else np.array(self.size) / edges
-        result: np.ndarray = points * factor
-        return result
+        scaled: np.ndarray = points * (self.size if isinstance(self.size, float) else np.array(self.size) / edges)
+        return scaled
+
+    def volume(self) -> float:
+        """Return the volume that a closed mesh encloses [m^3]; parts that overlap count twice."""
+        a, b, c = (self.vertices()[corner] for corner in self._triangles().faces.T)
+        return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6.0
+
+    def grid(self, spacing: float) -> DistanceGrid:
+        """Return the distances to this mesh for particles of that spacing [m], in its own frame.
+
+        Raises `WavetankError` for a mesh that cannot be read, is not closed or too large.
+        """
+        triangles, points = self._triangles(), self.vertices()
+        key = f"{triangles.digest} {self.up} {self.size} {self.thickness} {spacing}" + " hollow" * self.invert
+        name = self.name or self._label()
+        return grid_of(key, lambda: measure(points, triangles.faces, spacing, self.thickness, name, self.invert))
 
     def _triangles(self) -> Triangles:
         try:

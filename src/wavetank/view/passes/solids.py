@@ -18,7 +18,7 @@ import numpy as np
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import remembered
-from wavetank.solids.distance import SolidSet, grain, signed_distance
+from wavetank.solids.distance import SolidSet, around, grain, signed_distance
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, view_ray
 from wavetank.view.optics.rays import Box, box, box_interval
@@ -90,7 +90,7 @@ def meet(solids: SolidSet, k, origin, direction, first, last, bevel):
     that code takes seconds to compile.
     """
     pace, reach = direction.norm(), grain(solids, k)
-    t, steps, probe = first, 0, -1  # probe: which of the six places is asked for, -1 on the way there
+    t, inner, steps, probe = first, first, 0, -1  # probe: which of the six places is asked for, -1 on the way there
     hit, n = vec4(0.0, 0.0, 0.0, -1.0), vec3(0.0, 0.0, 0.0)
     is_going = True
     while is_going:
@@ -107,6 +107,12 @@ def meet(solids: SolidSet, k, origin, direction, first, last, bevel):
                 n = n.normalized(1e-9)
                 hit = vec4(n.x, n.y, n.z, t)
                 is_going = False
+        elif t == inner and value.w <= 0.0 and solids.reach[k] >= around():
+            # The near side of a container is left away, so that what it holds is seen.
+            t += qd.max(-value.w, 1e-4 * t + 1e-6) / pace
+            inner = t
+            steps += 1
+            is_going = steps < 128 and t <= last
         elif steps == 0 and value.w <= 0.0:
             tilt = qd.max(1.0 + value.w / qd.max(bevel, 1e-9), 0.0)
             toward = (vec3(value.x, value.y, value.z) * tilt - direction / pace).normalized(1e-9)

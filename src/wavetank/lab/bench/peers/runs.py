@@ -14,7 +14,8 @@ import numpy as np
 from wavetank.foundation.errors import WavetankError
 from wavetank.physics.measure import density_error
 from wavetank.scene.fluids import Block
-from wavetank.scene.scene import Scene, Tank
+from wavetank.scene.scene import Scene
+from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 
 WATER, TANK = (0.5, 0.6, 0.5), (1.6, 0.8, 0.5)  # m, those of the scene dam-break

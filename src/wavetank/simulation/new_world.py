@@ -1,0 +1,34 @@
+"""An empty world for a scene: all its arrays, allocated once."""
+
+from wavetank.device import compiler
+from wavetank.device.state import Fluids, Walls, new_particles, new_scratch, vectors
+from wavetank.physics.bodies import Pieces
+from wavetank.physics.grid_pressure.coarse_grid import OPEN_CELLS, new_levels
+from wavetank.physics.neighbors import list_room, new_grid
+from wavetank.physics.smoothing import half_space_table
+from wavetank.physics.world import World
+from wavetank.scene.scene import Scene
+from wavetank.simulation.moving_solids import MovingSolids
+
+
+def new_world(scene: Scene, capacity: int, solids: MovingSolids, pieces: Pieces | None) -> World:
+    """Return an empty world with room for `capacity` particles, and with these solids and `pieces` of bodies."""
+    dim, h = scene.dim, scene.support * scene.spacing
+    table = half_space_table(scene.kernel, dim, scene.support)
+    walls = Walls(vectors(2, len(table)))
+    compiler.upload(walls.table, table)
+    size = scene.tank.size if scene.tank else None
+    return World(
+        grid=new_grid(dim, capacity, size, h, list_room(dim, scene.support)),  # first: it may be refused
+        particles=new_particles(dim, capacity),
+        spare=new_particles(dim, capacity),
+        scratch=new_scratch(capacity),
+        solids=solids.device,
+        walls=walls,
+        fluids=Fluids(capacity, rows=vectors(4, len(scene.materials) + 1)),
+        materials={},
+        count=0,
+        has_friction=solids.has_friction,
+        levels=new_levels(scene.tank.beyond(OPEN_CELLS * h), h) if scene.tank else [],
+        pieces=pieces,
+    )

@@ -1,0 +1,1 @@
+"""Ground: outlines in the plane, and heights."""
