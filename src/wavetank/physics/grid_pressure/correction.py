@@ -45,7 +45,7 @@ from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
-from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
+from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, open_area, solve_levels
 from wavetank.physics.grid_pressure.room import (
     LEAST_OPEN,
     below_roof,
@@ -54,6 +54,7 @@ from wavetank.physics.grid_pressure.room import (
     gaps_at,
     in_part,
     open_tents,
+    whole,
 )
 from wavetank.physics.grid_pressure.surface import carried_share, depth_at
 from wavetank.physics.mixture import Blend
@@ -138,6 +139,12 @@ def parts_of(grid: CoarseGrid, cells: Grid):
 
 
 @qd.func
+def weights_at(grid: CoarseGrid, nodes: qd.template(), s, dim: qd.template(), searched: qd.template()):
+    """Weights of the `nodes` around the place `s` [cells]: tents, which solids cut where they are `searched`."""
+    return open_tents(grid, nodes, s, dim) if qd.static(searched) else tents(s - qd.floor(s), dim)
+
+
+@qd.func
 def add_fill(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, team, part, unit, count,
     searched: qd.template(), mixed: qd.template(),
@@ -152,9 +159,7 @@ def add_fill(
     for lane in range(lanes):
         s = in_cells(grid, predicted(particles, first + lane))
         nodes = corners(grid, qd.floor(s, qd.i32), dim)
-        weights = tents(s - qd.floor(s), dim)
-        if qd.static(searched):
-            weights = open_tents(grid, nodes, weights)
+        weights = weights_at(grid, nodes, s, dim, searched)
         for k in qd.static(range(2**dim)):
             w = unit * weights[k]
             at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
@@ -214,9 +219,7 @@ def add_errors(
     for lane in range(lanes):
         s = in_cells(grid, predicted(particles, first + lane))
         nodes = corners(grid, qd.floor(s, qd.i32), dim)
-        weights = tents(s - qd.floor(s), dim)
-        if qd.static(searched):
-            weights = open_tents(grid, nodes, weights)
+        weights = weights_at(grid, nodes, s, dim, searched)
         filled = 0.0
         for k in qd.static(range(2**dim)):
             filled += weights[k] * grid.fill[nodes[k]]
@@ -270,12 +273,12 @@ def gather(
     if qd.static(searched):
         qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):
-            surely = below_roof(grid, n) if grid.room[n] >= 1.0 else 0.0
+            surely = below_roof(grid, n, c) if grid.room[n] >= whole() else 0.0
             grid.gaps[n] = grid.fill[n] + surely * qd.max(1.0 - grid.fill[n], 0.0)
             grid.slope_y[n] = surely
         qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):
-            surely = in_part(grid, n) if grid.room[n] > 0.0 and grid.room[n] < 1.0 else grid.slope_y[n]
+            surely = in_part(grid, n) if grid.room[n] > 0.0 and grid.room[n] < whole() else grid.slope_y[n]
             close_slit(grid, n, surely, e.slit)
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
@@ -290,18 +293,19 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.rhs[n] = e.scale * total / qd.max(grid.room[n], e.least_open)
+        grid.rhs[n] = e.scale * total
         if qd.static(searched):
-            grid.rhs[n] -= grid.slope_x[n] * e.closing
+            grid.rhs[n] -= grid.slope_x[n] * e.closing * grid.room[n]
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
         couple_nodes(grid, piece, e.least_theta)
 
 
 @qd.func
-def slope_across(coupled, edge, difference):
-    """Derivative of lambda [m] across a face, told from 0 where the face leads into water."""
-    return coupled * edge * difference + (1e-30 if coupled > 0.0 else 0.0)
+def slope_across(grid: CoarseGrid, coupled, edge, n, m):
+    """Derivative of lambda [m] across the face from node `n` to `m`, told from 0 where it leads into water."""
+    area = qd.max(open_area(grid, n, m), 1e-3)
+    return coupled / area * edge * (grid.lam[m] - grid.lam[n]) + (1e-30 if coupled > 0.0 else 0.0)
 
 
 @qd.func
@@ -333,10 +337,9 @@ def move_particles(
     """
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
-        lam = grid.lam[n]
-        grid.slope_x[n] = slope_across(grid.wx[n], grid.dx, grid.lam[n + 1] - lam)
-        grid.slope_y[n] = slope_across(grid.wy[n], grid.dy, grid.lam[n + grid.nx] - lam)
-        grid.slope_z[n] = slope_across(grid.wz[n], grid.dz, grid.lam[n + grid.nx * grid.ny] - lam)
+        grid.slope_x[n] = slope_across(grid, grid.wx[n], grid.dx, n, n + 1)
+        grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, n + grid.nx)
+        grid.slope_z[n] = slope_across(grid, grid.wz[n], grid.dz, n, n + grid.nx * grid.ny)
     for turn in range(turns(cells, count)):
         for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
             first = team * cells.lanes
@@ -371,7 +374,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     """
     finest, cells, count, searched = world.levels[0], world.grid, world.count, int(world.has_solids)
     if world.room_version != world.solids_version:
-        find_room(finest, world.solids, LEAST_OPEN, searched)
+        find_room(finest, world.solids, LEAST_OPEN, UNIT, searched, params.dim)
         world.room_version = world.solids_version
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     few = int(not is_shared(finest))

@@ -8,7 +8,8 @@ time step before: pressures that are carried over make water pulse (docs/noteboo
     code    symbol     meaning                                                      unit
     fill    f          water in the tent of a node, over the room that it has       1
     theta              distance of the surface from the water's node, in edges      1
-    wx      w          coupling with the next node along x, 1 / (theta dx^2 rho)    1/m^2
+    wx      w          coupling with the next node along x, A / (theta dx^2 rho)    1/m^2
+            A          open share of the face between them                          1
     lam     lambda     multiplier                                                   m^2
 """
 
@@ -53,6 +54,15 @@ def block_threads():
 
 
 @qd.func
+def open_area(grid: CoarseGrid, n, m):
+    """Share of the face between the nodes `n` and `m` that is open, if both have room.
+
+    A face towards a whole cell is open as a whole, one between two that a wall cuts as much as they are.
+    """
+    return qd.min(qd.max(grid.room[n], grid.room[m]), 1.0)
+
+
+@qd.func
 def coupling(grid: CoarseGrid, n, m, edge, least_theta):
     """What the face between the nodes `n` and `m` couples them with [1/m^2]: 0 into solids and between air and air.
 
@@ -66,7 +76,7 @@ def coupling(grid: CoarseGrid, n, m, edge, least_theta):
     mean = 0.5 * (grid.density[n] + grid.density[m])
     density = qd.select(a <= 0.0, grid.density[m], qd.select(b <= 0.0, grid.density[n], mean))
     is_open = qd.min(qd.max(a, b), qd.min(grid.room[n], grid.room[m])) > 0.0
-    return qd.select(is_open, 1.0 / qd.max(theta * edge * edge * density, 1e-12), 0.0)
+    return qd.select(is_open, open_area(grid, n, m) / qd.max(theta * edge * edge * density, 1e-12), 0.0)
 
 
 @qd.func
@@ -242,12 +252,12 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
             for m in range(row + c[0] * fx, row + c[0] * fx + fx):
                 room += fine.room[m]
                 fill += fine.fill[m] * fine.room[m]
-                rhs += fine.rhs[m] * fine.room[m]
+                rhs += fine.rhs[m]
                 density += fine.density[m] * fine.fill[m] * fine.room[m]
     coarse.room[n] = room / (fx * fy * fz)
     coarse.density[n] = density / fill if fill > 0.0 else 1.0
     coarse.fill[n] = fill / qd.max(room, 1e-6)
-    coarse.rhs[n] = rhs / qd.max(room, 1e-6)
+    coarse.rhs[n] = rhs / (fx * fy * fz)
 
 
 @qd.kernel(fastcache=True)

@@ -1,33 +1,11 @@
 """Which room the cells of a tank have for water, and which share of it is gaps between rows of particles."""
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import coordinates, nearest
-from wavetank.solids.distance import SolidSet, signed_distance, vec3
+from wavetank.device.state import CoarseGrid, Coefficients
+from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, nearest, tents
+from wavetank.solids.distance import SolidSet, signed_distance, vec3, vec4
 
 LEAST_OPEN = 0.1  # a cell that is less open is solid
-
-
-@qd.func
-def sample_parts():
-    """Parts along each edge of a cell that a surface crosses."""
-    return 4
-
-
-@qd.func
-def open_tents(grid: CoarseGrid, nodes, weights: qd.template()):
-    """The `weights` of `nodes` that have room, as shares of their sum; all of them where none has room.
-
-    Water that stands beside a solid counts at the nodes outside, as beside a wall of the tank at the nearest alone.
-    """
-    result = weights
-    total = 0.0
-    for k in qd.static(range(weights.n)):
-        result[k] = weights[k] if grid.room[nodes[k]] > 0.0 else 0.0
-        total += result[k]
-    for k in qd.static(range(weights.n)):
-        result[k] = result[k] / total if total > 1e-6 else weights[k]
-    return result
 
 
 @qd.func
@@ -52,43 +30,9 @@ def gaps_at(grid: CoarseGrid, n, full):
 
 
 @qd.func
-def place_of(grid: CoarseGrid, c):
-    """The place [m] with the coordinates `c` in cells from the tank's corner; z = 0 in 2-D."""
-    return vec3(c[0] * grid.dx, c[1] * grid.dy, c[2] * grid.dz if grid.nz > 1 else 0.0)
-
-
-@qd.func
-def free_share(solids: SolidSet, center, edges):
-    """Share of a box around `center` with these `edges` [m], in a 2-D world the last one 0, that no solid takes.
-
-    A box that a surface may cross is divided in parts, in each of which surfaces count as planes.
-    """
-    share = 1.0
-    radius = 0.5 * edges.norm()
-    near = 0
-    for k in range(solids.tank_count, solids.count):
-        if (center - solids.position[k]).norm() < solids.reach[k] + radius:
-            distance = signed_distance(solids, k, center).w
-            share = 0.0 if distance <= -radius else share
-            near |= qd.cast(qd.abs(distance) < radius, qd.i32)
-    if near == 1 and share > 0.0:
-        parts = qd.Vector([sample_parts() if edges[axis] > 0.0 else 1 for axis in qd.static(range(3))])
-        edge = vec3(edges.x / parts[0], edges.y / parts[1], edges.z / parts[2])
-        total = 0.0
-        for sample in range(parts[0] * parts[1] * parts[2]):
-            number = qd.Vector([sample % parts[0], sample // parts[0] % parts[1], sample // (parts[0] * parts[1])])
-            place = center
-            for axis in qd.static(range(3)):
-                place[axis] += (number[axis] + 0.5) * edge[axis] - 0.5 * edges[axis]
-            free = 1.0
-            for k in range(solids.tank_count, solids.count):
-                if free > 0.0 and (place - solids.position[k]).norm() < solids.reach[k] + radius:
-                    value = signed_distance(solids, k, place)
-                    extent = qd.abs(value.x) * edge.x + qd.abs(value.y) * edge.y + qd.abs(value.z) * edge.z
-                    free = qd.min(free, 0.5 + value.w / qd.max(extent, 1e-3 * radius))
-            total += qd.max(free, 0.0)
-        share = total / (parts[0] * parts[1] * parts[2])
-    return share if share < 0.9999 else 1.0  # rounding is no solid
+def whole():
+    """Room of a node that no solid takes a part of; sums of tents beside walls are nearly one."""
+    return 0.97
 
 
 @qd.func
@@ -98,18 +42,20 @@ def is_water(fill):
 
 
 @qd.func
-def below_roof(grid: CoarseGrid, n):
-    """How surely what lacks at an open node `n` is a slit between water on one side and a solid on the other."""
+def below_roof(grid: CoarseGrid, n, c: Coefficients):
+    """How surely what lacks at an open node `n` is a slit between water below and a solid above, against gravity."""
     surely = 0.0
+    gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
     for axis in qd.static(range(3)):
         if grid.nz > 1 or axis < 2:
             for side in qd.static((-1, 1)):
-                c = coordinates(grid, n)
-                c[axis] += side
-                roof = nearest(grid, c)
-                c[axis] -= 2 * side
-                water = nearest(grid, c)
-                if grid.room[roof] < 1.0 and grid.room[water] >= 1.0:
+                place = coordinates(grid, n)
+                place[axis] += side
+                roof = nearest(grid, place)
+                place[axis] -= 2 * side
+                water = nearest(grid, place)
+                is_above = -side * gravity[axis] > 0.7 * gravity.norm()
+                if is_above and grid.room[roof] < whole() and grid.room[water] >= whole():
                     surely = qd.max(surely, is_water(grid.fill[water]))
     return surely
 
@@ -124,7 +70,7 @@ def in_part(grid: CoarseGrid, n):
                 c = coordinates(grid, n)
                 c[axis] += side
                 at = nearest(grid, c)
-                if grid.room[at] >= 1.0:
+                if grid.room[at] >= whole():
                     emptiest = qd.min(emptiest, grid.gaps[at])
     return is_water(emptiest) if emptiest < 2.0 else 0.0
 
@@ -138,34 +84,126 @@ def close_slit(grid: CoarseGrid, n, surely, full):
 
 
 @qd.func
-def open_share(grid: CoarseGrid, solids: SolidSet, n):
+def nearest_wall(grid: CoarseGrid, solids: SolidSet, n):
+    """(gradient, distance [m]) of the solid nearest to node `n`; far away where none is near its cell."""
+    c = coordinates(grid, n)
+    center = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
+    center += vec3(grid.x0, grid.y0, grid.z0)
+    edge = longest_edge(grid)
+    if grid.nz == 1:
+        center.z = 0.0
+    nearest = vec4(0.0, 1.0, 0.0, 4.0 * edge)
+    for k in range(solids.tank_count, solids.count):
+        if (center - solids.position[k]).norm() < solids.reach[k] + 4.0 * edge and nearest.w > -2.0 * edge:
+            value = signed_distance(solids, k, center)
+            if value.w < nearest.w:
+                nearest = value
+    return nearest
+
+
+@qd.func
+def longest_edge(grid: CoarseGrid):
+    """Longest edge of a cell [m]."""
+    edge = qd.max(grid.dx, grid.dy)
+    if grid.nz > 1:
+        edge = qd.max(edge, grid.dz)
+    return edge
+
+
+@qd.func
+def free_of(wall, way, edge):
+    """Share that is free of a piece of a cell with that `edge` [m], a `way` from the place where the wall was asked."""
+    return qd.min(qd.max(0.5 + (wall.w + way.dot(vec3(wall.x, wall.y, wall.z))) / edge, 0.0), 1.0)
+
+
+@qd.func
+def kept_wall(grid: CoarseGrid, n):
+    """What `nearest_wall` has found."""
+    return vec4(grid.slope_x[n], grid.slope_y[n], grid.slope_z[n], grid.lam[n])
+
+
+@qd.func
+def open_share(grid: CoarseGrid, n):
     """Share of the cell of node `n` that no solid takes."""
-    corner = vec3(grid.x0, grid.y0, grid.z0)
-    return free_share(solids, corner + place_of(grid, coordinates(grid, n) + 0.5), place_of(grid, vec3(1.0, 1.0, 1.0)))
+    edge = qd.min(grid.dx, grid.dy)
+    if grid.nz > 1:
+        edge = qd.min(edge, grid.dz)
+    return free_of(kept_wall(grid, n), vec3(0.0, 0.0, 0.0), edge)
+
+
+@qd.func
+def add_tents(grid: CoarseGrid, n, unit, dim: qd.template()):
+    """Add what free places of the cell of node `n` count at the nodes around, as particles there would, to the sums.
+
+    Pieces of half an edge are asked. Next to nodes without room the others have their share.
+    """
+    own = coordinates(grid, n)
+    edges = vec3(grid.dx, grid.dy, grid.dz)
+    edge = 0.5 * qd.min(grid.dx, grid.dy)
+    if grid.nz > 1:
+        edge = qd.min(edge, 0.5 * grid.dz)
+    wall = kept_wall(grid, n)
+    for k in range(qd.static(2**dim)):
+        way, s = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+        for axis in qd.static(range(dim)):
+            aside = 0.5 * ((k >> axis) % 2) - 0.25  # of the piece, in cells from the node
+            s[axis] = own[axis] + aside
+            way[axis] = aside * edges[axis]
+        free = free_of(wall, way, edge)
+        if free > 0.0:
+            at = corners(grid, qd.floor(s, qd.i32), dim)
+            weights = open_tents(grid, at, s, dim)
+            for corner in qd.static(range(2**dim)):
+                amount = unit * free * weights[corner] / 2.0**dim
+                qd.atomic_add(grid.sums[at[corner]], qd.cast(qd.round(amount), qd.i32))
+
+
+@qd.func
+def open_tents(grid: CoarseGrid, at: qd.template(), s, dim: qd.template()):
+    """Weights of the nodes `at` the corners around the place `s` [cells]; those without room leave theirs to others."""
+    weights = tents(s - qd.floor(s), dim)
+    total = 0.0
+    for k in qd.static(range(2**dim)):
+        weights[k] *= qd.cast(grid.room[at[k]] > 0.0, qd.f32)
+        total += weights[k]
+    return weights / qd.max(total, 1e-3)
 
 
 @qd.func
 def clear_at(grid: CoarseGrid, n):
     """1 where no solid takes room within two cells of node `n`, diagonals included; else 0."""
     c = coordinates(grid, n)
-    room = 1.0
+    apart = 0.0
     for z in range(qd.max(c[2] - 2, 0), qd.min(c[2] + 3, grid.nz)):
         for y in range(qd.max(c[1] - 2, 0), qd.min(c[1] + 3, grid.ny)):
             for x in range(qd.max(c[0] - 2, 0), qd.min(c[0] + 3, grid.nx)):
-                room = qd.min(room, grid.room[x + grid.nx * (y + grid.ny * z)])
-    return 1.0 if room >= 1.0 else 0.0
+                apart = qd.max(apart, qd.abs(grid.room[x + grid.nx * (y + grid.ny * z)] - 1.0))
+    return 1.0 if apart < 1e-3 else 0.0
 
 
 @qd.kernel(fastcache=True)
-def find_room(grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, searched: qd.template()):
-    """Find which share of each cell is open where solids are `searched`; else the tank ends where the cells do."""
-    for n in range(grid.nx * grid.ny * grid.nz):
-        room = 1.0
-        if qd.static(searched):
-            room = open_share(grid, solids, n)
-        grid.room[n] = room if room >= least_open else 0.0
-    for n in range(grid.nx * grid.ny * grid.nz):
-        clear = 1.0
-        if qd.static(searched):
-            clear = clear_at(grid, n)
-        grid.clear[n] = clear
+def find_room(
+    grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, unit: qd.f32, searched: qd.template(), dim: qd.template()
+):  # fmt: skip
+    """Find which room each node has for water where solids are `searched`; else the tank ends where the cells do.
+
+    Sums are of whole multiples of the inverse of `unit`, so that the order of threads does not matter; 0 before.
+    """
+    if qd.static(not searched):
+        for n in range(grid.nx * grid.ny * grid.nz):
+            grid.room[n] = 1.0
+            grid.clear[n] = 1.0
+    else:
+        for n in range(grid.nx * grid.ny * grid.nz):
+            wall = nearest_wall(grid, solids, n)
+            grid.slope_x[n], grid.slope_y[n], grid.slope_z[n], grid.lam[n] = wall.x, wall.y, wall.z, wall.w
+            grid.room[n] = qd.cast(open_share(grid, n) >= least_open, qd.f32)
+        for n in range(grid.nx * grid.ny * grid.nz):
+            if grid.lam[n] < 4.0 * longest_edge(grid) and grid.lam[n] > -longest_edge(grid):
+                add_tents(grid, n, unit, dim)
+        for n in range(grid.nx * grid.ny * grid.nz):
+            if grid.room[n] > 0.0 and grid.lam[n] < 2.0 * longest_edge(grid):
+                grid.room[n] = grid.sums[n] / unit
+            grid.sums[n] = 0
+        for n in range(grid.nx * grid.ny * grid.nz):
+            grid.clear[n] = clear_at(grid, n)
