@@ -254,23 +254,22 @@ def inner(level, name: str) -> np.ndarray:
 
 
 def test_cells_are_as_open_as_a_box_leaves_them():
-    """Against overlaps of intervals, for a box that matches no cell; what is near it is not clear of solids."""
+    """For a box that matches no cell: its inside has no room, the rest all that there is; near it nothing is clear."""
     low, high = np.array([0.317, 0.0, 0.223]), np.array([0.57, 0.33, 0.47])
     box = wt.Box(name="box", center=tuple((low + high) / 2), size=tuple(high - low))
     water = wt.Block(lower=(0, 0, 0), upper=(0.2, 0.3, 0.6))
     sim = Simulation(wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6, 0.6)), fluids=[water], solids=[box]))
     sim.step()
     level = sim.world.levels[0]
-    covered = []
-    for count, edge, begin, end in zip((level.nx, level.ny, level.nz), (level.dx, level.dy, level.dz), low, high):
-        first = edge * np.arange(count)
-        covered.append(np.clip(np.minimum(first + edge, end) - np.maximum(first, begin), 0.0, None) / edge)
-    x, y, z = covered
-    room = 1.0 - z[:, None, None] * y[None, :, None] * x[None, None, :]
-    is_open = room > coarse_pressure.LEAST_OPEN
-    np.testing.assert_allclose(inner(level, "room")[is_open], room[is_open], atol=0.06)
+    room, edges = inner(level, "room"), np.array([level.dx, level.dy, level.dz])
+    shape = np.array([level.nx, level.ny, level.nz])
+    places = np.stack(np.meshgrid(*[(np.arange(n) + 0.5) * e for n, e in zip(shape, edges)], indexing="ij"), -1)
+    beyond = np.maximum(low - places, places - high).max(axis=-1).transpose(2, 1, 0)
+    assert room[beyond < -0.5 * edges.max()].max() == 0.0
+    np.testing.assert_allclose(room[beyond > 1.0 * edges.max()], 1.0, atol=1e-3)
+    assert room.sum() * edges.prod() == pytest.approx(0.36 - (high - low).prod(), rel=0.01)
     near = inner(level, "clear") == 0.0
-    assert near[room < 0.999].all() and not near.all()
+    assert near[beyond < edges.min()].all() and not near.all()
 
 
 def test_water_beside_a_solid_fills_its_cells():

@@ -31,15 +31,22 @@ def rotation(dim: int, angle: float) -> np.ndarray:
 
 
 def start_after(dim: int, flow: np.ndarray, pull: np.ndarray) -> np.ndarray:
-    """What the start has of `pull` [m/s^2] after particles have moved with `flow` for DT, [n, dim]."""
-    sim = drop(dim, 10 if dim == 2 else 6, flow)
+    """What the start has of `pull` [m/s^2] after particles have moved with `flow` for DT, [n, dim].
+
+    Those in edges and corners have few neighbours, and forget.
+    """
+    side = 10 if dim == 2 else 6
+    sim = drop(dim, side, flow)
+    inner = np.all(np.abs(sim.positions - sim.positions.mean(axis=0)) < (side / 2 - 1) * D, axis=1)
     sim.frame()
     world = sim.world
     world.remember_viscosity(np.tile(pull.astype(np.float32), (sim.count, 1)))
     kinds = blend(world.materials, sim.scene)
     prepare_fluids(world, kinds, sim.scene, DT)
     solve_viscosity(world, kinds, sim.scene, coefficients(sim.scene, DT), 0)
-    return download(world.particles.viscous)[: sim.count].astype(float)
+    found = np.empty((sim.count, dim))
+    found[download(world.particles.id)[: sim.count]] = download(world.particles.viscous)[: sim.count]
+    return found[inner]
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -106,6 +106,10 @@ def _compiled(text: str) -> Value:
         ) from None
     if sum(1 for _ in ast.walk(tree)) > 3 * MOST_PARTS:
         raise WavetankError(f"{shown(text)} has more than {MOST_PARTS} parts; write a shorter expression.")
+    if isinstance(tree.body, ast.Tuple):
+        raise WavetankError(
+            f"{shown(text)} is no single number; write several in brackets, as [{text.replace(',', ', ')}]."
+        )
     return _value_of(tree.body, text)
 
 

@@ -35,7 +35,7 @@ from wavetank.physics.world import World
 from wavetank.scene.scene import Scene
 from wavetank.simulation.added_mass import added_mass
 from wavetank.simulation.body import Body
-from wavetank.simulation.colliders import shape_of
+from wavetank.simulation.colliders import shapes_of
 from wavetank.simulation.joints import new_joint
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.solids.distance import PARTS
@@ -110,8 +110,9 @@ class Bodies(Mapping[str, Body]):
             maker = maker.gyroscopic_forces(True)
         handle = self.world.add_body(maker)
         friction = self.solids.friction if solid.friction is None else solid.friction
-        collider = engine.Collider.new(shape_of(solid, self.dim, self.scene.spacing))
-        self.world.add_collider(collider.density(0.0).friction(friction).restitution(solid.restitution), handle)
+        for position, rotation, shape in shapes_of(solid, self.dim, self.scene.spacing):
+            collider = engine.Collider.new(shape).position(self._isometry(position, rotation))
+            self.world.add_collider(collider.density(0.0).friction(friction).restitution(solid.restitution), handle)
         if solid.is_body:
             self.members.append(self._body(number, solid, handle))
         return handle
@@ -301,9 +302,9 @@ class Bodies(Mapping[str, Body]):
 
     # --- states ---
 
-    def renewed(self) -> "Bodies":
-        """Return the bodies that there are now that solids have come or gone; the others go on as they were."""
-        bodies = Bodies(self.scene, self.solids)
+    def renewed(self, scene: Scene, solids: MovingSolids) -> "Bodies":
+        """Return the bodies among these solids; those that there were go on as they did."""
+        bodies = Bodies(scene, solids)
         for body in bodies.members:
             before = next((other for other in self.members if other.name == body.name), None)
             if before is not None:

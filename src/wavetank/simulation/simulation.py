@@ -240,7 +240,7 @@ class Simulation(Contents):
         self._renew_solids()
 
     def _renew_solids(self) -> None:
-        self.bodies = self.bodies.renewed()
+        self.bodies = self.bodies.renewed(self.scene, self.solids)
         self.world.pieces = self.bodies.cut()
         self.world.solids, self.world.has_friction = self.solids.device, self.solids.has_friction
         self._outdated = True
