@@ -55,7 +55,7 @@ from wavetank.physics.grid_pressure.room import (
     in_part,
     open_tents,
     whole,
-)
+)  # fmt: skip
 from wavetank.physics.grid_pressure.surface import carried_share, depth_at
 from wavetank.physics.mixture import Blend
 from wavetank.physics.pairs import column
