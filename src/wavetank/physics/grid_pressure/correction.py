@@ -255,8 +255,8 @@ def gather(
     The sums are 0 before. There are only the walls of the tank unless solids are `searched`. Where fluids are `mixed`,
     their densities are averaged.
 
-    Threads share the particles in parts. Where these are alone, each has sums of its own and waits for no other.
-    Where nodes are `few`, one thread is done with them before others have started.
+    Threads share the particles in parts; where these are alone, each has sums of its own and waits for no other. Where
+    nodes are `few`, one thread is done with them before others have started.
     """
     for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
@@ -386,8 +386,8 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing)
     move_particles(finest, world.particles, cells, world.solids, c, remembered(push), count, few)
     if world.pieces:
-        acting = (1.0 - carried(c.dt, params.frame_time)) * max(math.hypot(*params.gravity), 1e-6) * c.dt**2
-        push_on_grid(world, stiffness, stiffness / acting)
+        acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2
+        push_on_grid(world, stiffness, stiffness / acting)  # the grid is for worlds with gravity
 
 
 def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
@@ -396,6 +396,5 @@ def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
     return remembered(Errors(
         unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness, inner_from=INNER[0],
         inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT,
-        closing=CLOSING * params.grid_pressure / stiffness,
-        least_theta=LEAST_THETA,
+        closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA,
     ))  # fmt: skip
