@@ -9,21 +9,24 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from wavetank.formats import exporter_named
 from wavetank.formats.gif import LARGEST_RATE, GifWriter
 from wavetank.formats.mp4 import VideoWriter
+from wavetank.formats.outputs import Outputs, check_exports, parts_named
+from wavetank.formats.plan import Viewpoint
 from wavetank.formats.png import write_png
+from wavetank.formats.run_folder import SUMMARY, Run, RunFolder
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import make_folder
+from wavetank.scene.scene import Scene
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.simulation import Simulation
+from wavetank.view.camera import Camera
+from wavetank.view.extent import extent_of
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import QUALITIES, quality_named
 
@@ -53,7 +56,9 @@ class Order:
     video: bool = False
     gif: bool = False
     frames: bool = False  # a picture each
-    exports: tuple[str, ...] = ()  # formats of particles
+    exports: tuple[str, ...] = ()  # formats of frames
+    only: tuple[str, ...] = ()  # parts of a frame that these hold, see `instant.PARTS`; all but the surface without any
+    every: int = 1  # only each so manyth frame goes into these
     quality: str = "draft"
     look: dict[str, Any] = dataclasses.field(default_factory=dict)  # options of a picture: see `Style`
 
@@ -69,6 +74,9 @@ class Order:
             raise WavetankError(
                 f"--name = {self.name!r} is not allowed; it is the front part of file names, --out the folder."
             )
+        if not 1 <= self.every <= 1_000_000:
+            raise WavetankError(f"--every = {self.every} is not allowed; it must be a whole number of at least 1.")
+        parts_named(self.only)
         quality_named(self.quality)
 
     @property
@@ -81,6 +89,15 @@ class Order:
         """Options of every picture."""
         return {**self.look, "samples": QUALITIES[self.quality][1]}
 
+    def run(self, sim: Simulation) -> Run:
+        """Return this as the file of a run's folder has it."""
+        return Run(
+            name=self.name, arch=sim.arch or "cpu", seconds=self.seconds, start=sim.time, fps=self.fps, size=self.size,
+            video=self.video, gif=self.gif, frames=self.frames, exports=[*self.exports], only=[*self.only],
+            every=self.every, quality=self.quality,
+            look={name: str(value) for name, value in self.look.items() if value is not None},
+        )  # fmt: skip
+
     def path(self, suffix: str) -> Path:
         """Return the file of that suffix."""
         return self.out / f"{self.name}{suffix}"
@@ -91,27 +108,42 @@ def record(sim: Simulation, order: Order, console: Console | None = None) -> dic
 
     Ctrl-C ends the run early; every file is complete then, and the figures say `interrupted`.
     """
-    writers = [exporter_named(format_) for format_ in order.exports]
-    for writer in writers:
-        if hasattr(writer, "check"):
-            writer.check(sim.scene)
+    check_exports(order.exports, order.only, sim.scene)
     supersample = QUALITIES[order.quality][0]
     renderer = Renderer(*order.size, supersample)
     renderer.render(sim.frame(), **order.style)  # what is wrong with the look shows before anything is written
-    make_folder(order.out)
+    folder = RunFolder.create(order.out, order.run(sim), sim.scene)
+    outputs = Outputs(
+        folder.base, sim.scene, order.exports, fps=order.fps / order.every, only=order.only, view=view_of(sim.scene),
+        tell=(console or Console(stderr=True)).print,
+    )  # fmt: skip
     with ExitStack() as stack:
-        sinks = _open_sinks(order, writers, stack)
-        summary = _run(sim, order, renderer if order.has_pictures else None, [*sinks.values()], console)
+        sinks = _open_sinks(order, stack)
+        stack.enter_context(outputs)
+        writers = [*sinks.values(), lambda number, frame, image: _export(outputs, order.every, number, frame)]
+        summary = _run(sim, order, renderer if order.has_pictures else None, writers, console, folder)
+    files = [*sinks, *outputs.files]
     still = order.path(".png")
     image = Renderer(*order.size, 2 if order.quality == "draft" else supersample).render(sim.frame(), **order.style)
     write_png(still, image, {"scene": sim.scene.title, "time": f"{sim.time:.4f} s"})
-    stats = order.out / "stats.json"
-    figures = summary.figures() | {"files": [*sinks, str(still), str(stats)]}
+    stats = order.out / SUMMARY
+    figures = summary.figures() | {"files": [*files, str(still), str(stats)], "waited_for_files": outputs.waited}
     stats.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
     return figures
 
 
-def _open_sinks(order: Order, writers: Sequence[ModuleType], stack: ExitStack) -> dict[str, Sink]:
+def view_of(scene: Scene) -> Viewpoint:
+    """Return where pictures of a scene are taken from."""
+    camera = Camera.framing_extent(extent_of(scene))
+    return Viewpoint(camera.eye, camera.target, camera.field_of_view, camera.height)
+
+
+def _export(outputs: Outputs, every: int, number: int, frame: Frame) -> None:
+    if number % every == 0:
+        outputs.write(number // every, frame)
+
+
+def _open_sinks(order: Order, stack: ExitStack) -> dict[str, Sink]:
     """Open what frames go into, by the files' names; the `stack` closes it."""
     sinks: dict[str, Sink] = {}
     if order.video:
@@ -124,20 +156,16 @@ def _open_sinks(order: Order, writers: Sequence[ModuleType], stack: ExitStack) -
         sinks[str(order.path("-#####.png"))] = lambda number, frame, image: write_png(
             order.path(f"-{number:05d}.png"), image
         )
-    for writer in writers:
-        sinks[str(order.path(f"-#####{writer.SUFFIXES[0]}"))] = _particle_sink(writer, order)
     return sinks
 
 
-def _particle_sink(writer: ModuleType, order: Order) -> Sink:
-    def write(number: int, frame: Frame, image: Any) -> None:
-        writer.write(order.path(f"-{number:05d}{writer.SUFFIXES[0]}"), frame)
-
-    return write
-
-
 def _run(
-    sim: Simulation, order: Order, renderer: Renderer | None, sinks: Sequence[Sink], console: Console | None
+    sim: Simulation,
+    order: Order,
+    renderer: Renderer | None,
+    sinks: Sequence[Sink],
+    console: Console | None,
+    folder: RunFolder,
 ) -> "_Summary":
     """Let the water move and every sink have each frame, with its picture where there is a renderer."""
     summary = _Summary(sim)
@@ -155,6 +183,7 @@ def _run(
                 for sink in sinks:
                     sink(number, frame, image)
                 summary.add()
+                folder.add_stats(summary.last)
                 elapsed = progress.tasks[0].elapsed or 0.0
                 first = elapsed if number == 0 else first
                 speed = number / (elapsed - first) if elapsed > first else 0.0
