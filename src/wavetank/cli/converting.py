@@ -31,3 +31,23 @@ def export(
     print(f"{figures['frames']:,} frames, {figures['fps']:g} a second of water")
     for path in figures["files"]:
         print(f"  {path}")
+
+
+@app.command("import")
+def import_scene(
+    file: Annotated[Path, typer.Argument(metavar="SCENE.json", help="A scene of SPlisHSPlasH.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The scene file to be written, TOML.")],
+    spacing: Annotated[float | None, typer.Option(help="Distance of particles [m] in place of its own.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Read a scene of SPlisHSPlasH, write it as one of wavetank, and say what has no counterpart."""
+    from wavetank.formats.splishsplash import read_splishsplash
+
+    imported = read_splishsplash(file, spacing)
+    imported.scene.save(out)
+    if as_json:
+        print(json.dumps({"file": str(out), "notes": imported.notes}))
+        return
+    print(out)
+    for note in imported.notes:
+        print(f"  {note}")
