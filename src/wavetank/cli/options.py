@@ -18,6 +18,7 @@ View = Annotated[str | None, typer.Option(help="water, particles, slice or foam;
 Quality = Annotated[str, typer.Option(help="draft, standard (2 x 2 samples a pixel) or film (64 pictures averaged).")]
 ColorBy = Annotated[str | None, typer.Option(help="speed, density, material, foam, or a colour such as #3f99da.")]
 Cut = Annotated[str | None, typer.Option(help="Where a slice lies: z=0.35 for example.")]
+AllowLarge = Annotated[bool, typer.Option("--allow-large", help="Begin what needs more memory than is free, or hours.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object as the last line.")]
 
 

@@ -8,7 +8,7 @@ import threading
 import time
 from typing import Any
 
-from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.errors import NotFiniteError, WavetankError
 from wavetank.scene.scene import Scene
 from wavetank.session.commands import Command, FrameLength
 from wavetank.session.history import History
@@ -124,9 +124,18 @@ class Session(SessionState):
         except WavetankError as error:
             self.paused, self.steps_left = True, 0
             self.note(str(error))
+            if isinstance(error, NotFiniteError):
+                self._go_back()
         for sentence in self.sim.notes:
             self.note(sentence)
         self.sim.notes.clear()
+
+    def _go_back(self) -> None:
+        """Go to the last kept instant whose numbers are numbers."""
+        instant = self.history.last_finite()
+        if instant is not None:
+            self.go_to(instant)
+            self.note(f"Back at t = {instant.time:.3g} s, and paused; what was changed since then is as it was left.")
 
     def turn(self) -> bool:
         """Carry out what waits and compute a frame if one is due; say whether anything happened."""

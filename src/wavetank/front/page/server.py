@@ -25,7 +25,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.front.about import everything
 from wavetank.front.loop import Loop, News
 from wavetank.front.page.gate import Gate
-from wavetank.front.page.viewers import Viewers
+from wavetank.front.page.viewers import LONGEST_MESSAGE, Viewers
 from wavetank.front.picture import jpeg
 from wavetank.front.theme import style_sheet
 from wavetank.session.pace import share_interpreter
@@ -33,7 +33,6 @@ from wavetank.session.recording import Recording
 from wavetank.session.session import Session
 
 PORT = 8420  # the first one tried where none is asked for
-LONGEST_MESSAGE = 2_500_000  # bytes: a dropped scene file
 
 
 class WebFront:
