@@ -99,12 +99,12 @@ def put_particles(snapshot: Snapshot, scene: Scene, world: World, capacity: int)
 def digest(snapshot: Snapshot, rules: str = "") -> str:
     """Return the hex SHA-256 of an instant: of all that decides how it goes on, and of nothing else.
 
-    That is, in this order, each with its name and shape: the ledger but for the room that there is (time, next id, what
-    is owed, the fastest so far), how many births of foam there were, every array in the order of particle ids
-    (places, velocities, carried pressure, viscosity, dyes, ice, materials), foam in the order of births, bodies and their
-    engine, poses, targets and growth of solids, what hands hold, emitters and drains, and `rules`, the scene as it is now.
-    There is no state of random numbers: they follow from ids and the number of the frame. Recordings, tests and
-    `wavetank run` compare by this and nothing else.
+    That is, in this order, each with its name and shape: the ledger but for the room that there is (time, next id,
+    what is owed, the fastest so far), how many births of foam there were, every array in the order of particle ids
+    (places, velocities, carried pressure, viscosity, dyes, ice, materials), foam in the order of births, bodies and
+    their engine, poses, targets and growth of solids, what hands hold, emitters and drains, and `rules`, the scene as
+    it is now. There is no state of random numbers: they follow from ids and the number of the frame. Recordings, tests
+    and `wavetank run` compare by this and nothing else.
     """
     whole = hashlib.sha256()
     ledger = {name: value for name, value in snapshot.ledger.plain().items() if name != "capacity"}
