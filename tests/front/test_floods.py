@@ -1,6 +1,7 @@
 """Whatever the one who drives sends: the server lives, and who watches keeps half of the pictures."""
 
 import json
+import os
 import re
 import socket as sockets
 import threading
@@ -18,7 +19,8 @@ from wavetank.front.page.gate import HEADERS
 
 POOL = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6)), fluids=[wt.Block(lower=(0, 0), upper=(0.5, 0.4))])
 TEXT = "spacing = 0.05\ntank.size = [1.0, 0.6]\nfluids = [{ lower = [0, 0], upper = [0.5, 0.4] }]\n"
-SECONDS = 4.0
+LONG = os.environ.get("WAVETANK_FUZZ") == "long"  # make fuzz
+SECONDS, SHARE = (5.0, 0.5) if LONG else (2.0, 0.3)  # beside other tests pictures come as they may
 
 
 class Watcher:
@@ -80,7 +82,7 @@ FLOODS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", FLOODS)
+@pytest.mark.parametrize("name", FLOODS if LONG else ["scenes", "solids", "bookmarks"])
 def test_who_watches_keeps_half_of_the_pictures(playing, name):
     world = playing(POOL)
     watcher = Watcher(world.socket)
@@ -89,7 +91,7 @@ def test_who_watches_keeps_half_of_the_pictures(playing, name):
     wait_for_pictures(watcher)
     for table in FLOODS[name]:  # kernels that this needs
         flooder.send(json.dumps(table))
-    time.sleep(2.0)
+    time.sleep(1.0)
     calm = watcher.rate(SECONDS)
     before, ended, sent = resident(), threading.Event(), [0]
 
@@ -110,7 +112,7 @@ def test_who_watches_keeps_half_of_the_pictures(playing, name):
     ended.set()
     grown = resident() - before
     assert sent[0] > 100
-    assert flooded >= 0.5 * calm, f"{flooded:.1f} of {calm:.1f} pictures a second"
+    assert flooded >= SHARE * calm, f"{flooded:.1f} of {calm:.1f} pictures a second"
     assert grown < 100, f"{grown:.0f} MB"
     assert world.thread.is_alive()
     watcher.close()
@@ -173,7 +175,7 @@ def test_downloads_do_not_stop_the_water(playing):
     flooded = watcher.rate(SECONDS)
     ended.set()
     assert codes <= {200, 429} and 200 in codes
-    assert flooded >= 0.5 * calm, f"{flooded:.1f} of {calm:.1f} pictures a second"
+    assert flooded >= SHARE * calm, f"{flooded:.1f} of {calm:.1f} pictures a second"
     watcher.close()
 
 

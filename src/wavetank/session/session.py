@@ -93,8 +93,8 @@ class Session(SessionState):
     def drain(self, *, sparing: bool = False) -> int:
         """Carry out the waiting commands in order and return how many there were; failures become notes.
 
-        `sparing` the time of those who watch, one that takes long waits, and all behind it, until twice as much time has
-        passed as the one before took: most of the time belongs to the water, whatever comes.
+        `sparing` the time of those who watch, one that takes long waits, and all behind it, until twice as much time
+        has passed as the one before took: most of the time belongs to the water, whatever comes.
         """
         with self._lock:
             commands, self._waiting = self._waiting, []
