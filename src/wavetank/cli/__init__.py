@@ -14,11 +14,11 @@ def main() -> None:
     try:
         app(standalone_mode=True)
     except SystemExit as end:
-        if end.code == 130:
+        if end.code in (129, 130, 143):
             print("wavetank: stopped.", file=sys.stderr)
         raise
     except WavetankError as error:
-        print(f"wavetank: {error}", file=sys.stderr)
+        print(f"wavetank: {' '.join(str(error).splitlines())}", file=sys.stderr)
         sys.exit(1)
     except (OSError, MemoryError) as error:
         place, reason = getattr(error, "filename", None), getattr(error, "strerror", None)

@@ -22,6 +22,7 @@ Exports = Annotated[
     list[str], typer.Option(help="Write each frame: usd, vtkhdf, vtp, h5, npz, csv, ply, obj; several as usd,npz.")
 ]
 Only = Annotated[str, typer.Option(help="Parts of it: particles, foam, solids, surface; all but the surface.")]
+AllowLarge = Annotated[bool, typer.Option("--allow-large", help="Begin what needs more memory than is free, or hours.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object as the last line.")]
 
 

@@ -1,6 +1,7 @@
 """Commands for people: play, and replay of what was played."""
 
 import json
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -58,6 +59,10 @@ def replay(
     figures = replay_session(session, video=video, fps=fps, size=size_of(size), arch=arch, console=console)
     if as_json:
         print(json.dumps(figures))
+    if figures["interrupted"]:
+        print(f"the replay was stopped after {figures['frames']:,} frames", file=sys.stderr)
+        raise typer.Exit(figures["exit_code"])
+    if as_json:
         return
     same = "the same particles, bit for bit" if figures["same"] else "other particles than recorded"
     print(f"{figures['frames']:,} frames, {figures['seconds_of_water']:.2f} s of water on {figures['arch']}: {same}")

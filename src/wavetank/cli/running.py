@@ -1,4 +1,4 @@
-"""Commands that compute: scenes, run, render."""
+"""Commands that compute: scenes, run, resume, render."""
 
 import json
 from pathlib import Path
@@ -10,6 +10,7 @@ from rich.table import Table
 
 from wavetank import Scene, WavetankError, bundled_scenes
 from wavetank.cli.options import (
+    AllowLarge,
     Arch,
     ColorBy,
     Cut,
@@ -76,12 +77,17 @@ def run(
     cut: Cut = None,
     quality: Quality = "draft",
     name: Annotated[str, typer.Option(help="Front part of the files' names.")] = "",
+    checkpoint_every: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Keep a state of every so many seconds of water: see resume.")
+    ] = 0.0,
+    allow_large: AllowLarge = False,
     settings: Settings = [],  # noqa: B006
     arch: Arch = "cpu",
     as_json: Json = False,
 ) -> None:
     """Simulate a scene and write video, pictures, particles and figures."""
     from wavetank.front.headless import Order, record
+    from wavetank.simulation.cost import large_worlds_allowed
     from wavetank.simulation.simulation import Simulation
 
     world = configured(scene, settings)
@@ -89,14 +95,34 @@ def run(
         out, seconds, fps, size_of(size), name or Path(scene).stem, video=video, gif=gif, frames=frames,
         exports=names_in(export), only=names_in([only]), every=every, quality=quality,
         look={"view": view, "color_by": color_by, "cut": cut},
+        checkpoint_every=checkpoint_every,
     )  # fmt: skip
-    figures = record(Simulation(world, arch=arch), order, console)
+    with large_worlds_allowed(allow_large):
+        _finish(record(Simulation(world, arch=arch), order, console), as_json)
+
+
+@app.command()
+def resume(
+    folder: Annotated[Path, typer.Argument(help="The folder that run --checkpoint-every wrote to.")],
+    arch: Annotated[str, typer.Option(help="Back end; that of the run unless given.")] = "",
+    allow_large: AllowLarge = False,
+    as_json: Json = False,
+) -> None:
+    """Go on with a run that ended early, from its last checkpoint, to the same bits."""
+    from wavetank.front.headless import go_on
+    from wavetank.simulation.cost import large_worlds_allowed
+
+    with large_worlds_allowed(allow_large):
+        _finish(go_on(folder, arch, console), as_json)
+
+
+def _finish(figures: dict[str, Any], as_json: bool) -> None:
     if as_json:
         print(json.dumps(figures))
     else:
         _report(figures)
     if figures["interrupted"]:
-        raise typer.Exit(130)
+        raise typer.Exit(figures["exit_code"])
 
 
 @app.command()

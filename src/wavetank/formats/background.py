@@ -40,6 +40,13 @@ class Background:
         self._raise()
         self._jobs.put((job, size))
 
+    def drain(self) -> None:
+        """Wait until nothing waits; raises what went wrong."""
+        with self._room:
+            while self._number:
+                self._room.wait(0.2)
+        self._raise()
+
     def finish(self) -> None:
         """Wait until all is done; raises what went wrong."""
         self._jobs.put(None)

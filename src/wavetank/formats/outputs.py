@@ -88,6 +88,11 @@ class Outputs:
             else:
                 series.write(number, instant)
 
+    def drain(self) -> None:
+        """Wait until all that was given is in the files; raises what went wrong."""
+        if self._background is not None:
+            self._background.drain()
+
     def close(self, *, hurry: bool = False) -> None:
         """Write what waits and complete the files; raises what went wrong. In a `hurry` nothing is tried again."""
         if hurry:

@@ -1,8 +1,8 @@
 """Scene files of SPlisHSPlasH (splishsplash.physics-simulation.org), read as scenes of wavetank.
 
 Their lengths are metres and y is up, as ours. Otherwise: the distance of particles is twice `particleRadius`; the tank
-is an inverted box around its own centre, anywhere; sizes of emitters count particles; viscosities are kinematic [m^2/s];
-rotations are an axis and an angle. What has no counterpart is told, one sentence each: see docs/formats.md.
+is an inverted box around its own centre, anywhere; sizes of emitters count particles; viscosities are kinematic
+[m^2/s]; rotations are an axis and an angle. What has no counterpart is told, one sentence each: see docs/formats.md.
 """
 
 import dataclasses
@@ -96,7 +96,7 @@ class _Reader:
                 f"{self.path}: there is no fluid in it that wavetank could simulate"
                 + (f"; {', '.join(sorted(self.elastic))} is an elastic solid." if self.elastic else ".")
             )
-        used = {member.material for member in (*fluids, *emitters)}
+        used = {fluid.material for fluid in fluids} | {emitter.material for emitter in emitters}
         table: dict[str, Any] = {
             "title": self.path.stem.replace("_", " "), "spacing": self.spacing, "tank": solids.tank, "fluids": fluids,
             "materials": [material for name, material in materials.items() if name in used], "solids": solids.found,
@@ -169,7 +169,7 @@ class _Reader:
 
     def _allowed(self, parameter: str, value: float, what: str) -> float:
         low, high = next((p.low, p.high) for p in PARAMETERS if p.name == parameter)
-        kept = min(max(value, float(low)), float(high))
+        kept = min(max(value, float(low or 0.0)), math.inf if high is None else float(high))
         if kept != value:
             self.notes.append(f"{what} is {value:g}, outside of what is allowed; it is taken as {kept:g}.")
         return kept

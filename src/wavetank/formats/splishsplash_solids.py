@@ -150,7 +150,7 @@ class Solids:
             for loop in _section(turned(turn, vertices) + shift, faces):
                 yield Polygon(points=[(float(x), float(y)) for x, y in loop], invert=is_inverted(row), **place)
         else:
-            thickness = {}
+            thickness: dict[str, Any] = {}
             if is_inverted(row):
                 thickness = {"invert": True}
             elif not _is_closed(faces):
@@ -178,7 +178,7 @@ def _is_box(vertices: np.ndarray, faces: np.ndarray) -> bool:
     """Say whether these are the eight corners of a box along the axes, each in some face."""
     lower, upper = _bounds(vertices)
     at_corner = (np.isclose(vertices, lower) | np.isclose(vertices, upper)).all()
-    return len(vertices) == 8 and len(faces) == 12 and bool(at_corner) and (upper > lower).all()
+    return len(vertices) == 8 and len(faces) == 12 and bool(at_corner) and bool((upper > lower).all())
 
 
 def _is_ball(offsets: np.ndarray) -> bool:

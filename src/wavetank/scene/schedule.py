@@ -14,6 +14,7 @@ from wavetank.foundation.model import Model, Number
 from wavetank.foundation.rotations import turned
 from wavetank.foundation.timed import Timed
 from wavetank.foundation.tracks import checked_track, track, varies
+from wavetank.scene.bounds import STRONGEST
 from wavetank.scene.drains import Drain
 from wavetank.scene.emitters import Emitter
 
@@ -91,4 +92,9 @@ def gravity_at(scene: Any, time: float) -> tuple[float, ...]:
         axis = np.array(tank.tilt_axis, float)
         half = -0.5 * tank.tilt
         g = turned(np.concatenate([[np.cos(half)], np.sin(half) * axis / np.linalg.norm(axis)]), g)
+    if not np.linalg.norm(g) <= STRONGEST:
+        raise WavetankError(
+            f"gravity has a length of {np.linalg.norm(g):.3g} at t = {clock:.6g} s; at most {STRONGEST:g} m/s^2 are "
+            "allowed."
+        )
     return tuple(g[: scene.dim].tolist())

@@ -17,7 +17,7 @@ from later ones. It is stable where m_a is more than half of what the water real
     change     dv_before    change of velocity in the step before                       m/s, rad/s
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -326,6 +326,14 @@ class Bodies(Mapping[str, Body]):
         self.world = self.engine.PhysicsWorld.restore(arrays["bodies_engine"].tobytes())
         for body, memory in zip(self.members, arrays["bodies_memory"], strict=True):
             body.recall(memory)
+
+    def check(self, poses: Sequence[Pose]) -> None:
+        """Check that the engine, restored from a file, has the bodies where the solids are; raises `WavetankError`."""
+        for body in self.members:
+            (position, rotation), (place, turn) = self._pose(body), poses[body.number]
+            off = np.concatenate([position - place, np.abs(rotation) - np.abs(turn), 0.0 * self._velocity(body)])
+            if not np.abs(off).max() <= 1e-3 * (1.0 + np.abs(place).max()):
+                raise WavetankError(f"the engine's state of the body {body.name!r} is not that of the solid.")
 
 
 def _quaternion(matrix: np.ndarray) -> tuple[float, ...]:

@@ -9,7 +9,7 @@ from wavetank.physics import measure, population
 from wavetank.physics.measure import neighbor_numbers, update_densities
 from wavetank.physics.world import World
 from wavetank.scene.scene import Scene
-from wavetank.simulation.arrays import check_rows, largest_norm, put_by_id
+from wavetank.simulation.arrays import check_crowd, check_rows, largest_norm, put_by_id
 from wavetank.simulation.bodies import Bodies
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.instant import Standing
@@ -54,6 +54,7 @@ class Contents:
     @positions.setter
     def positions(self, values: Any) -> None:
         x = check_rows("positions", values, (self.count, self.scene.dim))
+        check_crowd("positions", x, self.scene.spacing)
         if not np.array_equal(x, self.positions):
             population.clear_forces(self.world.particles, self.count)  # what pressed them was elsewhere
             put_by_id(self.world.particles, self.count, "x", x)
@@ -67,8 +68,9 @@ class Contents:
     @velocities.setter
     def velocities(self, values: Any) -> None:
         v = check_rows("velocities", values, (self.count, self.scene.dim))
-        put_by_id(self.world.particles, self.count, "v", v)
-        self.ledger.fastest_start = max(self.ledger.fastest_start, largest_norm(v))
+        if not np.array_equal(v, self.velocities):
+            put_by_id(self.world.particles, self.count, "v", v)
+            self.ledger.fastest_start = max(self.ledger.fastest_start, largest_norm(v))
 
     @property
     def densities(self) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 
 from wavetank.device.compiler import download
 from wavetank.device.state import Diffuse
+from wavetank.foundation.errors import NotFiniteError
 from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import Standing
 from wavetank.solids.distance import SolidSet
@@ -51,6 +52,17 @@ class Frame:
     def velocities(self) -> np.ndarray:
         """Velocities [m/s], float32 [count, dim], ordered by particle id."""
         return self._by_id(self.v)
+
+    def check_finite(self) -> None:
+        """Raise `NotFiniteError` where a place or a velocity is no number."""
+        bad = ~(np.isfinite(self.positions) & np.isfinite(self.velocities)).all(axis=1)
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise NotFiniteError(
+                f"particle {self.ids[row]} at {self.positions[row].tolist()} m has the velocity "
+                f"{self.velocities[row].tolist()} m/s at t = {self.time:.6g} s and is no number that water can go on "
+                f"from, as are {int(bad.sum()) - 1:,} others; try shorter steps (substeps) or weaker forces."
+            )
 
     @functools.cached_property
     def densities(self) -> np.ndarray:

@@ -25,6 +25,7 @@ from wavetank.simulation.jets import flown, jet_of, particles_due, row
 GAP = 0.8  # d: room that new particles have from others
 PRESSED = 0.45  # d: the same for those that water under pressure has kept waiting, more than a row
 PATIENCE = 0.5  # s: flow of so long is owed at most; the rest is given up, and said
+MOST_DUE = 5_000_000  # particles of an emitter in a frame
 REACH = 4.0  # radii: how far the suction of a drain is felt
 
 
@@ -163,6 +164,11 @@ class Sources:
         source.flows = rows > 0.0
         if not source.flows:
             return
+        if rows * len(mouth) > MOST_DUE:
+            raise WavetankError(
+                f"emitters[{number}] lets out {rows * len(mouth):,.3g} particles in a frame; at most {MOST_DUE:,} are "
+                "allowed: lower its speed or flow, or make the spacing larger."
+            )
         due, source.phase = particles_due(mouth, source.phase, rows)
         keep = self._allowed(sim, now, len(due.place), source)
         if keep < len(due.place):
