@@ -18,6 +18,10 @@ View = Annotated[str | None, typer.Option(help="water, particles, slice or foam;
 Quality = Annotated[str, typer.Option(help="draft, standard (2 x 2 samples a pixel) or film (64 pictures averaged).")]
 ColorBy = Annotated[str | None, typer.Option(help="speed, density, material, foam, or a colour such as #3f99da.")]
 Cut = Annotated[str | None, typer.Option(help="Where a slice lies: z=0.35 for example.")]
+Exports = Annotated[
+    list[str], typer.Option(help="Write each frame: usd, vtkhdf, vtp, h5, npz, csv, ply, obj; several as usd,npz.")
+]
+Only = Annotated[str, typer.Option(help="Parts of it: particles, foam, solids, surface; all but the surface.")]
 AllowLarge = Annotated[bool, typer.Option("--allow-large", help="Begin what needs more memory than is free, or hours.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object as the last line.")]
 
@@ -48,6 +52,11 @@ def value_of(text: str) -> Any:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return text
+
+
+def names_in(texts: list[str]) -> tuple[str, ...]:
+    """Return the names in texts such as "usd,npz", each once."""
+    return tuple(dict.fromkeys(name.strip() for text in texts for name in text.split(",") if name.strip()))
 
 
 def size_of(text: str) -> tuple[int, int]:

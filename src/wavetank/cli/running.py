@@ -14,7 +14,9 @@ from wavetank.cli.options import (
     Arch,
     ColorBy,
     Cut,
+    Exports,
     Json,
+    Only,
     Quality,
     SceneName,
     Settings,
@@ -22,6 +24,7 @@ from wavetank.cli.options import (
     app,
     configured,
     console,
+    names_in,
     size_of,
 )
 from wavetank.scene.scene import bundled_levels, scene_schema
@@ -64,7 +67,9 @@ def run(
     video: Annotated[bool, typer.Option("--video", help="Write an MP4.")] = False,
     gif: Annotated[bool, typer.Option("--gif", help="Write an animated GIF.")] = False,
     frames: Annotated[bool, typer.Option("--frames", help="Write a PNG for each frame.")] = False,
-    export: Annotated[list[str], typer.Option(help="Write particles: npz, csv, ply; or their surface: obj.")] = [],  # noqa: B006
+    export: Exports = [],  # noqa: B006
+    only: Only = "",
+    every: Annotated[int, typer.Option(help="Export only each so manyth frame.")] = 1,
     fps: Annotated[float, typer.Option(help="Frames per second of water in video and files.")] = 30.0,
     size: Annotated[str, typer.Option(help="Width x height of pictures.")] = "1280x720",
     view: View = None,
@@ -88,7 +93,8 @@ def run(
     world = configured(scene, settings)
     order = Order(
         out, seconds, fps, size_of(size), name or Path(scene).stem, video=video, gif=gif, frames=frames,
-        exports=tuple(export), quality=quality, look={"view": view, "color_by": color_by, "cut": cut},
+        exports=names_in(export), only=names_in([only]), every=every, quality=quality,
+        look={"view": view, "color_by": color_by, "cut": cut},
         checkpoint_every=checkpoint_every,
     )  # fmt: skip
     with large_worlds_allowed(allow_large):

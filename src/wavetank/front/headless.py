@@ -6,25 +6,29 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from wavetank.formats import exporter_named
 from wavetank.formats.gif import LARGEST_RATE, GifWriter
 from wavetank.formats.mp4 import VideoWriter
+from wavetank.formats.outputs import Outputs, check_exports, parts_named
+from wavetank.formats.plan import Viewpoint
 from wavetank.formats.png import write_png
+from wavetank.formats.run_folder import SUMMARY, Run, RunFolder
 from wavetank.foundation.door import guarded, named
 from wavetank.foundation.errors import NotFiniteError, WavetankError
-from wavetank.foundation.replacing import make_folder, replacing
+from wavetank.foundation.replacing import replacing
 from wavetank.front.checkpoints import Begun, Checkpoints, FilmInParts, begun
 from wavetank.front.signals import Asked, asked_to_end
+from wavetank.scene.scene import Scene
 from wavetank.simulation.cost import check_time
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.simulation import Simulation
+from wavetank.view.camera import Camera
+from wavetank.view.extent import extent_of
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import QUALITIES, quality_named
 
@@ -55,7 +59,9 @@ class Order:
     video: bool = False
     gif: bool = False
     frames: bool = False  # a picture each
-    exports: tuple[str, ...] = ()  # formats of particles
+    exports: tuple[str, ...] = ()  # formats of frames
+    only: tuple[str, ...] = ()  # parts of a frame that these hold, see `instant.PARTS`; all but the surface without any
+    every: int = 1  # only each so manyth frame goes into these
     quality: str = "draft"
     look: dict[str, Any] = dataclasses.field(default_factory=dict)  # options of a picture: see `Style`
     checkpoint_every: float = 0.0  # s of water between two states from which the run can go on; 0: none
@@ -79,6 +85,9 @@ class Order:
             )
         if self.gif and self.checkpoint_every:
             raise WavetankError("--gif does not go with --checkpoint-every: a GIF is made in one go; write a --video.")
+        if not 1 <= self.every <= 1_000_000:
+            raise WavetankError(f"--every = {self.every} is not allowed; it must be a whole number of at least 1.")
+        parts_named(self.only)
         quality_named(self.quality)
 
     @property
@@ -90,6 +99,15 @@ class Order:
     def style(self) -> dict[str, Any]:
         """Options of every picture."""
         return {**self.look, "samples": QUALITIES[self.quality][1]}
+
+    def run(self, sim: Simulation) -> Run:
+        """Return this as the file of a run's folder has it."""
+        return Run(
+            name=self.name, arch=sim.arch or "cpu", seconds=self.seconds, start=sim.time, fps=self.fps, size=self.size,
+            video=self.video, gif=self.gif, frames=self.frames, exports=[*self.exports], only=[*self.only],
+            every=self.every, quality=self.quality,
+            look={name: str(value) for name, value in self.look.items() if value is not None},
+        )  # fmt: skip
 
     def path(self, suffix: str) -> Path:
         """Return the file of that suffix."""
@@ -104,20 +122,17 @@ def record(
     Ctrl-C and other wishes to end (`signals.py`) end the run early; every file is complete then, and the figures say
     `interrupted`. So it is where the water has become what is no number, which is then raised.
     """
-    writers = [exporter_named(format_) for format_ in order.exports]
-    for writer in writers:
-        if hasattr(writer, "check"):
-            writer.check(sim.scene)
+    check_exports(order.exports, order.only, sim.scene)
     check_time(sim.count, sim.scene, order.seconds, "this run")
     with asked_to_end(say="asked to end; the files are being completed (once more stops at once)") as asked:
         supersample = QUALITIES[order.quality][0]
         renderer = Renderer(*order.size, supersample)
         renderer.render(sim.frame(), **order.style)  # what is wrong with the look shows before anything is written
-        make_folder(order.out)
         work = _Work(sim, order, asked, begun)
         with ExitStack() as stack:
-            sinks = _open_sinks(order, writers, stack, work)
-            summary = _run(work, renderer if order.has_pictures else None, [*sinks.values()], console)
+            sinks = _open_sinks(order, stack, work)
+            work.open_outputs(stack, (console or Console(stderr=True)).print)
+            summary = _run(work, renderer if order.has_pictures else None, [*sinks.values(), work.export], console)
         still = order.path(".png")
         if summary.broken is None:
             fine = Renderer(*order.size, 2 if order.quality == "draft" else supersample)
@@ -126,8 +141,9 @@ def record(
                 {"scene": sim.scene.title, "time": f"{sim.time:.4f} s"},
             )  # fmt: skip
             sinks[str(still)] = lambda number, frame, image: None
-        stats = order.out / "stats.json"
-        figures = summary.figures() | {"files": [*sinks, str(stats)], "exit_code": asked.code}
+        stats = order.out / SUMMARY
+        files = [*sinks, *work.outputs.files, str(stats)]
+        figures = summary.figures() | {"files": files, "waited_for_files": work.outputs.waited, "exit_code": asked.code}
         with replacing(stats) as partial:
             partial.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
         if work.checkpoints and not asked and summary.broken is None:
@@ -144,8 +160,16 @@ def go_on(out: Path, arch: str = "", console: Console | None = None) -> dict[str
         console.print(f"the checkpoint before the last one is taken: {run.note}", markup=False)
     with guarded(named(out), "checkpoint"):
         table = dict(run.progress.order)
-        order = Order(**table | {"out": out, "size": tuple(table["size"]), "exports": tuple(table["exports"])})
+        for name in ("size", "exports", "only"):
+            table[name] = tuple(table[name])
+        order = Order(**table | {"out": out})
     return record(run.sim, order, console, run)
+
+
+def view_of(scene: Scene) -> Viewpoint:
+    """Return where pictures of a scene are taken from."""
+    camera = Camera.framing_extent(extent_of(scene))
+    return Viewpoint(camera.eye, camera.target, camera.field_of_view, camera.height)
 
 
 class _Work:
@@ -156,6 +180,11 @@ class _Work:
         self.start = begun.progress.start if begun else sim.time
         self.done = begun.checkpoint.frame if begun else -1  # number of the last frame that was written
         self.film: FilmInParts | None = None
+        if begun is None or not RunFolder.is_one(order.out):
+            self.folder = RunFolder.create(order.out, order.run(sim), sim.scene)
+        else:
+            self.folder = RunFolder.open(order.out)
+            self.folder.keep_stats(self.done + 1)
         self.checkpoints: Checkpoints | None = None
         if order.checkpoint_every:
             plain = dataclasses.asdict(order)
@@ -175,14 +204,30 @@ class _Work:
         self.film = stack.enter_context(FilmInParts(path, size, fps, folder, parts))
         return self.film
 
+    def open_outputs(self, stack: ExitStack, tell: Callable[[str], None]) -> None:
+        """Open the files of frames; those before a checkpoint are kept."""
+        order = self.order
+        self.outputs = Outputs(
+            self.folder.base, self.sim.scene, order.exports, fps=order.fps / order.every, only=order.only,
+            view=view_of(self.sim.scene), kept=self.done // order.every + 1, tell=tell,
+        )  # fmt: skip
+        stack.enter_context(self.outputs)
+
+    def export(self, number: int, frame: Frame, image: Any) -> None:
+        """Write a frame for other programs."""
+        if number % self.order.every == 0:
+            self.outputs.write(number // self.order.every, frame)
+
     def keep(self, number: int, summary: "_Summary") -> None:
         """Write a checkpoint where one is due, and where the run ends early."""
+        self.folder.add_stats(summary.last)
         if self.checkpoints and (self.asked or self.checkpoints.is_due(self.sim.time)):
+            self.outputs.drain()
             parts = self.film.cut(number) if self.film else []
             self.checkpoints.keep(self.sim, number, summary.plain(), parts)
 
 
-def _open_sinks(order: Order, writers: Sequence[ModuleType], stack: ExitStack, work: _Work) -> dict[str, Sink]:
+def _open_sinks(order: Order, stack: ExitStack, work: _Work) -> dict[str, Sink]:
     """Open what frames go into, by the files' names; the `stack` closes it."""
     sinks: dict[str, Sink] = {}
     if order.video:
@@ -195,16 +240,7 @@ def _open_sinks(order: Order, writers: Sequence[ModuleType], stack: ExitStack, w
         sinks[str(order.path("-#####.png"))] = lambda number, frame, image: write_png(
             order.path(f"-{number:05d}.png"), image
         )
-    for writer in writers:
-        sinks[str(order.path(f"-#####{writer.SUFFIXES[0]}"))] = _particle_sink(writer, order)
     return sinks
-
-
-def _particle_sink(writer: ModuleType, order: Order) -> Sink:
-    def write(number: int, frame: Frame, image: Any) -> None:
-        writer.write(order.path(f"-{number:05d}{writer.SUFFIXES[0]}"), frame)
-
-    return write
 
 
 def _run(work: _Work, renderer: Renderer | None, sinks: Sequence[Sink], console: Console | None) -> "_Summary":
