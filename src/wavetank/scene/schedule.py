@@ -46,11 +46,13 @@ class Timetable(Model):
         """Let expressions or keyframes of gravity mean its track; `gravity` is then its value at t = 0."""
         plain = values.get("gravity")
         if not (callable(plain) or varies(plain)):
-            return values
+            plain = values.get("gravity_track")  # as a state has it
+            if plain is None:
+                return values
         try:
-            size = None if callable(plain) else len(np.atleast_1d(track(plain)(0.0)))
+            size = 3 if callable(plain) else np.atleast_1d(track(plain)(0.0)).size
             tidy = checked_track(plain, "gravity", size)
-        except WavetankError as error:
+        except (WavetankError, TypeError, ValueError) as error:
             text = str(error)
             raise ValueError(text if text.startswith("gravity") else f"gravity: {text}") from None
         return {**values, "gravity": np.atleast_1d(track(tidy)(0.0)).tolist(), "gravity_track": tidy}
