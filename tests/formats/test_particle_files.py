@@ -11,8 +11,8 @@ from wavetank.foundation.errors import WavetankError
 def test_npz_brings_everything_back(tmp_path, frame):
     write_npz(tmp_path / "a.npz", frame)
     back = read_npz(tmp_path / "a.npz")
-    for name in ("positions", "velocities", "densities", "foam_positions", "foam_velocities", "foam_kinds",
-                 "foam_ages", "foam_ids"):  # fmt: skip
+    for name in ("ids", "positions", "velocities", "densities", "dyes", "foam_positions", "foam_velocities",
+                 "foam_kinds", "foam_ages", "foam_lives", "foam_ids"):  # fmt: skip
         assert (back[name] == getattr(frame, name)).all()
         assert back[name].dtype == getattr(frame, name).dtype
     assert (back["materials"] == frame.materials).all()
@@ -26,7 +26,7 @@ def test_csv_brings_every_bit_back(tmp_path, frame):
     axes = "xyz"[: frame.dim]
     assert list(back) == ["id", *axes, *("v" + axis for axis in axes), "density", "kind", "age", "material"]
     table = {name: column[back["kind"] == 0] for name, column in back.items()}
-    assert table["id"].tolist() == list(range(frame.count))
+    assert table["id"].tolist() == frame.ids.tolist()
     assert (np.stack([table[axis] for axis in axes], 1).astype(np.float32) == frame.positions).all()
     assert (np.stack([table["v" + axis] for axis in axes], 1).astype(np.float32) == frame.velocities).all()
     assert (table["density"].astype(np.float32) == frame.densities).all()
@@ -48,6 +48,11 @@ def test_ply_brings_every_bit_back(tmp_path, frame):
             assert (back[name] == (values[:, k] if k < frame.dim else 0.0)).all()
     assert (back["density"] == frame.densities).all()
     assert (back["material"] == frame.materials).all()
+    assert (back["id"] == frame.ids).all()
+    dyed, half = frame.dyes != 0, 64 / 127
+    palette = np.array([(0x2F, 0x7F, 0xD0), (0xE0, 0xA5, 0x26), (0xE0, 0xA5, 0x26)])[frame.materials]
+    colors = np.where(dyed[:, None], (1 - half) * palette + half * np.array((0xC0, 0x10, 0x30)), palette)
+    assert (np.stack([back[name] for name in ("red", "green", "blue")], 1) == np.round(colors)).all()
     foam = read_foam(tmp_path / "a.ply")
     for k in range(3):
         for name, values in (("xyz"[k], frame.foam_positions), ("v" + "xyz"[k], frame.foam_velocities)):
@@ -65,7 +70,8 @@ def test_ply_has_the_header_that_readers_expect(tmp_path, frame):
     assert f"element foam {len(frame.foam_ids)}" in lines
     properties = [line.split()[-1] for line in lines if line.startswith("property")]
     assert properties == [*COLUMNS, *FOAM_COLUMNS]
-    assert len(body) == 4 * (len(COLUMNS) * frame.count + len(FOAM_COLUMNS) * len(frame.foam_ids))
+    water = 4 * (len(COLUMNS) - 3) + 3  # colours are bytes
+    assert len(body) == water * frame.count + 4 * len(FOAM_COLUMNS) * len(frame.foam_ids)
 
 
 @pytest.mark.parametrize("suffix", suffixes("particles"))

@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from wavetank import cli
+from wavetank.cli import experiments
 from wavetank.foundation.errors import WavetankError
 from wavetank.front import backends
 
@@ -10,14 +10,14 @@ from wavetank.front import backends
 def test_two_sides_that_are_the_same_differ_in_nothing(capsys, monkeypatch):
     """Both are processes of their own; `--compare vulkan` does the same, and needs a driver."""
     monkeypatch.setattr(backends.compare, "__defaults__", (("particles",), 0.05))
-    cli._compare_backends("cpu", as_json=True)
+    experiments._compare_backends("cpu", as_json=True)
     result = json.loads(capsys.readouterr().out)
     assert result["particles"] == 4913
     assert result["views"] == {"particles": {"close": 1.0, "largest": 0}}
     for name, (ours, theirs) in {**result["figures"], "height": result["height"]}.items():
         assert ours == theirs > 0.0, name
     monkeypatch.setattr(backends, "compare", lambda arch: result)
-    cli._compare_backends("cpu", as_json=False)
+    experiments._compare_backends("cpu", as_json=False)
     table = capsys.readouterr().out
     assert "100.000 %" in table
     assert all(name in table for name in result["figures"])

@@ -1,4 +1,4 @@
-"""Files that wavetank writes: one module per format, listed in `EXPORTERS`.
+"""Files that wavetank writes and reads: one module per format, listed in `EXPORTERS`.
 
 A module of this package has ``SUFFIXES`` (with the dot, lower case), ``KIND`` and ``write``:
 
@@ -7,6 +7,7 @@ A module of this package has ``SUFFIXES`` (with the dot, lower case), ``KIND`` a
     video         write(path, width, height, fps): a context manager with write(image)
     particles     write(path, frame): one file an instant
     surface       likewise
+    series        write(plan): a `plan.Series`, which takes one frame after the other
 
 and may have `check(scene)`, which raises `WavetankError` before a run whose worlds it cannot write.
 """
@@ -14,11 +15,11 @@ and may have `check(scene)`, which raises `WavetankError` before a run whose wor
 from pathlib import Path
 from types import ModuleType
 
-from wavetank.formats import csv, gif, mp4, npz, obj, ply, png
+from wavetank.formats import csv, gif, hdf5, mp4, npz, obj, ply, png, usd, vtkhdf, vtp
 from wavetank.foundation.errors import WavetankError
 
-EXPORTERS: tuple[ModuleType, ...] = (png, mp4, npz, csv, ply, obj, gif)
-INSTANTS = ("particles", "surface")  # kinds that write a frame
+EXPORTERS: tuple[ModuleType, ...] = (png, mp4, npz, csv, ply, obj, gif, usd, vtkhdf, vtp, hdf5)
+INSTANTS = ("particles", "surface", "series")  # kinds that write a frame
 
 
 def suffixes(*kinds: str) -> tuple[str, ...]:

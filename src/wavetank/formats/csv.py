@@ -1,21 +1,22 @@
 """Particles as a table of text: for spreadsheets and for looking at."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from wavetank.foundation.replacing import replacing
-from wavetank.simulation.frame import Frame
 
 SUFFIXES = (".csv",)
 KIND = "particles"
 
 
-def write_csv(path: str | Path, frame: Frame) -> None:
+def write_csv(path: str | Path, frame: Any) -> None:
     """Write one line a particle: id, position [m], velocity [m/s], density [kg/m^3], kind, age [s], material.
 
     Water comes first, kind 0 and age 0; then spray, foam and bubbles, kinds 1 to 3, with numbers of their own,
-    density 0 and material 0. Nine digits bring every float32 back exactly.
+    density 0 and material 0. Solids follow as comments: name, position [m], quaternion (w, x, y, z). Nine digits bring
+    every float32 back exactly. `frame` is a `Frame` or an `Instant`.
     """
     axes = "xyz"[: frame.dim]
     header = ",".join(["id", *axes, *(f"v{axis}" for axis in axes), "density", "kind", "age", "material"])
@@ -25,11 +26,15 @@ def write_csv(path: str | Path, frame: Frame) -> None:
         file.write(header + "\n")
         file.writelines(
             f"{number},{_numbers(row)},0,0,{material}\n"
-            for number, (row, material) in enumerate(zip(water, frame.materials, strict=True))
+            for number, row, material in zip(frame.ids, water, frame.materials, strict=True)
         )
         file.writelines(
             f"{number},{_numbers(row)},0,{kind},{age:.9g},0\n"
             for number, row, kind, age in zip(frame.foam_ids, foam, frame.foam_kinds, frame.foam_ages, strict=True)
+        )
+        file.writelines(
+            f"# {'_'.join(one.name.split())},{_numbers(one.position)},{_numbers(one.rotation)}\n"
+            for one in frame.standing
         )
 
 
@@ -41,7 +46,7 @@ def read_csv(path: str | Path) -> dict[str, np.ndarray]:
     """Return the columns of a file by name, float64 [count]."""
     with Path(path).open(encoding="utf-8") as file:
         names = file.readline().strip().split(",")
-        lines = file.readlines()
+        lines = [line for line in file if not line.startswith("#")]
     rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.empty((0, len(names)))
     return dict(zip(names, rows.T, strict=True))
 

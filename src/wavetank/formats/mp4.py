@@ -1,5 +1,6 @@
 """H.264 video in MP4, for every browser and player."""
 
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -8,20 +9,22 @@ from typing import Any
 import numpy as np
 
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import partial_path
+from wavetank.foundation.replacing import partial_path, replacing
 
 SUFFIXES = (".mp4",)
 KIND = "video"
 
 _BT709 = 1  # the number of ITU-R BT.709 for primaries, transfer and matrix (ITU-T H.273)
 _LIMITED = 1  # libav's number for video range, 16 to 235
+FRAGMENT = 1_000_000  # microseconds of video that play by themselves, at most
 
 
 class VideoWriter:
     """Writes pictures of one size to a file that appears when it is complete.
 
-    Use it in a ``with``. An interrupt (Ctrl-C) still completes the file with the pictures that were written; any other
-    error leaves nothing, and a file of that name as it was.
+    Use it in a ``with``. An interrupt (Ctrl-C) still completes the file with the pictures that were written, and a
+    second one while it does leaves a file that plays as far as it goes; any other error leaves nothing, and a file of
+    that name as it was. While it grows the file is fragmented (ISO/IEC 14496-12, 8.8): each part plays by itself.
     """
 
     def __init__(self, path: str | Path, width: int, height: int, fps: float = 60.0, *, quality: int = 18) -> None:
@@ -61,7 +64,7 @@ class VideoWriter:
         self.count += 1
 
     def close(self) -> None:
-        """Complete the file and give it its name; without a single picture no file is left."""
+        """Complete the file, its index first, and give it its name; without a single picture no file is left."""
         if self._container is None:
             return
         try:
@@ -71,9 +74,22 @@ class VideoWriter:
             self._container.close()
             self._container = None
             if self.count:
-                self._partial.replace(self.path)
+                join([self._partial], self.path)
+        except KeyboardInterrupt:
+            self.keep()
+            raise
+        except OSError as error:
+            raise WavetankError(f"{str(self.path)!r} cannot be written: {error.strerror or error}.") from error
         finally:
             self.discard()
+
+    def keep(self) -> None:
+        """Stop at once and leave what there is under the file's name; it plays as far as it goes."""
+        container, self._container = self._container, None
+        if container is not None:
+            container.close()
+        if self.count and self._partial.exists():
+            self._partial.replace(self.path)
 
     def discard(self) -> None:
         """Stop and leave nothing."""
@@ -100,8 +116,8 @@ def _open(path: Path) -> Any:
     except ImportError:
         raise WavetankError("video needs the package `av`; install it with `pip install av`.") from None
     try:
-        # The index goes first (faststart), so that a browser plays while it loads.
-        return av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"})
+        flags = {"movflags": "+frag_keyframe+empty_moov+default_base_moof", "frag_duration": str(FRAGMENT)}
+        return av.open(str(path), "w", format="mp4", options=flags)
     except OSError as error:
         raise WavetankError(f"{str(path)!r} cannot be written: {error}.") from None
 
@@ -117,6 +133,32 @@ def _add_stream(container: Any, width: int, height: int, rate: Fraction, quality
     context.color_primaries = context.color_trc = context.colorspace = _BT709
     context.color_range = _LIMITED
     return stream
+
+
+def join(parts: Sequence[Path], path: Path) -> None:
+    """Write one file with the pictures of the `parts`, one behind the other; nothing is encoded anew.
+
+    The index goes first (faststart), so that a browser plays while it loads. Raises `WavetankError` where the file
+    cannot be written.
+    """
+    import av
+
+    options = {"movflags": "+faststart"}
+    with replacing(path) as whole, av.open(str(whole), "w", format="mp4", options=options) as target:
+        stream, shift = None, 0
+        for part in parts:
+            with av.open(str(part), format="mp4") as source:
+                track = source.streams.video[0]
+                stream = stream or target.add_stream_from_template(track)
+                end = shift
+                for packet in source.demux(track):
+                    if packet.dts is None or packet.pts is None:
+                        continue
+                    packet.pts, packet.dts = packet.pts + shift, packet.dts + shift
+                    end = max(end, packet.pts + max(packet.duration or 0, 1))
+                    packet.stream = stream
+                    target.mux(packet)
+                shift = end
 
 
 write = VideoWriter

@@ -1,28 +1,36 @@
 """Particles as NumPy archives: everything, exactly."""
 
+import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.replacing import replacing
-from wavetank.simulation.frame import Frame
+from wavetank.scene.scene import Scene
+from wavetank.simulation.instant import FOAM, WATER, Instant, Standing, solids_by_name
 
 SUFFIXES = (".npz",)
 KIND = "particles"
+POSES = (("position", 3), ("rotation", 4), ("velocity", 3), ("angular_velocity", 3))
 
 
-def write_npz(path: str | Path, frame: Frame) -> None:
-    """Write positions [m], velocities [m/s], densities [kg/m^3], materials, ordered by particle id; time [s], number.
+def write_npz(path: str | Path, frame: Any) -> None:
+    """Write all arrays of a `Frame` or an `Instant`, ordered by particle id; time [s], number.
 
-    Spray, foam and bubbles follow: `foam_positions`, `foam_velocities`, `foam_kinds` (1 spray, 2 foam, 3 bubble),
-    `foam_ages` [s] and `foam_ids`, which stay with a particle from file to file.
+    `ids`, `positions` [m], `velocities` [m/s], `densities` [kg/m^3], `materials`, `dyes`; spray, foam and bubbles as
+    `foam_positions`, `foam_velocities`, `foam_kinds` (1 spray, 2 foam, 3 bubble), `foam_ages`, `foam_lives` [s] and
+    `foam_ids`, which stay with a particle from file to file; `solid_names` and their `solid_poses` [n, 13]: position
+    [m], quaternion (w, x, y, z), and of bodies velocity [m/s] and angular velocity [rad/s].
     """
+    arrays = {name: getattr(frame, name) for name in (*WATER, *FOAM)}
+    poses = [np.concatenate([getattr(one, name) for name, _ in POSES]) for one in frame.standing]
     with replacing(path) as partial, partial.open("wb") as file:
         np.savez_compressed(
-            file, positions=frame.positions, velocities=frame.velocities, densities=frame.densities,
-            materials=frame.materials, time=np.float64(frame.time), number=np.int64(frame.number),
-            foam_positions=frame.foam_positions, foam_velocities=frame.foam_velocities, foam_kinds=frame.foam_kinds,
-            foam_ages=frame.foam_ages, foam_ids=frame.foam_ids,
+            file, **arrays, time=np.float64(frame.time), number=np.int64(frame.number),
+            solid_names=np.array([one.name for one in frame.standing], "U"),
+            solid_poses=np.array(poses, float).reshape(-1, sum(width for _, width in POSES)),
         )  # fmt: skip
 
 
@@ -30,6 +38,23 @@ def read_npz(path: str | Path) -> dict[str, np.ndarray]:
     """Return the arrays of a file by name."""
     with np.load(path) as file:
         return {name: file[name] for name in file.files}
+
+
+def read(path: str | Path, scene: Scene) -> Instant:
+    """Return the instant of `scene` that a file holds; raises `WavetankError` for a file that holds none."""
+    try:
+        arrays = read_npz(path)
+        known, ends = solids_by_name(scene), np.cumsum([width for _, width in POSES])[:-1]
+        standing = tuple(
+            Standing(str(name), known[str(name)], *np.split(row, ends))
+            for name, row in zip(arrays.get("solid_names", ()), arrays.get("solid_poses", ()), strict=True)
+            if str(name) in known
+        )
+        return Instant.read(scene, int(arrays["number"]), float(arrays["time"]), arrays, standing)
+    except OSError as error:
+        raise WavetankError(f"{path}: these particles cannot be read: {error.strerror or error}.") from None
+    except (KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise WavetankError(f"{path}: these are no particles that wavetank wrote: {str(error).rstrip('.')}.") from None
 
 
 write = write_npz

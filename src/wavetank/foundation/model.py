@@ -13,12 +13,14 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from wavetank.foundation.errors import WavetankError
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+FARTHEST = 1e9  # of a number that has no other bound: beyond it single precision squares to what is no number
+Number = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=FARTHEST, allow_inf_nan=False)]
 Vector = tuple[Number, Number] | tuple[Number, Number, Number]
 Size = tuple[Positive, Positive] | tuple[Positive, Positive, Positive]
 Quaternion = tuple[Number, Number, Number, Number]
 
+MOST_TOLD = 200  # errors of a table that are compared
 LIST = "a list of numbers, as [0, -9.81, 0]"
 METRES = "m"  # marks the fields of a scene that are lengths: `Scene.scaled` multiplies these and nothing else
 Length = Annotated[Positive, METRES]
@@ -119,7 +121,7 @@ def numeric_fields(model: type[BaseModel]) -> tuple[str, ...]:
 
 def sentence(report: ValidationError, model: type[BaseModel]) -> str:
     """Say the most telling error of `report` in one line: key, value, what is allowed."""
-    errors = report.errors(include_url=False)
+    errors = report.errors(include_url=False)[:MOST_TOLD]
     # An unknown key explains more than what it leads to, and in a union the deepest complaint is the meant one.
     error = max(errors, key=lambda e: (e["type"] == "extra_forbidden", len(e["loc"])))
     key = _key(error["loc"]) or model.__name__
@@ -216,8 +218,23 @@ def _is_model(candidate: Any) -> bool:
     return isinstance(candidate, type) and issubclass(candidate, BaseModel)
 
 
+def _beginning(value: Any, depth: int = 4) -> Any:
+    """Return as much of a value as a message can show, whatever its size."""
+    if isinstance(value, str | bytes):
+        return value[:100]
+    if isinstance(value, np.ndarray):
+        return value.reshape(-1)[:30].tolist()
+    if depth and isinstance(value, list | tuple):
+        return type(value)([_beginning(part, depth - 1) for part in value[:30]])
+    if depth and isinstance(value, dict):
+        return {key: _beginning(value[key], depth - 1) for key in list(value)[:10]}
+    if isinstance(value, int) and abs(value) > 10**60:
+        return 10**60 if value > 0 else -(10**60)
+    return value if not isinstance(value, list | tuple | dict) else "..."
+
+
 def _short(value: Any) -> str:
-    text = repr(value).replace("\n", " ")
+    text = repr(_beginning(value)).replace("\n", " ")
     return text if len(text) <= 60 else text[:57] + "..."
 
 

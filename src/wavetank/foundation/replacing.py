@@ -1,11 +1,18 @@
-"""Files appear complete or not at all."""
+"""Files appear complete or not at all, and what a killed process left behind is swept at the next start."""
 
 import contextlib
+import functools
+import hashlib
 import os
+import re
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 
 from wavetank.foundation.errors import WavetankError
+
+_LEFT = re.compile(r"\..+\.([0-9a-f]{6})-(\d+)\.partial")
+_swept: set[Path] = set()
 
 
 def partial_path(path: str | Path) -> Path:
@@ -13,8 +20,45 @@ def partial_path(path: str | Path) -> Path:
     target = Path(path)
     if not target.parent.is_dir():
         raise WavetankError(f"{str(target)!r} cannot be written: there is no folder {str(target.parent)!r}.")
-    # The process's number keeps two writers of one file apart.
-    return target.with_name(f".{target.name}.{os.getpid()}.partial")
+    sweep(target.parent)
+    # The process's number keeps two writers of one file apart, and tells later whether one is still there.
+    return target.with_name(f".{target.name[:200]}.{_here()}-{os.getpid()}.partial")
+
+
+def sweep(folder: Path) -> None:
+    """Remove what processes of this machine that are no more left in a folder; once for each folder and process."""
+    folder = folder.absolute()
+    if folder in _swept:
+        return
+    _swept.add(folder)
+    with contextlib.suppress(OSError):
+        for entry in os.scandir(folder):
+            match = _LEFT.fullmatch(entry.name)
+            if match and match[1] == _here() and not _lives(int(match[2])):
+                with contextlib.suppress(OSError):
+                    Path(entry.path).unlink()
+
+
+@functools.cache
+def _here() -> str:
+    """Return what tells this machine, and this space of process numbers, from others that share a disk with it."""
+    try:
+        space = str(Path("/proc/self/ns/pid").readlink())
+    except OSError:
+        space = ""
+    return hashlib.sha256(f"{socket.gethostname()} {space}".encode()).hexdigest()[:6]
+
+
+def _lives(process: int) -> bool:
+    if os.name == "nt":  # there, asking a process whether it lives would end it
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def make_folder(path: str | Path) -> Path:
@@ -27,13 +71,30 @@ def make_folder(path: str | Path) -> Path:
 
 
 @contextlib.contextmanager
-def replacing(path: str | Path) -> Iterator[Path]:
-    """Give a temporary path to write to; it takes the place of `path` on success and is removed on an error."""
+def replacing(path: str | Path, *, lasting: bool = False) -> Iterator[Path]:
+    """Give a temporary path to write to; it takes the place of `path` on success and is removed on an error.
+
+    A `lasting` file is on the disk before it gets its name, so that it outlives a power cut too.
+    """
     partial = partial_path(path)
     try:
         yield partial
+        if lasting:
+            flush(partial)
         partial.replace(path)
+        if lasting:
+            flush(Path(path).parent)
     except OSError as error:
         raise WavetankError(f"{str(path)!r} cannot be written: {error.strerror or error}.") from error
     finally:
         partial.unlink(missing_ok=True)
+
+
+def flush(path: Path) -> None:
+    """Have the disk take what was written to a file or a folder; where it cannot be asked, nothing happens."""
+    with contextlib.suppress(OSError):
+        number = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(number)
+        finally:
+            os.close(number)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.foundation.errors import WavetankError
 from wavetank.scene.scene import bundled_levels
 from wavetank.session.game import Game
 from wavetank.session.scores import keep_score, key_of, scores
@@ -49,7 +50,7 @@ class Hud:
     def _keep_score(self, game: Game) -> None:
         try:
             self._is_best = keep_score(self._level, game.stars, game.mark)
-        except OSError as error:
+        except (OSError, WavetankError) as error:
             self.session.note(f"The score cannot be kept: {error}.")
         self.scores = scores()
 

@@ -2,17 +2,17 @@
 
 import contextlib
 import os
-import signal
 import sys
 import threading
 import webbrowser
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.replacing import partial_path
 from wavetank.front.page.gate import is_loopback
+from wavetank.front.signals import asked_to_end
 from wavetank.scene.scene import Scene
 from wavetank.session.recording import Recording
 from wavetank.session.session import Session
@@ -80,7 +80,7 @@ def play_in_window(scene: Scene, arch: str, *, record: Path | None = None, most:
 
     _check_folder(record)
     window = Window(Session(scene, arch, most_particles=most))
-    with _stop_on_signal(window.stop):
+    with _stopped_when_asked(window.stop):
         try:
             window.open()
             window.run()
@@ -120,7 +120,7 @@ def play_in_browser(
     _check_folder(record)
     session = Session(scene, arch, most_particles=most)
     front = WebFront(session, host, port)
-    with _stop_on_signal(front.stop):
+    with _stopped_when_asked(front.stop):
         front.start()
         where = "" if is_loopback(host) else " (anyone with this link can steer; it is not encrypted)"
         print(f"wavetank plays at {front.url}{where} (Ctrl-C ends it)", flush=True)
@@ -142,22 +142,7 @@ def with_particles(scene: Scene, wanted: int) -> Scene:
 
 
 @contextlib.contextmanager
-def _stop_on_signal(stop: Any) -> Iterator[None]:
-    """Turn the first Ctrl-C, and being asked to end, into a call of `stop`; a second Ctrl-C ends at once."""
-    if threading.current_thread() is not threading.main_thread():
+def _stopped_when_asked(stop: Callable[[], None]) -> Iterator[None]:
+    """Call `stop` when the process is asked to end; a second wish ends at once, but for the recording."""
+    with asked_to_end(lambda: threading.Thread(target=stop, daemon=True).start()):
         yield
-        return
-    asked = threading.Event()
-
-    def note(number: int, frame: Any) -> None:
-        if asked.is_set():
-            raise KeyboardInterrupt
-        asked.set()
-        threading.Thread(target=stop, daemon=True).start()
-
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, action in before.items():
-            signal.signal(number, action)

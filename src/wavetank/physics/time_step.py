@@ -70,7 +70,7 @@ def filled_share(steps: float) -> float:
 
 
 def largest_speed(particles: Particles, count: int) -> float:
-    """Return the largest speed [m/s] of the first `count` particles, 0 without any."""
+    """Return the largest speed [m/s] of the first `count` particles, 0 without any; not finite where one is not."""
     return math.sqrt(float(np.int32(largest_square(particles, count, lanes())).view(np.float32))) if count else 0.0
 
 
@@ -93,8 +93,11 @@ def pool_depth(
 
 @qd.func
 def square_at(particles: Particles, i):
-    """The bits of a squared speed: as integers, numbers of one sign stand in the same order."""
-    return qd.bit_cast(particles.v[i].norm_sqr(), qd.i32)
+    """The bits of a squared speed: as integers, numbers of one sign stand in the same order.
+
+    What is no number comes after all others, but for its sign, which says nothing and is taken away.
+    """
+    return qd.bit_cast(particles.v[i].norm_sqr(), qd.i32) & 0x7FFFFFFF
 
 
 @qd.kernel(fastcache=True)

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema, model_validator
 from typing_extensions import override
 
-from wavetank.foundation.model import METRES, Length, Model, Place, Vector, register_model
+from wavetank.foundation.model import FARTHEST, METRES, Length, Model, Place, Vector, register_model
 
 
 class Fluid(Model):
@@ -101,10 +101,11 @@ def _array(value: Any) -> np.ndarray:
         array = array.reshape(0, array.shape[1] if array.ndim == 2 else 3)
     if array.ndim != 2 or array.shape[1] not in (2, 3):
         raise ValueError(f"positions have shape {list(array.shape)}; they must be [n, 2] or [n, 3].")
-    bad = ~np.isfinite(array).all(axis=1)
+    bad = ~(np.abs(array) <= FARTHEST).all(axis=1)
     if bad.any():
         row = int(np.argmax(bad))
-        raise ValueError(f"positions[{row}] = {array[row].tolist()} is not finite; every number must be.")
+        what = f"beyond {FARTHEST:g}" if np.isfinite(array[row]).all() else "not finite"
+        raise ValueError(f"positions[{row}] = {array[row].tolist()} is {what}; every number must be within that.")
     return array
 
 

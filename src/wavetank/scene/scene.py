@@ -5,7 +5,6 @@ import functools
 import importlib.resources
 import json
 import math
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,12 +13,14 @@ import numpy as np
 import tomli_w
 from pydantic import BeforeValidator, ValidationError, model_validator
 
+from wavetank.foundation.door import guarded, named, parse_toml, read_text
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.materials import COLORS, Material, Properties
 from wavetank.foundation.model import Model, is_length, sentence
 from wavetank.foundation.params import PRESETS, QUALITIES, Parameters
 from wavetank.foundation.replacing import replacing
 from wavetank.foundation.tracks import scaled
+from wavetank.scene.bounds import check_numbers, check_scales
 from wavetank.scene.filled import AnyFluid, Filled
 from wavetank.scene.fluids import Points
 from wavetank.scene.forces import AnyForce
@@ -57,7 +58,10 @@ class Scene(Timetable, Parameters):
     @model_validator(mode="before")
     @classmethod
     def _from_preset(cls, values: Any) -> Any:
-        return cls.spread_gravity({**_chosen(values), **values}) if isinstance(values, dict) else values
+        if not isinstance(values, dict):
+            return values
+        check_numbers(values)
+        return cls.spread_gravity({**_chosen(values), **values})
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":
@@ -72,6 +76,7 @@ class Scene(Timetable, Parameters):
                 raise ValueError(
                     f"{name} = {tuple(vector)} has {len(vector)} components in a {dim}-D world; give {dim}."
                 )
+        check_scales(self.spacing, self.gravity)
         self._check_count()
         self._check_inside()
         self._check_names()
@@ -256,11 +261,8 @@ class Scene(Timetable, Parameters):
     @classmethod
     def from_text(cls, text: str, origin: str = "scene", **context: Any) -> "Scene":
         """Read the text of a TOML file; a mistake in it is told with `origin` in front; `context` as in `parse`."""
-        try:
-            table = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise WavetankError(f"{origin}: this is not TOML: {error}.") from None
-        scene: Scene = cls.parse(table, origin, **context)
+        with guarded(origin, "scene"):
+            scene: Scene = cls.parse(parse_toml(text, origin), origin, **context)
         return scene
 
     def save(self, path: str | Path) -> None:
@@ -362,17 +364,21 @@ def _read(name: str | Path) -> tuple[str, str, Path]:
                 Path(),
             )
     path = Path(name)
-    if not path.is_file():
-        near = difflib.get_close_matches(str(name), [*_names("scenes"), *_names("levels")], 1)
+    if not _is_there(path):
+        near = difflib.get_close_matches(str(name)[:100], [*_names("scenes"), *_names("levels")], 1)
         raise WavetankError(
-            f"there is no file {str(name)!r}, and no bundled scene of that name; "
+            f"there is no file {named(name)!r}, and no bundled scene of that name; "
             + (f"did you mean {near[0]!r}? B" if near else "b")
             + f"undled are: {', '.join(_names('scenes'))}; levels: {', '.join(_names('levels'))}."
         )
+    return read_text(path, "scene"), named(path), path.parent
+
+
+def _is_there(path: Path) -> bool:
     try:
-        return path.read_text("utf-8"), str(path), path.parent
-    except (OSError, UnicodeDecodeError) as error:
-        raise WavetankError(f"{path}: the scene cannot be read: {error}.") from None
+        return path.exists() or path.is_symlink()
+    except (OSError, ValueError):  # a name that no file can have
+        return False
 
 
 def _numbers(values: Any) -> str:

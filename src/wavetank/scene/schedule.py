@@ -14,6 +14,7 @@ from wavetank.foundation.model import Model, Number
 from wavetank.foundation.rotations import turned
 from wavetank.foundation.timed import Timed
 from wavetank.foundation.tracks import checked_track, track, varies
+from wavetank.scene.bounds import STRONGEST
 from wavetank.scene.drains import Drain
 from wavetank.scene.emitters import Emitter
 
@@ -45,11 +46,13 @@ class Timetable(Model):
         """Let expressions or keyframes of gravity mean its track; `gravity` is then its value at t = 0."""
         plain = values.get("gravity")
         if not (callable(plain) or varies(plain)):
-            return values
+            plain = values.get("gravity_track")  # as a state has it
+            if plain is None:
+                return values
         try:
-            size = None if callable(plain) else len(np.atleast_1d(track(plain)(0.0)))
+            size = 3 if callable(plain) else np.atleast_1d(track(plain)(0.0)).size
             tidy = checked_track(plain, "gravity", size)
-        except WavetankError as error:
+        except (WavetankError, TypeError, ValueError) as error:
             text = str(error)
             raise ValueError(text if text.startswith("gravity") else f"gravity: {text}") from None
         return {**values, "gravity": np.atleast_1d(track(tidy)(0.0)).tolist(), "gravity_track": tidy}
@@ -91,4 +94,9 @@ def gravity_at(scene: Any, time: float) -> tuple[float, ...]:
         axis = np.array(tank.tilt_axis, float)
         half = -0.5 * tank.tilt
         g = turned(np.concatenate([[np.cos(half)], np.sin(half) * axis / np.linalg.norm(axis)]), g)
+    if not np.linalg.norm(g) <= STRONGEST:
+        raise WavetankError(
+            f"gravity has a length of {np.linalg.norm(g):.3g} at t = {clock:.6g} s; at most {STRONGEST:g} m/s^2 are "
+            "allowed."
+        )
     return tuple(g[: scene.dim].tolist())

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
+from wavetank.foundation.door import check_plain
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import Model, Quaternion, Vector, sentence
 from wavetank.solids.shapes import AnySolid
@@ -22,7 +23,7 @@ Point = tuple[Length, Length, Length]
 Angle = Annotated[float, Field(ge=-1e4, le=1e4, allow_inf_nan=False)]  # rad
 Name = Annotated[str, Field(max_length=80)]
 Pointer = Annotated[int, Field(ge=0, le=9)]
-Value = bool | int | float | str | Vector
+Value = bool | int | Annotated[float, Field(allow_inf_nan=False)] | Annotated[str, Field(max_length=80)] | Vector
 
 
 class Command(Model):
@@ -280,6 +281,7 @@ def command_of(table: Any) -> Command:
     if kind is None:
         known = ", ".join(_BY_NAME)
         raise WavetankError(f"do = {str(keys.get('do'))[:40]!r} is not a command; it must be one of {known}.")
+    check_plain(keys, "a command")
     try:
         return kind.model_validate(keys, context={"files": False})
     except ValidationError as report:

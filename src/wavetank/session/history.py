@@ -46,6 +46,15 @@ class History:
             return None
         return self.instants[max(0, bisect.bisect_right(self.times, time + 1e-9) - 1)].unpack()
 
+    def last_finite(self) -> Snapshot | None:
+        """Return the last instant whose numbers are numbers; those behind it are forgotten."""
+        while self.instants:
+            instant = self.instants[-1].unpack()
+            if instant.is_finite:
+                return instant
+            self.forget_from(self.times[-1])
+        return None
+
     def clear(self) -> None:
         """Forget all, bookmarks too: the world is another."""
         self.instants, self.times, self.bookmarks, self._size = [], [], {}, 0

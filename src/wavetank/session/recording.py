@@ -4,7 +4,6 @@ A command stands with the number of frames that were computed before it. Physics
 the list is the whole session; the digest of the particles at the end tells whether it did.
 """
 
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -12,6 +11,7 @@ from typing import Annotated, Any, Literal
 import tomli_w
 from pydantic import Field
 
+from wavetank.foundation.door import guarded, named, parse_toml, read_text
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import Model
 from wavetank.foundation.replacing import replacing
@@ -19,6 +19,10 @@ from wavetank.foundation.version import VERSION
 from wavetank.scene.scene import Scene
 from wavetank.session.commands import Command, command_of, table_of
 from wavetank.session.session import MOST_PARTICLES, Session
+
+MOST_FRAMES = 20_000_000  # 90 hours at 60 frames a second
+MOST_COMMANDS = 5_000_000
+READ = "this recording cannot be read: it"
 
 
 class Recording(Model):
@@ -28,10 +32,10 @@ class Recording(Model):
     version: str = ""  # of wavetank that recorded it
     arch: str = "cpu"
     most_particles: Annotated[int, Field(ge=0)] = MOST_PARTICLES
-    frames: Annotated[int, Field(ge=0, le=100_000_000)] = 0
+    frames: Annotated[int, Field(ge=0, le=MOST_FRAMES)] = 0
     digest: str = ""
     scene: dict[str, Any]
-    commands: list[dict[str, Any]] = []
+    commands: Annotated[list[dict[str, Any]], Field(max_length=MOST_COMMANDS)] = []
 
     @classmethod
     def of(cls, session: Session, start: Scene) -> "Recording":
@@ -67,12 +71,9 @@ class Recording(Model):
     @classmethod
     def load(cls, path: str | Path) -> "Recording":
         """Read a recording; raises `WavetankError` for what is none."""
-        try:
-            table = tomllib.loads(Path(path).read_text("utf-8"))
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            reason = (isinstance(error, OSError) and error.strerror) or error
-            raise WavetankError(f"{path}: this recording cannot be read: {reason}.") from None
-        recording: Recording = cls.parse(table, str(path))
+        origin = named(path)
+        with guarded(origin, "recording"):
+            recording: Recording = cls.parse(parse_toml(read_text(path, "recording"), origin, READ), origin)
         return recording
 
     def timed_commands(self, origin: str = "recording") -> list[tuple[int, Command]]:

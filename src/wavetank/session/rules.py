@@ -9,7 +9,7 @@ from wavetank.foundation.params import LIVE, Parameters
 from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
 from wavetank.session import commands as c
 from wavetank.session.history import BOOKMARKS
-from wavetank.session.state import SessionState
+from wavetank.session.state import MOST_SOLIDS, SessionState
 from wavetank.session.tools import Hand
 from wavetank.simulation.snapshot import Packed
 from wavetank.view.camera import Camera
@@ -102,6 +102,8 @@ def move_solid(state: SessionState, command: c.MoveSolid) -> None:
 
 def add_solid(state: SessionState, command: c.AddSolid) -> None:
     """Put a solid into the world; it swells, so that the water has time to make way."""
+    if len(state.sim.scene.solids) >= MOST_SOLIDS:
+        raise WavetankError(f"there are {MOST_SOLIDS} solids already; take one away first.")
     state.sim.add_solid(command.solid, 0.35)
 
 

@@ -2,10 +2,12 @@
 
 import hashlib
 import json
-import os
 from typing import Any
 
+from wavetank.foundation.door import parse_json, read_text
+from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.folders import data_folder
+from wavetank.foundation.replacing import replacing
 from wavetank.scene.scene import Scene, bundled_levels
 
 FILE = "scores.json"
@@ -22,8 +24,8 @@ def key_of(scene: Scene) -> str:
 def scores() -> dict[str, dict[str, Any]]:
     """Return all high scores by level, `stars` and `mark`; what cannot be read counts as none."""
     try:
-        table = json.loads((data_folder() / FILE).read_text("utf-8"))
-    except (OSError, ValueError):
+        table = parse_json(read_text(data_folder() / FILE, "file of scores", 10_000_000), FILE)
+    except WavetankError:
         return {}
     entries = table.items() if isinstance(table, dict) else ()
     return {name: entry for name, entry in entries if isinstance(entry, dict) and _is_score(entry)}
@@ -38,9 +40,8 @@ def keep_score(level: str, stars: int, mark: float) -> bool:
     table[level] = {"stars": stars, "mark": round(mark, 3)}
     folder = data_folder()
     folder.mkdir(parents=True, exist_ok=True)
-    partial = folder / f"{FILE}.{os.getpid()}.partial"
-    partial.write_text(json.dumps(table, indent=2, sort_keys=True) + "\n", encoding="utf-8")
-    partial.replace(folder / FILE)
+    with replacing(folder / FILE) as partial:
+        partial.write_text(json.dumps(table, indent=2, sort_keys=True) + "\n", encoding="utf-8")
     return True
 
 

@@ -8,9 +8,19 @@ import threading
 import time
 from typing import Any
 
-from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.door import guarded
+from wavetank.foundation.errors import NotFiniteError, WavetankError
 from wavetank.scene.scene import Scene
-from wavetank.session.commands import Command, FrameLength
+from wavetank.session.commands import (
+    AddSolid,
+    Bookmark,
+    Command,
+    FrameLength,
+    LoadScene,
+    RemoveSolid,
+    Reset,
+    Rewind,
+)
 from wavetank.session.history import History
 from wavetank.session.rules import RULES
 from wavetank.session.state import SessionState
@@ -19,6 +29,11 @@ MOST_PARTICLES = 200_000
 SLUGGISH, SWIFT = 0.045, 0.025  # s: a frame that takes longer is made shorter, one that takes less longer again
 MOST_PARTS = 8  # of a frame; shorter time steps would turn density errors into velocity
 WORTH = 1.0  # a frame takes no less than so many times its picture, or pictures would eat the time
+BEGINNINGS = (LoadScene, Reset)
+EXPENSIVE = (*BEGINNINGS, AddSolid, RemoveSolid, Bookmark, Rewind)  # commands that take long
+MOST_EXPENSIVE = 8  # of these in the queue
+SPARED, SHORTEST_REST = 2.0, 0.1  # times as long as such a command took, and s at least, none follows it
+LONGEST_NOTE = 400  # characters
 MOST_WAITING = 4096  # commands in the queue; what comes on top is dropped
 
 
@@ -39,15 +54,27 @@ class Session(SessionState):
         self.changes = 0  # grows whenever a picture would look different
         self.uncommanded: set[str] = set()  # forces that came or went without a command: no recording has them
         self._waiting: list[Command] = []
+        self._spared_until = 0.0  # on the clock of the process, until which nothing that takes long is done
         self._latest: dict[Any, int] = {}
         self._lock, self._wake = threading.Lock(), threading.Event()
 
     # --- commands ---
 
     def submit(self, command: Command) -> bool:
-        """Put a command into the queue, from any thread; say whether there was room."""
+        """Put a command into the queue, from any thread; say whether there was room.
+
+        Of those that take long few wait, and another beginning takes the place of one that was not reached yet.
+        """
         with self._lock:
             slot = command.slot
+            if isinstance(command, BEGINNINGS):
+                kept = [other for other in self._waiting if not isinstance(other, BEGINNINGS)]
+                if len(kept) != len(self._waiting):
+                    self._waiting = kept
+                    self._latest.clear()
+            elif isinstance(command, EXPENSIVE):
+                if sum(isinstance(other, EXPENSIVE) for other in self._waiting) >= MOST_EXPENSIVE:
+                    return False
             if slot is not None and slot in self._latest:
                 place = self._latest[slot]
                 self._waiting[place] = command.after(self._waiting[place])
@@ -63,17 +90,35 @@ class Session(SessionState):
         self._wake.set()
         return True
 
-    def drain(self) -> int:
-        """Carry out all waiting commands in order and return how many there were; refusals become notes."""
+    def drain(self, *, sparing: bool = False) -> int:
+        """Carry out the waiting commands in order and return how many there were; failures become notes.
+
+        `sparing` the time of those who watch, one that takes long waits, and all behind it, until twice as much time
+        has passed as the one before took: most of the time belongs to the water, whatever comes.
+        """
         with self._lock:
             commands, self._waiting = self._waiting, []
             self._latest.clear()
-        for command in commands:
-            try:
-                self.apply(command)
-            except WavetankError as error:
-                self.note(str(error))
+        for number, command in enumerate(commands):
+            if sparing and isinstance(command, EXPENSIVE) and time.perf_counter() < self._spared_until:
+                with self._lock:
+                    self._waiting[:0] = commands[number:]
+                    self._latest.clear()  # places have changed; what comes joins those behind it only
+                return number
+            self._carry_out(command)
         return len(commands)
+
+    def _carry_out(self, command: Command) -> None:
+        """Carry out one command; whatever goes wrong becomes a note, and the water goes on."""
+        began = time.perf_counter()
+        try:
+            with guarded(f"The command {type(command).model_fields['do'].default!r} failed", "command"):
+                self.apply(command)
+        except WavetankError as error:
+            self.note(str(error)[:LONGEST_NOTE])
+        if isinstance(command, EXPENSIVE):
+            end = time.perf_counter()
+            self._spared_until = end + max(SPARED * (end - began), SHORTEST_REST)
 
     def apply(self, command: Command) -> None:
         """Carry out one command now; raises `WavetankError` and changes nothing where it is not allowed."""
@@ -124,13 +169,22 @@ class Session(SessionState):
         except WavetankError as error:
             self.paused, self.steps_left = True, 0
             self.note(str(error))
+            if isinstance(error, NotFiniteError):
+                self._go_back()
         for sentence in self.sim.notes:
             self.note(sentence)
         self.sim.notes.clear()
 
+    def _go_back(self) -> None:
+        """Go to the last kept instant whose numbers are numbers."""
+        instant = self.history.last_finite()
+        if instant is not None:
+            self.go_to(instant)
+            self.note(f"Back at t = {instant.time:.3g} s, and paused; what was changed since then is as it was left.")
+
     def turn(self) -> bool:
         """Carry out what waits and compute a frame if one is due; say whether anything happened."""
-        happened = self.drain() > 0
+        happened = self.drain(sparing=self.smooth) > 0
         if self.paused and not self.steps_left:
             self.pace.stop()
             return happened

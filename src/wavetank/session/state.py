@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.memory import in_words
 from wavetank.foundation.params import LIVE
 from wavetank.scene.fluids import Points
 from wavetank.scene.forces import Force
@@ -14,11 +15,14 @@ from wavetank.session.history import History
 from wavetank.session.pace import Pace
 from wavetank.session.tools import TOOL_NAMES, Hand, Tool
 from wavetank.session.tools.carry import TOOL_SOLID, carry
+from wavetank.simulation.cost import cost_of
 from wavetank.simulation.simulation import Simulation
 from wavetank.simulation.snapshot import Snapshot
 from wavetank.solids.shapes import moved
 from wavetank.view.camera import Camera
 
+MOST_BYTES = 4_000_000_000  # that the world of a session may take
+MOST_SOLIDS = 300  # in a session: each is looked for by every particle near it
 CARRY_PACE = 0.8  # of sqrt(g L): how fast a command carries a solid
 
 
@@ -47,6 +51,12 @@ class SessionState:
             raise WavetankError(
                 f"spacing = {scene.spacing} makes about {count:,.0f} particles; at most {self.most_particles:,} are "
                 "allowed in a session: use a larger spacing or less fluid."
+            )
+        cost = cost_of(scene)
+        if cost.bytes > MOST_BYTES:
+            raise WavetankError(
+                f"{cost.sentence()}; at most {in_words(MOST_BYTES)} are allowed in a session: use a larger "
+                "spacing or a smaller tank."
             )
         sim = Simulation(scene, self.arch)
         if scene.emitters:

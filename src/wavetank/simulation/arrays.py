@@ -8,7 +8,10 @@ import numpy as np
 from wavetank.device.compiler import download, upload
 from wavetank.device.state import Particles
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.model import FARTHEST
 from wavetank.scene.scene import Scene
+
+CROWD = 100  # particles within a cube of a spacing
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,9 +40,31 @@ def check_newcomers(scene: Scene, positions: Any, velocities: Any, dyes: Any, ma
         raise WavetankError(
             f"positions have shape {list(x.shape)}, velocities {list(v.shape)}; both must be [n, {scene.dim}]."
         )
-    if not (np.isfinite(x).all() and np.isfinite(v).all()):
-        raise WavetankError("positions and velocities of new particles must be finite numbers.")
+    if not (bool((np.abs(x) <= FARTHEST).all()) and bool((np.abs(v) <= FARTHEST).all())):
+        raise WavetankError(f"positions and velocities of new particles must be finite numbers within {FARTHEST:g}.")
+    check_crowd("positions", x, scene.spacing)
     return Newcomers(x, v, dye, material)
+
+
+def check_crowd(name: str, x: np.ndarray, spacing: float) -> None:
+    """Raise `WavetankError` where more than `CROWD` of the places `x` [n, dim] lie within a cube of edge `spacing` [m].
+
+    Each would be a neighbour of all others: the work grows with the square, and lists of neighbours with it.
+    """
+    if len(x) <= CROWD:
+        return
+    cells = np.floor(np.clip(x.astype(np.float64) / spacing, -(2.0**50), 2.0**50))
+    order = np.lexsort(cells.T)
+    new = np.concatenate([[True], (np.diff(cells[order], axis=0) != 0.0).any(axis=1), [True]])
+    first = np.flatnonzero(new)
+    most = int(np.argmax(np.diff(first)))
+    number = int(first[most + 1] - first[most])
+    if number > CROWD:
+        place = x[order[first[most]]].tolist()
+        raise WavetankError(
+            f"{name}: {number:,} particles lie in one place, within a spacing of {place}; at most {CROWD} can: at rest "
+            "there is one."
+        )
 
 
 def check_rows(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
@@ -52,10 +77,15 @@ def check_rows(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
         raise WavetankError(
             f"{name} have shape {list(rows.shape)}; they must have {list(shape)}, a row for each particle by id."
         )
-    bad = ~np.isfinite(rows).all(axis=1)
+    bad = ~(np.abs(rows) <= FARTHEST).all(axis=1)
     if bad.any():
         row = int(np.argmax(bad))
-        raise WavetankError(f"{name}[{row}] = {rows[row].tolist()} is not finite; every number must be.")
+        why = (
+            f"beyond {FARTHEST:g}; every number must be within it"
+            if np.isfinite(rows[row]).all()
+            else ("not finite; every number must be")
+        )
+        raise WavetankError(f"{name}[{row}] = {rows[row].tolist()} is {why}.")
     return rows
 
 

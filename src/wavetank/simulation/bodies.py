@@ -5,7 +5,7 @@ passes them. What the water did to them moves them in the next step, or at once 
 (`coupling.py`).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -305,6 +305,16 @@ class Bodies(Mapping[str, Body]):
         self.world = self.engine.PhysicsWorld.restore(arrays["bodies_engine"].tobytes())
         for row, memory in enumerate(arrays["bodies_memory"]):
             self.coupling.recall(row, memory)
+
+    def check(self, poses: Sequence[Pose]) -> None:
+        """Check that the engine, restored from a file, has the bodies where the solids are; raises `WavetankError`."""
+        for body in self.members:
+            (position, rotation), (place, turn) = self._pose(body.rigid()), poses[body.number]
+            off = np.concatenate(
+                [position - place, np.abs(rotation) - np.abs(turn), 0.0 * self._velocities([body.rigid()])[0]]
+            )
+            if not np.abs(off).max() <= 1e-3 * (1.0 + np.abs(place).max()):
+                raise WavetankError(f"the engine's state of the body {body.name!r} is not that of the solid.")
 
 
 def _three(v: Any) -> tuple[float, float, float]:

@@ -9,9 +9,12 @@ from wavetank.physics import measure, population
 from wavetank.physics.measure import neighbor_numbers, update_densities
 from wavetank.physics.world import World
 from wavetank.scene.scene import Scene
-from wavetank.simulation.arrays import check_rows, largest_norm, put_by_id
+from wavetank.simulation.arrays import check_crowd, check_rows, largest_norm, put_by_id
+from wavetank.simulation.bodies import Bodies
 from wavetank.simulation.frame import Frame
+from wavetank.simulation.instant import Standing
 from wavetank.simulation.ledger import Ledger
+from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.simulation.sources import Sources
 
 
@@ -22,6 +25,8 @@ class Contents:
     world: World
     ledger: Ledger
     sources: Sources
+    solids: MovingSolids
+    bodies: Bodies
     time_steps: int  # of the last frame
     seconds_per_frame: float  # that the last frame took to compute
     _outdated: bool  # whether the water moved since its densities were measured
@@ -49,6 +54,7 @@ class Contents:
     @positions.setter
     def positions(self, values: Any) -> None:
         x = check_rows("positions", values, (self.count, self.scene.dim))
+        check_crowd("positions", x, self.scene.spacing)
         if not np.array_equal(x, self.positions):
             population.clear_forces(self.world.particles, self.count)  # what pressed them was elsewhere
             put_by_id(self.world.particles, self.count, "x", x)
@@ -62,8 +68,9 @@ class Contents:
     @velocities.setter
     def velocities(self, values: Any) -> None:
         v = check_rows("velocities", values, (self.count, self.scene.dim))
-        put_by_id(self.world.particles, self.count, "v", v)
-        self.ledger.fastest_start = max(self.ledger.fastest_start, largest_norm(v))
+        if not np.array_equal(v, self.velocities):
+            put_by_id(self.world.particles, self.count, "v", v)
+            self.ledger.fastest_start = max(self.ledger.fastest_start, largest_norm(v))
 
     @property
     def densities(self) -> np.ndarray:
@@ -98,8 +105,21 @@ class Contents:
             v=world.particles.v, rho=world.scratch.rho, id=world.particles.id, material=world.particles.material,
             solids=world.solids,
             diffuse=world.pool.now if world.pool else None, foam_count=world.pool.count if world.pool else 0,
-            dye=world.particles.dye,
+            dye=world.particles.dye, stand=self.standing,
         )  # fmt: skip
+
+    def standing(self) -> tuple[Standing, ...]:
+        """Return the solids but for the walls of the tank, where they stand."""
+        solids, bodies = self.solids, {body.number: body for body in self.bodies.values()}
+        found = []
+        for number in range(solids.tank_count, len(solids.members)):
+            (position, rotation), body = solids.poses[number], bodies.get(number)
+            velocity, spin = np.split(np.zeros(6) if body is None else self.bodies.coupling.velocity[body.row], 2)
+            if body is not None:
+                velocity = velocity + np.cross(spin, position - body.center)
+            pose = (position.copy(), rotation.copy(), velocity.copy(), spin.copy())
+            found.append(Standing(solids.names[number], solids.members[number], *pose))
+        return tuple(found)
 
     def stats(self) -> dict[str, float]:
         """Measure this instant; see `physics.measure.statistics` for the keys, and foam in numbers of particles."""

@@ -38,6 +38,7 @@ MOST = 4.0  # of the water that goes along with an immersed body: most that is b
 ROWS = (
     "impulse", "due", "given", "change", "carried", "by_grid", "velocity", "before", "seen_push", "seen_gain",
 )  # fmt: skip
+REMEMBERED = len(ROWS) + 2  # rows of `Coupling.memory`
 
 
 class Coupling:

@@ -6,13 +6,16 @@ copies are made when they are first asked for, ordered by particle id, and stay 
 
 import dataclasses
 import functools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from wavetank.device.compiler import download
 from wavetank.device.state import Diffuse
+from wavetank.foundation.errors import NotFiniteError
 from wavetank.scene.scene import Scene
+from wavetank.simulation.instant import Standing
 from wavetank.solids.distance import SolidSet
 
 
@@ -33,6 +36,7 @@ class Frame:
     solids: SolidSet
     diffuse: Diffuse | None = None  # spray, foam and bubbles in device arrays, packed at the front
     foam_count: int = 0  # of them
+    stand: Callable[[], tuple[Standing, ...]] = tuple  # asks where the solids stand
 
     @property
     def dim(self) -> int:
@@ -48,6 +52,17 @@ class Frame:
     def velocities(self) -> np.ndarray:
         """Velocities [m/s], float32 [count, dim], ordered by particle id."""
         return self._by_id(self.v)
+
+    def check_finite(self) -> None:
+        """Raise `NotFiniteError` where a place or a velocity is no number."""
+        bad = ~(np.isfinite(self.positions) & np.isfinite(self.velocities)).all(axis=1)
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise NotFiniteError(
+                f"particle {self.ids[row]} at {self.positions[row].tolist()} m has the velocity "
+                f"{self.velocities[row].tolist()} m/s at t = {self.time:.6g} s and is no number that water can go on "
+                f"from, as are {int(bad.sum()) - 1:,} others; try shorter steps (substeps) or weaker forces."
+            )
 
     @functools.cached_property
     def densities(self) -> np.ndarray:
@@ -124,6 +139,11 @@ class Frame:
     def foam_ids(self) -> np.ndarray:
         """Numbers of their births, int32 [foam_count]: the same particle has the same number in every frame."""
         return self._of_foam("id", np.zeros(0, np.int32))
+
+    @functools.cached_property
+    def standing(self) -> tuple[Standing, ...]:
+        """The solids but for the walls of the tank, where they stand."""
+        return self.stand()
 
     def _of_foam(self, name: str, nothing: np.ndarray) -> np.ndarray:
         if self.diffuse is None:

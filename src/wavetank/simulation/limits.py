@@ -3,6 +3,10 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
+from wavetank.device.compiler import download
+from wavetank.foundation.errors import NotFiniteError
 from wavetank.physics.plan import capillary_speed, pace_of_solids, steps_in
 from wavetank.physics.time_step import largest_speed
 from wavetank.physics.world import World
@@ -11,6 +15,8 @@ from wavetank.scene.scene import Scene
 from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids
 
+MOST_IDS = int(np.iinfo(np.int32).max)
+
 
 def count_steps(
     world: World, scene: Scene, solids: MovingSolids, ledger: Ledger, forces: Sequence[Force], duration: float
@@ -18,9 +24,26 @@ def count_steps(
     """Return how many time steps make up `duration` [s], no whole number."""
     box = scene.tank.box() if scene.tank else ledger.start_box
     solid = pace_of_solids(world, scene) * _solid_speed(scene, solids, duration)
-    speed = max(solid, largest_speed(world.particles, world.count))
+    fastest = largest_speed(world.particles, world.count)
+    if not math.isfinite(fastest):
+        _refuse(world, ledger)
+    speed = max(solid, fastest)
     speed += duration * sum(force.largest_acceleration() for force in forces)
     return steps_in(world, scene, duration, speed, box, forced=bool(forces))
+
+
+def _refuse(world: World, ledger: Ledger) -> None:
+    """Raise `NotFiniteError`, which says whose velocity or place is no number, or whose speed has no square."""
+    x, v = (download(array)[: world.count] for array in (world.particles.x, world.particles.v))
+    with np.errstate(over="ignore", invalid="ignore"):
+        good = np.isfinite(x).all(axis=1) & np.isfinite((v * v).sum(axis=1))
+    ids = download(world.particles.id)[: world.count]
+    row = int(np.argmin(np.where(good, MOST_IDS, ids)))
+    raise NotFiniteError(
+        f"particle {ids[row]} at {x[row].tolist()} m has the velocity {v[row].tolist()} m/s at t = {ledger.time:.6g} s "
+        f"and is no number that water can go on from, as are {int((~good).sum()) - 1:,} others; go back to a state of "
+        "before, and try shorter steps (substeps) or weaker forces."
+    )
 
 
 def find_speed_limit(

@@ -1,11 +1,8 @@
 """A running world: the public face of the solver."""
 
-import dataclasses
 import math
 import time
 from collections.abc import Iterator, Sequence
-from copy import deepcopy
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,23 +16,22 @@ from wavetank.physics.foam.update import load_kernels, update_foam
 from wavetank.physics.time_step import filled_share, whole
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import MAX_PARTICLES, Scene
-from wavetank.scene.schedule import changes_gravity, gravity_at, with_gravity
+from wavetank.scene.schedule import changes_gravity, gravity_at
 from wavetank.simulation import limits
-from wavetank.simulation import snapshot as snapshots
 from wavetank.simulation.arrays import check_newcomers
 from wavetank.simulation.bodies import Bodies
-from wavetank.simulation.contents import Contents
+from wavetank.simulation.cost import check_cost, check_frames, check_time
 from wavetank.simulation.filling import fill
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.simulation.new_world import new_world
-from wavetank.simulation.snapshot import Snapshot
 from wavetank.simulation.sources import Sources, check_places
+from wavetank.simulation.states import States
 from wavetank.solids.solid import Solid
 
 
-class Simulation(Contents):
+class Simulation(States):
     """Water that moves. See `Scene` for what it is made of."""
 
     gravity_by_hand: tuple[float, ...] | None  # m/s^2, in place of what changes by itself
@@ -49,6 +45,7 @@ class Simulation(Contents):
 
     def reset(self) -> None:
         """Put everything back to the start of the scene."""
+        check_cost(self.scene)
         start, scene = fill(self.scene, lambda scene: type(self)(scene, self.arch or "cpu")), self.scene
         positions, velocities = start.particles()
         self.solids = MovingSolids(self._walls(), scene.solids, scene.friction, scene.spacing, scene.start_time)
@@ -90,6 +87,7 @@ class Simulation(Contents):
         if not (math.isfinite(seconds) and seconds >= 0):
             raise WavetankError(f"seconds = {seconds} is not allowed; it must be a finite number of at least 0.")
         frame, ledger = self.scene.frame_time, self.ledger
+        check_time(self.count, self.scene, seconds, f"advance({seconds:g})")
         ledger.owed += seconds
         if ledger.owed < 0.2 * frame / self.scene.substeps:
             return
@@ -109,13 +107,18 @@ class Simulation(Contents):
 
     def frames(self, seconds: float, fps: float = 60.0) -> Iterator[Frame]:
         """Yield the present frame and then one every 1 / `fps` until `seconds` of water have passed."""
-        if not (math.isfinite(fps) and fps > 0):
-            raise WavetankError(f"fps = {fps} is not allowed; it must be a positive number.")
-        start = self.time
-        yield self.frame()
-        for number in range(1, round(seconds * fps) + 1):
-            self.advance(max(0.0, start + number / fps - self.time - self.ledger.owed))
-            yield self.frame()
+        for _, frame in self.numbered_frames(seconds, fps, self.time):
+            yield frame
+
+    def numbered_frames(
+        self, seconds: float, fps: float, start: float, done: int = -1
+    ) -> Iterator[tuple[int, Frame]]:  # fmt: skip
+        """Yield such frames from the time `start` [s] on with their numbers, but for those up to number `done`."""
+        check_frames(self.count, self.scene, seconds, fps)
+        for number in range(done + 1, round(seconds * fps) + 1):
+            if number:
+                self.advance(max(0.0, start + number / fps - self.time - self.ledger.owed))
+            yield number, self.frame()
 
     def push(self, force: Force) -> None:
         """Let a force act during the next frame only."""
@@ -316,43 +319,6 @@ class Simulation(Contents):
             rows = pool_rows(before.pool, self.scene.dim)
             self.world.pool = pool_from(rows, before.pool.born, before.pool.capacity, self.scene.dim, capacity)
 
-    # --- states ---
-
-    def snapshot(self) -> Snapshot:
-        """Return this instant as host arrays, for `resume`."""
-        taken = snapshots.take_snapshot(self.scene, self.world, self.solids, self.ledger)
-        sources = self.sources.plain() if self.sources else {}
-        return dataclasses.replace(taken, arrays=taken.arrays | self.bodies.arrays(), sources=sources)
-
-    def resume(self, snapshot: Snapshot) -> None:
-        """Go back (or on) to an instant; parameters and forces stay as they are now."""
-        self.scene.assign("solids", snapshot.solids)
-        self.solids = snapshots.restore_solids(self.scene, self._walls(), snapshot)
-        if snapshot.ledger.capacity > self.ledger.capacity:
-            self._fill(snapshot.ledger.capacity)
-        self._renew_solids()
-        before, self.ledger, self.pushed = self.ledger, snapshot.ledger.copy(), []
-        self.ledger.capacity = before.capacity
-        self.ledger.next_id = max(self.ledger.next_id, before.next_id)
-        snapshots.put_particles(snapshot, self.scene, self.world, self.ledger.capacity)
-        self.bodies.resume(snapshot.arrays)
-        self.sources = Sources(self.scene)
-        self.sources.read(snapshot.sources)
-
-    def clone(self) -> "Simulation":
-        """Return a world of its own that goes on from here to the same bits, with the same forces and parameters."""
-        empty = self.scene.model_copy(update={"fluids": [], "solids": []})
-        copy = type(self)(empty, self.arch or "cpu")
-        copy.scene = self.scene.model_copy(deep=True)
-        copy.resume(dataclasses.replace(self.snapshot(), solids=[*copy.scene.solids]))
-        copy.forces, copy.pushed = deepcopy((self.forces, self.pushed))
-        copy.gravity_by_hand = self.gravity_by_hand
-        return copy
-
-    def digest(self) -> str:
-        """Return the hex SHA-256 of the state: time, particles by id, foam, poses of the solids, to the last bit."""
-        return snapshots.digest(self.snapshot())
-
     # --- parameters ---
 
     def __getattr__(self, name: str) -> Any:
@@ -373,18 +339,3 @@ class Simulation(Contents):
             if name not in self.__dict__ and not hasattr(type(self), name):
                 refuse_assignment(name)
             super().__setattr__(name, value)
-
-    # --- files ---
-
-    def save(self, path: str | Path) -> None:
-        """Write the whole state to an .npz file, replaced in one move; `restore` continues from it exactly."""
-        scene = self.scene if self.gravity_by_hand is None else with_gravity(self.scene, self.gravity_by_hand)
-        snapshots.write_snapshot(path, self.snapshot(), scene.model_dump_json(exclude={"fluids"}))
-
-    @classmethod
-    def restore(cls, path: str | Path, arch: str = "cpu") -> "Simulation":
-        """Continue from a file that `save` wrote, bit for bit on the same back end."""
-        snapshot, text = snapshots.read_snapshot(path, lambda text: Scene.model_validate_json(text).solids)
-        self = cls(Scene.model_validate_json(text), arch)
-        self.resume(snapshot)
-        return self

@@ -3,17 +3,13 @@
 import dataclasses
 import hashlib
 import json
-import zipfile
 import zlib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wavetank.device.compiler import download, upload
 from wavetank.device.state import LASTING
-from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import replacing
 from wavetank.physics.foam.pool import pool_from, pool_rows
 from wavetank.physics.world import World
 from wavetank.scene.scene import Scene
@@ -24,7 +20,6 @@ from wavetank.solids.solid import Solid
 
 ARRAYS = LASTING  # of the particles, in device order
 VISCOUS = "viscous"  # the same, where there are viscous fluids
-TOLD = ("id", "x", "v", "dye", "frozen", "material")  # of these, what a digest tells
 SAMPLE, WORTH = 1024, 0.8  # bytes; the share of these that must be left for packing to be worth it
 
 
@@ -56,6 +51,11 @@ class Snapshot:
     def time(self) -> float:
         """Seconds of water since the start [s]."""
         return float(self.ledger.time)
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether all of its numbers are numbers, with squares."""
+        return all(bool((np.abs(rows) < 1e18).all()) for rows in self.arrays.values() if rows.dtype.kind == "f")
 
 
 def take_snapshot(scene: Scene, world: World, solids: MovingSolids, ledger: Ledger) -> Snapshot:
@@ -96,18 +96,28 @@ def put_particles(snapshot: Snapshot, scene: Scene, world: World, capacity: int)
     world.pool = pool_from(snapshot.arrays, numbers.foam_born, numbers.foam_capacity, scene.dim, capacity)
 
 
-def digest(snapshot: Snapshot) -> str:
-    """Return the hex SHA-256 of an instant: time, particles by id, foam, poses, bodies, to the last bit."""
-    order = np.argsort(snapshot.arrays["id"], kind="stable")
-    particles = {name: snapshot.arrays[name][order] for name in TOLD}
-    foam = {name: rows for name, rows in sorted(snapshot.arrays.items()) if name.startswith("foam_")}
-    poses = {f"pose {number}": np.concatenate(pose) for number, pose in enumerate(snapshot.poses)}
+def digest(snapshot: Snapshot, rules: str = "") -> str:
+    """Return the hex SHA-256 of an instant: of all that decides how it goes on, and of nothing else.
+
+    That is, in this order, each with its name and shape: the ledger but for the room that there is (time, next id,
+    what is owed, the fastest so far), how many births of foam there were, every array in the order of particle ids
+    (places, velocities, carried pressure, viscosity, dyes, ice, materials), foam in the order of births, bodies and
+    their engine, poses, targets and growth of solids, what hands hold, emitters and drains, and `rules`, the scene as
+    it is now. There is no state of random numbers: they follow from ids and the number of the frame. Recordings, tests
+    and `wavetank run` compare by this and nothing else.
+    """
     whole = hashlib.sha256()
-    memory = {name: rows for name, rows in snapshot.arrays.items() if name == "bodies_memory"}
-    for name, values in ({"time": np.float64(snapshot.time)} | particles | foam | poses | memory).items():
-        whole.update(f"{name} {values.shape}".encode() + values.tobytes())
-    if snapshot.sources:
-        whole.update(json.dumps(snapshot.sources, sort_keys=True).encode())
+    ledger = {name: value for name, value in snapshot.ledger.plain().items() if name != "capacity"}
+    order = np.argsort(snapshot.arrays["id"], kind="stable")
+    whole.update(json.dumps([ledger, snapshot.numbers.foam_born], sort_keys=True).encode())
+    for name, rows in sorted(snapshot.arrays.items()):
+        values = rows[order] if name in (*ARRAYS, VISCOUS) else rows
+        whole.update(f"{name} {values.dtype.str} {values.shape}".encode() + np.ascontiguousarray(values).tobytes())
+    poses = [*snapshot.poses, *(pose for _, pose in sorted(snapshot.targets.items()))]
+    for number, pose in enumerate(poses):
+        whole.update(f"pose {number}".encode() + np.concatenate(pose).tobytes())
+    others = [sorted(snapshot.targets), sorted(snapshot.growing.items()), snapshot.courses, snapshot.sources]
+    whole.update(json.dumps(others, sort_keys=True).encode() + rules.encode())
     return whole.hexdigest()
 
 
@@ -149,61 +159,3 @@ def _packed(plane: np.ndarray) -> tuple[bool, bytes]:
     sample = whole[len(whole) // 2 :][:SAMPLE]
     small = len(zlib.compress(sample, 1)) < WORTH * len(sample)
     return small, zlib.compress(whole, 1) if small else whole
-
-
-def write_snapshot(path: str | Path, snapshot: Snapshot, scene: str) -> None:
-    """Write a snapshot and the JSON of its scene to an .npz file, replaced in one move."""
-    about = {
-        "numbers": snapshot.ledger.plain() | dataclasses.asdict(snapshot.numbers),
-        "names": snapshot.names,
-        "poses": [_pose_list(pose) for pose in snapshot.poses],
-        "targets": {k: _pose_list(pose) for k, pose in snapshot.targets.items()},
-        "growing": snapshot.growing,
-        "courses": snapshot.courses,
-        "sources": snapshot.sources,
-    }
-    with replacing(path) as partial, partial.open("wb") as file:
-        np.savez(file, format=2, scene=scene, about=json.dumps(about), allow_pickle=False, **snapshot.arrays)
-
-
-def read_snapshot(path: str | Path, solids: Any) -> tuple[Snapshot, str]:
-    """Read what `write_snapshot` wrote; `solids` makes the list of solids from the scene's JSON."""
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            data = {name: file[name] for name in file.files}
-        data.setdefault("a", np.zeros_like(data["v"]))  # earlier states carry no pressure on
-        scene = str(data["scene"])
-        about = json.loads(str(data["about"]))
-        members, numbers = solids(scene), about["numbers"]
-        snapshot = Snapshot(
-            ledger=Ledger.read(numbers),
-            numbers=Numbers(**{field.name: int(numbers[field.name]) for field in dataclasses.fields(Numbers)}),
-            arrays={
-                name: data[name]
-                for name in (
-                    *ARRAYS,
-                    *(name for name in data if name == VISCOUS or name.startswith(("foam_", "bodies_"))),
-                )
-            },
-            solids=members,
-            names=about["names"],
-            poses=[_pose(row) for row in about["poses"]],
-            targets={int(k): _pose(row) for k, row in about["targets"].items()},
-            growing={int(k): (age, time) for k, (age, time) in about["growing"].items()},
-            courses=about.get("courses", {}),
-            sources=about.get("sources", {}),
-        )
-    except OSError as error:
-        raise WavetankError(f"{path}: the state cannot be read: {error.strerror or error}.") from None
-    except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        why = "it holds objects, not arrays" if "pickle" in str(error) else str(error).rstrip(".")
-        raise WavetankError(f"{path}: this is not a state that `Simulation.save` wrote: {why}.") from None
-    return snapshot, scene
-
-
-def _pose_list(pose: Pose) -> list[list[float]]:
-    return [pose[0].tolist(), pose[1].tolist()]
-
-
-def _pose(row: list[list[float]]) -> Pose:
-    return np.array(row[0], float), np.array(row[1], float)

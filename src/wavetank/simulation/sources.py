@@ -25,6 +25,7 @@ from wavetank.simulation.jets import flown, jet_of, particles_due, row
 GAP = 0.8  # d: room that new particles have from others
 PRESSED = 0.45  # d: the same for those that water under pressure has kept waiting, more than a row
 PATIENCE = 0.5  # s: flow of so long is owed at most; the rest is given up, and said
+MOST_DUE = 5_000_000  # particles of an emitter in a frame
 REACH = 4.0  # radii: how far the suction of a drain is felt
 
 
@@ -163,6 +164,11 @@ class Sources:
         source.flows = rows > 0.0
         if not source.flows:
             return
+        if rows * len(mouth) > MOST_DUE:
+            raise WavetankError(
+                f"emitters[{number}] lets out {rows * len(mouth):,.3g} particles in a frame; at most {MOST_DUE:,} are "
+                "allowed: lower its speed or flow, or make the spacing larger."
+            )
         due, source.phase = particles_due(mouth, source.phase, rows)
         keep = self._allowed(sim, now, len(due.place), source)
         if keep < len(due.place):
@@ -233,8 +239,8 @@ def check_places(sim: Water) -> None:
         now = emitter.at(scene.start_time)
         mouth = now.mouth(scene.spacing)
         x, _ = flown(scene, emitter, mouth, row(mouth), scene.start_time, _step(sim))
-        size = scene.tank.size if scene.tank else None
-        inside = np.ones(len(x), bool) if size is None else np.all((x >= 0.0) & (x <= np.array(size)), axis=1)
+        lower, upper = scene.tank.box() if scene.tank else (-np.inf, np.inf)
+        inside = np.all((x >= lower) & (x <= upper), axis=1)
         if not (sim.free_places(x, 0.0, scene.wall_gap * scene.spacing) & inside).any():
             raise WavetankError(
                 f"emitters[{number}] is inside of a solid or outside of the tank, and nothing can come out; move its "

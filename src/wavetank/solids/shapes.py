@@ -213,7 +213,7 @@ class _SetOperation(Solid):
         return max(float(np.linalg.norm(part.origin)) + part.reach() for part in self.parts)
 
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
-        own = [("center", self.center)] if "center" in self.model_fields_set else []
+        own = [("center", self.center)] if any(self.center) else []  # the usual one belongs to any world
         return own + [
             (f"parts[{number}].{name}", vector)
             for number, part in enumerate(self.parts)

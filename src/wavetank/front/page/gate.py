@@ -13,12 +13,18 @@ from typing import Any
 
 OPEN_PATHS = ("/page/",)  # style and scripts, the same for everyone
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+#: of every answer: our own page alone may frame, load and read what is here (OWASP's list of secure headers)
 HEADERS = {
     "content-security-policy": "default-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
-    "frame-ancestors 'self' http://127.0.0.1:* http://localhost:*; base-uri 'none'; form-action 'none'",
+    "frame-ancestors 'self' http://127.0.0.1:* http://localhost:*; base-uri 'none'; form-action 'none'; "
+    "object-src 'none'",
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
     "cache-control": "no-store",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "permissions-policy": "camera=(), geolocation=(), microphone=()",
+    "x-permitted-cross-domain-policies": "none",
 }
 
 
@@ -48,7 +54,7 @@ class Gate:
         host, origin = headers.get("host", ""), headers.get("origin")
         if self.hosts is not None and host.lower() not in self.hosts:
             return False
-        if origin is not None and urllib.parse.urlsplit(origin).netloc.lower() != host.lower():
+        if origin is not None and _place_of(origin) != host.lower():
             return False
         # Browsers always name the origin of a socket; what does not is no browser and needs the token all the same.
         if scope["type"] == "http" and scope["path"].startswith(OPEN_PATHS):
@@ -79,19 +85,33 @@ class Gate:
         return wrapped
 
 
+def _place_of(origin: str) -> str | None:
+    """Return the host and the port of an origin; None for what is none."""
+    try:
+        return urllib.parse.urlsplit(origin).netloc.lower()
+    except ValueError:
+        return None
+
+
 def is_loopback(host: str) -> bool:
     """Say whether only this machine can reach a server that listens on `host`."""
     return host in ("localhost", "::1", "[::1]") or host.startswith("127.")
 
 
 async def _refuse(scope: Any, receive: Any, send: Any) -> None:
+    kind = "http.response"
     if scope["type"] == "websocket":
         await receive()
-        await send({"type": "websocket.close", "code": 1008})
-        return
+        kind = "websocket.http.response"
+        if kind not in (scope.get("extensions") or {}):
+            await send({"type": "websocket.close", "code": 1008})
+            return
     body = b"wavetank: this page opens with the link that the program printed, token included.\n"
     await send({
-        "type": "http.response.start", "status": 403,
-        "headers": [(b"content-type", b"text/plain; charset=utf-8"), (b"content-length", str(len(body)).encode())],
+        "type": f"{kind}.start", "status": 403,
+        "headers": [
+            (b"content-type", b"text/plain; charset=utf-8"), (b"content-length", str(len(body)).encode()),
+            *((name.encode(), value.encode()) for name, value in HEADERS.items()),
+        ],
     })  # fmt: skip
-    await send({"type": "http.response.body", "body": body})
+    await send({"type": f"{kind}.body", "body": body})

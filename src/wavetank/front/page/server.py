@@ -11,6 +11,7 @@ import math
 import mimetypes
 import socket
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -20,12 +21,14 @@ from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route, WebSocketRoute
+from typing_extensions import override
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.front.about import everything
 from wavetank.front.loop import Loop, News
-from wavetank.front.page.gate import Gate
-from wavetank.front.page.viewers import Viewers
+from wavetank.front.page.gate import HEADERS, Gate
+from wavetank.front.page.viewers import LONGEST_MESSAGE, Viewers
 from wavetank.front.picture import jpeg
 from wavetank.front.theme import style_sheet
 from wavetank.session.pace import share_interpreter
@@ -33,7 +36,22 @@ from wavetank.session.recording import Recording
 from wavetank.session.session import Session
 
 PORT = 8420  # the first one tried where none is asked for
-LONGEST_MESSAGE = 2_500_000  # bytes: a dropped scene file
+MOST_CONNECTIONS = 1200  # at once; what comes on top is told to come back later
+MOST_DOWNLOADS = 1  # that wait for the simulation's thread
+REST = 0.3  # s between two of them
+
+
+class Protocol(H11Protocol):
+    """HTTP/1.1 whose every answer has our headers, that to what is no request at all included."""
+
+    @override
+    def send_400_response(self, msg: str) -> None:
+        headers = "".join(f"{name}: {value}\r\n" for name, value in HEADERS.items())
+        head = f"HTTP/1.1 400 Bad Request\r\ncontent-type: text/plain; charset=utf-8\r\n{headers}"
+        body = "This is no request.\n"
+        text = f"{head}content-length: {len(body)}\r\nconnection: close\r\n\r\n{body}"
+        self.transport.write(text.encode("ascii"))
+        self.transport.close()
 
 
 class WebFront:
@@ -59,11 +77,13 @@ class WebFront:
         self._server = uvicorn.Server(uvicorn.Config(
             self.gate, log_level="error", access_log=False, lifespan="off", ws="websockets-sansio",
             ws_max_size=LONGEST_MESSAGE, ws_per_message_deflate=False, timeout_graceful_shutdown=1,
+            http=Protocol, server_header=False, limit_concurrency=MOST_CONNECTIONS,
         ))  # fmt: skip
         self._events: asyncio.AbstractEventLoop | None = None
         self._thread = threading.Thread(target=self._serve, name="wavetank web", daemon=True)
         self._packer = concurrent.futures.ThreadPoolExecutor(1, "wavetank jpeg")
         self._packing: concurrent.futures.Future[None] | None = None
+        self._downloads, self._spared_until = 0, 0.0  # under way; when the next one may be
         self._told_world: dict[str, Any] = {}
         self._told: Any = None  # the last status, and who was there
         self._told_regions: dict[str, Any] = {}
@@ -182,7 +202,12 @@ class WebFront:
         return await self._download("scene.toml", lambda: self.session.present_scene().text())
 
     async def _download(self, name: str, make: Callable[[], str]) -> Response:
-        """Return a text that the simulation's thread makes, as a file."""
+        """Return a text that the simulation's thread makes, as a file; not too many at once, which the water feels."""
+        if self._downloads >= MOST_DOWNLOADS or time.monotonic() < self._spared_until:
+            return Response(
+                "too many downloads at once; try again\n", status_code=429, media_type="text/plain",
+                headers={"retry-after": "1"},
+            )  # fmt: skip
 
         def made() -> str:
             try:
@@ -191,12 +216,16 @@ class WebFront:
                 self.session.note(str(error))
                 raise
 
+        self._downloads += 1
         future = self.ask(made)
         headers = {"content-disposition": f"attachment; filename={name}"}
         try:
             return Response(await asyncio.wrap_future(future), media_type="application/toml", headers=headers)
         except WavetankError as error:
             return Response(f"{error}\n", status_code=409, media_type="text/plain")
+        finally:
+            self._downloads -= 1
+            self._spared_until = time.monotonic() + REST
 
 
 def _packaged(name: str) -> Response:

@@ -6,12 +6,14 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from wavetank.foundation.door import guarded, parse_json
 from wavetank.foundation.errors import WavetankError
 from wavetank.session.commands import Command, ToolBegin, ToolEnd, ToolMove, command_of
 
 RATE, BURST = 500.0, 1000.0  # messages a second, and at once: more than any hand makes
 MOST_VIEWERS = 16
 LONGEST_SIDE = 8192  # px
+LONGEST_MESSAGE = 2_500_000  # bytes: a dropped scene file
 
 Ray = Callable[[float, float], dict[str, Any]]
 
@@ -126,7 +128,8 @@ class Viewers:
                 await asyncio.sleep(0.02)
                 continue
             try:
-                self.hear(viewer, _table(message))
+                with guarded("a message", "command"):
+                    self.hear(viewer, _table(message))
             except WavetankError as error:
                 viewer.post({"type": "note", "text": str(error)[:400]})
 
@@ -202,10 +205,7 @@ def _table(message: dict[str, Any]) -> dict[str, Any]:
     text = message.get("text")
     if text is None:
         raise WavetankError("a message must be text: JSON with the key 'do'.")
-    try:
-        table = json.loads(text)
-    except (ValueError, RecursionError):
-        raise WavetankError("a message must be JSON with the key 'do'.") from None
+    table = parse_json(text, "a message, which must be JSON with the key 'do',", LONGEST_MESSAGE)
     if not isinstance(table, dict):
         raise WavetankError("a message must be a JSON object with the key 'do'.")
     return table

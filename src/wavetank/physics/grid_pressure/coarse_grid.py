@@ -66,12 +66,21 @@ def nearest(grid: CoarseGrid, c):
 
 def new_levels(box: tuple[np.ndarray, np.ndarray], h: float) -> list[CoarseGrid]:
     """Allocate the grid of a tank between the corners `box` [m] and its coarser levels, the finest first."""
-    shape = [_divided(edge / (EDGE * h)) for edge in box[1] - box[0]]
+    shape = _shape_of(box, h)
     levels = [_new_level(shape, box)]
     while any(_can_halve(n) for n in shape):
         shape = [n // 2 if _can_halve(n) else n for n in shape]
         levels.append(_new_level(shape, box))
     return levels
+
+
+def nodes_of(box: tuple[np.ndarray, np.ndarray], h: float) -> int:
+    """Return how many nodes the finest of these grids has, in Python's integers: it may be more than there can be."""
+    return math.prod(_shape_of(box, h))
+
+
+def _shape_of(box: tuple[np.ndarray, np.ndarray], h: float) -> list[int]:
+    return [_divided(float(edge) / (EDGE * h)) for edge in box[1] - box[0]]
 
 
 def piece_width() -> int:

@@ -17,8 +17,8 @@ from typing_extensions import override
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Particles
-from wavetank.foundation.model import Length, Number, Place
-from wavetank.scene.forces.force import Force, in_space
+from wavetank.foundation.model import Number, Place
+from wavetank.scene.forces.force import Force, Radius, Strength, in_space
 from wavetank.scene.forces.regions import add_to, soft_share
 from wavetank.solids.distance import lift, vec3
 
@@ -41,8 +41,8 @@ class Attract(Force):
 
     kind: Literal["attract"] = "attract"
     center: Place
-    radius: Length
-    strength: Number  # m/s^2, negative repels
+    radius: Radius
+    strength: Strength  # m/s^2, negative repels
     drag: Annotated[Number, Field(ge=0, le=1e4)] = 2.0  # 1/s
 
     @override

@@ -6,14 +6,15 @@ duration  T        time it takes                                     s
 radius    R        where it ends                                     m
 """
 
-from typing import Literal
+from typing import Annotated, Literal
 
+from pydantic import Field
 from typing_extensions import override
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Particles
-from wavetank.foundation.model import Length, Number, Place, Positive
-from wavetank.scene.forces.force import Force, in_space
+from wavetank.foundation.model import Place, Positive
+from wavetank.scene.forces.force import Force, Radius, Speed, in_space
 from wavetank.scene.forces.regions import add_to, soft_share
 from wavetank.solids.distance import lift, vec3
 
@@ -36,9 +37,9 @@ class Burst(Force):
 
     kind: Literal["burst"] = "burst"
     center: Place
-    radius: Length
-    speed: Number  # m/s
-    duration: Positive = 1 / 60  # s
+    radius: Radius
+    speed: Speed  # m/s
+    duration: Annotated[Positive, Field(ge=1e-6)] = 1 / 60  # s
 
     @override
     def apply(self, particles: Particles, count: int, dt: float, time: float) -> None:

@@ -14,8 +14,8 @@ from typing_extensions import override
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Particles
-from wavetank.foundation.model import Length, Number, Place, Vector
-from wavetank.scene.forces.force import Force, in_space
+from wavetank.foundation.model import Number, Place
+from wavetank.scene.forces.force import Force, Radius, Speeds, in_space
 from wavetank.scene.forces.regions import add_to, soft_share
 from wavetank.solids.distance import lift, vec3
 
@@ -34,8 +34,8 @@ class Drag(Force):
 
     kind: Literal["drag"] = "drag"
     center: Place
-    radius: Length
-    velocity: Vector  # m/s
+    radius: Radius
+    velocity: Speeds  # m/s
     drag: Annotated[Number, Field(ge=0, le=1e4)] = 20.0  # 1/s
 
     @override

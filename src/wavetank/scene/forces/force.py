@@ -1,11 +1,21 @@
 """What every force has. A force of your own is a subclass with `apply`: see `examples/05_a_force_of_your_own.py`."""
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from wavetank.device.state import Particles
+from wavetank.foundation.model import FARTHEST, METRES
 from wavetank.foundation.timed import Timed
+
+# Bounds within which speeds, their squares, and what a radius divides are numbers in single precision.
+Speed = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]  # m/s
+Strength = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]  # m/s^2
+Speeds = tuple[Speed, Speed] | tuple[Speed, Speed, Speed]
+Strengths = tuple[Strength, Strength] | tuple[Strength, Strength, Strength]
+Radius = Annotated[float, Field(ge=1e-6, le=FARTHEST, allow_inf_nan=False), METRES]
 
 
 class Force(Timed):

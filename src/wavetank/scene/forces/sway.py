@@ -14,8 +14,8 @@ from typing_extensions import override
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Particles
-from wavetank.foundation.model import Number, Vector
-from wavetank.scene.forces.force import Force, in_space
+from wavetank.foundation.model import Number
+from wavetank.scene.forces.force import Force, Strengths, in_space
 from wavetank.scene.forces.regions import add_to
 from wavetank.solids.distance import vec3
 
@@ -31,7 +31,7 @@ class Sway(Force):
     """A tank on the move."""
 
     kind: Literal["sway"] = "sway"
-    acceleration: Vector  # m/s^2
+    acceleration: Strengths  # m/s^2
     frequency: Annotated[Number, Field(ge=0, le=1e3)] = 0.0  # Hz
     phase: Number = 0.0  # rad
 

@@ -14,8 +14,8 @@ from typing_extensions import override
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Particles
-from wavetank.foundation.model import Length, Number, Place
-from wavetank.scene.forces.force import Force, in_space
+from wavetank.foundation.model import Number, Place
+from wavetank.scene.forces.force import Force, Radius, Speed, in_space
 from wavetank.scene.forces.regions import add_to, away_from_line, soft_share
 from wavetank.solids.distance import lift, vec3
 
@@ -39,8 +39,8 @@ class Vortex(Force):
 
     kind: Literal["vortex"] = "vortex"
     center: Place
-    radius: Length
-    speed: Number  # m/s at the rim; negative turns the other way
+    radius: Radius
+    speed: Speed  # m/s at the rim; negative turns the other way
     axis: tuple[Number, Number, Number] = (0.0, 1.0, 0.0)  # in a 2-D world give (0, 0, 1)
     drag: Annotated[Number, Field(ge=0, le=1e4)] = 8.0  # 1/s
 

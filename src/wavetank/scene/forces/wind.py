@@ -17,8 +17,8 @@ from typing_extensions import override
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Particles
-from wavetank.foundation.model import METRES, Number, Place, Vector
-from wavetank.scene.forces.force import Force, in_space
+from wavetank.foundation.model import METRES, Number, Place
+from wavetank.scene.forces.force import Force, Speeds, in_space
 from wavetank.scene.forces.regions import add_to, away_from_line, soft_share
 from wavetank.solids.distance import lift, vec3
 
@@ -38,7 +38,7 @@ class Wind(Force):
     """Moving air. With a radius it blows in a tube through `center`, without one everywhere."""
 
     kind: Literal["wind"] = "wind"
-    velocity: Vector  # m/s
+    velocity: Speeds  # m/s
     drag: Annotated[Number, Field(ge=0, le=1e4)] = 1.0  # 1/s
     center: Place | None = None
     radius: Annotated[Number, Field(ge=0), METRES] = 0.0

@@ -6,7 +6,7 @@ import functools
 import hashlib
 import importlib.resources
 import io
-import zipfile
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, WithJsonSchema, model_validator
 from typing_extensions import override
 
+from wavetank.foundation.door import opened, read_array, unpack_text
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import Edges, Length, Place
 from wavetank.solids.distance import GRIDS
@@ -196,18 +197,21 @@ def read_heights(name: str, folder: Path) -> np.ndarray:
 
 def _read(path: Path) -> np.ndarray:
     """Return the heights in a file; raises `ValueError` with one sentence for what is none."""
-    if not path.is_file():
+    if not path.exists():
         raise ValueError(f"there is no file of heights {path}.")
     if path.suffix.lower() not in (".npy", *PICTURES):
         raise ValueError(f"{path}: heights are read from .npy, {', '.join(PICTURES)} files; convert this one.")
-    if path.stat().st_size > LARGEST_FILE:
-        raise ValueError(f"{path} is larger than {LARGEST_FILE // 1_000_000} MB; take every second height.")
+    try:
+        file = opened(path, LARGEST_FILE, "file of heights")
+    except WavetankError as error:
+        raise ValueError(str(error)) from None
     try:
         if path.suffix.lower() == ".npy":
-            return np.asarray(np.load(path, allow_pickle=False), np.float64)
+            with file:
+                return np.asarray(read_array(file, os.fstat(file.fileno()).st_size, f"{path}", "it"), np.float64)
         from PIL import Image
 
-        with Image.open(path) as picture:
+        with file, Image.open(file) as picture:
             if picture.width * picture.height > MOST_HEIGHTS:
                 raise ValueError(
                     f"it has {picture.width} x {picture.height} pixels; at most {MOST_HEIGHTS:,} are allowed"
@@ -229,8 +233,10 @@ def _text(heights: np.ndarray) -> str:
 
 @functools.lru_cache(maxsize=8)
 def _heights(text: str) -> np.ndarray:
+    wrong = "data is no ground that a saved scene holds; give heights or path instead"
     try:
-        with np.load(io.BytesIO(base64.b64decode(text, validate=True)), allow_pickle=False) as file:
-            return np.asarray(file["heights"], np.float64)
-    except (binascii.Error, OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        raise ValueError("data is no ground that a saved scene holds; give heights or path instead.") from None
+        return np.asarray(unpack_text(base64.b64decode(text, validate=True), wrong)["heights"], np.float64)
+    except (binascii.Error, ValueError, KeyError):
+        raise ValueError(f"{wrong}.") from None
+    except WavetankError as error:
+        raise ValueError(str(error)) from None

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.solids.meshes.counted import check_file
 from wavetank.solids.meshes.triangles import Triangles
 
 SUFFIXES = (".obj", ".stl", ".ply", ".glb")
-LARGEST_FILE = 500_000_000  # bytes
 BUNDLED = "wavetank/"  # how the names of bundled models begin
 
 
@@ -28,10 +28,9 @@ def read_file(path: Path) -> Triangles:
     """Return the surface of a mesh file; raises `ValueError` with one sentence for what is none."""
     if path.suffix.lower() not in SUFFIXES:
         raise ValueError(f"{path}: meshes are read from {', '.join(SUFFIXES)} files; convert this one.")
-    if not path.is_file():
+    if not path.exists():
         raise ValueError(f"there is no mesh file {path}; bundled models are: {', '.join(bundled_models())}.")
-    if path.stat().st_size > LARGEST_FILE:
-        raise ValueError(f"{path} is larger than {LARGEST_FILE // 1_000_000} MB; simplify the mesh.")
+    check_file(path)
     return Triangles.of(*_arrays(path), str(path))
 
 

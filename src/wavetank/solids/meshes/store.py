@@ -2,12 +2,16 @@
 
 import contextlib
 import hashlib
-import os
+import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
+from wavetank.foundation.door import read_arrays
+from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.folders import cache_folder
+from wavetank.foundation.replacing import replacing
 from wavetank.solids.meshes.grid import DistanceGrid
 
 FORMAT = 1  # counts up when the same mesh would give other distances
@@ -23,18 +27,25 @@ def grid_of(key: str, make: Callable[[], DistanceGrid]) -> DistanceGrid:
     key = hashlib.sha256(f"{FORMAT} {key}".encode()).hexdigest()
     if key not in _grids:
         path = cache_folder() / "meshes" / f"{key}.npz"
-        grid = None
-        with contextlib.suppress(Exception), np.load(path, allow_pickle=False) as file:
-            grid = DistanceGrid(file["distances"], float(file["cell"]))
+        grid = _read(path)
         if grid is None:
             grid = make()
-            partial = path.with_name(f"{key}.{os.getpid()}.partial")
-            with contextlib.suppress(OSError):
+            with contextlib.suppress(OSError, WavetankError):
                 path.parent.mkdir(parents=True, exist_ok=True)
-                with partial.open("wb") as file:
+                with replacing(path) as partial, partial.open("wb") as file:
                     np.savez(file, distances=grid.distances, cell=grid.cell)
-                partial.replace(path)
         while len(_grids) >= _KEPT:
             del _grids[next(iter(_grids))]
         _grids[key] = grid
     return _grids[key]
+
+
+def _read(path: Path) -> DistanceGrid | None:
+    """Return the grid of a file; None where there is none, or one that is damaged or foreign: it is made anew."""
+    with contextlib.suppress(Exception):
+        arrays = read_arrays(path, "grid of distances")
+        distances, cell = arrays["distances"], float(arrays["cell"])
+        sound = distances.dtype == np.float32 and distances.ndim in (2, 3) and bool(np.isfinite(distances).all())
+        if sound and 0.0 < cell < math.inf:
+            return DistanceGrid(distances, cell)
+    return None

@@ -5,10 +5,12 @@ import binascii
 import dataclasses
 import hashlib
 import io
-import zipfile
 from typing import Any
 
 import numpy as np
+
+from wavetank.foundation.door import unpack_text
+from wavetank.foundation.errors import WavetankError
 
 MOST_TRIANGLES = 1_000_000
 
@@ -77,11 +79,16 @@ class Triangles:
     @classmethod
     def from_text(cls, text: str, origin: str) -> "Triangles":
         """Read what `text` wrote; raises `ValueError` for anything else."""
+        wrong = f"{origin}: data is not a mesh that a saved scene holds; give path instead"
         try:
-            with np.load(io.BytesIO(base64.b64decode(text, validate=True)), allow_pickle=False) as file:
-                vertices, faces = file["vertices"], file["faces"]
-        except (binascii.Error, OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-            raise ValueError(f"{origin}: data is not a mesh that a saved scene holds; give path instead.") from None
+            arrays = unpack_text(base64.b64decode(text, validate=True), wrong)
+            vertices, faces = arrays["vertices"], arrays["faces"]
+        except (binascii.Error, ValueError, KeyError):
+            raise ValueError(f"{wrong}.") from None
+        except WavetankError as error:
+            raise ValueError(str(error)) from None
+        if len(faces) > MOST_TRIANGLES or len(vertices) > 3 * MOST_TRIANGLES:
+            raise ValueError(f"{origin} has {len(faces):,} triangles; at most {MOST_TRIANGLES:,} are allowed.")
         return cls.of(vertices, faces, origin)
 
 

@@ -1,0 +1,69 @@
+"""What several commands share: the application, options that they have in common, and how texts become values."""
+
+import tomllib
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from wavetank import Scene, WavetankError, __version__
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+console = Console(stderr=True)
+
+SceneName = Annotated[str, typer.Argument(help="A bundled scene or the path of a TOML file.")]
+Settings = Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="Set a key of the scene.")]
+Arch = Annotated[str, typer.Option(help="Back end: cpu, gpu (the best there is), cuda, vulkan, metal, amdgpu.")]
+View = Annotated[str | None, typer.Option(help="water, particles, slice or foam; water unless particles are coloured.")]
+Quality = Annotated[str, typer.Option(help="draft, standard (2 x 2 samples a pixel) or film (64 pictures averaged).")]
+ColorBy = Annotated[str | None, typer.Option(help="speed, density, material, foam, or a colour such as #3f99da.")]
+Cut = Annotated[str | None, typer.Option(help="Where a slice lies: z=0.35 for example.")]
+Exports = Annotated[
+    list[str], typer.Option(help="Write each frame: usd, vtkhdf, vtp, h5, npz, csv, ply, obj; several as usd,npz.")
+]
+Only = Annotated[str, typer.Option(help="Parts of it: particles, foam, solids, surface; all but the surface.")]
+AllowLarge = Annotated[bool, typer.Option("--allow-large", help="Begin what needs more memory than is free, or hours.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object as the last line.")]
+
+
+@app.callback(invoke_without_command=True)
+def _root(version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False) -> None:
+    """Real-time, interactive, position-based fluids."""
+    if version:
+        print(__version__)
+        raise typer.Exit
+
+
+def configured(name: str, settings: list[str]) -> Scene:
+    """Return a scene with what `--set` says."""
+    scene = Scene.load(name)
+    changes: dict[str, Any] = {}
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        if not equals or not key:
+            raise WavetankError(f"--set {setting} is not allowed; write it as NAME=VALUE, as in --set viscosity=0.1.")
+        changes[key.strip()] = value_of(text.strip())
+    return scene.changed(**changes) if changes else scene
+
+
+def value_of(text: str) -> Any:
+    """Read a value as TOML does; what is not TOML is a string."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def names_in(texts: list[str]) -> tuple[str, ...]:
+    """Return the names in texts such as "usd,npz", each once."""
+    return tuple(dict.fromkeys(name.strip() for text in texts for name in text.split(",") if name.strip()))
+
+
+def size_of(text: str) -> tuple[int, int]:
+    """Read width and height [px]; raises `WavetankError`."""
+    from wavetank.view.renderer import LARGEST_SIDE as LARGEST
+
+    width, _, height = text.lower().partition("x")
+    if not all(side.isdigit() and 1 <= int(side) <= LARGEST for side in (width, height)):
+        raise WavetankError(f"--size = {text!r} is not allowed; write it as 1280x720, from 1x1 to {LARGEST}x{LARGEST}.")
+    return int(width), int(height)

@@ -1,0 +1,179 @@
+"""Commands that compute: scenes, run, resume, render."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from wavetank import Scene, WavetankError, bundled_scenes
+from wavetank.cli.options import (
+    AllowLarge,
+    Arch,
+    ColorBy,
+    Cut,
+    Exports,
+    Json,
+    Only,
+    Quality,
+    SceneName,
+    Settings,
+    View,
+    app,
+    configured,
+    console,
+    names_in,
+    size_of,
+)
+from wavetank.scene.scene import bundled_levels, scene_schema
+
+
+@app.command()
+def scenes(
+    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema of a scene file.")] = False,
+    as_json: Json = False,
+) -> None:
+    """List the bundled scenes, and the levels with the best that was reached."""
+    if schema:
+        print(scene_schema())
+        return
+    from wavetank.session.scores import scores
+
+    rows = [(name, Scene.load(name)) for name in bundled_scenes()]
+    levels, best = [(name, Scene.load(name)) for name in bundled_levels()], scores()
+    if as_json:
+        about = {name: {"title": s.title, "dim": s.dim, "spacing": s.spacing} for name, s in rows}
+        games = {name: {"title": s.title, "goal": s.goal.text, "best": best.get(name)} for name, s in levels if s.goal}
+        print(json.dumps({**about, "levels": games}))
+        return
+    table = Table("scene", "title", "world", "particles")
+    for name, scene in rows:
+        table.add_row(name, scene.title, f"{scene.dim}-D", f"{len(scene.particles()[0]):,}")
+    Console().print(table)
+    board = Table("level", "goal", "particles", "stars")
+    for name, scene in levels:
+        stars = best.get(name, {}).get("stars", 0)
+        board.add_row(name, scene.goal.text if scene.goal else "", f"{len(scene.particles()[0]):,}", "*" * stars)
+    Console().print(board)
+
+
+@app.command()
+def run(
+    scene: SceneName,
+    seconds: Annotated[float, typer.Option(help="Seconds of water.")] = 4.0,
+    out: Annotated[Path, typer.Option(help="Folder for what is written.")] = Path("out"),
+    video: Annotated[bool, typer.Option("--video", help="Write an MP4.")] = False,
+    gif: Annotated[bool, typer.Option("--gif", help="Write an animated GIF.")] = False,
+    frames: Annotated[bool, typer.Option("--frames", help="Write a PNG for each frame.")] = False,
+    export: Exports = [],  # noqa: B006
+    only: Only = "",
+    every: Annotated[int, typer.Option(help="Export only each so manyth frame.")] = 1,
+    fps: Annotated[float, typer.Option(help="Frames per second of water in video and files.")] = 30.0,
+    size: Annotated[str, typer.Option(help="Width x height of pictures.")] = "1280x720",
+    view: View = None,
+    color_by: ColorBy = None,
+    cut: Cut = None,
+    quality: Quality = "draft",
+    name: Annotated[str, typer.Option(help="Front part of the files' names.")] = "",
+    checkpoint_every: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Keep a state of every so many seconds of water: see resume.")
+    ] = 0.0,
+    allow_large: AllowLarge = False,
+    settings: Settings = [],  # noqa: B006
+    arch: Arch = "cpu",
+    as_json: Json = False,
+) -> None:
+    """Simulate a scene and write video, pictures, particles and figures."""
+    from wavetank.front.headless import Order, record
+    from wavetank.simulation.cost import large_worlds_allowed
+    from wavetank.simulation.simulation import Simulation
+
+    world = configured(scene, settings)
+    order = Order(
+        out, seconds, fps, size_of(size), name or Path(scene).stem, video=video, gif=gif, frames=frames,
+        exports=names_in(export), only=names_in([only]), every=every, quality=quality,
+        look={"view": view, "color_by": color_by, "cut": cut},
+        checkpoint_every=checkpoint_every,
+    )  # fmt: skip
+    with large_worlds_allowed(allow_large):
+        _finish(record(Simulation(world, arch=arch), order, console), as_json)
+
+
+@app.command()
+def resume(
+    folder: Annotated[Path, typer.Argument(help="The folder that run --checkpoint-every wrote to.")],
+    arch: Annotated[str, typer.Option(help="Back end; that of the run unless given.")] = "",
+    allow_large: AllowLarge = False,
+    as_json: Json = False,
+) -> None:
+    """Go on with a run that ended early, from its last checkpoint, to the same bits."""
+    from wavetank.front.headless import go_on
+    from wavetank.simulation.cost import large_worlds_allowed
+
+    with large_worlds_allowed(allow_large):
+        _finish(go_on(folder, arch, console), as_json)
+
+
+def _finish(figures: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(figures))
+    else:
+        _report(figures)
+    if figures["interrupted"]:
+        raise typer.Exit(figures["exit_code"])
+
+
+@app.command()
+def render(
+    world: Annotated[str, typer.Argument(metavar="SCENE|STATE.npz", help="A scene, or a state that was saved.")],
+    at: Annotated[
+        float | None, typer.Option(help="Time [s], to which a saved state goes on; its own, or a scene's best moment.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="The picture, PNG.")] = Path("picture.png"),
+    width: Annotated[int, typer.Option(help="Pixels.")] = 1280,
+    height: Annotated[int, typer.Option(help="Pixels.")] = 720,
+    view: View = None,
+    color_by: ColorBy = None,
+    cut: Cut = None,
+    quality: Quality = "standard",
+    eye: Annotated[
+        str | None, typer.Option(help="Where the camera is [m], as 2,1,3; what it looks at is --target.")
+    ] = None,
+    target: Annotated[str | None, typer.Option(help="What the camera looks at [m]; the middle unless told.")] = None,
+    timings: Annotated[bool, typer.Option("--timings", help="Print the milliseconds of every pass.")] = False,
+    settings: Settings = [],  # noqa: B006
+    arch: Arch = "cpu",
+    as_json: Json = False,
+) -> None:
+    """Draw one picture of a scene or of a saved state."""
+    from wavetank.front.still import take
+
+    scene = None if world.endswith(".npz") else configured(world, settings)
+    if scene is None and settings:
+        raise WavetankError("--set does not go with a saved state, which has its scene with it.")
+    figures = take(
+        world, scene, out, width, height, at=at, arch=arch, quality=quality, eye=eye, target=target, timings=timings,
+        view=view, color_by=color_by, cut=cut,
+    )  # fmt: skip
+    if as_json:
+        print(json.dumps(figures))
+        return
+    for name, milliseconds in figures.get("milliseconds", {}).items():
+        print(f"{name:12s} {milliseconds:8.1f} ms")
+    if timings:
+        print(f"{'together':12s} {sum(figures['milliseconds'].values()):8.1f} ms")
+    print(out)
+
+
+def _report(figures: dict[str, Any]) -> None:
+    last, worst = figures["last"], figures["worst"]
+    print(f"{figures['seconds_of_water']:.2f} s of water, {last['count']:,} particles on {figures['arch']}")
+    print(
+        f"density error: mean {100 * figures['mean']['density_error_mean']:.2f} %, "
+        f"worst frame {100 * worst['density_error_mean']:.2f} % and 99th percentile "
+        f"{100 * worst['density_error_p99']:.2f} %"
+    )
+    for path in figures["files"]:
+        print(f"  {path}")

@@ -1,0 +1,121 @@
+"""HDF5 files that grow by a frame at a time, and can be opened at any of them: rows of columns, one after the other."""
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wavetank.formats.committed import CommittedFile
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.patience import Patience
+
+CHUNK = 1 << 17  # bytes of a column that lie together, about
+
+
+def import_h5py() -> Any:
+    """Return the module; raise `WavetankError` where it is not installed."""
+    try:
+        import h5py
+    except ImportError:
+        raise WavetankError("HDF5 and VTKHDF files need h5py; install it: pip install 'wavetank[hdf5]'.") from None
+    return h5py
+
+
+class GrowingFile:
+    """Columns that grow; what was appended counts from the next `commit` on, which counts frames up."""
+
+    def __init__(self, path: str | Path, group: str, counter: str, patience: Patience | None = None) -> None:
+        """Open `path`; the attribute `counter` of `group` says how many frames there are."""
+        h5py = import_h5py()
+        self.disk = CommittedFile(path, patience or Patience())
+        # The oldest layout is read by all, and knows no mark of a file that somebody writes, which outlives a kill.
+        self.file = h5py.File(self.disk, "w", libver=("earliest", "v110"))
+        self.hidden = False  # whether readers still see the file that was there before
+        self.frames, self._counter = 0, (self.file.require_group(group), counter)
+        self._counter[0].attrs.create(counter, 0, dtype=np.int64)
+
+    def column(self, name: str, kind: Any, *width: int) -> None:
+        """Make a column of rows of that type and width."""
+        dtype = np.dtype(kind)
+        rows = max(16, CHUNK // (dtype.itemsize * int(np.prod(width, dtype=int))))
+        self.file.create_dataset(
+            name, shape=(0, *width), maxshape=(None, *width), chunks=(rows, *width), dtype=dtype, track_times=False
+        )
+
+    def append(self, name: str, rows: Any) -> None:
+        """Append rows to a column."""
+        dataset = self.file[name]
+        values = np.asarray(rows, dataset.dtype)
+        if len(values):
+            first = dataset.shape[0]
+            dataset.resize(first + len(values), axis=0)
+            dataset[first:] = values
+
+    def length(self, name: str) -> int:
+        """Return the rows of a column."""
+        return int(self.file[name].shape[0])
+
+    def commit(self) -> None:
+        """End a frame: first its data, then its number, so that no reader meets a number without data."""
+        for frames in (self.frames, self.frames + 1):
+            self._counter[0].attrs.modify(self._counter[1], np.int64(frames))
+            self.file.flush()
+            if not self.hidden:
+                self.disk.commit()
+        self.frames += 1
+
+    def close(self) -> None:
+        """Close the file; without a frame there is none."""
+        try:
+            self.file.close()
+        finally:
+            if self.frames:
+                self.disk.close()
+            else:
+                self.disk.abandon()
+
+
+def opened(path: str | Path) -> Any:
+    """Open such a file for reading; raises `WavetankError` for what is none."""
+    h5py = import_h5py()
+    try:
+        return h5py.File(path, "r")
+    except OSError as error:
+        reason = str(error).splitlines()[0]
+        raise WavetankError(f"{path}: this HDF5 file cannot be read: {reason}.") from None
+
+
+Rows = Mapping[str, np.ndarray]
+
+
+class Table:
+    """Columns of a growing file that have a number of rows in each frame, which `first` and `count` tell."""
+
+    def __init__(self, file: GrowingFile, name: str, columns: Mapping[str, tuple[Any, tuple[int, ...]]]) -> None:
+        self.file, self.name, self.columns = file, name, [*columns]
+        for column, (kind, width) in columns.items():
+            file.column(f"{name}/{column}", kind, *width)
+        for column in ("first", "count"):
+            file.column(f"{name}/{column}", np.int64)
+
+    def append(self, rows: Rows) -> None:
+        """Append the rows of a frame."""
+        count = len(rows[self.columns[0]])
+        self.file.append(f"{self.name}/first", [self.file.length(f"{self.name}/{self.columns[0]}")])
+        self.file.append(f"{self.name}/count", [count])
+        for column in self.columns:
+            self.file.append(f"{self.name}/{column}", rows[column])
+
+
+def table_rows(group: Any, frame: int) -> dict[str, np.ndarray]:
+    """Return the columns of a table in a frame."""
+    first, count = int(group["first"][frame]), int(group["count"][frame])
+    return {name: group[name][first : first + count] for name in group if name not in ("first", "count")}
+
+
+def frames_of(path: str | Path, read: Callable[[Any, int], Any], counter: str) -> Iterator[Any]:
+    """Yield what `read` makes of each frame of a file."""
+    with opened(path) as file:
+        for frame in range(int(file.attrs[counter])):
+            yield read(file, frame)

@@ -1,0 +1,176 @@
+"""HDF5 for analysis: all frames in one file of plain tables; the layout is in docs/formats.md.
+
+Rows of all frames lie one after the other; `first` and `count` of a table say which are those of a frame. The attribute
+`NFrames` is written last: a file whose run was killed has all frames that it counts.
+"""
+
+import dataclasses
+import itertools
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wavetank.formats.growing import GrowingFile, Table, frames_of, import_h5py, opened, table_rows
+from wavetank.formats.plan import Plan
+from wavetank.formats.surface import WaterSurface
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.version import VERSION
+from wavetank.scene.scene import Scene
+from wavetank.simulation.instant import FOAM, WATER, Instant, Standing, solids_by_name
+
+SUFFIXES = (".h5", ".hdf5")
+KIND = "series"
+VERSION_OF_LAYOUT = 1
+COUNTER = "NFrames"
+SOLIDS: dict[str, tuple[Any, tuple[int, ...]]] = {
+    "names": ("S64", ()), "positions": ("f8", (3,)), "rotations": ("f8", (4,)), "velocities": ("f8", (3,)),
+    "angular_velocities": ("f8", (3,)),
+}  # fmt: skip
+VERTICES: dict[str, tuple[Any, tuple[int, ...]]] = {
+    "positions": ("f4", (3,)), "normals": ("f4", (3,)), "velocities": ("f4", (3,)), "materials": ("i4", ()),
+}  # fmt: skip
+
+
+def check(scene: Scene) -> None:
+    """Raise `WavetankError` where the package that writes HDF5 is missing."""
+    import_h5py()
+
+
+class Hdf5Series:
+    """Writes all frames into one file."""
+
+    repeatable = False
+
+    def __init__(self, plan: Plan) -> None:
+        path = plan.path(SUFFIXES[0])
+        self.files = [str(path)]
+        file = self.file = GrowingFile(path, "/", COUNTER, plan.patience)
+        about = {"format": "wavetank", "layout": VERSION_OF_LAYOUT, "wavetank": VERSION, "dim": plan.scene.dim,
+                 "spacing": plan.scene.spacing, "fps": plan.fps}  # fmt: skip
+        for name, value in about.items():
+            file.file.attrs[name] = value
+        file.file.create_dataset("scene", data=np.bytes_(plan.scene.text().encode()), track_times=False)
+        for name, kind in (("time", "f8"), ("number", "i8")):
+            file.column(f"frames/{name}", kind)
+        self.water = Table(file, "water", _columns(WATER, plan.scene.dim, ""))
+        self.foam = Table(file, "foam", _columns(FOAM, plan.scene.dim, "foam_"))
+        self.solids = Table(file, "solids", SOLIDS)
+        self.surface: tuple[Table, Table] | None = None
+        if "surface" in plan.parts:
+            self.surface = Table(file, "surface", VERTICES), Table(file, "triangles", {"corners": ("i4", (3,))})
+        self._keep(path, plan.kept)
+
+    def _keep(self, path: Path, frames: int) -> None:
+        """Begin with the first frames of the file that is there: the same calls make the same bytes."""
+        self.file.hidden = True
+        for number, instant in enumerate(itertools.islice(read(path), frames) if frames else ()):
+            self.write(number, instant)
+        self.file.hidden = False
+        if self.file.frames != frames:
+            raise WavetankError(f"{path} has {self.file.frames} frames, and {frames} of them are to be kept.")
+
+    def write(self, number: int, instant: Instant) -> None:
+        """Append a frame."""
+        self.file.append("frames/time", [instant.time])
+        self.file.append("frames/number", [instant.number])
+        self.water.append({name: getattr(instant, name) for name in WATER})
+        self.foam.append({name.removeprefix("foam_"): getattr(instant, name) for name in FOAM})
+        standing = instant.standing
+        self.solids.append({
+            "names": np.array([one.name.encode()[:64] for one in standing], "S64"),
+            "positions": _rows([one.position for one in standing], 3),
+            "rotations": _rows([one.rotation for one in standing], 4),
+            "velocities": _rows([one.velocity for one in standing], 3),
+            "angular_velocities": _rows([one.angular_velocity for one in standing], 3),
+        })  # fmt: skip
+        if self.surface is not None:
+            vertices, corners = _joined(instant)
+            self.surface[0].append(vertices)
+            self.surface[1].append({"corners": corners})
+        self.file.commit()
+
+    def close(self) -> None:
+        """Close the file."""
+        self.file.close()
+
+
+def _columns(names: dict[str, tuple[type, int]], dim: int, prefix: str) -> dict[str, tuple[Any, tuple[int, ...]]]:
+    return {
+        name.removeprefix(prefix): (np.dtype(kind), (dim,) if width else ()) for name, (kind, width) in names.items()
+    }
+
+
+def _rows(values: list[np.ndarray], width: int) -> np.ndarray:
+    return np.array(values, float).reshape(-1, width)
+
+
+def _joined(instant: Instant) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The surfaces of all fluids as one: vertices by column, and corners."""
+    surfaces = instant.surfaces
+    firsts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
+    none = np.zeros((0, 3), np.float32)
+    vertices = {
+        "positions": np.concatenate([none, *(surface.vertices for surface in surfaces)]),
+        "normals": np.concatenate([none, *(surface.normals for surface in surfaces)]),
+        "velocities": np.concatenate([none, *(surface.velocities for surface in surfaces)]),
+        "materials": np.concatenate(
+            [np.zeros(0, np.int32), *(np.full(len(s.vertices), s.material, np.int32) for s in surfaces)]
+        ),
+    }
+    corners = [s.triangles + first for s, first in zip(surfaces, firsts, strict=False)]
+    return vertices, np.concatenate([np.zeros((0, 3), np.int32), *corners])
+
+
+def _surfaces(file: Any, frame: int, scene: Scene) -> tuple[WaterSurface, ...]:
+    """What `_joined` joined."""
+    if "surface" not in file:
+        return ()
+    rows, corners = table_rows(file["surface"], frame), table_rows(file["triangles"], frame)["corners"]
+    found, palette = [], scene.palette()
+    for number in np.unique(rows["materials"]).tolist():
+        own = np.flatnonzero(rows["materials"] == number)  # those of a fluid are together
+        triangles = corners[np.isin(corners[:, 0], own)] - own[0]
+        points, normals, velocities = (rows[name][own] for name in ("positions", "normals", "velocities"))
+        fluid = palette[number]
+        found.append(WaterSurface(fluid.name, number, str(fluid.color), points, normals, velocities, triangles))
+    return tuple(found)
+
+
+def read(path: str | Path) -> Iterator[Instant]:
+    """Yield the frames of a file that was written here; raises `WavetankError` for another one."""
+    with opened(path) as file:
+        if file.attrs.get("format") != "wavetank" or COUNTER not in file.attrs:
+            raise WavetankError(f"{path}: this HDF5 file was not written by wavetank; it has no format and {COUNTER}.")
+        if file.attrs["layout"] != VERSION_OF_LAYOUT:
+            raise WavetankError(
+                f"{path}: its layout is {file.attrs['layout']}, and this version of wavetank reads "
+                f"{VERSION_OF_LAYOUT}; use the version that wrote it, {file.attrs.get('wavetank', 'a later one')}."
+            )
+        scene = Scene.from_text(bytes(file["scene"][()]).decode(), str(path), files=False)
+    known = solids_by_name(scene)
+
+    def instant(file: Any, frame: int) -> Instant:
+        foam = {f"foam_{name}": rows for name, rows in table_rows(file["foam"], frame).items()}
+        solids = table_rows(file["solids"], frame)
+        standing = tuple(
+            Standing(name, known[name], solids["positions"][k], solids["rotations"][k], solids["velocities"][k],
+                     solids["angular_velocities"][k])
+            for k, name in enumerate(row.decode() for row in solids["names"]) if name in known
+        )  # fmt: skip
+        arrays = table_rows(file["water"], frame) | foam
+        frames = file["frames"]
+        read = Instant.read(scene, int(frames["number"][frame]), float(frames["time"][frame]), arrays, standing)
+        return dataclasses.replace(read, surfaces=_surfaces(file, frame, scene))
+
+    return frames_of(path, instant, COUNTER)
+
+
+def rate(path: str | Path) -> float:
+    """Return the frames per second of water of such a file."""
+    with opened(path) as file:
+        return float(file.attrs.get("fps", 30.0))
+
+
+write = Hdf5Series

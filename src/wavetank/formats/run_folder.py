@@ -1,0 +1,148 @@
+"""The folder of a run: what it was, and what it wrote; docs/formats.md.
+
+run.toml       what was ordered, and the version of this layout
+scene.toml     the scene with all that was set; meshes and heights are inside of it
+stats.jsonl    a line of figures for each frame, the first one at the start
+stats.json     the figures of the whole run, once it has ended
+states/        checkpoints: whole states, from which the run goes on to the last bit
+NAME*          pictures, films and files of frames
+"""
+
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tomli_w
+from pydantic import Field
+
+from wavetank.formats import hdf5, npz
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.model import Model
+from wavetank.foundation.replacing import make_folder, replacing
+from wavetank.foundation.version import VERSION
+from wavetank.scene.scene import Scene
+from wavetank.simulation.instant import Instant
+
+FILE, SCENE, STATS, SUMMARY, STATES = "run.toml", "scene.toml", "stats.jsonl", "stats.json", "states"
+Count = Annotated[int, Field(ge=0, le=100_000_000)]
+
+
+class Run(Model):
+    """What was ordered."""
+
+    format: Literal[1] = 1
+    wavetank: str = VERSION  # that began it
+    name: str = "run"  # front part of the files' names
+    arch: str = "cpu"
+    seconds: Annotated[float, Field(ge=0, le=86400, allow_inf_nan=False)] = 0.0  # of water
+    start: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0  # s: time of the water at the first frame
+    fps: Annotated[float, Field(ge=1, le=240, allow_inf_nan=False)] = 30.0
+    size: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] = (1280, 720)  # px
+    video: bool = False
+    gif: bool = False
+    frames: bool = False
+    exports: list[str] = []
+    only: list[str] = []
+    every: Annotated[int, Field(ge=1)] = 1
+    quality: str = "draft"
+    look: dict[str, str] = {}
+
+
+class RunFolder:
+    """Such a folder, to be written or read."""
+
+    def __init__(self, path: Path, run: Run, scene: Scene) -> None:
+        self.path, self.run, self.scene = path, run, scene
+
+    @classmethod
+    def create(cls, path: str | Path, run: Run, scene: Scene) -> "RunFolder":
+        """Begin a run in a folder, with what it needs to be repeated."""
+        folder = cls(make_folder(path), run, scene)
+        scene.save(folder.path / SCENE)
+        for stale in (STATS, SUMMARY):
+            (folder.path / stale).unlink(missing_ok=True)
+        with replacing(folder.path / FILE) as partial:
+            partial.write_text(tomli_w.dumps(run.model_dump()), encoding="utf-8")
+        return folder
+
+    @classmethod
+    def is_one(cls, path: str | Path) -> bool:
+        """Say whether a path is the folder of a run."""
+        return (Path(path) / FILE).is_file()
+
+    @classmethod
+    def open(cls, path: str | Path) -> "RunFolder":
+        """Open the folder of a run; raises `WavetankError` for what is none."""
+        place = Path(path) / FILE
+        try:
+            table = tomllib.loads(place.read_text("utf-8"))
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            reason = (isinstance(error, OSError) and error.strerror) or error
+            raise WavetankError(f"{place}: the run cannot be read: {reason}; it is written by wavetank run.") from None
+        if table.get("format", 1) != 1:
+            made = table.get("wavetank", "a later one")
+            raise WavetankError(
+                f"{place}: format = {table['format']!r} is not known to this version of wavetank, which reads 1; use "
+                f"the one that wrote it, {made}."
+            )
+        return cls(Path(path), Run.parse(table, str(place)), Scene.load(Path(path) / SCENE))
+
+    @property
+    def states(self) -> Path:
+        """The folder of checkpoints, made where there is none."""
+        return make_folder(self.path / STATES)
+
+    @property
+    def base(self) -> Path:
+        """Front part of the paths of what the run writes."""
+        return self.path / self.run.name
+
+    # --- figures ---
+
+    def add_stats(self, row: Mapping[str, float]) -> None:
+        """Append the figures of a frame."""
+        with (self.path / STATS).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+
+    def stats(self) -> list[dict[str, float]]:
+        """Return the figures of all frames that were finished."""
+        path = self.path / STATS
+        lines = path.read_text("utf-8").splitlines(keepends=True) if path.is_file() else []
+        return [json.loads(line) for line in lines if line.endswith("\n")]
+
+    def keep_stats(self, count: int) -> None:
+        """Drop the figures of all but the first `count` frames, before a run goes on from there."""
+        rows = self.stats()[:count]
+        with replacing(self.path / STATS) as partial:
+            partial.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+
+    # --- frames ---
+
+    def has_instants(self) -> bool:
+        """Say whether frames were written from which everything else can be made: npz or h5, with all their parts."""
+        whole = not self.run.only or {"particles", "foam", "solids"} <= {*self.run.only}
+        return whole and (self._has_tables() or any(self._archives()))
+
+    def instants(self) -> Iterator[Instant]:
+        """Yield the frames that were written."""
+        if self._has_tables():
+            return hdf5.read(self._hdf5())
+        return (npz.read(path, self.scene) for path in self._archives())
+
+    def _has_tables(self) -> bool:
+        return bool({"h5", "hdf5"} & {*self.run.exports}) and self._hdf5().is_file()
+
+    def _hdf5(self) -> Path:
+        return self.base.with_name(f"{self.run.name}{hdf5.SUFFIXES[0]}")
+
+    def _archives(self) -> list[Path]:
+        if "npz" not in self.run.exports:
+            return []
+        number = "[0-9]" * 5
+        return sorted(self.path.glob(f"{_escaped(self.run.name)}-{number}{npz.SUFFIXES[0]}"))
+
+
+def _escaped(name: str) -> str:
+    return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in name)

@@ -1,0 +1,33 @@
+"""How much a scene may hold, and how large its numbers may be, so that a stranger's file can do no harm.
+
+Together with `model.FARTHEST` and the bounds of the forces these keep every product that a step makes within float32
+(3.4e38): the largest are squares of speeds, and those times a density.
+"""
+
+import math
+from typing import Any
+
+FINEST, COARSEST = 1e-7, 1e4  # m, of the spacing
+STRONGEST = 1e6  # m/s^2, of gravity
+#: how many of each there may be
+MOST = {
+    "solids": 2000, "fluids": 2000, "emitters": 200, "drains": 200, "joints": 2000, "forces": 100, "materials": 100,
+}  # fmt: skip
+
+
+def check_numbers(values: dict[str, Any]) -> None:
+    """Raise `ValueError` where a table, not looked into yet, lists more than there may be."""
+    for name, most in MOST.items():
+        members = values.get(name)
+        if isinstance(members, list | tuple) and len(members) > most:
+            raise ValueError(f"there are {len(members):,} {name}; at most {most:,} are allowed.")
+
+
+def check_scales(spacing: float, gravity: tuple[float, ...]) -> None:
+    """Raise `ValueError` for a spacing [m] or a gravity [m/s^2] that single precision cannot compute with."""
+    if not FINEST <= spacing <= COARSEST:
+        raise ValueError(
+            f"spacing = {spacing:g} is not allowed; it must be a number of metres from {FINEST:g} to {COARSEST:g}."
+        )
+    if not math.hypot(*gravity) <= STRONGEST:
+        raise ValueError(f"gravity = {tuple(gravity)} is not allowed; its length must be at most {STRONGEST:g} m/s^2.")

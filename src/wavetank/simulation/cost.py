@@ -1,0 +1,112 @@
+"""What a world will take, in Python's integers, before any of it is made: particles, cells, nodes, bytes, seconds.
+
+Bytes are counted from the declarations of `device/state.py`; seconds are a lower bound by what one thread of a fast
+processor needs for a particle and a step, so that what is refused by it is really long.
+"""
+
+import contextlib
+import dataclasses
+import math
+import os
+from collections.abc import Iterator
+
+from wavetank.device import compiler
+from wavetank.device.state import CoarseGrid
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.memory import free_memory, in_words, time_in_words
+from wavetank.physics.grid_pressure.coarse_grid import OPEN_CELLS, nodes_of
+from wavetank.physics.neighbors import MAX_ENTRIES, list_room
+from wavetank.scene.scene import Scene
+
+SCRATCH = 12  # numbers of `Scratch` for each particle
+PER_PARTICLE = 2.0e-7  # s of a step of one thread, at the least
+PER_STEP = 1.0e-4  # s, however few particles
+LONGEST = 3600.0  # s that a run may be expected to take unless it is told that it may be long
+SHARE = 0.9  # of free memory
+_allowed = False
+
+
+@contextlib.contextmanager
+def large_worlds_allowed(allowed: bool = True) -> Iterator[None]:
+    """Let what needs more memory than is free, or more than an hour, begin all the same."""
+    global _allowed
+    before, _allowed = _allowed, allowed
+    try:
+        yield
+    finally:
+        _allowed = before
+
+
+@dataclasses.dataclass(frozen=True)
+class Cost:
+    """What a world needs."""
+
+    particles: int
+    nodes: int  # of the tank's grid
+    bytes: int
+
+    def sentence(self) -> str:
+        """Say it."""
+        return (
+            f"{self.particles:,} particles and {self.nodes:,} cells of the tank need {in_words(self.bytes)} of memory"
+        )
+
+
+def cost_of(scene: Scene, capacity: int | None = None) -> Cost:
+    """Return what a world of this scene needs, with room for `capacity` particles, by its fluids where None."""
+    dim = scene.dim
+    estimate = sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
+    particles = int(min(estimate, 1e18)) if capacity is None else capacity
+    own = 2 * (4 * dim + 5) + SCRATCH + 2 + 1 + -(-list_room(dim, scene.support) // 8)
+    cells = 2 * max(4 * particles, 4096)
+    host = 6 * dim if capacity is None else 2 * dim  # places in double precision while they are chosen
+    nodes = (
+        nodes_of(scene.tank.beyond(OPEN_CELLS * scene.support * scene.spacing), scene.support * scene.spacing)
+        if scene.tank
+        else 0
+    )
+    fields = len(dataclasses.fields(CoarseGrid)) + 2 * 16
+    return Cost(particles, nodes, 4 * (particles * (own + host) + cells + nodes * fields * 8 // 7))
+
+
+def check_cost(scene: Scene, capacity: int | None = None) -> None:
+    """Raise `WavetankError` with the numbers for a world that cannot be, or needs more memory than is free."""
+    cost = cost_of(scene, capacity)
+    if cost.nodes * 16 > MAX_ENTRIES:
+        raise WavetankError(
+            f"spacing = {scene.spacing:g} divides the tank into {cost.nodes:,} cells; at most {MAX_ENTRIES // 16:,} "
+            "are possible: use a larger spacing or a smaller tank."
+        )
+    free = free_memory()
+    if free is not None and cost.bytes > SHARE * free and not _allowed:
+        raise WavetankError(
+            f"{cost.sentence()}, and {in_words(free)} are free: use a larger spacing, or --allow-large "
+            "(`with wavetank.large_worlds_allowed():`) to try it all the same."
+        )
+
+
+def expected_seconds(particles: int, scene: Scene, seconds: float) -> float:
+    """Return a lower bound of the time [s] that `seconds` of water take to compute."""
+    steps = scene.substeps * seconds / scene.frame_time
+    threads = compiler.threads() or 64
+    return steps * (PER_STEP + particles * PER_PARTICLE / min(threads, os.cpu_count() or 1))
+
+
+def check_time(particles: int, scene: Scene, seconds: float, what: str) -> None:
+    """Raise `WavetankError` for a time of water [s] that will take more than an hour, unless that is allowed."""
+    expected = expected_seconds(particles, scene, seconds)
+    if expected > LONGEST and not _allowed:
+        raise WavetankError(
+            f"{what} is {time_in_words(seconds)} of {particles:,} particles and will take {time_in_words(expected)} or "
+            "more; --allow-large (`with wavetank.large_worlds_allowed():`) begins it all the same."
+        )
+
+
+def check_frames(particles: int, scene: Scene, seconds: float, fps: float) -> None:
+    """Raise `WavetankError` for a time [s] and frames a second that are no numbers, or will take more than an hour."""
+    if not (math.isfinite(fps) and fps > 0):
+        raise WavetankError(f"fps = {fps} is not allowed; it must be a positive number.")
+    if not (math.isfinite(seconds) and seconds >= 0):
+        raise WavetankError(f"seconds = {seconds} is not allowed; it must be a finite number of at least 0.")
+    work = max(seconds, 0.05 * seconds * fps * scene.frame_time)  # a frame is work, however short
+    check_time(particles, scene, work, f"frames({seconds:g}, {fps:g})")

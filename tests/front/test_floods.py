@@ -1,0 +1,203 @@
+"""Whatever the one who drives sends: the server lives, and who watches keeps half of the pictures."""
+
+import json
+import os
+import re
+import socket as sockets
+import threading
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+import wavetank as wt
+from wavetank.front.page.gate import HEADERS
+
+POOL = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6)), fluids=[wt.Block(lower=(0, 0), upper=(0.5, 0.4))])
+TEXT = "spacing = 0.05\ntank.size = [1.0, 0.6]\nfluids = [{ lower = [0, 0], upper = [0.5, 0.4] }]\n"
+LONG = os.environ.get("WAVETANK_FUZZ") == "long"  # make fuzz
+SECONDS, SHARE = (5.0, 0.5) if LONG else (2.0, 0.3)  # beside other tests pictures come as they may
+
+
+class Watcher:
+    """Someone honest at the page, who shows every picture and asks for the next."""
+
+    def __init__(self, url: str) -> None:
+        self.socket, self.pictures, self.notes = connect(url, max_size=None), 0, []
+        self._ended = False
+        self._thread = threading.Thread(target=self._look, daemon=True)
+        self._thread.start()
+
+    def _look(self) -> None:
+        while not self._ended:
+            try:
+                message = self.socket.recv(timeout=1.0)
+                if isinstance(message, bytes):
+                    self.pictures += 1
+                    self.socket.send('{"do": "ack"}')
+                else:
+                    table = json.loads(message)
+                    self.notes += table.get("notes", []) + ([table["text"]] if table["type"] == "note" else [])
+            except TimeoutError:
+                continue
+            except ConnectionClosed:
+                return
+
+    def rate(self, seconds: float) -> float:
+        """Pictures a second."""
+        before = self.pictures
+        time.sleep(seconds)
+        return (self.pictures - before) / seconds
+
+    def close(self) -> None:
+        self._ended = True
+        self.socket.close()
+
+
+def wait_for_pictures(watcher: Watcher) -> None:
+    end = time.monotonic() + 120
+    while watcher.pictures < 5 and time.monotonic() < end:
+        time.sleep(0.05)
+
+
+def resident() -> float:
+    """Memory of this process [MB], the server's."""
+    return int(re.search(r"VmRSS:\s+(\d+)", Path("/proc/self/status").read_text())[1]) / 1024
+
+
+SOLID = {"do": "add-solid", "solid": {"shape": "box", "center": [0.8, 0.1], "size": [0.05, 0.05]}}
+FLOODS = {
+    "scenes": [{"do": "load", "text": TEXT}],
+    "resets": [{"do": "reset", "parameters": {"spacing": 0.04}}, {"do": "reset", "parameters": {}}],
+    "solids": [SOLID],
+    "bookmarks": [{"do": "bookmark", "name": "a"}, {"do": "bookmark", "name": "a", "action": "go"}],
+    "rewinds": [{"do": "rewind", "time": 0.0}],
+    "numbers": [{"do": "set", "name": "viscosity", "value": 0.1}],
+    "nonsense": [{"do": "x" * 1000}, {"do": "load", "text": "x = ["}],
+    "tools": [{"do": "point-begin", "tool": "pour", "x": 0.5, "y": 0.5}, {"do": "point-end"}],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FLOODS if LONG else ["scenes", "solids", "bookmarks"])
+def test_who_watches_keeps_half_of_the_pictures(playing, name):
+    world = playing(POOL)
+    watcher = Watcher(world.socket)
+    flooder = connect(world.socket, max_size=None)
+    flooder.send('{"do": "drive"}')
+    wait_for_pictures(watcher)
+    for table in FLOODS[name]:  # kernels that this needs
+        flooder.send(json.dumps(table))
+    time.sleep(1.0)
+    calm = watcher.rate(SECONDS)
+    before, ended, sent = resident(), threading.Event(), [0]
+
+    def flood() -> None:
+        texts = [json.dumps(table) for table in FLOODS[name]]
+        try:
+            while not ended.is_set():
+                for text in texts:
+                    flooder.send(text)
+                    sent[0] += 1
+        except ConnectionClosed:
+            return
+
+    thread = threading.Thread(target=flood, daemon=True)
+    thread.start()
+    time.sleep(0.5)
+    flooded = watcher.rate(SECONDS)
+    ended.set()
+    grown = resident() - before
+    assert sent[0] > 100
+    assert flooded >= SHARE * calm, f"{flooded:.1f} of {calm:.1f} pictures a second"
+    assert grown < 100, f"{grown:.0f} MB"
+    assert world.thread.is_alive()
+    watcher.close()
+
+
+def answer(port: int, request: bytes) -> bytes:
+    with sockets.create_connection(("127.0.0.1", port), timeout=20) as line:
+        line.sendall(request)
+        parts = []
+        while part := line.recv(65536):
+            parts.append(part)
+            if len(b"".join(parts)) > 200_000:
+                break
+    return b"".join(parts)
+
+
+def test_headers_are_on_every_answer(playing):
+    """Good pages, refusals, what is not there, what is no request, a socket that is refused."""
+    world = playing(POOL)
+    port, token = world.front.port, world.front.gate.token
+    host = f"Host: 127.0.0.1:{port}\r\nConnection: close\r\n"
+    ask = "GET {} HTTP/1.1\r\n" + host + "{}\r\n"
+    upgrade = "Upgrade: websocket\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
+    requests = {
+        200: [ask.format(f"/?token={token}", ""), ask.format("/page/main.js", ""),
+              ask.format(f"/scene.toml?token={token}", "")],
+        403: [ask.format("/", ""), ask.format("/", "Origin: http://[\r\n"), ask.format("/", "Origin: http://[::1\r\n"),
+              ask.format("/socket", upgrade).replace("Connection: close", "Connection: Upgrade")],
+        404: [ask.format("/page/none.js", ""), ask.format(f"/none?token={token}", "")],
+        405: [ask.format(f"/?token={token}", "").replace("GET", "POST")],
+        400: ["nonsense\r\n\r\n", "GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n"],
+    }  # fmt: skip
+    for status, texts in requests.items():
+        for text in texts:
+            head = answer(port, text.encode()).partition(b"\r\n\r\n")[0].decode("latin-1").lower()
+            assert head.startswith(f"http/1.1 {status}"), (text, head)
+            for name, value in HEADERS.items():
+                assert f"\r\n{name}: {value}".lower() in head, (text, name, head)
+            assert "\r\nserver:" not in head
+
+
+def test_downloads_do_not_stop_the_water(playing):
+    world = playing(POOL)
+    watcher = Watcher(world.socket)
+    wait_for_pictures(watcher)
+    calm, ended, codes = watcher.rate(SECONDS), threading.Event(), set()
+
+    def ask() -> None:
+        url = f"{world.base}/scene.toml?token={world.front.gate.token}"
+        while not ended.is_set():
+            try:
+                codes.add(urllib.request.urlopen(url, timeout=60).status)
+            except urllib.error.HTTPError as error:
+                codes.add(error.code)
+            except OSError:
+                return
+
+    for _ in range(6):
+        threading.Thread(target=ask, daemon=True).start()
+    flooded = watcher.rate(SECONDS)
+    ended.set()
+    assert codes <= {200, 429} and 200 in codes
+    assert flooded >= SHARE * calm, f"{flooded:.1f} of {calm:.1f} pictures a second"
+    watcher.close()
+
+
+def test_what_nobody_thought_of_pauses_and_is_told(playing, monkeypatch):
+    monkeypatch.delenv("WAVETANK_STRICT_DOOR", raising=False)
+    world = playing(POOL)
+    watcher = Watcher(world.socket)
+    wait_for_pictures(watcher)
+
+    def fail(*arguments):
+        raise RuntimeError("a pipe\nhas burst")
+
+    from wavetank.session import rules
+    from wavetank.session.commands import SetView
+
+    monkeypatch.setitem(rules.RULES, SetView, fail)
+    watcher.socket.send('{"do": "view", "view": "particles"}')
+    monkeypatch.setattr(type(world.session), "_fit_frame", fail)
+    end = time.monotonic() + 60
+    while time.monotonic() < end and not any("The water is paused" in note for note in watcher.notes):
+        time.sleep(0.05)
+    assert any("The command 'view' failed" in note and "a pipe has burst" in note for note in watcher.notes)
+    assert any("The water is paused: RuntimeError, a pipe has burst" in note for note in watcher.notes)
+    assert world.thread.is_alive() and world.session.paused
+    watcher.close()
