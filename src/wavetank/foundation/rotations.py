@@ -30,8 +30,12 @@ def inverse(q: np.ndarray) -> np.ndarray:
 
 
 def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return vector `v` turned by the unit quaternion `q`."""
-    return v + 2.0 * np.cross(q[1:], np.cross(q[1:], v) + q[0] * v)
+    """Return vector `v`, or vectors [n, 3], turned by the unit quaternion `q`."""
+    # Written out: `np.cross` takes 20 us for one vector, and a world with many bodies turns many in each step.
+    w, x, y, z = q.tolist()
+    a, b, c = v[..., 0], v[..., 1], v[..., 2]
+    d, e, f = y * c - z * b + w * a, z * a - x * c + w * b, x * b - y * a + w * c
+    return np.stack([a + 2.0 * (y * f - z * e), b + 2.0 * (z * d - x * f), c + 2.0 * (x * e - y * d)], axis=-1)
 
 
 def matrix_of(rotations: np.ndarray) -> np.ndarray:

@@ -33,6 +33,7 @@ from wavetank.foundation.rotations import matrix_of
 TOLERANCE = 0.1  # of sqrt(g d), or of the fastest body: change of a body's velocity that is worth a second step
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
 AT_ONCE = 0.2  # of what is owed: more would ring
+TOUCH = 1e-4  # m/s: change of velocity by the engine that is contact
 STAYS = 0.9  # share that is left after a step of what was seen of how much water goes along
 MOST = 4.0  # of the water that goes along with an immersed body: most that is believed
 ROWS = (
@@ -59,7 +60,8 @@ class Coupling:
         self.held = np.zeros(count, bool)  # they have no momentum of their own
         self.lasted = 0.0  # s, of the last step
         self._asked = np.zeros((count, 6))  # what was owed at the try before,
-        self._moved = np.zeros((count, 6))  # and how far bodies yielded then
+        self._moved = np.zeros((count, 6))  # how far bodies yielded then,
+        self._touching = np.zeros(count, bool)  # and which the engine has pushed
 
     @property
     def owed(self) -> np.ndarray:
@@ -89,6 +91,7 @@ class Coupling:
         self.change, self.velocity = velocity - self.velocity, velocity
         self.carried, self.lasted = self.by_grid, dt
         self._moved = np.zeros_like(velocity)
+        self._touching = (np.abs(velocity - begun)[:, :3] > TOUCH).any(axis=1)
 
     def _learn(self) -> None:
         """See how much water goes along by how its push follows the changes of velocity from step to step."""
@@ -110,7 +113,9 @@ class Coupling:
     def yielding(self, rotations: np.ndarray, slow: float) -> np.ndarray:
         """Return by how much bodies are to be faster [n, 6] for the step to be taken again; 0 for those that are not.
 
-        Those yield whose velocity is wrong by more than `slow` [m/s].
+        Those yield whose velocity is wrong by more than `slow` [m/s] and that are lighter than the water that goes
+        along; what heavier ones are owed can wait for the next step. Bodies that lie against others, and are held by
+        more than water, yield once.
         """
         asked = self.owed
         least = self.taken()[:, None] * self.added
@@ -124,7 +129,8 @@ class Coupling:
         self.along[~known] = np.maximum(self.along, least)[~known]
         step, alone = self.solved(rotations, asked), self.solved(rotations, asked, 0.0)
         wrong = np.maximum(np.linalg.norm(alone[:, :3], axis=1), np.linalg.norm(alone[:, 3:], axis=1) * self.reaches)
-        step[wrong <= slow] = 0.0
+        patient = (self.masses > self.along[:, 0]) | (self._touching & self._moved.any(axis=1))
+        step[(wrong <= slow) | patient] = 0.0
         self._asked = asked
         return step
 
