@@ -11,6 +11,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.patience import Patience
 
 CHUNK = 1 << 17  # bytes of a column that lie together, about
+FEW = 128  # rows that lie together of what has one for each frame: as many are written for each
 
 
 def import_h5py() -> Any:
@@ -35,10 +36,10 @@ class GrowingFile:
         self.frames, self._counter = 0, (self.file.require_group(group), counter)
         self._counter[0].attrs.create(counter, 0, dtype=np.int64)
 
-    def column(self, name: str, kind: Any, *width: int) -> None:
-        """Make a column of rows of that type and width."""
+    def column(self, name: str, kind: Any, *width: int, each_frame: bool = False) -> None:
+        """Make a column of rows of that type and width; with `each_frame` it has one for each frame."""
         dtype = np.dtype(kind)
-        rows = max(16, CHUNK // (dtype.itemsize * int(np.prod(width, dtype=int))))
+        rows = FEW if each_frame else max(16, CHUNK // (dtype.itemsize * int(np.prod(width, dtype=int))))
         self.file.create_dataset(
             name, shape=(0, *width), maxshape=(None, *width), chunks=(rows, *width), dtype=dtype, track_times=False
         )
@@ -97,7 +98,7 @@ class Table:
         for column, (kind, width) in columns.items():
             file.column(f"{name}/{column}", kind, *width)
         for column in ("first", "count"):
-            file.column(f"{name}/{column}", np.int64)
+            file.column(f"{name}/{column}", np.int64, each_frame=True)
 
     def append(self, rows: Rows) -> None:
         """Append the rows of a frame."""
