@@ -19,8 +19,8 @@ FOAM = ("spray", "foam", "bubbles")
 def open_run(path):
     """Import the stage that `--export usd` wrote, and set up what USD's preview materials do not say.
 
-    Water refracts, foam is white, frames are those of the stage, the camera is the stage's. Where there is a surface the
-    particles are not rendered. Return the objects by the names of their prims.
+    Water refracts, foam is white, frames and camera are those of the stage. Where there is a surface the particles are
+    not rendered. Return the objects by the names of their prims.
     """
     scene, known = bpy.context.scene, set(bpy.data.objects)
     bpy.ops.wm.usd_import(filepath=str(path), set_frame_range=True, import_usd_preview=True)
@@ -40,6 +40,8 @@ def open_run(path):
         elif name.startswith("particles") and one.type == "POINTCLOUD":
             _give(one, plain("wavetank particles", (0.03, 0.21, 0.63, 1.0), attribute="displayColor"))
             one.hide_render = bool(surfaces)
+        elif one.type == "MESH" and one not in surfaces:
+            one.data.set_sharp_from_angle(angle=0.6)
         elif one.type == "CAMERA":
             scene.camera = one
         elif one.type == "LIGHT":
@@ -108,7 +110,7 @@ def _floor(scene):
     _give(floor, plain("wavetank floor", (0.6, 0.6, 0.58, 1.0)))
 
 
-class IMPORT_OT_wavetank_run(bpy.types.Operator):
+class IMPORT_OT_wavetank_run(bpy.types.Operator):  # noqa: N801 (Blender asks for such a name)
     """Open a run of wavetank: a .usda that `wavetank run --export usd` wrote."""
 
     bl_idname = "import_scene.wavetank_run"
