@@ -10,7 +10,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.patience import Patience
 from wavetank.foundation.replacing import partial_path
 
-PAGE = 4096  # bytes
+PAGE = 16384  # bytes
 
 
 class CommittedFile:

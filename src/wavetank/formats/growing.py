@@ -11,6 +11,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.patience import Patience
 
 CHUNK = 1 << 17  # bytes of a column that lie together, about
+FEW = 128  # rows that lie together of what has one for each frame: as many are written for each
 
 
 def import_h5py() -> Any:
@@ -30,31 +31,34 @@ class GrowingFile:
         h5py = import_h5py()
         self.disk = CommittedFile(path, patience or Patience())
         # The oldest layout is read by all, and knows no mark of a file that somebody writes, which outlives a kill.
-        self.file = h5py.File(self.disk, "w", libver=("earliest", "v110"))
+        self.file = h5py.File(self.disk, "w", libver=("earliest", "v110"), rdcc_nbytes=2 * CHUNK)
+        self._columns: dict[str, Any] = {}
+        self._lengths: dict[str, int] = {}
         self.hidden = False  # whether readers still see the file that was there before
         self.frames, self._counter = 0, (self.file.require_group(group), counter)
         self._counter[0].attrs.create(counter, 0, dtype=np.int64)
 
-    def column(self, name: str, kind: Any, *width: int) -> None:
-        """Make a column of rows of that type and width."""
+    def column(self, name: str, kind: Any, *width: int, each_frame: bool = False) -> None:
+        """Make a column of rows of that type and width; with `each_frame` it has one for each frame."""
         dtype = np.dtype(kind)
-        rows = max(16, CHUNK // (dtype.itemsize * int(np.prod(width, dtype=int))))
-        self.file.create_dataset(
+        rows = FEW if each_frame else max(16, CHUNK // (dtype.itemsize * int(np.prod(width, dtype=int))))
+        self._columns[name] = self.file.create_dataset(
             name, shape=(0, *width), maxshape=(None, *width), chunks=(rows, *width), dtype=dtype, track_times=False
         )
+        self._lengths[name] = 0
 
     def append(self, name: str, rows: Any) -> None:
         """Append rows to a column."""
-        dataset = self.file[name]
-        values = np.asarray(rows, dataset.dtype)
+        dataset, first = self._columns[name], self._lengths[name]
+        values = np.ascontiguousarray(rows, dataset.dtype)
         if len(values):
-            first = dataset.shape[0]
+            self._lengths[name] = first + len(values)
             dataset.resize(first + len(values), axis=0)
-            dataset[first:] = values
+            dataset.write_direct(values, dest_sel=np.s_[first : first + len(values)])
 
     def length(self, name: str) -> int:
         """Return the rows of a column."""
-        return int(self.file[name].shape[0])
+        return self._lengths[name]
 
     def commit(self) -> None:
         """End a frame: first its data, then its number, so that no reader meets a number without data."""
@@ -97,7 +101,7 @@ class Table:
         for column, (kind, width) in columns.items():
             file.column(f"{name}/{column}", kind, *width)
         for column in ("first", "count"):
-            file.column(f"{name}/{column}", np.int64)
+            file.column(f"{name}/{column}", np.int64, each_frame=True)
 
     def append(self, rows: Rows) -> None:
         """Append the rows of a frame."""

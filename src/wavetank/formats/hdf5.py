@@ -53,7 +53,7 @@ class Hdf5Series:
             file.file.attrs[name] = value
         file.file.create_dataset("scene", data=np.bytes_(plan.scene.text().encode()), track_times=False)
         for name, kind in (("time", "f8"), ("number", "i8")):
-            file.column(f"frames/{name}", kind)
+            file.column(f"frames/{name}", kind, each_frame=True)
         self.water = Table(file, "water", _columns(WATER, plan.scene.dim, ""))
         self.foam = Table(file, "foam", _columns(FOAM, plan.scene.dim, "foam_"))
         self.solids = Table(file, "solids", SOLIDS)

@@ -21,8 +21,8 @@ from wavetank.simulation.instant import Instant
 #: What splashsurf's authors recommend; lengths in particle radii, half a spacing.
 SMOOTHING_LENGTH, CUBE_SIZE, THRESHOLD = 2.0, 0.5, 0.6
 MESH_SMOOTHING, NORMAL_SMOOTHING = 25, 10  # iterations
-#: What ends so near to a wall of the tank [spacings] and faces it so much [cosine] ends at the wall.
-NEAR, FACING = 0.35, 0.7
+#: What ends so near to a wall of the tank [spacings] and faces it, not at all to fully [cosine], ends at the wall.
+NEAR, FACING = 0.35, (0.3, 0.8)
 FARTHEST = 0.3  # spacings that a vertex is moved for the sake of the volume
 
 
@@ -123,28 +123,28 @@ def _fit_volume(vertices: np.ndarray, normals: np.ndarray, triangles: np.ndarray
 
     These go along their normals, all by the same way, found by Newton's method: dV / ds is the area.
     """
-    pinned = np.zeros(vertices.shape, bool)
+    held = np.zeros(vertices.shape)  # share to which a coordinate is that of a wall
     if scene.tank is not None:
-        lower, upper = scene.tank.box()
         near = NEAR * scene.spacing
-        pinned |= (vertices > upper - near) & (normals > FACING) | (vertices > upper)
-        vertices[pinned] = np.broadcast_to(upper, vertices.shape)[pinned]
-        low = (vertices < lower + near) & (normals < -FACING) | (vertices < lower)
-        vertices[low] = np.broadcast_to(lower, vertices.shape)[low]
-        normals[pinned], normals[low] = 1.0, -1.0
-        pinned |= low
-        flat = pinned.any(axis=1)
-        normals[flat] = np.where(pinned[flat], normals[flat], 0.0)
+        for side, corner in zip((-1.0, 1.0), scene.tank.box(), strict=True):
+            beyond = side * (vertices - corner)
+            facing = np.clip((side * normals - FACING[0]) / (FACING[1] - FACING[0]), 0.0, 1.0)
+            share = np.where(beyond > 0.0, 1.0, np.where(beyond > -near, facing, 0.0))
+            vertices += share * (corner - vertices)
+            normals[share == 1.0] = side
+            held = np.maximum(held, share)
+        flat = (held == 1.0).any(axis=1)
+        normals[flat] *= held[flat] == 1.0
         normals[flat] /= np.linalg.norm(normals[flat], axis=1, keepdims=True)
-    free = np.asarray(~pinned.any(axis=1))
+    loose = 1.0 - held.max(axis=1)
     way, most = 0.0, FARTHEST * scene.spacing
     for _ in range(3):
         a, b, c = (vertices[triangles[:, k]] for k in range(3))
         crosses = np.cross(b - a, c - a)
-        area = 0.5 * float(np.linalg.norm(crosses, axis=1)[free[triangles].all(axis=1)].sum())
+        area = 0.5 * float(np.linalg.norm(crosses, axis=1) @ loose[triangles].mean(axis=1))
         missing = volume - float(np.einsum("ij,ij->", a, crosses)) / 6.0
         step = np.clip(way + missing / area, -most, most) - way if area > 0.0 else 0.0
         way += step
-        vertices[free] += step * normals[free]
+        vertices += step * loose[:, None] * normals
     if scene.tank is not None:
         np.clip(vertices, *scene.tank.box(), out=vertices)

@@ -86,20 +86,20 @@ class _Part:
         root.attrs["Version"] = np.array([2, 0], np.int64)
         root.attrs.create("Type", np.bytes_(b"PolyData"))
         file.column("VTKHDF/Points", "f4", 3)
-        file.column("VTKHDF/NumberOfPoints", "i8")
+        file.column("VTKHDF/NumberOfPoints", "i8", each_frame=True)
         for cells in CELLS:
             for name in ("NumberOfCells", "NumberOfConnectivityIds", "Offsets", "Connectivity"):
-                file.column(f"VTKHDF/{cells}/{name}", "i8")
+                file.column(f"VTKHDF/{cells}/{name}", "i8", each_frame=name.startswith("Number"))
         for name, rows in sorted(first.data.items()):
             file.column(f"VTKHDF/PointData/{name}", rows.dtype, *rows.shape[1:])
-            file.column(f"VTKHDF/Steps/PointDataOffsets/{name}", "i8")
+            file.column(f"VTKHDF/Steps/PointDataOffsets/{name}", "i8", each_frame=True)
         root.require_group("CellData")
         root.require_group("FieldData")
-        file.column("VTKHDF/Steps/Values", "f8")
+        file.column("VTKHDF/Steps/Values", "f8", each_frame=True)
         for name in ("PartOffsets", "NumberOfParts", "PointOffsets"):
-            file.column(f"VTKHDF/Steps/{name}", "i8")
+            file.column(f"VTKHDF/Steps/{name}", "i8", each_frame=True)
         for name in ("CellOffsets", "ConnectivityIdOffsets"):
-            file.column(f"VTKHDF/Steps/{name}", "i8", len(CELLS))
+            file.column(f"VTKHDF/Steps/{name}", "i8", len(CELLS), each_frame=True)
 
     def append(self, time: float, piece: Piece) -> None:
         """Append a step."""

@@ -293,8 +293,8 @@ def missing(sim: Water, source: Emitter | Drain, level: float) -> int:
     scene, gauge = sim.scene, source.gauge
     x = download(sim.world.particles.x)[: sim.count].astype(np.float64)
     if gauge is None:
-        size = scene.tank.size if scene.tank else (1.0,) * scene.dim
-        gauge = Gauge.parse({"lower": (0.0,) * scene.dim, "upper": size})
+        lower, upper = scene.tank.box() if scene.tank else (np.zeros(scene.dim), np.ones(scene.dim))
+        gauge = Gauge.parse({"lower": lower.tolist(), "upper": upper.tolist()})
     lack = (level - gauge.level(x, scene.spacing)) * gauge.base() / scene.spacing**scene.dim
     return math.floor(lack + 0.5)
 
