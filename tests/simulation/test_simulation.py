@@ -120,7 +120,8 @@ def test_a_state_from_before_pressure_was_carried_on_is_read(tmp_path):
     sim.step()
     sim.save(tmp_path / "now.npz")
     with np.load(tmp_path / "now.npz") as file:
-        np.savez(tmp_path / "then.npz", **{name: file[name] for name in file.files if name != "a"})
+        before = {name: file[name] for name in file.files if name not in ("a", "seal")}
+        np.savez(tmp_path / "then.npz", **before | {"format": 2})
     again = Simulation.restore(tmp_path / "then.npz")
     np.testing.assert_array_equal(again.positions, sim.positions)
     again.step()
@@ -129,9 +130,9 @@ def test_a_state_from_before_pressure_was_carried_on_is_read(tmp_path):
 
 def test_a_file_that_is_no_state(tmp_path):
     (tmp_path / "x.npz").write_bytes(b"nothing")
-    with pytest.raises(wt.WavetankError, match=r"x\.npz: this is not a state.*it holds objects, not arrays\.$"):
+    with pytest.raises(wt.WavetankError, match=r"x\.npz: this is not a state.*File is not a zip file\.$"):
         Simulation.restore(tmp_path / "x.npz")
-    with pytest.raises(wt.WavetankError, match=r"y\.npz: the state cannot be read: No such file"):
+    with pytest.raises(wt.WavetankError, match=r"y\.npz: the state .* cannot be read: No such file"):
         Simulation.restore(tmp_path / "y.npz")
 
 

@@ -31,7 +31,7 @@ ZORILLA = 5  # surfaceTensionMethod in N/m
 #: viscosityMethod -> name of its table, and how its number is meant
 VISCOSITIES = {
     1: ("Standard viscosity", "kinematic"), 2: ("Bender and Koschier 2017", "share"), 3: ("Peer et al. 2015", "share"),
-    4: ("Peer et al. 2016", "share"), 5: ("Takahashi et al. 2015 (improved)", "dynamic"),
+    4: ("Peer et al. 2016", "share"), 5: ("Takahashi et al. 2015 (improved)", "kinematic"),
     6: ("Weiler et al. 2018", "kinematic"),
 }  # fmt: skip
 STEP = 0.001  # s: time step for which their shares of the strain rate that stays are meant
@@ -142,8 +142,6 @@ class _Reader:
             if method and not meaning:
                 self.notes.append(f"{name}: viscosityMethod {method} is not known; it is taken as without viscosity.")
             return None
-        if meaning == "dynamic":
-            return self._allowed("dynamic_viscosity", value, f"{name}: viscosity")
         if meaning == "kinematic":
             return self._allowed("dynamic_viscosity", value * density, f"{name}: viscosity")
         # What is left of the strain rate after a step: 1 / (1 + nu dt / h^2), as implicit viscosity leaves.
@@ -208,8 +206,8 @@ class _Reader:
                 continue
             if self.spacing != self.own_spacing:
                 raise WavetankError(
-                    f"{self.path}: FluidModels[{number}] are particles {self.own_spacing:g} m apart; another spacing is "
-                    "for fluid blocks only."
+                    f"{self.path}: FluidModels[{number}] are particles {self.own_spacing:g} m apart; another spacing "
+                    "is for fluid blocks only."
                 )
             points = self._particles(str(row["particleFile"])) * np.array(row.get("scale", (1, 1, 1)), float)
             points = turned(turn_of(row), points) + np.array(row.get("translation", (0, 0, 0)), float)

@@ -61,7 +61,8 @@ def arrays_of(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 def is_inverted(row: dict[str, Any]) -> bool:
     """Say whether a body is all but its hollow: a container."""
-    return bool(row.get("mapInvert") or row.get("invertSDF"))
+    told = [row[key] for key in ("mapInvert", "invertSDF") if key in row]
+    return any(told) if told else bool(row.get("isWall"))
 
 
 class Solids:

@@ -208,8 +208,8 @@ class _Work:
         """Open the files of frames; those before a checkpoint are kept."""
         order = self.order
         self.outputs = Outputs(
-            self.folder.base, self.sim.scene, order.exports, fps=order.fps / order.every, only=order.only,
-            view=view_of(self.sim.scene), kept=self.done // order.every + 1, tell=tell,
+            self.folder.base, self.folder.scene, order.exports, fps=order.fps / order.every, only=order.only,
+            view=view_of(self.folder.scene), kept=self.done // order.every + 1, tell=tell,
         )  # fmt: skip
         stack.enter_context(self.outputs)
 

@@ -114,7 +114,7 @@ class Contents:
         found = []
         for number in range(solids.tank_count, len(solids.members)):
             (position, rotation), body = solids.poses[number], bodies.get(number)
-            velocity, spin = np.split(np.zeros(6) if body is None else body.velocity_row, 2)
+            velocity, spin = np.split(np.zeros(6) if body is None else self.bodies.coupling.velocity[body.row], 2)
             if body is not None:
                 velocity = velocity + np.cross(spin, position - body.center)
             pose = (position.copy(), rotation.copy(), velocity.copy(), spin.copy())
