@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test lint figures gallery validation clean
+.PHONY: demo test lint figures gallery validation fuzz soak lowest newest clean
 
 demo: .venv/demo-ready
 	$(BIN)/wavetank run obstacle-tank --seconds 4 --fps 30 --size 1280x720 --video --name demo --out out
@@ -37,8 +37,24 @@ gallery: .venv/test-ready
 validation: .venv/test-ready
 	$(BIN)/python docs/figures.py validation
 
+# 20,000 mutations of all that comes from outside, each flood, each scene exact over 100 frames: an hour or two.
+# What fails lies in tests/fuzz/found. make fuzz COUNT=1000 is shorter.
+COUNT ?= 20000
+fuzz: .venv/test-ready
+	$(BIN)/python tests/fuzz/long.py --count $(COUNT)
+	WAVETANK_FUZZ=long $(BIN)/python -m pytest -q tests/fuzz/test_attacks.py tests/front/test_floods.py tests/simulation/test_exact.py
+
+# An hour of playing, switching scenes, coming and going, exporting: memory and speed over time. make soak MINUTES=5 is shorter.
+MINUTES ?= 60
+soak: .venv/test-ready
+	$(BIN)/python tests/fuzz/soak.py --minutes $(MINUTES)
+
+# The tests that lean on packages, with the lowest and with the newest versions that are allowed.
+lowest newest: .venv/test-ready
+	$(BIN)/python tests/dependencies.py $@
+
 clean:
-	rm -rf .venv out
+	rm -rf .venv .venv-lowest .venv-newest out
 
 .venv/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

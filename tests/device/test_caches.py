@@ -1,0 +1,44 @@
+"""A damaged or foreign cache costs time, never a wrong or a dead run."""
+
+import os
+import random
+import subprocess
+import sys
+
+RUN = """
+import sys
+import wavetank as wt
+scene = wt.Scene(spacing=0.08, tank=wt.Tank(size=(1, 1, 1)), fluids=[wt.Block(lower=(0, 0, 0), upper=(0.4, 1, 1))],
+                 solids=[wt.Mesh(path="wavetank/knot.obj", center=(0.7, 0.3, 0.5), size=0.4)])
+sim = wt.Simulation(scene)
+sim.step()
+print(sim.digest())
+"""
+
+
+def test_damaged_caches_change_nothing(tmp_path):
+    """Kernels and grids of meshes; files are cut, flipped, emptied, or something else."""
+    places = {"XDG_CACHE_HOME": str(tmp_path), "WAVETANK_CACHE": str(tmp_path / "own"), "HOME": str(tmp_path)}
+
+    def run() -> str:
+        done = subprocess.run(
+            [sys.executable, "-c", RUN], capture_output=True, text=True, env=os.environ | places, timeout=600
+        )
+        assert done.returncode == 0, done.stderr[-2000:]
+        assert done.stderr == ""
+        return done.stdout
+
+    first, chance = run(), random.Random(3)
+    files = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert any(path.suffix == ".npz" for path in files) and len(files) > 5
+    for number, path in enumerate(sorted(files)):
+        content = bytearray(path.read_bytes())
+        if number % 4 == 0 and content:
+            for _ in range(8):
+                content[chance.randrange(len(content))] ^= 255
+        elif number % 4 == 1:
+            content = content[: len(content) // 2]
+        else:
+            content = bytearray(b"" if number % 4 == 2 else b"something else")
+        path.write_bytes(bytes(content))
+    assert run() == first
