@@ -5,7 +5,8 @@ import pytest
 from clouds import Cloud
 
 import wavetank as wt
-from wavetank.physics.central_xsph import apply_central_xsph, pack_multipliers
+from wavetank.physics.central_xsph import apply_central_xsph
+from wavetank.physics.xsph_viscosity import pack_velocities
 from wavetank.simulation.simulation import Simulation
 
 
@@ -16,7 +17,7 @@ def smoothed(cloud: Cloud, multipliers: np.ndarray) -> np.ndarray:
     lam[: cloud.count] = multipliers
     world.scratch.lam.from_numpy(lam)
     packed = world.fluids.array("packed")
-    pack_multipliers(packed, world.particles, world.scratch, cloud.count)
+    pack_velocities(packed, world.particles, world.scratch.lam, cloud.count)
     apply_central_xsph(world.spare, world.particles, packed, world.grid, cloud.c, cloud.count, cloud.method)
     return world.spare.v.to_numpy()[: cloud.count].astype(np.float64)
 

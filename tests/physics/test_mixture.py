@@ -8,8 +8,8 @@ import wavetank as wt
 from wavetank.device.compiler import upload
 from wavetank.foundation.materials import Material
 from wavetank.physics.density_constraint import correct_positions, start_multipliers
-from wavetank.physics.mixture import blend, pack_weights, stiffening
-from wavetank.physics.xsph_viscosity import apply_mixed_xsph
+from wavetank.physics.mixture import blend, stiffening
+from wavetank.physics.xsph_viscosity import apply_mixed_xsph, pack_velocities
 
 
 def mixed_cloud(dim: int, ratio: float = 100.0, **settings) -> tuple[Cloud, np.ndarray]:
@@ -74,7 +74,7 @@ def test_smoothing_keeps_momentum_and_is_eq_11_for_equal_masses(dim):
     cloud, w = mixed_cloud(dim, viscosity=0.5, calming=0.0)
     world = cloud.world
     packed = world.fluids.array("packed")
-    pack_weights(packed, world.particles, world.scratch, cloud.count)
+    pack_velocities(packed, world.particles, world.scratch.weight, cloud.count)
     grid = world.grid
     apply_mixed_xsph(world.spare, world.particles, packed, grid, cloud.c, cloud.count, cloud.method)
     smoothed = world.spare.v.to_numpy()[: cloud.count].astype(np.float64)

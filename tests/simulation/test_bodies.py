@@ -220,3 +220,15 @@ def test_what_is_no_body_and_no_joint_is_said(solids, joints, what):
     with pytest.raises(WavetankError, match=what) as said:
         wt.Scene.parse({"spacing": 0.05, "tank": {"size": (1, 1, 1)}, "solids": solids, "joints": joints})
     assert "\n" not in str(said.value)
+
+
+def test_a_body_falls_as_gravity_does_that_changes():
+    """Of its own motion, in the air, v = the integral of g."""
+    scene = wt.Scene(
+        spacing=0.05, gravity=("4*sin(pi*t)", 0, 0), tank=wt.Tank(size=(4, 4, 4)),
+        fluids=[wt.Block(lower=(0, 0, 0), upper=(0.2, 0.1, 0.2))],
+        solids=[wt.Sphere(name="ball", center=(1, 2, 2), radius=0.1, density=500)],
+    )  # fmt: skip
+    sim = wt.Simulation(scene)
+    sim.advance(1.0)
+    assert sim.bodies["ball"].velocity == pytest.approx([8 / np.pi, 0, 0], rel=0.01)

@@ -24,6 +24,11 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.concatenate([[w], v])
 
 
+def inverse(q: np.ndarray) -> np.ndarray:
+    """Return the unit quaternion that turns back what `q` turns."""
+    return q * (1.0, -1.0, -1.0, -1.0)
+
+
 def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return vector `v` turned by the unit quaternion `q`."""
     return v + 2.0 * np.cross(q[1:], np.cross(q[1:], v) + q[0] * v)

@@ -33,33 +33,39 @@ from wavetank.solids.distance import (
 
 
 @qd.func
-def last_mark():
-    """The last bit of `near`, which stands for every solid from that number on."""
-    return 30
+def marks():
+    """Bits of `near`: one for each wall of the tank, the others by turns for all other solids."""
+    return 31
 
 
 @qd.func
-def mark(k):
-    """Bit of `near` that stands for solid `k`."""
-    return 1 << qd.min(k, last_mark())
+def bit_of(k, solids: SolidSet):
+    """Bit of `near` that stands for solid `k`, and where there are more than `marks` for some others too."""
+    bit = k
+    if k >= marks():
+        bit = solids.tank_count + (k - solids.tank_count) % (marks() - solids.tank_count)
+    return bit
 
 
 @qd.func
-def is_near(near, k):
+def is_near(near, k, solids: SolidSet):
     """Say whether solid `k` is marked in the bits `near`."""
-    return (near >> qd.min(k, last_mark())) & 1
+    return (near >> bit_of(k, solids)) & 1
 
 
 @qd.func
-def next_near(near, k, count):
-    """First solid behind number `k` that is marked in the bits `near`, or `count`: most particles have few marks."""
+def next_near(near, k, solids: SolidSet):
+    """First solid behind number `k` that is marked in the bits `near`, or past all: most particles have few marks."""
     following = k + 1
-    if following < last_mark():
-        rest = near >> following
-        following = following + qd.math.ffs(rest) - 1 if rest != 0 else count
-    elif (near >> last_mark()) == 0:
-        following = count
-    return qd.min(following, count)
+    bit = bit_of(following, solids)
+    rest = near >> bit
+    if rest != 0:
+        following += qd.math.ffs(rest) - 1
+    elif (near >> solids.tank_count) != 0:  # by the next turn
+        following += marks() - bit + qd.math.ffs(near >> solids.tank_count) - 1
+    else:
+        following = solids.count
+    return qd.min(following, solids.count)
 
 
 @qd.func
@@ -90,10 +96,10 @@ def add_solids(
     sums: qd.template(), lane, p: qd.template(), near, behind, solids: SolidSet, walls: Walls, c: Coefficients
 ):  # fmt: skip
     """Add the marked solids behind number `behind`, as `add_wall` does, at the place `p` of a lane."""
-    k = next_near(near, behind, solids.count)
+    k = next_near(near, behind, solids)
     while k < solids.count:
         add_wall(sums, lane, signed_distance(solids, k, lift(p)), walls, c)
-        k = next_near(near, k, solids.count)
+        k = next_near(near, k, solids)
 
 
 @qd.func
@@ -108,11 +114,11 @@ def find_walls(sums: qd.template(), team, particles: Particles, solids: SolidSet
         near |= particles.near[first + lane]
     for lane in range(sums.m):
         sums[3, lane] = 1.0
-    k = next_near(near, -1, solids.tank_count)
+    k = next_near(near, -1, solids)
     while k < solids.tank_count:
         for lane in range(sums.m):
             add_wall(sums, lane, plane_distance(solids, k, lift(predicted(particles, first + lane))), walls, c)
-        k = next_near(near, k, solids.tank_count)
+        k = next_near(near, k, solids)
     if near >> solids.tank_count != 0:
         for lane in range(sums.m):
             p = predicted(particles, first + lane)
@@ -126,14 +132,14 @@ def press_back(p, near, free, push, solids: SolidSet, walls: Walls, c: Coefficie
 
     `free` is the share of the support that all the marked solids leave.
     """
-    k = next_near(near, solids.tank_count - 1, solids.count)
+    k = next_near(near, solids.tank_count - 1, solids)
     while k < solids.count:
         if solids.unit[k] > 0.0:
             value = signed_distance(solids, k, p)
             share = wall_share(walls, value.w, c.h) * c.wall_density
             others = free / qd.max(1.0 - share[0], 1e-6)
             push_back(solids, k, p, vec3(value.x, value.y, value.z) * (-push * others * share[1] * c.inverse_h))
-        k = next_near(near, k, solids.count)
+        k = next_near(near, k, solids)
 
 
 @qd.func
@@ -192,11 +198,11 @@ def follow(k, at, end, solids: SolidSet, gap):
 @qd.func
 def kept_in_tank(target, near, solids: SolidSet, gap):
     """Return the point `target` moved back in front of the marked walls of the tank; nothing passes a half-space."""
-    k = next_near(near, -1, solids.count)
+    k = next_near(near, -1, solids)
     while k < solids.tank_count:
         value = plane_distance(solids, k, target)
         target += vec3(value.x, value.y, value.z) * qd.max(gap - value.w, 0.0)
-        k = next_near(near, k, solids.count)
+        k = next_near(near, k, solids)
     return target
 
 
@@ -212,7 +218,7 @@ def stopped(origin, target, near, solids: SolidSet, gap, mass):
     turn, moved = 0, 1
     while turn < 2 and moved == 1:
         moved = 0
-        k = next_near(near, solids.tank_count - 1, solids.count)
+        k = next_near(near, solids.tank_count - 1, solids)
         while k < solids.count:
             rotation = solids.rotation[k]
             end = to_local(solids.position[k], rotation, target)
@@ -224,11 +230,11 @@ def stopped(origin, target, near, solids: SolidSet, gap, mass):
                 moved = 1
                 if mass > 0.0:
                     push_back(solids, k, target, mass * (target - before))
-            k = next_near(near, k, solids.count)
-        marks = near
+            k = next_near(near, k, solids)
+        walls = near
         if moved == 1:  # perhaps farther than its marks reach
-            marks |= (1 << solids.tank_count) - 1
-        inside = kept_in_tank(target, marks, solids, gap)
+            walls |= (1 << solids.tank_count) - 1
+        inside = kept_in_tank(target, walls, solids, gap)
         if (inside - target).norm_sqr() > 0.0:
             target = inside
             moved = 1
@@ -267,7 +273,7 @@ def near_bodies(x, p, solids: SolidSet, h):
         margin = way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(solids.reach[k], away)
         if away < solids.reach[k] + margin:
             if signed_distance(solids, k, p).w < margin:
-                near |= mark(k)
+                near |= 1 << bit_of(k, solids)
     return near
 
 
@@ -282,7 +288,7 @@ def bodies_in_reach(x, p, solids: SolidSet, gap):
     for k in range(solids.tank_count, solids.count):
         away = (p - solids.position[k]).norm()
         if away < solids.reach[k] + way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(solids.reach[k], away):
-            near |= mark(k)
+            near |= 1 << bit_of(k, solids)
     return near
 
 

@@ -22,7 +22,7 @@ way back is made up for as well. With the friction alone two drops kept 73 % of 
 """
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import Coefficients, Grid, Particles, Scratch
+from wavetank.device.state import Coefficients, Grid, Particles
 from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.smoothing import kernel
 from wavetank.physics.teams import end_of, end_team, first_team, turns
@@ -53,18 +53,6 @@ def add_central_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, meth
     along = (share - push - 0.5 * slope) * v_n / qd.max(square, 1e-20)
     for k in qd.static(range(r.n)):
         sums[k] += along * r[k] + push * dv[k]
-
-
-@qd.kernel(fastcache=True)
-def pack_multipliers(packed: qd.types.ndarray(), particles: Particles, scratch: Scratch, count: qd.i32):
-    """Put velocities and multipliers side by side, where a visitor finds both with one access."""
-    for i in range(count):
-        v = particles.v[i]
-        row = packed[i]
-        for k in qd.static(range(v.n)):
-            row[k] = v[k]
-        row[3] = scratch.lam[i]
-        packed[i] = row
 
 
 @qd.kernel(fastcache=True)

@@ -32,7 +32,7 @@ def apply_friction(
             p = lift(predicted(particles, i))
             v = lift(particles.v[i])
             for k in range(solids.count):
-                if is_near(near, k) == 1 and (solids.friction[k] > 0.0 or k >= solids.tank_count):
+                if is_near(near, k, solids) == 1 and (solids.friction[k] > 0.0 or k >= solids.tank_count):
                     value = signed_distance(solids, k, p)
                     n = vec3(value.x, value.y, value.z)
                     push = (

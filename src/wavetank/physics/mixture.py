@@ -84,15 +84,3 @@ def weigh(scratch: Scratch, particles: Particles, rows: qd.types.ndarray(), coun
     """Write the inverse mass of every particle."""
     for i in range(count):
         scratch.weight[i] = rows[particles.material[i]][0]
-
-
-@qd.kernel(fastcache=True)
-def pack_weights(packed: qd.types.ndarray(), particles: Particles, scratch: Scratch, count: qd.i32):
-    """Put velocities and inverse masses side by side, where a visitor finds both with one access."""
-    for i in range(count):
-        v = particles.v[i]
-        row = packed[i]
-        for k in qd.static(range(v.n)):
-            row[k] = v[k]
-        row[3] = scratch.weight[i]
-        packed[i] = row

@@ -1,7 +1,7 @@
 """What the water does to bodies: the exact opposite of what these do to it.
 
-Whatever moves a particle at a solid, its share of the density (Eq. 6 with the wall's gradient), contact, friction and
-viscous drag, moves it by some way within a step. The opposite, times the particle's mass, is what the solid is pushed
+Whatever moves a particle at a solid, its share of the density (Eq. 6 with the wall's gradient), contact and friction,
+moves it by some way within a step. The opposite, times the particle's mass, is what the solid is pushed
 by; times the lever arm about its centre of mass, what it is turned by. Sums are of whole numbers, so that the order in
 which threads come does not matter and runs repeat bit for bit; a body's unit is as fine as the number of particles that
 can press on it allows (`simulation/bodies.py`).

@@ -10,7 +10,7 @@ import math
 from wavetank.device.state import Coefficients
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids
-from wavetank.physics.central_xsph import apply_central_xsph, pack_multipliers
+from wavetank.physics.central_xsph import apply_central_xsph
 from wavetank.physics.coefficients import coefficients, in_iteration, relaxations
 from wavetank.physics.density_constraint import (
     correct_positions,
@@ -22,14 +22,13 @@ from wavetank.physics.dynamic_viscosity.implicit_viscosity import carry_on, solv
 from wavetank.physics.friction import apply_friction
 from wavetank.physics.grid_pressure.correction import correct_pressure
 from wavetank.physics.integrate import predict, update_velocities
-from wavetank.physics.mixture import pack_weights
 from wavetank.physics.neighbors import find_neighbors, sort_particles
 from wavetank.physics.plan import Plan, plan_step
 from wavetank.physics.population import hold_frozen, stop_frozen
 from wavetank.physics.tension import apply_tension, prepare_fluids
 from wavetank.physics.vorticity import confine_vorticity
 from wavetank.physics.world import World
-from wavetank.physics.xsph_viscosity import apply_mixed_xsph, apply_xsph
+from wavetank.physics.xsph_viscosity import apply_mixed_xsph, apply_xsph, pack_velocities
 
 
 def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
@@ -113,11 +112,11 @@ def smooth_and_confine(world: World, plan: Plan, c: Coefficients) -> None:
         apply_xsph(spare, particles, scratch, grid, c, count, plan.method, plan.turning)
     if mixed:
         packed = world.fluids.array("packed")
-        pack_weights(packed, particles, scratch, count)
+        pack_velocities(packed, particles, scratch.weight, count)
         apply_mixed_xsph(spare, particles, packed, grid, c, count, plan.method)
     elif plan.is_central:
         packed = world.fluids.array("packed")
-        pack_multipliers(packed, particles, scratch, count)
+        pack_velocities(packed, particles, scratch.lam, count)
         apply_central_xsph(spare, particles, packed, grid, c, count, plan.method)
     world.exchange("v")
     if plan.turning:

@@ -214,7 +214,7 @@ def attract(
                 if particles.near[i] != 0:
                     wetting = pull.adhesion * surface[i].w * rows[particles.material[i]][3]
                     for k in range(solids.count):
-                        if is_near(particles.near[i], k) == 1:
+                        if is_near(particles.near[i], k, solids) == 1:
                             value = signed_distance(solids, k, lift(p))
                             if value.w < c.h:
                                 n = vec3(value.x, value.y, value.z)

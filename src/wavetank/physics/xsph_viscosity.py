@@ -92,11 +92,23 @@ def apply_xsph(
 
 
 @qd.kernel(fastcache=True)
+def pack_velocities(packed: qd.types.ndarray(), particles: Particles, values: qd.types.ndarray(), count: qd.i32):
+    """Put velocities and one more number of each particle side by side, where a visitor finds both with one access."""
+    for i in range(count):
+        v = particles.v[i]
+        row = packed[i]
+        for k in qd.static(range(v.n)):
+            row[k] = v[k]
+        row[3] = values[i]
+        packed[i] = row
+
+
+@qd.kernel(fastcache=True)
 def apply_mixed_xsph(
     smoothed: Particles, particles: Particles, packed: qd.types.ndarray(), grid: Grid, c: Coefficients, count: qd.i32,
     method: qd.template(),
 ):  # fmt: skip
-    """Smooth the velocities (Eq. 11) of fluids of different density; `packed` as `mixture.pack_weights` leaves it."""
+    """Smooth the velocities (Eq. 11) of fluids of different density; `packed` holds inverse masses too."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
             sums = qd.Matrix.zero(qd.f32, particles.v[team].n, grid.lanes)

@@ -9,7 +9,7 @@ in the step before:
     (m + m_a) dv = P + m g dt + m_a dv_before
 
 Where dv does not change, that is m dv = P + m g dt, whatever m_a is; what it adds to the momentum of one step it takes
-from later ones. It is stable where m_a is more than half of what the water really adds (docs/notebook/bodies.md).
+from later ones. It is stable where m_a is more than half of what the water really adds (docs/bodies.md).
 
     code       symbol       meaning                                                     unit
     impulse    P            what the water gave in a step                               kg m/s, kg m^2/s
@@ -25,7 +25,7 @@ from typing_extensions import override
 
 from wavetank.device.compiler import download, upload
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.rotations import product, turned, unit_quaternion
+from wavetank.foundation.rotations import inverse, product, turned, unit_quaternion
 from wavetank.physics.bodies import Pieces, Retry, new_pieces
 from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED, carried
 from wavetank.physics.mixture import blend
@@ -36,7 +36,7 @@ from wavetank.scene.scene import Scene
 from wavetank.simulation.added_mass import added_mass
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
-from wavetank.simulation.joints import new_joint
+from wavetank.simulation.joints import put_joint
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.solids.distance import PARTS
 from wavetank.solids.mass import Ruler, inertia_of, water_of
@@ -46,7 +46,6 @@ from wavetank.solids.solid import Solid
 TOLERANCE = 0.1  # of sqrt(g d), or of the fastest body: change of a body's velocity that is worth a second step
 MOST_TRIES = 3  # of a step
 FEWEST = 6.0  # pieces across a body
-BACK = np.array([1.0, -1.0, -1.0, -1.0])  # turns a quaternion round
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
 
 
@@ -69,18 +68,20 @@ class Bodies(Mapping[str, Body]):
         self.members: list[Body] = []
         self.fastest = 0.0  # m/s
         self.retry = Retry()
-        self.joints: dict[str, Any] = {}
+        self.gravity = np.zeros(3)  # m/s^2, of the present step
+        self.pieces: Pieces | None = None  # of all bodies, on the device
         solids.feeling, solids.passing = {}, {}
         if not any(solid.is_body for solid in solids.members):
             return
+        self.density = blend(scene.materials_of(scene.kinds()), scene).largest_density
         self.engine = import_engine()
         self.world = self.engine.PhysicsWorld(gravity=(0.0, 0.0, 0.0))
         self.world.integration_parameters.length_unit = max(10.0 * scene.spacing, 1e-3)
         self.handles = [self._add(number, solid) for number, solid in enumerate(solids.members)]
         for joint in scene.joints:
-            self.joints[joint.name] = new_joint(self.engine, self.world, self.handles, solids, joint)
-        solids.feeling = {body.number: (body.dry.center, body.unit) for body in self.members}
-        solids.rebuild()
+            put_joint(self.engine, self.world, self.handles, solids, joint)
+        solids.feel({body.number: (body.dry.center, body.unit) for body in self.members})
+        self.pieces = self._pieces()
 
     @override
     def __getitem__(self, name: str) -> Body:
@@ -118,8 +119,7 @@ class Bodies(Mapping[str, Body]):
         return handle
 
     def _body(self, number: int, solid: Solid, handle: Any) -> Body:
-        spacing, dim = self.scene.spacing, self.dim
-        density = blend(self.scene.materials_of(self.scene.kinds()), self.scene).largest_density
+        spacing, dim, density = self.scene.spacing, self.dim, self.density
         cut = Ruler(solid, dim, spacing).cut()
         dry, wet = inertia_of(solid, cut), water_of(cut, density)
         axes = tuple(map(float, wet.axes[3 - dim :]))
@@ -151,10 +151,8 @@ class Bodies(Mapping[str, Body]):
         properties = self.engine.MassProperties(body.dry.center.tolist(), mass, moments.tolist(), frame)
         body.rigid().set_additional_mass_properties(properties)
 
-    def cut(self) -> Pieces | None:
+    def _pieces(self) -> Pieces:
         """Return the pieces of all bodies on the device."""
-        if not self.members:
-            return None
         spacing, table = self.scene.spacing, {}
         for body in self.members:
             edge = min(spacing, 2.0 * float(body.wet.axes[3 - self.dim]) / FEWEST)
@@ -165,15 +163,14 @@ class Bodies(Mapping[str, Body]):
 
     # --- a step ---
 
-    def advance(self, dt: float, share: float, fastest: float) -> None:
+    def advance(self, gravity: tuple[float, ...], dt: float, share: float, fastest: float) -> None:
         """Move the bodies for a step of `dt` [s], which ends at a `share` of the frame; none is left faster [m/s]."""
-        self.fastest = fastest
-        gravity = np.array([*self.scene.gravity, 0.0][:3])
+        self.fastest, self.gravity = fastest, np.array([*gravity, 0.0][:3])
         for body in self.members:
             self._hold(body, self._is_held(body))
             self._weigh(body)
             impulse = body.impulse - body.early + body.taken * body.added_row * body.change
-            impulse[:3] += body.dry.mass * gravity * (body.lasted or dt)
+            impulse[:3] += body.dry.mass * self.gravity * (body.lasted or dt)
             self._push(body, impulse)
             self._limit(body)
         for number in self.solids.targets:
@@ -195,7 +192,7 @@ class Bodies(Mapping[str, Body]):
         """
         added, inertia = (body.taken * part for part in body.added)
         velocity, rotation = self._velocity(body), self._pose(body)[1]
-        spin = np.linalg.solve(body.dry.tensor + inertia * np.eye(3), turned(rotation * BACK, impulse[3:]))
+        spin = np.linalg.solve(body.dry.tensor + inertia * np.eye(3), turned(inverse(rotation), impulse[3:]))
         if self.dim == 2:
             spin[:2] = 0.0
         body.rigid().linvel = (velocity[:3] + impulse[:3] / (body.dry.mass + added)).tolist()
@@ -224,7 +221,7 @@ class Bodies(Mapping[str, Body]):
         upload(world.solids.reaction, np.zeros(sums.size, np.int32))
         particle = blend(world.materials, self.scene).largest_density * self.scene.spacing**self.dim
         share = carried(dt, self.scene.frame_time)
-        limit = LARGEST_CARRIED * float(np.linalg.norm(self.scene.gravity))
+        limit = LARGEST_CARRIED * float(np.linalg.norm(self.gravity))
         for body in self.members:
             row = sums[body.number] / body.unit
             scale = np.repeat([1.0, body.solid.reach()], 3) * particle / dt
@@ -240,7 +237,7 @@ class Bodies(Mapping[str, Body]):
         The step of `dt` [s] is then to be taken again: the water pushed as if the body could not give way.
         """
         fastest = max(float(np.linalg.norm(body.velocity_row[:3])) for body in self.members)
-        slow = TOLERANCE * max(float(np.linalg.norm(self.scene.gravity) * self.scene.spacing) ** 0.5, fastest)
+        slow = TOLERANCE * max(float(np.linalg.norm(self.gravity) * self.scene.spacing) ** 0.5, fastest)
         any_yielded = False
         for body in self.members:
             step = (body.impulse - body.expected - body.early) / (body.dry_row + body.taken * body.added_row)

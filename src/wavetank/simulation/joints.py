@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.foundation.rotations import turned
+from wavetank.foundation.rotations import inverse, turned
 from wavetank.scene.joints import BallJoint, Hinge, Joint, Rope, Slider, Spring, Weld
 from wavetank.simulation.moving_solids import MovingSolids
 
 DAMPING = 1e8  # N m s or N s/m: a motor gives all that it has until it is as fast as it should be
 
 
-def new_joint(engine: Any, world: Any, handles: Sequence[Any], solids: MovingSolids, joint: Joint) -> Any:
-    """Put a joint into the `world` of the `engine`, and return its handle there; `handles` are those of the solids."""
+def put_joint(engine: Any, world: Any, handles: Sequence[Any], solids: MovingSolids, joint: Joint) -> None:
+    """Put a joint into the `world` of the `engine`; `handles` are those of the solids."""
     first = solids.find(joint.first)
     second = solids.find(joint.second) if joint.second else None
     if second is None:
@@ -25,14 +25,14 @@ def new_joint(engine: Any, world: Any, handles: Sequence[Any], solids: MovingSol
         if number is None:
             return place.tolist()
         position, rotation = solids.poses[number]
-        return turned(rotation * (1.0, -1.0, -1.0, -1.0), place - position).tolist()
+        return turned(inverse(rotation), place - position).tolist()
 
     def direction(number: int | None, axis: Any) -> list[float]:
         vector = np.array([*axis, 0.0][:3], float)
         vector /= np.linalg.norm(vector)
         if number is None:
             return vector.tolist()
-        return turned(solids.poses[number][1] * (1.0, -1.0, -1.0, -1.0), vector).tolist()
+        return turned(inverse(solids.poses[number][1]), vector).tolist()
 
     if isinstance(joint, Hinge | Slider):
         kind = engine.RevoluteJointBuilder if isinstance(joint, Hinge) else engine.PrismaticJointBuilder
@@ -57,14 +57,13 @@ def new_joint(engine: Any, world: Any, handles: Sequence[Any], solids: MovingSol
         if second is not None:
             turn = turn * engine.Rotation3(*map(float, solids.poses[second][1]))
         builder = builder.local_frame2(engine.Isometry3(local(first, joint.at), turn))
-        return world.impulse_joints.insert(
-            ends[1], ends[0], builder.local_frame1(engine.Isometry3(local(second, joint.at))).build()
-        )
+        builder = builder.local_frame1(engine.Isometry3(local(second, joint.at)))
     else:
         assert isinstance(joint, BallJoint)
         builder = engine.SphericalJointBuilder()
-    far = joint.to if isinstance(joint, Rope | Spring) else joint.at
-    builder = builder.local_anchor1(local(second, far)).local_anchor2(local(first, joint.at))
-    if not isinstance(joint, Rope | Spring):
+    if not isinstance(joint, Weld):  # whose frames say it
+        far = joint.to if isinstance(joint, Rope | Spring) else joint.at
+        builder = builder.local_anchor1(local(second, far)).local_anchor2(local(first, joint.at))
+    if isinstance(joint, Hinge | Slider | BallJoint):
         builder = builder.contacts_enabled(False)
-    return world.impulse_joints.insert(ends[1], ends[0], builder.build())
+    world.impulse_joints.insert(ends[1], ends[0], builder.build())

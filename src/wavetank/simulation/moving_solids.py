@@ -52,11 +52,16 @@ class MovingSolids:
         self.has_friction = self.friction > 0.0 or any(solid.friction for solid in self.members)
         self.reaches = [solid.span() for solid in self.members]
         self.walls = [solid.program()[0] for solid in self.members[: self.tank_count]]
-        units = np.zeros(max(len(self.members), 1), np.float32)
-        for number, (_, unit) in self.feeling.items():
+        self._resize()
+        self._upload(0.0, 0.0)
+
+    def feel(self, feeling: dict[int, tuple[np.ndarray, float]]) -> None:
+        """Let bodies feel what the water does to them: centre of mass [m] and `SolidSet.unit`, by number."""
+        self.feeling = feeling
+        units = np.zeros(len(self.members), np.float32)
+        for number, (_, unit) in feeling.items():
             units[number] = unit
         upload(self.device.unit, units)
-        self._resize()
         self._upload(0.0, 0.0)
 
     def add(self, solid: Solid, grow: float) -> str:

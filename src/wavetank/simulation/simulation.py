@@ -69,7 +69,7 @@ class Simulation(Contents):
 
     def _fill(self, capacity: int) -> None:
         """Make an empty world with room for `capacity` particles."""
-        self.world = new_world(self.scene, capacity, self.solids, self.bodies.cut())
+        self.world = new_world(self.scene, capacity, self.solids, self.bodies.pieces)
         self.ledger.capacity, self._outdated = capacity, True
 
     def _walls(self) -> list[Solid]:
@@ -129,16 +129,19 @@ class Simulation(Contents):
         parts = self.time_steps = whole(self._steps_in(duration))
         self.solids.grow(duration)
         for part in range(parts):
+            start, dt, shares = (
+                self.time + duration * part / parts,
+                duration / parts,
+                (part / parts, (part + 1) / parts),
+            )
+            scene = self._scene_at(start + 0.5 * dt)
             if self.bodies:
-                self.bodies.advance(duration / parts, (part + 1) / parts, limit)
-            self.world.solids_version = self.solids.move_to(part / parts, (part + 1) / parts)
+                self.bodies.advance(scene.gravity, dt, shares[1], limit)
+            self.world.solids_version = self.solids.move_to(*shares)
             if self.count:
-                start, dt = self.time + duration * part / parts, duration / parts
                 for force in self._acting_at(start + 0.5 * dt):
                     force.apply(self.world.particles, self.count, dt, start)
-                self.bodies.step(
-                    self.world, self._scene_at(start + 0.5 * dt), dt, limit, (part / parts, (part + 1) / parts)
-                )
+                self.bodies.step(self.world, scene, dt, limit, shares)
         self.solids.passing.clear()
         self.solids.move_to(0.0, 1.0)
         self._let_out()
@@ -241,7 +244,7 @@ class Simulation(Contents):
 
     def _renew_solids(self) -> None:
         self.bodies = self.bodies.renewed(self.scene, self.solids)
-        self.world.pieces = self.bodies.cut()
+        self.world.pieces = self.bodies.pieces
         self.world.solids, self.world.has_friction = self.solids.device, self.solids.has_friction
         self._outdated = True
 

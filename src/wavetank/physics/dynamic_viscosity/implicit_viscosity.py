@@ -143,7 +143,7 @@ def find_drag(
             fast = qd.sqrt(vec3(c.gravity_x, c.gravity_y, c.gravity_z).norm() * c.h)
             walls = 0
             for k in range(solids.count):
-                if is_near(near, k) == 1:
+                if is_near(near, k, solids) == 1:
                     value = signed_distance(solids, k, p)
                     if value.w < c.h:
                         share = interpolated(table, value.w / c.h)

@@ -177,7 +177,7 @@ def add_fill(
 def approached(x, p, near, solids: SolidSet, walls: Walls, c: Coefficients, searched: qd.template()):
     """Relative density that the marked solids have added on the way from `x` to `p`, in their motion."""
     added, free = 0.0, 1.0
-    k = next_near(near, -1, solids.count)
+    k = next_near(near, -1, solids)
     while k < (solids.count if qd.static(searched) else solids.tank_count):
         value = vec4(0.0, 0.0, 0.0, 0.0)
         way = p - x
@@ -193,7 +193,7 @@ def approached(x, p, near, solids: SolidSet, walls: Walls, c: Coefficients, sear
             inward = -way.dot(vec3(value.x, value.y, value.z))
             added = added * (1.0 - share[0]) + inward * free * share[1] / c.h
             free *= 1.0 - share[0]
-        k = next_near(near, k, solids.count)
+        k = next_near(near, k, solids)
     return added
 
 
