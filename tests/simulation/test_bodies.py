@@ -61,6 +61,18 @@ def test_a_disc_floats_in_a_plane():
     assert np.mean(heights) == pytest.approx(surface, abs=0.02)
 
 
+@pytest.mark.parametrize("spacing", [0.05, 0.02])
+def test_half_of_a_body_is_under_water(spacing):
+    """Whatever the unit of the sums, which depends on the spacing."""
+    scene = wt.Scene(
+        spacing=spacing, tank=wt.Tank(size=(1.0, 0.8)), fluids=[wt.Block(lower=(0, 0), upper=(1.0, 0.4))],
+        solids=[wt.Box(name="box", center=(0.5, 0.4), size=(0.3, 0.2), density=500, held=True)],
+    )  # fmt: skip
+    sim = wt.Simulation(scene)
+    sim.advance(0.5)
+    assert sim.bodies["box"].immersed == pytest.approx(0.5, abs=0.1)
+
+
 def test_momentum_goes_from_water_to_body():
     """Without gravity the sum of momenta and of their moments stays, and energy does not rise."""
     scene = wt.Scene(

@@ -222,11 +222,12 @@ class Bodies(Mapping[str, Body]):
         particle = blend(world.materials, self.scene).largest_density * self.scene.spacing**self.dim
         share = carried(dt, self.scene.frame_time)
         limit = LARGEST_CARRIED * float(np.linalg.norm(self.gravity))
+        cell = world.levels[0].dy if world.levels else 1.0
         for body in self.members:
             row = sums[body.number] / body.unit
             scale = np.repeat([1.0, body.solid.reach()], 3) * particle / dt
             direct, grid = row[:6] * scale, row[OF_GRID : OF_GRID + 6] * scale
-            body.immersed = min(1.0, row[IMMERSION] * particle / body.wet.mass)
+            body.immersed = min(1.0, row[IMMERSION] * particle / (body.wet.mass * cell))
             force = share * body.carried + grid / dt
             body.by_grid = force * min(1.0, limit * body.wet.mass / max(float(np.linalg.norm(force[:3])), 1e-30))
             body.impulse = direct + force * dt
