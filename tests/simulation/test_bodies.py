@@ -166,6 +166,13 @@ def test_bodies_are_held_moved_and_let_go():
         _ = sim.bodies["bow"]
 
 
+def test_a_fast_body_begins_as_fast_as_it_is_said_to():
+    """The water's speed limit, that of a fall through the tank, is not a body's: 4.2 m/s here."""
+    sim = pool(wt.Sphere(name="shot", center=(0.48, 0.8, 0.48), radius=0.06, density=8000, velocity=(0, -12, 0)))
+    sim.step()
+    assert sim.bodies["shot"].velocity[1] == pytest.approx(-12.0 - 9.81 / 60, rel=1e-3)
+
+
 def test_bodies_come_and_go():
     """Another one is added while the first floats, and the first is taken away."""
     sim = pool(wt.Box(name="box", center=(0.3, 0.45, 0.3), size=(0.16, 0.16, 0.16), density=500))
