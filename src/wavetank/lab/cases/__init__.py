@@ -26,6 +26,7 @@ from wavetank.lab.cases import (
     standing_wave,
     still_tank,
     tension_drop,
+    water_entry,
 )
 from wavetank.lab.cases.case import Case
 
@@ -35,4 +36,5 @@ CASES: tuple[Case, ...] = (
     layers.CASE, lock_exchange.CASE, shear_wave.CASE, gravity_current.CASE, buckling.CASE, coiling.CASE,
     tension_drop.CASE,
     calm_vorticity.CASE, emitter.CASE, buoyancy.CASE, heave.CASE,
+    water_entry.CASE,
 )  # fmt: skip
