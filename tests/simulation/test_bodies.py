@@ -162,8 +162,18 @@ def test_bodies_are_held_moved_and_let_go():
     assert sim.bodies["box"].velocity[1] > 2.0
     with pytest.raises(WavetankError, match="velocity = .* of body 'box' must be 3 finite numbers"):
         sim.bodies["box"].velocity = (0.0, np.nan, 0.0)
+    assert "box" in sim.bodies
+    assert "bow" not in sim.bodies
     with pytest.raises(WavetankError, match="no body named 'bow'; bodies: box"):
         _ = sim.bodies["bow"]
+
+
+def test_a_tank_without_gravity_has_bodies():
+    """Where nothing is deep."""
+    sim = pool(wt.Sphere(name="ball", center=(0.48, 0.4, 0.48), radius=0.1, density=500), gravity=(0, 0, 0))
+    sim.advance(0.1)
+    assert np.linalg.norm(sim.bodies["ball"].velocity) < 0.1
+    assert sim.bodies["ball"].immersed == 0.0
 
 
 def test_a_fast_body_begins_as_fast_as_it_is_said_to():

@@ -92,6 +92,10 @@ class Bodies(Mapping[str, Body]):
         raise WavetankError(f"there is no body named {name!r}; bodies: {known}.")
 
     @override
+    def __contains__(self, name: object) -> bool:
+        return any(body.name == name for body in self.members)
+
+    @override
     def __iter__(self) -> Iterator[str]:
         return iter([body.name for body in self.members])
 

@@ -41,9 +41,7 @@ def find_speed_limit(
     start = max([ledger.fastest_start, *(_start_speed(solid) for solid in scene.solids)])
     fall = sum(2.0 * abs(g) * edge for g, edge in zip(scene.gravity, scene.tank.size, strict=True))
     ledger.steepest = max(ledger.steepest, 0.5 * fall)  # what gravity was a moment ago is still in the water
-    fastest = (
-        math.sqrt(2.0 * ledger.steepest + start**2) + 2.0 * ledger.fastest_solid + ledger.fastest_force
-    )
+    fastest = math.sqrt(2.0 * ledger.steepest + start**2) + 2.0 * ledger.fastest_solid + ledger.fastest_force
     return scene.speed_limit * max(fastest + capillary_speed(world, scene), 1e-6)
 
 

@@ -1,6 +1,6 @@
-"""Linear theory of a body that floats in a tank, in a plane: potential flow below small waves, walls and floor included.
+"""Linear theory of a body that floats in a tank, in a plane: potential flow below small waves, walls and floor too.
 
-What `heave` compares with. The flow is at rest but for small motions; the surface keeps its place, and so does the body:
+What `heave` compares with. The flow is at rest but for small motions; surface and body keep their places:
 
     div grad phi = 0;  d eta / dt = d phi / dy,  d phi / dt = -g eta at the surface;  d phi / dn = V n at the body
     (m + A) dV/dt = -C xi - rho g Q eta

@@ -52,7 +52,9 @@ def run(quick: bool, arch: str) -> Outcome:
     for ratio in ratios:
         times, depths = fall(sphere(ratio, RADIUS / (4 if quick else 6)), arch, FAR * RADIUS, IMPACT)
         theory = course(sphere_motion(ratio), times, IMPACT)
-        figures += compare(f"sphere of {ratio:g} times water's density", times, depths, theory, FAR * RADIUS, 0.15 if quick else 0.1)
+        figures += compare(
+            f"sphere of {ratio:g} times water's density", times, depths, theory, FAR * RADIUS, 0.15 if quick else 0.1
+        )
         series |= columns(f"sphere_{ratio:g}", times, depths, theory)
 
     def draw(plot: Any) -> None:
@@ -176,7 +178,9 @@ def compare(
     off = float(np.sqrt(np.mean((depths[until] - theory[until]) ** 2)) / far)
     source = "von Karman 1929; Zhao and Faltinsen 1993" if "wedge" in name else "cavity drag 0.30, added mass 1/4"
     return [
-        Figure(f"{name}: depth at {1e3 * at:.0f} ms, over theory's", ratio, "", 1.0 - within, 1.0 + within, "1", source),
+        Figure(
+            f"{name}: depth at {1e3 * at:.0f} ms, over theory's", ratio, "", 1.0 - within, 1.0 + within, "1", source
+        ),
         Figure(f"{name}: rms off theory until then", 100.0 * off, "%", reference="0", source=source),
     ]
 
