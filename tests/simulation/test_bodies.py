@@ -261,3 +261,20 @@ def test_a_body_falls_as_gravity_does_that_changes():
     sim = wt.Simulation(scene)
     sim.advance(1.0)
     assert sim.bodies["ball"].velocity == pytest.approx([8 / np.pi, 0, 0], rel=0.01)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_body_of_voxels_rests_on_the_walls_of_the_tank(dim):
+    """A cup, which is a difference, slides down a wall to the floor, in a tilted gravity."""
+    outer, inner = (0.3, 0.3, 0.3)[:dim], (0.2, 0.3, 0.2)[:dim]
+    cup = wt.Difference(
+        name="cup", center=(0.4, 0.5, 0.5)[:dim], density=3000.0, friction=0.0,
+        parts=[wt.Box(center=(0, 0, 0)[:dim], size=outer), wt.Box(center=(0, 0.1, 0)[:dim], size=inner)],
+    )  # fmt: skip
+    sim = wt.Simulation(wt.Scene(
+        spacing=0.05, tank=wt.Tank(size=(1.0, 1.0, 1.0)[:dim]), solids=[cup], gravity=(-3.0, -9.0, 0.0)[:dim],
+        fluids=[wt.Block(lower=(0.7, 0, 0)[:dim], upper=(1.0, 0.1, 1.0)[:dim])],
+    ))  # fmt: skip
+    sim.advance(2.0)
+    assert sim.bodies["cup"].position[:2].tolist() == pytest.approx([0.15, 0.15], abs=0.02)
+    assert np.linalg.norm(sim.bodies["cup"].velocity) < 0.02

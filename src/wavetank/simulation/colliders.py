@@ -11,6 +11,7 @@ from wavetank.solids.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, Un
 from wavetank.solids.solid import Solid
 
 VOXELS = 32  # across what is made of voxels, at least
+THICK = 100.0  # m: half of the edge of a box that stands for a half-space
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 Placed = tuple[np.ndarray, np.ndarray, Any]  # position [m] and rotation in the solid's frame, and the shape there
 
@@ -34,7 +35,10 @@ def shapes_of(solid: Solid, dim: int, spacing: float) -> list[Placed]:
         make = shapes.capsule_y if isinstance(solid, Capsule) else shapes.cylinder
         return [(middle, node.turn, make(half_height, radius))]
     if isinstance(solid, HalfSpace):
-        return [(middle, UPRIGHT, shapes.halfspace([float(n) for n in (*solid.normal, 0.0)[:3]]))]
+        # A large box: the engine knows no contact of voxels with a half-space.
+        normal = np.array([float(n) for n in (*solid.normal, 0.0)[:3]])
+        normal /= np.linalg.norm(normal)
+        return [(-THICK * normal, _upwards(normal), shapes.cuboid(THICK, THICK, THICK))]
     if isinstance(solid, Union):
         return [
             (part.origin + turned(part.quaternion, place), product(part.quaternion, turn), shape)
@@ -47,6 +51,13 @@ def shapes_of(solid: Solid, dim: int, spacing: float) -> list[Placed]:
         closed = solid.is_body and solid.thickness is None
         return [(middle, UPRIGHT, (shapes.convex_decomposition if closed else shapes.trimesh)(points, faces))]
     return [] if getattr(solid, "invert", False) else [_of_voxels(solid, dim, spacing)]
+
+
+def _upwards(normal: np.ndarray) -> np.ndarray:
+    """Return the quaternion that turns y to a unit vector."""
+    turn = np.array([1.0 + normal[1], normal[2], 0.0, -normal[0]])  # of half the angle about y x normal
+    length = float(np.linalg.norm(turn))
+    return turn / length if length > 1e-6 else np.array([0.0, 1.0, 0.0, 0.0])
 
 
 def _of_voxels(solid: Solid, dim: int, spacing: float) -> Placed:

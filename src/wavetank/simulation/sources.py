@@ -233,8 +233,8 @@ def check_places(sim: Water) -> None:
         now = emitter.at(scene.start_time)
         mouth = now.mouth(scene.spacing)
         x, _ = flown(scene, emitter, mouth, row(mouth), scene.start_time, _step(sim))
-        size = scene.tank.size if scene.tank else None
-        inside = np.ones(len(x), bool) if size is None else np.all((x >= 0.0) & (x <= np.array(size)), axis=1)
+        lower, upper = scene.tank.box() if scene.tank else (-math.inf, math.inf)
+        inside = np.all((x >= np.array(lower)) & (x <= np.array(upper)), axis=1)
         if not (sim.free_places(x, 0.0, scene.wall_gap * scene.spacing) & inside).any():
             raise WavetankError(
                 f"emitters[{number}] is inside of a solid or outside of the tank, and nothing can come out; move its "

@@ -131,7 +131,8 @@ def _sources(
 def _solve(along_x: np.ndarray, along_y: np.ndarray, free: np.ndarray, rhs: np.ndarray) -> np.ndarray:
     """Return the potentials for these sources, zero at nodes that are not free: block elimination, column by column."""
     nx, ny = free.shape
-    blocks, sides = [], rhs.copy()
+    blocks: list[np.ndarray] = []
+    sides = rhs.copy()
     for i in range(nx):
         own = np.zeros((ny, ny))
         down = np.diag(along_y[i])
