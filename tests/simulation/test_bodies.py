@@ -264,7 +264,7 @@ def test_a_body_falls_as_gravity_does_that_changes():
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_a_body_of_voxels_rests_on_the_walls_of_the_tank(dim):
+def test_a_cup_rests_on_the_walls_of_the_tank(dim):
     """A cup, which is a difference, slides down a wall to the floor, in a tilted gravity."""
     outer, inner = (0.3, 0.3, 0.3)[:dim], (0.2, 0.3, 0.2)[:dim]
     cup = wt.Difference(
