@@ -34,6 +34,17 @@ def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return v + 2.0 * np.cross(q[1:], np.cross(q[1:], v) + q[0] * v)
 
 
+def matrix_of(rotations: np.ndarray) -> np.ndarray:
+    """Return the rotation matrices [n, 3, 3] of unit quaternions [n, 4]."""
+    w, x, y, z = rotations.T
+    rows = [
+        [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
 def turn_from_y(axis: np.ndarray) -> np.ndarray:
     """Return the shortest turn that takes the y axis to the direction of `axis` (identity for a zero vector)."""
     length = float(np.linalg.norm(axis))

@@ -218,6 +218,7 @@ def stopped(origin, target, near, solids: SolidSet, gap, mass):
     turn, moved = 0, 1
     while turn < 2 and moved == 1:
         moved = 0
+        last, push = -1, vec3(0.0, 0.0, 0.0)
         k = next_near(near, solids.tank_count - 1, solids)
         while k < solids.count:
             rotation = solids.rotation[k]
@@ -229,13 +230,17 @@ def stopped(origin, target, near, solids: SolidSet, gap, mass):
                 target = solids.position[k] + rotate(rotation, out)
                 moved = 1
                 if mass > 0.0:
-                    push_back(solids, k, target, mass * (target - before))
+                    last, push = k, target - before
+                    push_back(solids, k, target, mass * push)
             k = next_near(near, k, solids)
         walls = near
         if moved == 1:  # perhaps farther than its marks reach
             walls |= (1 << solids.tank_count) - 1
         inside = kept_in_tank(target, walls, solids, gap)
         if (inside - target).norm_sqr() > 0.0:
+            if last >= 0:  # what is held between body and tank goes nowhere, and is no push
+                undone = qd.max(0.0, qd.min(1.0, (target - inside).dot(push) / push.norm_sqr()))
+                push_back(solids, last, target, (-mass * undone) * push)
             target = inside
             moved = 1
         turn += 1

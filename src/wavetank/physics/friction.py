@@ -42,11 +42,15 @@ def apply_friction(
                         * c.wall_density
                         / c.h
                     )
-                    relative = v - surface_velocity(solids, k, p, c.dt)
+                    moving = surface_velocity(solids, k, p, c.dt)
+                    relative = v - moving
                     slip = relative - n * n.dot(relative)
                     share = solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12)
                     if k >= solids.tank_count and value.w < c.h:
-                        share += c.calming_at_solids * qd.max(0.0, 1.0 - slip.norm_sqr() * c.slow_at_solids)
+                        calming = c.calming_at_solids * qd.max(0.0, 1.0 - slip.norm_sqr() * c.slow_at_solids)
+                        if solids.unit[k] > 0.0:  # a body that is on its way is not held up
+                            calming *= qd.max(free(), 1.0 - moving.norm_sqr() * resting() * c.slow_at_solids)
+                        share += calming
                     change = slip * qd.min(1.0, share)
                     v -= change
                     push_back(solids, k, p - n * value.w, -change * (c.dt / scratch.weight[i]))
@@ -54,6 +58,18 @@ def apply_friction(
             for axis in qd.static(range(held.n)):
                 held[axis] = v[axis]
             particles.v[i] = held
+
+
+@qd.func
+def resting():
+    """Inverse square of the speed up to which a body is taken for one at rest, over that of slow sliding."""
+    return 36.0
+
+
+@qd.func
+def free():
+    """Share of the calming that is left for a body on its way."""
+    return 0.1
 
 
 @qd.func

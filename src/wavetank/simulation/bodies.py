@@ -1,20 +1,8 @@
 """Bodies: solids that water and other solids move. Contact, joints and motion are the engine's (Rapier).
 
 A step of water sees bodies as it sees every solid, in the motion that the engine gave them for the step: no particle
-passes them. What it did to them (`physics/reactions.py`) they get in the next step. That alone explodes where a body is
-light: the water answers a push with more than the body weighs (Causin et al. 2005, 10.1016/j.cma.2004.12.005). So a
-body is as heavy as the water that it takes along as well, and that part of its weight is pushed by what accelerated it
-in the step before:
-
-    (m + m_a) dv = P + m g dt + m_a dv_before
-
-Where dv does not change, that is m dv = P + m g dt, whatever m_a is; what it adds to the momentum of one step it takes
-from later ones. It is stable where m_a is more than half of what the water really adds (docs/bodies.md).
-
-    code       symbol       meaning                                                     unit
-    impulse    P            what the water gave in a step                               kg m/s, kg m^2/s
-    added      m_a          mass of the water that goes along, by how much is immersed  kg
-    change     dv_before    change of velocity in the step before                       m/s, rad/s
+passes them. What the water did to them moves them in the next step, or at once where it is by far not what it was
+(`coupling.py`).
 """
 
 from collections.abc import Iterator, Mapping
@@ -25,7 +13,7 @@ from typing_extensions import override
 
 from wavetank.device.compiler import download, upload
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.rotations import inverse, product, turned, unit_quaternion
+from wavetank.foundation.rotations import product, turned, unit_quaternion
 from wavetank.physics.bodies import Pieces, Retry, new_pieces
 from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED, carried
 from wavetank.physics.mixture import blend
@@ -36,15 +24,15 @@ from wavetank.scene.scene import Scene
 from wavetank.simulation.added_mass import added_mass
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
+from wavetank.simulation.coupling import TOLERANCE, Coupling
 from wavetank.simulation.joints import put_joint
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.solids.distance import PARTS
-from wavetank.solids.mass import Ruler, inertia_of, water_of
+from wavetank.solids.mass import Inertia, Ruler, inertia_of, water_of
 from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
-TOLERANCE = 0.1  # of sqrt(g d), or of the fastest body: change of a body's velocity that is worth a second step
-MOST_TRIES = 3  # of a step
+MOST_TRIES = 4  # of a step
 FEWEST = 6.0  # pieces across a body
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
 
@@ -71,7 +59,8 @@ class Bodies(Mapping[str, Body]):
         self.gravity = np.zeros(3)  # m/s^2, of the present step
         self.pieces: Pieces | None = None  # of all bodies, on the device
         solids.feeling, solids.passing = {}, {}
-        if not any(solid.is_body for solid in solids.members):
+        numbers = [number for number, solid in enumerate(solids.members) if solid.is_body]
+        if not numbers:
             return
         self.density = blend(scene.materials_of(scene.kinds()), scene).largest_density
         self.engine = import_engine()
@@ -80,6 +69,7 @@ class Bodies(Mapping[str, Body]):
         self.handles = [self._add(number, solid) for number, solid in enumerate(solids.members)]
         for joint in scene.joints:
             put_joint(self.engine, self.world, self.handles, solids, joint)
+        self._weigh_all(numbers)
         solids.feel({body.number: (body.dry.center, body.unit) for body in self.members})
         self.pieces = self._pieces()
 
@@ -118,42 +108,55 @@ class Bodies(Mapping[str, Body]):
         for position, rotation, shape in shapes_of(solid, self.dim, self.scene.spacing):
             collider = engine.Collider.new(shape).position(self._isometry(position, rotation))
             self.world.add_collider(collider.density(0.0).friction(friction).restitution(solid.restitution), handle)
-        if solid.is_body:
-            self.members.append(self._body(number, solid, handle))
         return handle
 
-    def _body(self, number: int, solid: Solid, handle: Any) -> Body:
-        spacing, dim, density = self.scene.spacing, self.dim, self.density
-        cut = Ruler(solid, dim, spacing).cut()
-        dry, wet = inertia_of(solid, cut), water_of(cut, density)
-        axes = tuple(map(float, wet.axes[3 - dim :]))
-        mass, inertia = added_mass(axes)
-        # Of one that is round nothing goes along, but for what is about an edge or a wall near by.
-        inertia = inertia * wet.mass * max(axes) ** 2 + 2.0 * float(np.trace(wet.tensor)) / (3.0 if dim == 3 else 2.0)
-        around = LAYERS * dim * (solid.reach() / spacing + 3.0) ** (dim - 1)
-        unit = 2.0**31 / (4.0 * (wet.mass / (density * spacing**dim) + around) * spacing)
+    def _weigh_all(self, numbers: list[int]) -> None:
+        """Find how the mass of the bodies lies in them, and the water that goes along with them."""
+        inertias, added = [], []
+        for number in numbers:
+            solid = self.solids.members[number]
+            cut = Ruler(solid, self.dim, self.scene.spacing).cut()
+            dry, wet = inertia_of(solid, cut), water_of(cut, self.density)
+            axes = tuple(map(float, wet.axes[3 - self.dim :]))
+            mass, inertia = added_mass(axes)
+            # Of one that is round nothing goes along, but for what is about an edge or a wall near by.
+            around = 2.0 * float(np.trace(wet.tensor)) / (3.0 if self.dim == 3 else 2.0)
+            added.append((mass * wet.mass, inertia * wet.mass * max(axes) ** 2 + around))
+            inertias.append((dry, wet))
+        masses = np.array([dry.mass for dry, _ in inertias])
+        tensors = np.array([dry.tensor for dry, _ in inertias])
+        reaches = [self.solids.members[number].reach() for number in numbers]
+        self.coupling = Coupling(masses, tensors, np.array(reaches), np.array(added))
+        self.moments, frames = np.linalg.eigh(tensors)
+        frames[np.linalg.det(frames) < 0.0, :, 0] *= -1.0
+        self.frames = [self.engine.Rotation3(*_quaternion(matrix)) for matrix in frames]
+        for row, number in enumerate(numbers):
+            self._put(row, number, *inertias[row])
+
+    def _put(self, row: int, number: int, dry: Inertia, wet: Inertia) -> None:
+        """Put a body among the others; how fine its sums are follows from how many particles can press on it."""
+        solid, handle, spacing = self.solids.members[number], self.handles[number], self.scene.spacing
+        around = LAYERS * self.dim * (solid.reach() / spacing + 3.0) ** (self.dim - 1)
+        unit = 2.0**31 / (4.0 * (wet.mass / (self.density * spacing**self.dim) + around) * spacing)
         body = Body(
             self.solids.names[number], number, solid, lambda: self.world.rigid_bodies[handle],
-            lambda: self.solids.poses[number], dim, dry, wet, (mass * wet.mass, inertia), unit,
+            lambda: self.solids.poses[number], self.dim, dry, wet, unit, self.coupling, row,
         )  # fmt: skip
-        self._weigh(body)
+        self.members.append(body)
+        self._weigh(body, body.rigid())
         if solid.velocity is not None:
             body.velocity = solid.velocity
         if solid.angular_velocity is not None:
             spin = solid.angular_velocity
             body.angular_velocity = (0.0, 0.0, spin) if isinstance(spin, int | float) else spin
-        return body
 
-    def _weigh(self, body: Body) -> None:
+    def _weigh(self, body: Body, rigid: Any) -> None:
         """Tell the engine the mass of a body and of the water that goes along."""
-        added, inertia = (body.taken * part for part in body.added)
-        moments, axes = np.linalg.eigh(body.dry.tensor + inertia * np.eye(3))
-        if np.linalg.det(axes) < 0.0:
-            axes[:, 0] = -axes[:, 0]
-        frame = self.engine.Rotation3(*_quaternion(axes))
-        mass = body.dry.mass + added
-        properties = self.engine.MassProperties(body.dry.center.tolist(), mass, moments.tolist(), frame)
-        body.rigid().set_additional_mass_properties(properties)
+        mass, inertia = self.coupling.along[body.row]
+        moments = (self.moments[body.row] + inertia).tolist()
+        center, frame = body.dry.center.tolist(), self.frames[body.row]
+        properties = self.engine.MassProperties(center, body.dry.mass + float(mass), moments, frame)
+        rigid.set_additional_mass_properties(properties)
 
     def _pieces(self) -> Pieces:
         """Return the pieces of all bodies on the device."""
@@ -170,37 +173,22 @@ class Bodies(Mapping[str, Body]):
     def advance(self, gravity: tuple[float, ...], dt: float, share: float, fastest: float) -> None:
         """Move the bodies for a step of `dt` [s], which ends at a `share` of the frame; none is left faster [m/s]."""
         self.fastest, self.gravity = fastest, np.array([*gravity, 0.0][:3])
-        for body in self.members:
-            self._hold(body, self._is_held(body))
-            self._weigh(body)
-            impulse = body.impulse - body.early + body.taken * body.added_row * body.change
-            impulse[:3] += body.dry.mass * self.gravity * (body.lasted or dt)
-            self._push(body, impulse)
-            self._limit(body)
+        rigid, rotations = [body.rigid() for body in self.members], self._rotations()
+        self.coupling.held = np.array([self._is_held(body) for body in self.members])
+        wanted = self.coupling.begin(rotations, self.gravity, dt)
+        for body, now, row in zip(self.members, rigid, wanted, strict=True):
+            self._hold(body, now)
+            self._weigh(body, now)
+            self._set_velocity(now, row, body.solid.reach())
+        begun = self._velocities(rigid)
         for number in self.solids.targets:
             pose = self._isometry(*self.solids.between(number, share))
             self.world.rigid_bodies[self.handles[number]].set_next_kinematic_position(pose)
         self.world.integration_parameters.dt = dt
         self.world.step()
-        for body in self.members:
-            velocity = self._velocity(body)
-            body.change, body.velocity_row = velocity - body.velocity_row, velocity
-            body.expected, body.early = body.impulse * (dt / (body.lasted or dt)), np.zeros(6)
-            body.carried, body.lasted = body.by_grid, dt
-            self._pass(body, self.solids.poses[body.number])
-
-    def _push(self, body: Body, impulse: np.ndarray) -> None:
-        """Give a body, and the water that goes along, an impulse [kg m/s, kg m^2/s].
-
-        The engine would ask for masses that it takes over in its next step only.
-        """
-        added, inertia = (body.taken * part for part in body.added)
-        velocity, rotation = self._velocity(body), self._pose(body)[1]
-        spin = np.linalg.solve(body.dry.tensor + inertia * np.eye(3), turned(inverse(rotation), impulse[3:]))
-        if self.dim == 2:
-            spin[:2] = 0.0
-        body.rigid().linvel = (velocity[:3] + impulse[:3] / (body.dry.mass + added)).tolist()
-        body.rigid().angvel = (velocity[3:] + turned(rotation, spin)).tolist()
+        self.coupling.start(rotations, wanted, begun, self._velocities(rigid), dt)
+        for body, now in zip(self.members, rigid, strict=True):
+            self._pass(body, now, self.solids.poses[body.number])
 
     def step(self, world: World, scene: Scene, dt: float, fastest: float, part: tuple[float, float]) -> None:
         """Let the water take a step of `dt` [s], which is that `part` of a frame.
@@ -224,80 +212,73 @@ class Bodies(Mapping[str, Body]):
         sums = download(world.solids.reaction).astype(float).reshape(-1, PARTS)
         upload(world.solids.reaction, np.zeros(sums.size, np.int32))
         particle = blend(world.materials, self.scene).largest_density * self.scene.spacing**self.dim
-        share = carried(dt, self.scene.frame_time)
-        limit = LARGEST_CARRIED * float(np.linalg.norm(self.gravity))
+        rows = sums[[body.number for body in self.members]] / np.array([[body.unit] for body in self.members])
+        coupling, wet = self.coupling, np.array([body.wet.mass for body in self.members])
+        scale = np.repeat(np.stack([np.ones(len(wet)), coupling.reaches], axis=1), 3, axis=1) * (particle / dt)
+        grid = rows[:, OF_GRID : OF_GRID + 6] * scale
+        force = carried(dt, self.scene.frame_time) * coupling.carried + grid / dt
+        most = LARGEST_CARRIED * float(np.linalg.norm(self.gravity)) * wet
+        share = np.minimum(1.0, most / np.maximum(np.linalg.norm(force[:, :3], axis=1), 1e-30))
+        coupling.by_grid = force * share[:, None]
+        coupling.impulse = rows[:, :6] * scale + force * dt
         cell = world.levels[0].dy if world.levels else 1.0
-        for body in self.members:
-            row = sums[body.number] / body.unit
-            scale = np.repeat([1.0, body.solid.reach()], 3) * particle / dt
-            direct, grid = row[:6] * scale, row[OF_GRID : OF_GRID + 6] * scale
-            body.immersed = min(1.0, row[IMMERSION] * particle / (body.wet.mass * cell))
-            force = share * body.carried + grid / dt
-            body.by_grid = force * min(1.0, limit * body.wet.mass / max(float(np.linalg.norm(force[:3])), 1e-30))
-            body.impulse = direct + force * dt
+        coupling.immersed = np.minimum(1.0, rows[:, IMMERSION] * particle / (wet * cell))
 
     def yielded(self, dt: float) -> bool:
         """Let bodies yield that were pushed by far more than in the step before; say whether any was.
 
         The step of `dt` [s] is then to be taken again: the water pushed as if the body could not give way.
         """
-        fastest = max(float(np.linalg.norm(body.velocity_row[:3])) for body in self.members)
+        fastest = float(np.linalg.norm(self.coupling.velocity[:, :3], axis=1).max())
         slow = TOLERANCE * max(float(np.linalg.norm(self.gravity) * self.scene.spacing) ** 0.5, fastest)
-        any_yielded = False
-        for body in self.members:
-            step = (body.impulse - body.expected - body.early) / (body.dry_row + body.taken * body.added_row)
-            change = max(np.linalg.norm(step[:3]), np.linalg.norm(step[3:]) * body.solid.reach())
-            if change > slow and not self._is_held(body):
-                self._yield(body, step, dt)
-                any_yielded = True
-        return any_yielded
-
-    def _yield(self, body: Body, step: np.ndarray, dt: float) -> None:
-        """Let a body be faster by `step` [m/s, rad/s] in this step already."""
-        rigid = body.rigid()
-        body.early = body.early + body.dry_row * step
-        rigid.linvel = (body.velocity_row[:3] + step[:3]).tolist()
-        rigid.angvel = (body.velocity_row[3:] + step[3:]).tolist()
-        self._limit(body)
-        step, body.velocity_row = self._velocity(body) - body.velocity_row, self._velocity(body)
-        position, rotation = self._pose(body)
-        center = position + turned(rotation, body.dry.center)
-        rotation = unit_quaternion([*(rotation + 0.5 * dt * product(np.array([0.0, *step[3:]]), rotation))])
-        rigid.position = self._isometry(center + dt * step[:3] - turned(rotation, body.dry.center), rotation)
-        self._pass(body, self.solids.passing[body.number][0])
+        rotations = self._rotations()
+        steps = self.coupling.yielding(rotations, slow)
+        moved, real = np.flatnonzero(steps.any(axis=1)), np.zeros_like(steps)
+        for row in moved:
+            body, before = self.members[row], self.coupling.velocity[row]
+            rigid = body.rigid()
+            self._set_velocity(rigid, before + steps[row], body.solid.reach())
+            step = real[row] = self._velocities([rigid])[0] - before
+            position, rotation = self._pose(rigid)
+            center = position + turned(rotation, body.dry.center)
+            rotation = unit_quaternion([*(rotation + 0.5 * dt * product(np.array([0.0, *step[3:]]), rotation))])
+            rigid.position = self._isometry(center + dt * step[:3] - turned(rotation, body.dry.center), rotation)
+            self._pass(body, rigid, self.solids.passing[body.number][0])
+        self.coupling.move_on(rotations, steps, real)
+        return len(moved) > 0
 
     def _is_held(self, body: Body) -> bool:
         return body.solid.held or body.number in self.solids.targets
 
-    def _hold(self, body: Body, held: bool) -> None:
+    def _hold(self, body: Body, rigid: Any) -> None:
         """Let a body stay where it is, or is moved to; let it go as fast as it was moved."""
-        kinds, rigid = self.engine.RigidBodyType, body.rigid()
+        kinds, held = self.engine.RigidBodyType, self._is_held(body)
         kind = kinds.KINEMATIC_POSITION_BASED if held else kinds.DYNAMIC
         if rigid.body_type != kind:
             rigid.body_type = kind
         if held:
             rigid.set_next_kinematic_position(self._isometry(*self.solids.poses[body.number]))
 
-    def _pass(self, body: Body, begin: Pose) -> None:
-        self.solids.passing[body.number] = (begin, self._pose(body))
-        self.solids.poses[body.number] = self._pose(body)
+    def _pass(self, body: Body, rigid: Any, begin: Pose) -> None:
+        end = self._pose(rigid)
+        self.solids.passing[body.number] = (begin, end)
+        self.solids.poses[body.number] = end
 
-    def _limit(self, body: Body) -> None:
-        """Keep a body's surface from being faster than the water may get."""
-        velocity, rigid = self._velocity(body), body.rigid()
-        speed, spin = np.linalg.norm(velocity[:3]), np.linalg.norm(velocity[3:]) * body.solid.reach()
-        if speed > self.fastest:
-            rigid.linvel = (velocity[:3] * (self.fastest / speed)).tolist()
-        if spin > self.fastest:
-            rigid.angvel = (velocity[3:] * (self.fastest / spin)).tolist()
+    def _set_velocity(self, rigid: Any, row: np.ndarray, reach: float) -> None:
+        """Set the velocity [6] of a body; no part of its surface is left faster than the water may get."""
+        speed, spin = float(np.linalg.norm(row[:3])), float(np.linalg.norm(row[3:])) * reach
+        rigid.linvel = (row[:3] * min(1.0, self.fastest / max(speed, 1e-30))).tolist()
+        rigid.angvel = (row[3:] * min(1.0, self.fastest / max(spin, 1e-30))).tolist()
 
-    def _velocity(self, body: Body) -> np.ndarray:
-        v, w = body.rigid().linvel, body.rigid().angvel
-        return np.array([v.x, v.y, v.z, w.x, w.y, w.z])
+    def _velocities(self, rigid: list[Any]) -> np.ndarray:
+        return np.array([(*_three(now.linvel), *_three(now.angvel)) for now in rigid])
 
-    def _pose(self, body: Body) -> Pose:
-        p, q = body.rigid().translation, body.rigid().rotation
-        return np.array([p.x, p.y, p.z]), np.array([q.w, q.i, q.j, q.k])
+    def _rotations(self) -> np.ndarray:
+        return np.array([self.solids.poses[body.number][1] for body in self.members])
+
+    def _pose(self, rigid: Any) -> Pose:
+        q = rigid.rotation
+        return np.array(_three(rigid.translation)), np.array([q.w, q.i, q.j, q.k])
 
     def _isometry(self, position: np.ndarray, rotation: np.ndarray) -> Any:
         return self.engine.Isometry3([*map(float, position)], self.engine.Rotation3(*map(float, rotation)))
@@ -307,27 +288,32 @@ class Bodies(Mapping[str, Body]):
     def renewed(self, scene: Scene, solids: MovingSolids) -> "Bodies":
         """Return the bodies among these solids; those that there were go on as they did."""
         bodies = Bodies(scene, solids)
+        memories: Any = self.coupling.memory() if self.members else []
         for body in bodies.members:
-            before = next((other for other in self.members if other.name == body.name), None)
-            if before is not None:
-                body.recall(before.memory())
-                body.velocity, body.angular_velocity = before.velocity, before.angular_velocity
+            for before, memory in zip(self.members, memories, strict=True):
+                if before.name == body.name:
+                    bodies.coupling.recall(body.row, memory)
+                    body.velocity, body.angular_velocity = before.velocity, before.angular_velocity
         return bodies
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return all that decides how the bodies go on, for a snapshot."""
         if not self.members:
             return {}
-        memories = np.stack([body.memory() for body in self.members])
-        return {"bodies_memory": memories, "bodies_engine": np.frombuffer(self.world.snapshot(), np.uint8).copy()}
+        engine = np.frombuffer(self.world.snapshot(), np.uint8).copy()
+        return {"bodies_memory": self.coupling.memory(), "bodies_engine": engine}
 
     def resume(self, arrays: dict[str, np.ndarray]) -> None:
         """Go on from what `arrays` returned, with the same solids."""
         if not self.members:
             return
         self.world = self.engine.PhysicsWorld.restore(arrays["bodies_engine"].tobytes())
-        for body, memory in zip(self.members, arrays["bodies_memory"], strict=True):
-            body.recall(memory)
+        for row, memory in enumerate(arrays["bodies_memory"]):
+            self.coupling.recall(row, memory)
+
+
+def _three(v: Any) -> tuple[float, float, float]:
+    return (v.x, v.y, v.z)
 
 
 def _quaternion(matrix: np.ndarray) -> tuple[float, ...]:

@@ -61,9 +61,18 @@ def below_roof(grid: CoarseGrid, n, c: Coefficients):
 
 
 @qd.func
+def mostly():
+    """Room of a node that a solid takes so little of that its fill can be told."""
+    return 0.75
+
+
+@qd.func
 def in_part(grid: CoarseGrid, n):
-    """The same for a node whose cell a solid takes a part of: where all open nodes beside it, see `gaps`, are full."""
-    emptiest = 2.0
+    """The same for a node whose cell a solid takes a part of: where all open nodes beside it, see `gaps`, are full.
+
+    Where none is open, as below a roof near the face of a cell, those count that are mostly so.
+    """
+    emptiest, emptiest_most = 2.0, 2.0
     for axis in qd.static(range(3)):
         if grid.nz > 1 or axis < 2:
             for side in qd.static((-1, 1)):
@@ -72,6 +81,10 @@ def in_part(grid: CoarseGrid, n):
                 at = nearest(grid, c)
                 if grid.room[at] >= whole():
                     emptiest = qd.min(emptiest, grid.gaps[at])
+                elif grid.room[at] >= mostly() and at != n:
+                    emptiest_most = qd.min(emptiest_most, grid.gaps[at])
+    if emptiest == 2.0 and grid.room[n] < mostly():
+        emptiest = emptiest_most
     return is_water(emptiest) if emptiest < 2.0 else 0.0
 
 

@@ -1,0 +1,165 @@
+"""How bodies move by what the water did to them: all of them at once, one row each.
+
+A step of water sees a body in the motion that it has for the step, as it sees every solid, and answers with a push
+(`physics/reactions.py`). Momentum wants a change of velocity dv with
+
+    m dv = P(dv) + m g dt + O
+
+where O is what the steps before left over. A body that moves by the push of the last step explodes where it is light:
+the water answers with more than the body weighs (Causin et al. 2005, 10.1016/j.cma.2004.12.005). So the push is taken
+for one that falls as the body gives way, P = P_before - k (dv - dv_before), where k is the water that goes along:
+
+    (m + k) dv = P_before + k dv_before + m g dt + O
+
+What turns out to be wrong of it, O = the right-hand side of the first equation less the left, is made up for in the
+next step; no momentum is lost, whatever k is. That is stable where k is more than three quarters of what it really is.
+Where it is by far wrong, where a body hits the water, the body yields by O / (m + k) and the step is taken again. Two
+answers of the water say what k is (their secant), which the next steps go by; deep in the water it is that of an
+ellipsoid (`added_mass.py`).
+
+    code       symbol       meaning                                                          unit
+    impulse    P            what the water gave in a step                                    kg m/s, kg m^2/s
+    change     dv_before    change of velocity in the step before, without how it yielded    m/s, rad/s
+    along      k            mass and moment of inertia of the water that goes along          kg, kg m^2
+    due        m g dt + O   what a body gets by this step but for P,
+    given      m dv         and what it has got; the engine's own change dv_c (contact, joints) moved k as well, so
+                            that of its momentum (m + k) dv_c a body has not got k dv_c
+"""
+
+import numpy as np
+
+from wavetank.foundation.rotations import matrix_of
+
+TOLERANCE = 0.1  # of sqrt(g d), or of the fastest body: change of a body's velocity that is worth a second step
+AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
+AT_ONCE = 0.2  # of what is owed: more would ring
+STAYS = 0.9  # share that is left after a step of what was seen of how much water goes along
+MOST = 4.0  # of the water that goes along with an immersed body: most that is believed
+ROWS = (
+    "impulse", "due", "given", "change", "carried", "by_grid", "velocity", "before", "seen_push", "seen_gain",
+)  # fmt: skip
+
+
+class Coupling:
+    """What bodies have got from the water and what they are still to get; rows are motion and turn."""
+
+    def __init__(self, masses: np.ndarray, tensors: np.ndarray, reaches: np.ndarray, added: np.ndarray) -> None:
+        """Begin at rest: `masses` [n] [kg], `tensors` [n, 3, 3] [kg m^2], `reaches` [n] [m], `added` [n, 2]."""
+        self.masses, self.tensors, self.reaches, self.added = masses, tensors, reaches, added
+        count = len(masses)
+        self.impulse, self.due, self.given = (np.zeros((count, 6)) for _ in range(3))  # kg m/s, kg m^2/s
+        self.carried = np.zeros((count, 6))  # N, N m: `by_grid` before the step
+        self.by_grid = np.zeros((count, 6))  # N, N m: by the pressure of the grid
+        self.velocity, self.change = np.zeros((count, 6)), np.zeros((count, 6))  # m/s, rad/s
+        self.along = np.zeros((count, 2))  # kg, kg m^2
+        self.before, self.seen_push, self.seen_gain = (np.zeros((count, 6)) for _ in range(3))
+        self.sums = np.zeros((count, 2, 2))
+        self.immersed = np.zeros(count)
+        self.held = np.zeros(count, bool)  # they have no momentum of their own
+        self.lasted = 0.0  # s, of the last step
+        self._asked = np.zeros((count, 6))  # what was owed at the try before,
+        self._moved = np.zeros((count, 6))  # and how far bodies yielded then
+
+    @property
+    def owed(self) -> np.ndarray:
+        """Momentum [n, 6] that bodies are still to get."""
+        return np.where(self.held[:, None], 0.0, self.due + self.impulse - self.given)
+
+    def begin(self, rotations: np.ndarray, gravity: np.ndarray, dt: float) -> np.ndarray:
+        """Return the velocities [n, 6] for a step of `dt` [s] of bodies that are turned so [n, 4], but for contact."""
+        self._learn()
+        owed = self.owed
+        weight = np.zeros_like(owed)
+        weight[:, :3] = self.masses[:, None] * gravity * dt
+        ratio = dt / (self.lasted or dt)
+        self.due = owed + weight
+        wanted = AT_ONCE * owed + weight + ratio * (self.impulse + np.repeat(self.along, 3, axis=1) * self.change)
+        return self.velocity + self.solved(rotations, wanted)
+
+    def start(
+        self, rotations: np.ndarray, wanted: np.ndarray, begun: np.ndarray, velocity: np.ndarray, dt: float
+    ) -> None:
+        """Begin a step of `dt` [s] with these velocities [n, 6]; `begun` they were before contact and joints.
+
+        What makes `begun` less than `wanted`, the speed limit, takes momentum for good.
+        """
+        self.given = self.weighed(rotations, wanted - self.velocity)
+        self.given -= np.repeat(self.along, 3, axis=1) * (velocity - begun)
+        self.change, self.velocity = velocity - self.velocity, velocity
+        self.carried, self.lasted = self.by_grid, dt
+        self._moved = np.zeros_like(velocity)
+
+    def _learn(self) -> None:
+        """See how much water goes along by how its push follows the changes of velocity from step to step."""
+        gained = self.velocity - self.before
+        self.before = self.velocity.copy()
+        push, way = self.impulse - self.seen_push, gained - self.seen_gain
+        self.seen_push, self.seen_gain = self.impulse.copy(), gained
+        for block, part in ((slice(0, 3), 0), (slice(3, 6), 1)):
+            now = np.stack([-(push[:, block] * way[:, block]).sum(axis=1), (way[:, block] ** 2).sum(axis=1)], axis=1)
+            self.sums[:, part] = STAYS * self.sums[:, part] + now
+        found = self.sums[..., 0] / np.maximum(self.sums[..., 1], 1e-30)
+        self.along = np.clip(found, self.taken()[:, None] * self.added, MOST * self.added)
+
+    def taken(self) -> np.ndarray:
+        """Share of `added` that goes along: that of a plate on the surface is a third of a cube's (Lamb 1932, 108)."""
+        touched = self.impulse.any(axis=1)
+        return np.maximum(np.cbrt(self.immersed), np.where(touched, AFLOAT, 0.0))
+
+    def yielding(self, rotations: np.ndarray, slow: float) -> np.ndarray:
+        """Return by how much bodies are to be faster [n, 6] for the step to be taken again; 0 for those that are not.
+
+        Those yield whose velocity is wrong by more than `slow` [m/s].
+        """
+        asked = self.owed
+        least = self.taken()[:, None] * self.added
+        known = self._moved.any(axis=1)
+        own = self.weighed(rotations, self._moved)
+        for block, part in ((slice(0, 3), 0), (slice(3, 6), 1)):
+            way = self._moved[:, block]
+            less = ((self._asked - asked - own)[:, block] * way).sum(axis=1)
+            found = less / np.where(known, np.maximum((way**2).sum(axis=1), 1e-30), 1.0)
+            self.along[known, part] = np.clip(found, least[:, part], MOST * self.added[:, part])[known]
+        self.along[~known] = np.maximum(self.along, least)[~known]
+        step, alone = self.solved(rotations, asked), self.solved(rotations, asked, 0.0)
+        wrong = np.maximum(np.linalg.norm(alone[:, :3], axis=1), np.linalg.norm(alone[:, 3:], axis=1) * self.reaches)
+        step[wrong <= slow] = 0.0
+        self._asked = asked
+        return step
+
+    def move_on(self, rotations: np.ndarray, step: np.ndarray, real: np.ndarray) -> None:
+        """Take note that bodies have yielded by `step` [n, 6], of which the speed limit has left `real`."""
+        self.given = self.given + self.weighed(rotations, step)
+        self.velocity = self.velocity + real
+        self._moved = real
+
+    def solved(self, rotations: np.ndarray, impulse: np.ndarray, share: float = 1.0) -> np.ndarray:
+        """Return the change of velocity [n, 6] by an impulse [n, 6] of bodies and a `share` of the water along."""
+        turn, along = matrix_of(rotations), share * self.along
+        tensors = turn @ self.tensors @ turn.transpose(0, 2, 1) + along[:, 1, None, None] * np.eye(3)
+        spin = np.linalg.solve(tensors, impulse[:, 3:, None])[..., 0]
+        return np.concatenate([impulse[:, :3] / (self.masses + along[:, 0])[:, None], spin], axis=1)
+
+    def weighed(self, rotations: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return the momentum [n, 6] of bodies by a velocity [n, 6]."""
+        turn = matrix_of(rotations)
+        spin = turn @ (self.tensors @ (turn.transpose(0, 2, 1) @ velocity[:, 3:, None]))
+        return np.concatenate([velocity[:, :3] * self.masses[:, None], spin[..., 0]], axis=1)
+
+    # --- states ---
+
+    def memory(self) -> np.ndarray:
+        """Return all that it remembers, float64 [n, 12, 6]."""
+        rest = np.zeros_like(self.impulse)
+        rest[:, 0], rest[:, 1], rest[:, 2:4], rest[:, 4] = self.immersed, self.lasted, self.along, self.held
+        sums = np.pad(self.sums.reshape(-1, 4), ((0, 0), (0, 2)))
+        return np.stack([*(getattr(self, name) for name in ROWS), rest, sums], axis=1)
+
+    def recall(self, number: int, memory: np.ndarray) -> None:
+        """Let body `number` remember a row [12, 6] of what `memory` returned."""
+        for name, row in zip(ROWS, memory, strict=False):
+            getattr(self, name)[number] = row
+        rest = memory[len(ROWS)]
+        self.immersed[number], self.lasted = rest[0], float(rest[1])
+        self.along[number], self.held[number] = rest[2:4], bool(rest[4])
+        self.sums[number] = memory[-1][:4].reshape(2, 2)
