@@ -17,9 +17,9 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 console = Console(stderr=True)
 
 CASE_NAMES = (
-    "buckling, calm-vorticity, coiling, column, creep, cup, drop, elliptical-drop, emitter, energy, gravity-current, "
-    "layers, lobovsky, lock-exchange, martin-moyce, momentum, resolution, rest, seeds, shear-wave, standing-wave, "
-    "still-tank, tension-drop"
+    "buckling, buoyancy, calm-vorticity, coiling, column, creep, cup, drop, elliptical-drop, emitter, energy, "
+    "gravity-current, heave, layers, lobovsky, lock-exchange, martin-moyce, momentum, resolution, rest, seeds, "
+    "shear-wave, standing-wave, still-tank, tension-drop, water-entry"
 )
 Cases = Annotated[list[str], typer.Argument(metavar="[CASE]...", help=f"{CASE_NAMES}; not rest, creep without one.")]
 SceneName = Annotated[str, typer.Argument(help="A bundled scene or the path of a TOML file.")]
