@@ -6,6 +6,7 @@ python docs/figures.py validation [case ...]
                                   validation/: a picture of every case of `wavetank validate`, or of these, and a table
 """
 
+import dataclasses
 import json
 import shutil
 import sys
@@ -28,6 +29,8 @@ from wavetank.view.style import QUALITIES
 
 DOCS = Path(__file__).parent
 VALIDATION = DOCS.parent / "validation"
+#: name -> eye of the gallery's picture [m], where the usual one looks at a wall
+SEEN_FROM = {"ducks": (0.9, 1.5, 1.5)}
 LARGEST = 80_000  # bytes of a picture there
 VALIDATION_HEAD = """# Validation
 
@@ -118,11 +121,14 @@ def gallery(names: list[str]) -> None:
         if name in names or not names:
             sim = wt.Simulation(scene)
             sim.advance(moment)
-            picture(sim, folder / f"{name}.jpg", 960, 540)
+            usual = Camera.framing_extent(extent_of_water(sim.frame()), 16 / 9)
+            camera = dataclasses.replace(usual, eye=SEEN_FROM.get(name, usual.eye))
+            picture(sim, folder / f"{name}.jpg", 960, 540, camera=camera)
             print(name, count, flush=True)
+        eye = f" --eye {','.join(map(str, SEEN_FROM[name]))}" if name in SEEN_FROM else ""
         rows.append(
             f"## {scene.title}\n\n![{scene.title}](gallery/{name}.jpg)\n\n"
-            f"`wavetank render {name} --at {moment:g} --set spacing={scene.spacing:g} --quality film`"
+            f"`wavetank render {name} --at {moment:g} --set spacing={scene.spacing:g}{eye} --quality film`"
             f" ({count:,} particles)\n"
         )
     head = "# Gallery\n\nEvery bundled scene, drawn by the command below its picture; made by `make gallery`.\n\n"

@@ -71,6 +71,17 @@ def bathtub(around: int = 96, wall: float = 0.1) -> tuple[np.ndarray, np.ndarray
     return turned(rings, around, formula)
 
 
+def boat(around: int = 96, wall: float = 0.045) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return an open boat, 1 m long and pointed at both ends, with walls and a floor."""
+    outer = [(0.30, 0.10, 0.0), (0.37, 0.135, 0.04), (0.43, 0.165, 0.12), (0.47, 0.18, 0.2), (0.5, 0.19, 0.28)]
+    inner = [(a - 1.3 * wall, b - wall, max(y, 0.05)) for a, b, y in reversed(outer[1:])]
+    rings = [(a, b, y, 1.55) for a, b, y in [*outer, *inner]]
+    formula = (
+        f"superellipses |x/a|^1.55 + |z/b|^1.55 = 1 along a profile: an open boat; wall {wall}; {around} steps around"
+    )
+    return turned(rings, around, formula)
+
+
 def vase(around: int = 96) -> tuple[np.ndarray, np.ndarray, str]:
     """Return what a vase encloses, closed above its neck: to be a container it is turned inside out."""
     y = np.linspace(0.0, 1.0, 41)
@@ -118,5 +129,6 @@ def write(name: str, vertices: np.ndarray, faces: np.ndarray, formula: str) -> N
 if __name__ == "__main__":
     write("knot", *knot())
     write("bathtub", *bathtub())
+    write("boat", *boat())
     write("vase", *vase())
     write_heights("valley", valley())

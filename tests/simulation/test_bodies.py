@@ -89,6 +89,18 @@ def test_a_disc_floats_in_a_plane():
     assert np.mean(heights) == pytest.approx(surface, abs=0.02)
 
 
+@pytest.mark.parametrize("spacing", [0.05, 0.02])
+def test_half_of_a_body_is_under_water(spacing):
+    """Whatever the unit of the sums, which depends on the spacing."""
+    scene = wt.Scene(
+        spacing=spacing, tank=wt.Tank(size=(1.0, 0.8)), fluids=[wt.Block(lower=(0, 0), upper=(1.0, 0.4))],
+        solids=[wt.Box(name="box", center=(0.5, 0.4), size=(0.3, 0.2), density=500, held=True)],
+    )  # fmt: skip
+    sim = wt.Simulation(scene)
+    sim.advance(0.5)
+    assert sim.bodies["box"].immersed == pytest.approx(0.5, abs=0.1)
+
+
 def test_momentum_goes_from_water_to_body():
     """Without gravity the sum of momenta and of their moments stays, and energy does not rise."""
     scene = wt.Scene(
@@ -178,8 +190,25 @@ def test_bodies_are_held_moved_and_let_go():
     assert sim.bodies["box"].velocity[1] > 2.0
     with pytest.raises(WavetankError, match="velocity = .* of body 'box' must be 3 finite numbers"):
         sim.bodies["box"].velocity = (0.0, np.nan, 0.0)
+    assert "box" in sim.bodies
+    assert "bow" not in sim.bodies
     with pytest.raises(WavetankError, match="no body named 'bow'; bodies: box"):
         _ = sim.bodies["bow"]
+
+
+def test_a_tank_without_gravity_has_bodies():
+    """Where nothing is deep."""
+    sim = pool(wt.Sphere(name="ball", center=(0.48, 0.4, 0.48), radius=0.1, density=500), gravity=(0, 0, 0))
+    sim.advance(0.1)
+    assert np.linalg.norm(sim.bodies["ball"].velocity) < 0.1
+    assert sim.bodies["ball"].immersed == 0.0
+
+
+def test_a_fast_body_begins_as_fast_as_it_is_said_to():
+    """The water's speed limit, that of a fall through the tank, is not a body's: 4.2 m/s here."""
+    sim = pool(wt.Sphere(name="shot", center=(0.48, 0.8, 0.48), radius=0.06, density=8000, velocity=(0, -12, 0)))
+    sim.step()
+    assert sim.bodies["shot"].velocity[1] == pytest.approx(-12.0 - 9.81 / 60, rel=1e-3)
 
 
 def test_bodies_come_and_go():
@@ -260,3 +289,20 @@ def test_a_body_falls_as_gravity_does_that_changes():
     sim = wt.Simulation(scene)
     sim.advance(1.0)
     assert sim.bodies["ball"].velocity == pytest.approx([8 / np.pi, 0, 0], rel=0.01)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_cup_rests_on_the_walls_of_the_tank(dim):
+    """A cup, which is a difference, slides down a wall to the floor, in a tilted gravity."""
+    outer, inner = (0.3, 0.3, 0.3)[:dim], (0.2, 0.3, 0.2)[:dim]
+    cup = wt.Difference(
+        name="cup", center=(0.4, 0.5, 0.5)[:dim], density=3000.0, friction=0.0,
+        parts=[wt.Box(center=(0, 0, 0)[:dim], size=outer), wt.Box(center=(0, 0.1, 0)[:dim], size=inner)],
+    )  # fmt: skip
+    sim = wt.Simulation(wt.Scene(
+        spacing=0.05, tank=wt.Tank(size=(1.0, 1.0, 1.0)[:dim]), solids=[cup], gravity=(-3.0, -9.0, 0.0)[:dim],
+        fluids=[wt.Block(lower=(0.7, 0, 0)[:dim], upper=(1.0, 0.1, 1.0)[:dim])],
+    ))  # fmt: skip
+    sim.advance(2.0)
+    assert sim.bodies["cup"].position[:2].tolist() == pytest.approx([0.15, 0.15], abs=0.02)
+    assert np.linalg.norm(sim.bodies["cup"].velocity) < 0.02

@@ -222,3 +222,19 @@ def test_sides_have_names():
         wt.Tank(size=(1, 1), open=["+z"])
     with pytest.raises(wt.WavetankError, match="both must have as many"):
         wt.Tank(size=(1, 1), lower=(0, 0, 0))
+
+
+def test_water_is_packed_around_bodies_under_a_tap():
+    """While it is packed bodies stay where they are, and nothing comes or goes."""
+    pytest.importorskip("rapier3d")
+    scene = wt.Scene(
+        spacing=0.05, tank=wt.Tank(size=(1.0, 1.0, 1.0)),
+        fluids=[wt.Filled(inside=wt.Sphere(center=(0.5, 0.5, 0.5), radius=0.4))],
+        solids=[wt.Sphere(name="ball", center=(0.5, 0.5, 0.5), radius=0.15, density=500)],
+        joints=[wt.Rope(first="ball", at=(0.5, 0.5, 0.5), to=(0.5, 0.0, 0.5))],
+        emitters=[wt.Emitter(position=(0.5, 0.9, 0.5), direction=(0, -1, 0), radius=0.1, speed=1.0)],
+    )  # fmt: skip
+    sim = wt.Simulation(scene)
+    assert sim.count == pytest.approx(4 / 3 * np.pi * (0.4**3 - 0.15**3) / 0.05**3, rel=0.02)
+    assert np.linalg.norm(sim.positions - 0.5, axis=1).min() > 0.15
+    assert sim.bodies["ball"].position.tolist() == [0.5, 0.5, 0.5]

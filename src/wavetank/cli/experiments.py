@@ -13,9 +13,9 @@ from wavetank import Scene, WavetankError
 from wavetank.cli.options import Arch, Json, SceneName, app, console
 
 CASE_NAMES = (
-    "buckling, calm-vorticity, coiling, column, creep, cup, drop, elliptical-drop, emitter, energy, gravity-current, "
-    "layers, lobovsky, lock-exchange, martin-moyce, momentum, resolution, rest, seeds, shear-wave, standing-wave, "
-    "still-tank, tension-drop"
+    "buckling, buoyancy, calm-vorticity, coiling, column, creep, cup, drop, elliptical-drop, emitter, energy, "
+    "gravity-current, heave, layers, lobovsky, lock-exchange, martin-moyce, momentum, resolution, rest, seeds, "
+    "shear-wave, standing-wave, still-tank, tension-drop, water-entry"
 )
 Cases = Annotated[list[str], typer.Argument(metavar="[CASE]...", help=f"{CASE_NAMES}; not rest, creep without one.")]
 

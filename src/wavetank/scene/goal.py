@@ -71,8 +71,15 @@ class Mix(Aim):
     kind: Literal["mix"] = "mix"
 
 
-AnyAim = Annotated[Fill | Dry | Deliver | Apart | Mix, Field(discriminator="kind")]
-for _kind in (Fill, Dry, Deliver, Apart, Mix):
+class Bring(Aim):
+    """Bring a body into the region: `share` is how much of it has to be there."""
+
+    kind: Literal["bring"] = "bring"
+    body: str  # the name of a solid with a density or a mass
+
+
+AnyAim = Annotated[Fill | Dry | Deliver | Apart | Mix | Bring, Field(discriminator="kind")]
+for _kind in (Fill, Dry, Deliver, Apart, Mix, Bring):
     register_model(_kind.model_fields["kind"].default, _kind)
 
 

@@ -7,7 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wavetank.scene.goal import Aim, Apart, Deliver, Dry, Fill, Mix
+from wavetank.device.compiler import download
+from wavetank.foundation.errors import WavetankError
+from wavetank.scene.goal import Aim, Apart, Bring, Deliver, Dry, Fill, Mix
 from wavetank.simulation.frame import Frame
 
 COLOR_REACH = 90.0  # of 255: how far a dye may be from the colour asked for
@@ -76,6 +78,22 @@ def mixed_share(aim: Aim, frame: Frame, start: int) -> float:
     return 1.0 - variance / (mean * (1.0 - mean))
 
 
+def brought_share(aim: Aim, frame: Frame, start: int) -> float:
+    """Return how much of a body is in the region: of the box around its origin that its ball holds."""
+    assert isinstance(aim, Bring)
+    names = [solid.name if solid.is_body else "" for solid in frame.scene.solids]
+    if aim.body not in names or not aim.body:
+        known = ", ".join(filter(None, names)) or "none"
+        raise WavetankError(f"goal.aims: there is no body named {aim.body!r}; bodies: {known}.")
+    number = frame.solids.tank_count + names.index(aim.body)
+    center = download(frame.solids.position)[number, : frame.dim].astype(float)
+    half = float(download(frame.solids.reach)[number]) / frame.dim**0.5
+    low, high = np.array(aim.lower), np.array(aim.upper)
+    shared = np.minimum(center + half, high) - np.maximum(center - half, low)
+    return float(np.prod(np.maximum(shared, 0.0) / (2.0 * half)))
+
+
 MEASURES: dict[type[Aim], Callable[[Aim, Frame, int], float]] = {
     Fill: wet_share, Dry: wet_share, Deliver: delivered_share, Apart: gathered_share, Mix: mixed_share,
+    Bring: brought_share,
 }  # fmt: skip

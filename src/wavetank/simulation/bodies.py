@@ -82,6 +82,10 @@ class Bodies(Mapping[str, Body]):
         raise WavetankError(f"there is no body named {name!r}; bodies: {known}.")
 
     @override
+    def __contains__(self, name: object) -> bool:
+        return any(body.name == name for body in self.members)
+
+    @override
     def __iter__(self) -> Iterator[str]:
         return iter([body.name for body in self.members])
 
@@ -217,7 +221,8 @@ class Bodies(Mapping[str, Body]):
         share = np.minimum(1.0, most / np.maximum(np.linalg.norm(force[:, :3], axis=1), 1e-30))
         coupling.by_grid = force * share[:, None]
         coupling.impulse = rows[:, :6] * scale + force * dt
-        coupling.immersed = np.minimum(1.0, rows[:, IMMERSION] * particle / wet)
+        cell = world.levels[0].dy if world.levels else 1.0
+        coupling.immersed = np.minimum(1.0, rows[:, IMMERSION] * particle / (wet * cell))
 
     def yielded(self, dt: float) -> bool:
         """Let bodies yield that were pushed by far more than in the step before; say whether any was.

@@ -10,15 +10,15 @@ from wavetank.solids.meshes.mesh import Mesh
 from wavetank.solids.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, Union
 from wavetank.solids.solid import Solid
 
-VOXELS = 32  # across what is made of voxels, at least
+FEWEST, MOST = 24, 64  # small cubes across what is made of them
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 Placed = tuple[np.ndarray, np.ndarray, Any]  # position [m] and rotation in the solid's frame, and the shape there
 
 
 def shapes_of(solid: Solid, dim: int, spacing: float) -> list[Placed]:
-    """Return the shapes that a solid consists of; what has no exact counterpart is made of voxels.
+    """Return the shapes that a solid consists of; what has no exact counterpart is made of boxes.
 
-    In a 2-D world all shapes lie in the plane z = 0, and a box or what is made of voxels is as thick as it is wide.
+    In a 2-D world all shapes lie in the plane z = 0, and a box or what is made of boxes is as thick as it is wide.
     """
     import rapier3d as engine
 
@@ -46,15 +46,33 @@ def shapes_of(solid: Solid, dim: int, spacing: float) -> list[Placed]:
         points = points - 0.5 * (points.min(axis=0) + points.max(axis=0))
         closed = solid.is_body and solid.thickness is None
         return [(middle, UPRIGHT, (shapes.convex_decomposition if closed else shapes.trimesh)(points, faces))]
-    return [] if getattr(solid, "invert", False) else [_of_voxels(solid, dim, spacing)]
+    return [] if getattr(solid, "invert", False) else _of_boxes(solid, dim, spacing)
 
 
-def _of_voxels(solid: Solid, dim: int, spacing: float) -> Placed:
+def _of_boxes(solid: Solid, dim: int, spacing: float) -> list[Placed]:
+    """Return boxes of the small cubes that are mostly inside, as large as they get; voxels know no half-space."""
     import rapier3d as engine
 
-    cut = Ruler(solid, dim, spacing).cut(min(spacing, 2.0 * solid.reach() / VOXELS))
+    cut = Ruler(solid, dim, spacing).cut(max(min(spacing, 2.0 * solid.reach() / FEWEST), 2.0 * solid.reach() / MOST))
     edges = np.where(cut.edges > 0.0, cut.edges, cut.edges.max())
     full = cut.volumes > 0.5 * cut.volumes.max()
     lower = cut.places[full].min(axis=0) - 0.5 * edges
-    numbers = np.round((cut.places[full] - lower) / edges - 0.5).astype(np.int32)
-    return lower, UPRIGHT, engine.SharedShape.voxels(edges.tolist(), numbers)
+    numbers = np.round((cut.places[full] - lower) / edges - 0.5).astype(int)
+    taken = np.zeros(numbers.max(axis=0) + 1, bool)
+    taken[tuple(numbers.T)] = True
+    boxes = []
+    for corner in numbers[np.lexsort(numbers.T)]:
+        if not taken[tuple(corner)]:
+            continue
+        end = corner + 1
+        for axis in range(3):  # grow along one axis after the other
+            while end[axis] < taken.shape[axis]:
+                slab = [slice(low, high) for low, high in zip(corner, end, strict=True)]
+                slab[axis] = slice(end[axis], end[axis] + 1)
+                if not taken[tuple(slab)].all():
+                    break
+                end[axis] += 1
+        taken[tuple(slice(low, high) for low, high in zip(corner, end, strict=True))] = False
+        half = 0.5 * (end - corner) * edges
+        boxes.append((lower + corner * edges + half, UPRIGHT, engine.SharedShape.cuboid(*map(float, half))))
+    return boxes

@@ -78,9 +78,12 @@ def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulat
             f"{name} has no room for its {number:,} particles; use a smaller spacing or a larger shape."
         )
     container = _inside_out(fluid.inside, scene.dim)
-    solids = [solid.model_copy(update={"name": ""}) for solid in (*obstacles, container)]
+    fixed = {"name": "", "density": None, "mass": None, "hollow": False, "held": False, "velocity": None,
+             "angular_velocity": None}  # fmt: skip
+    solids = [solid.model_copy(update=fixed) for solid in (*obstacles, container)]
     world = scene.model_copy(update={
         "fluids": [Points(positions=lattice[chosen])], "solids": solids, "forces": [], "materials": [], "goal": None,
+        "joints": [], "emitters": [], "drains": [],
         "gravity": (0.0,) * scene.dim, "surface_tension": 0.0, "grid_pressure": 0.0, "vorticity": 0.0, "foam": 0.0,
         "friction": 0.0, "frame_time": 1.0 / 60.0,
     })  # fmt: skip

@@ -14,6 +14,7 @@ from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
 from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids
+from wavetank.solids.solid import Solid
 
 MOST_IDS = int(np.iinfo(np.int32).max)
 
@@ -58,12 +59,17 @@ def find_speed_limit(
         return math.inf
     ledger.fastest_solid = max(ledger.fastest_solid, _solid_speed(scene, solids, duration))
     ledger.fastest_force = max(ledger.fastest_force, sum(force.largest_speed() for force in forces))
+    start = max([ledger.fastest_start, *(_start_speed(solid) for solid in scene.solids)])
     fall = sum(2.0 * abs(g) * edge for g, edge in zip(scene.gravity, scene.tank.size, strict=True))
     ledger.steepest = max(ledger.steepest, 0.5 * fall)  # what gravity was a moment ago is still in the water
-    fastest = (
-        math.sqrt(2.0 * ledger.steepest + ledger.fastest_start**2) + 2.0 * ledger.fastest_solid + ledger.fastest_force
-    )
+    fastest = math.sqrt(2.0 * ledger.steepest + start**2) + 2.0 * ledger.fastest_solid + ledger.fastest_force
     return scene.speed_limit * max(fastest + capillary_speed(world, scene), 1e-6)
+
+
+def _start_speed(solid: Solid) -> float:
+    """Return the largest speed [m/s] that any place of a body begins with."""
+    spin = math.hypot(*np.ravel(solid.angular_velocity if solid.angular_velocity is not None else 0.0))
+    return math.hypot(*(solid.velocity or (0.0,))) + (spin * solid.reach() if spin else 0.0)
 
 
 def _solid_speed(scene: Scene, solids: MovingSolids, duration: float) -> float:

@@ -39,6 +39,23 @@ class Light:
     step: qd.i32
 
 
+class Paints:
+    """Albedos of solids on the device, written anew when they change."""
+
+    def __init__(self) -> None:
+        self.colors: np.ndarray = np.zeros((0, 3), np.float32)
+        self.device = qd.ndarray(vec3, shape=(1,))
+
+    def of(self, colors: np.ndarray) -> Any:
+        """Return a device array vec3 [n] of these `colors` [n, 3], linear RGB."""
+        if self.colors.shape != colors.shape or (self.colors != colors).any():
+            if len(colors) > self.device.shape[0]:
+                self.device = qd.ndarray(vec3, shape=(len(colors),))
+            upload(self.device, colors)
+            self.colors = colors
+        return self.device
+
+
 @dataclasses.dataclass
 class Buffers:
     """What the passes hand to each other."""
@@ -48,6 +65,7 @@ class Buffers:
     foam: Any  # i32 [height, width, 2]: optical depth of foam in 1/256, and the part of it that the sun reaches
     sun_depth: Any  # i32 [texels, texels]: bits of the depth [m] of what the sun sees first
     solid_box: Any  # i32 [4]: first and last column, first and last row that may show a solid
+    paints: Paints  # of solids
     curve: Any  # i32 [entries]: sRGB byte of linear light 0 to 1, in equal steps
     picture: Any  # i32 [words]: the finished picture, three sRGB bytes a pixel, row by row
     water: Any  # WaterBuffers once a picture of water was taken
@@ -100,6 +118,7 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
         foam=qd.ndarray(qd.i32, shape=(height, width, 2)),
         sun_depth=qd.ndarray(qd.i32, shape=(texels, texels)),
         solid_box=qd.ndarray(qd.i32, shape=(4,)),
+        paints=Paints(),
         curve=curve,
         picture=qd.ndarray(qd.i32, shape=(3 * -(-height * width // 4),)),
         water=None,

@@ -2,6 +2,7 @@
 
 from wavetank.lab.cases import (
     buckling,
+    buoyancy,
     calm_vorticity,
     coiling,
     column,
@@ -12,6 +13,7 @@ from wavetank.lab.cases import (
     emitter,
     energy,
     gravity_current,
+    heave,
     layers,
     lobovsky,
     lock_exchange,
@@ -24,6 +26,7 @@ from wavetank.lab.cases import (
     standing_wave,
     still_tank,
     tension_drop,
+    water_entry,
 )
 from wavetank.lab.cases.case import Case
 
@@ -32,5 +35,6 @@ CASES: tuple[Case, ...] = (
     drop.CASE, energy.CASE, rest.CASE, creep.CASE, momentum.CASE, cup.CASE, seeds.CASE, resolution.CASE,
     layers.CASE, lock_exchange.CASE, shear_wave.CASE, gravity_current.CASE, buckling.CASE, coiling.CASE,
     tension_drop.CASE,
-    calm_vorticity.CASE, emitter.CASE,
+    calm_vorticity.CASE, emitter.CASE, buoyancy.CASE, heave.CASE,
+    water_entry.CASE,
 )  # fmt: skip

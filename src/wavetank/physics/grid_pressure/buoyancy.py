@@ -96,7 +96,8 @@ def push_bodies(
         push = rotate(turn, slope) * (stiffness * pieces.volume[number])
         add_to_body(solids, k, of_grid(), at, push)
         depth = -per_lambda * value_at(grid.lam, grid, at, particles.x[0])
-        wet = qd.min(qd.max(2.0 * depth / grid.dy, 0.0), 1.0) * pieces.volume[number]
+        # In metres, as the pushes are that the body's unit is for: times the edge of a cell.
+        wet = qd.min(qd.max(2.0 * depth / grid.dy, 0.0), 1.0) * pieces.volume[number] * grid.dy
         qd.atomic_add(solids.reaction[parts() * k + immersion()], qd.cast(qd.round(solids.unit[k] * wet), qd.i32))
 
 

@@ -387,7 +387,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     move_particles(finest, world.particles, cells, world.solids, c, remembered(push), count, few)
     if world.pieces:
         acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2
-        push_on_grid(world, stiffness, stiffness / acting)  # the grid is for worlds with gravity
+        push_on_grid(world, stiffness, stiffness / acting if acting else 0.0)  # nothing is deep without gravity
 
 
 def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:

@@ -20,6 +20,7 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import remembered
 from wavetank.solids.distance import SolidSet, around, grain, signed_distance
 from wavetank.view.buffers import Buffers, Pixels
+from wavetank.view.colormaps import rgb_of, to_linear
 from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, view_ray
 from wavetank.view.optics.rays import Box, box, box_interval
 from wavetank.view.shot import Shot
@@ -52,10 +53,20 @@ def lower_depth(shot: Shot, buffers: Buffers, lens: Lens, depth: Any, is_seen: i
     """Lower `depth` to the solids that `lens` sees; with `is_seen` (1 or 0) draw them into the picture."""
     solids = shot.frame.solids
     if solids.count > solids.tank_count:
+        paints = buffers.paints.of(colors_of(shot))
         trace(
-            depth, buffers.pixels, buffers.solid_box, strips_of(depth), solids, window(shot), lens, shot.look.solid,
-            is_seen,
+            depth, buffers.pixels, buffers.solid_box, strips_of(depth), solids, window(shot), lens, paints, is_seen,
         )  # fmt: skip
+
+
+def colors_of(shot: Shot) -> np.ndarray:
+    """Return the albedo of every solid, walls of the tank included, float32 [n, 3], linear RGB."""
+    solids = shot.frame.solids
+    colors = np.tile(np.asarray(shot.look.solid, np.float32), (solids.count, 1))
+    for number, solid in enumerate(shot.frame.scene.solids, solids.tank_count):
+        if solid.color and number < solids.count:
+            colors[number] = to_linear(np.array(rgb_of(solid.color)))
+    return colors
 
 
 def window(shot: Shot) -> Window:
@@ -132,10 +143,10 @@ def meet(solids: SolidSet, k, origin, direction, first, last, bevel):
 
 @qd.func
 def nearest_solid(solids: SolidSet, window: Window, lens: Lens, row, column, far):
-    """(normal, depth) of the first solid in a pixel nearer than `far`; depth -1 where there is none."""
+    """(normal, depth, number) of the first solid in a pixel nearer than `far`; depth -1 where there is none."""
     ray = view_ray(lens, row, column)
     origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
-    best = vec4(0.0, 0.0, 0.0, -1.0)
+    best, which = vec4(0.0, 0.0, 0.0, -1.0), 0
     last = qd.min(far, 1e4) + window.raised
     for k in range(solids.tank_count, solids.count):
         bound = ball_interval(origin, direction, solids.position[k], 1.001 * solids.reach[k] + 1e-4)
@@ -148,10 +159,9 @@ def nearest_solid(solids: SolidSet, window: Window, lens: Lens, row, column, far
         if first <= end:
             hit = meet(solids, k, origin, direction, first, end, window.raised)
             if hit.w >= 0.0:
-                best = hit
+                best, which = hit, k
                 last = hit.w
-    best.w -= window.raised
-    return best
+    return qd.Vector([best.x, best.y, best.z, best.w - window.raised, qd.cast(which, qd.f32)])
 
 
 @qd.func
@@ -178,7 +188,7 @@ def box_of_solids(solids: SolidSet, lens: Lens, rows, columns):
 @qd.kernel(fastcache=True)
 def trace(
     depth: qd.types.ndarray(), pixels: Pixels, box: qd.types.ndarray(), strips: Strips, solids: SolidSet,
-    window: Window, lens: Lens, albedo: vec3, is_seen: qd.i32,
+    window: Window, lens: Lens, paints: qd.types.ndarray(), is_seen: qd.i32,
 ):  # fmt: skip
     """Lower `depth` to that of the nearest solid; with `is_seen` it is that of `pixels`, where the solid is drawn.
 
@@ -193,9 +203,9 @@ def trace(
         for column in range(first, last):
             if in_box(box, row, column):
                 hit = nearest_solid(solids, window, lens, row, column, qd.bit_cast(depth[row, column], qd.f32))
-                if hit.w > 0.0:
-                    depth[row, column] = qd.bit_cast(hit.w, qd.i32)
+                if hit[3] > 0.0:
+                    depth[row, column] = qd.bit_cast(hit[3], qd.i32)
                     if is_seen == 1:
                         pixels.surface[row, column] = -1  # SOLID
-                        pixels.normal[row, column] = vec3(hit.x, hit.y, hit.z)
-                        pixels.color[row, column] = albedo
+                        pixels.normal[row, column] = vec3(hit[0], hit[1], hit[2])
+                        pixels.color[row, column] = paints[qd.cast(hit[4], qd.i32)]

@@ -1,0 +1,78 @@
+"""Drop: lets a body fall into the water."""
+
+import math
+from typing import ClassVar, Literal
+
+import numpy as np
+from typing_extensions import override
+
+from wavetank.session.tools.hand import Hand
+from wavetank.session.tools.tool import Tool, option
+from wavetank.solids.shapes import Box, Capsule, Sphere
+from wavetank.solids.solid import Solid
+
+MOST_BODIES = 60
+
+
+class Drop(Tool):
+    """Let a body fall."""
+
+    name: ClassVar[str] = "drop"
+    label: ClassVar[str] = "Drop"
+    sentence: ClassVar[str] = "Click to let a body fall; it floats or sinks as its density says."
+    icon: ClassVar[str] = "M8 2h8v8H8zM12 12v4m-2-2 2 2 2-2M3 20c3-2 6-2 9 0s6 2 9 0"
+    key: ClassVar[str] = "o"
+
+    shape: Literal["box", "ball", "log", "plank"] = option("box", None, None, "", "What it is.")
+    radius: float = option(0.06, 0.02, 0.3, "L", "Half its size.")
+    density: float = option(0.4, 0.05, 10.0, "water", "Density, over that of water.")
+    height: float = option(0.1, 0.0, 0.5, "L", "How high over the place you point at it is let go.")
+
+    @override
+    def begin(self, hand: Hand) -> None:
+        sim = hand.sim
+        if len(sim.bodies) >= MOST_BODIES:
+            hand.notes.append(f"There are {MOST_BODIES} bodies already; remove one first.")
+            return
+        half = max(self.radius * hand.size, 2.0 * hand.spacing)
+        reach = half * (
+            2.2 if self.shape in ("log", "plank") else math.sqrt(sim.scene.dim) if self.shape == "box" else 1
+        )
+        center = hand.anchor + [0.0, self.height * hand.size + reach, 0.0]
+        if sim.scene.dim == 3 and hand.hit.kind != "water":  # in front of what the pointer met
+            center -= reach * hand.normal * [1.0, 0.0, 1.0]
+        middle = 0.5 * (hand.lower + hand.upper)
+        inside = np.clip(center, np.minimum(hand.lower + reach, middle), np.maximum(hand.upper - reach, middle))
+        center[[0, 2]] = inside[[0, 2]]
+        center[1] = self._clear(hand, center, reach)
+        sim.add_solid(self._solid(hand.flat(center), half))
+
+    def _clear(self, hand: Hand, center: np.ndarray, reach: float) -> float:
+        """Return the height [m], from that of `center` on up, where neither water nor another body is in the way."""
+        others = [(np.array([*body.position, 0.0][:3]), body.solid.reach()) for body in hand.sim.bodies.values()]
+        balls = [(place, reach + far) for place, far in others]
+        x = hand.sim.positions.astype(float)
+        x = np.concatenate([x, np.zeros((len(x), 3 - x.shape[1]))], axis=1)
+        beside = np.hypot(*(x - center)[:, [0, 2]].T)
+        over = x[beside < reach + hand.spacing]
+        height = float(center[1])
+        if len(over):
+            height = max(height, float(over[:, 1].max()) + reach + hand.spacing)
+        for place, apart in sorted(balls, key=lambda ball: float(ball[0][1])):
+            away = math.hypot(*(place - center)[[0, 2]])
+            if away < apart and abs(place[1] - height) < math.sqrt(apart**2 - away**2):
+                height = float(place[1]) + math.sqrt(apart**2 - away**2)
+        return height
+
+    def _solid(self, center: tuple[float, ...], half: float) -> Solid:
+        density = 1000.0 * self.density
+        dim = len(center)
+        if self.shape == "log":
+            along = np.array([2.0 * half, 0.0, 0.0])[:dim]
+            ends = (np.array(center) - along, np.array(center) + along)
+            return Capsule(start=tuple(ends[0]), end=tuple(ends[1]), radius=0.6 * half, density=density)
+        if self.shape == "plank":
+            return Box(center=center, size=(4.0 * half, 0.8 * half, 2.0 * half)[:dim], density=density)
+        if self.shape == "box":
+            return Box(center=center, size=(2.0 * half,) * dim, density=density)
+        return Sphere(center=center, radius=half, density=density)
