@@ -145,7 +145,7 @@ def process(*arguments: str) -> subprocess.Popen:
     )  # fmt: skip
 
 
-RUN = ("drop-2d", "--seconds", "20", "--fps", "30", "--size", "160x96", "--video")
+RUN = ("drop-2d", "--fps", "30", "--size", "160x96", "--video")
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ RUN = ("drop-2d", "--seconds", "20", "--fps", "30", "--size", "160x96", "--video
     ],
 )  # fmt: skip
 def test_being_asked_to_end_leaves_a_video_that_plays(signals, code, tmp_path):
-    run = process("run", *RUN, "--out", str(tmp_path), "--name", "a")
+    run = process("run", *RUN, "--seconds", "200", "--out", str(tmp_path), "--name", "a")
     end = time.monotonic() + 120
     while time.monotonic() < end and not [*tmp_path.glob(".*.partial")]:
         time.sleep(0.02)
@@ -173,7 +173,7 @@ def test_being_asked_to_end_leaves_a_video_that_plays(signals, code, tmp_path):
 
 @pytest.mark.parametrize("delay", [0.05, 0.6])
 def test_a_killed_run_goes_on_and_leaves_nothing_behind(delay, tmp_path):
-    arguments = ("run", *RUN, "--export", "npz", "--checkpoint-every", "0.1", "--name", "a")
+    arguments = ("run", *RUN, "--seconds", "20", "--export", "npz", "--checkpoint-every", "0.1", "--name", "a")
     run = process(*arguments, "--out", str(tmp_path / "killed"))
     end = time.monotonic() + 120
     while time.monotonic() < end and not (tmp_path / "killed" / "states" / "run.json").exists():

@@ -59,7 +59,7 @@ def test_a_person_plays(open_page, browser):
     browser.wait_for(f"{PICTURE} !== {first!r}")
     assert browser.run("location.search") == "", "the token stays out of the address bar"
     assert "Basin" in browser.run("document.querySelector('#title').textContent")
-    assert browser.run("document.querySelectorAll('#tools button').length") == 18
+    assert browser.run("document.querySelectorAll('#tools button').length") == 20
 
     # A key.
     browser.key(" ")

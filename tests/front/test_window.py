@@ -317,10 +317,10 @@ def test_a_level_is_won_and_lost(person, tmp_path, monkeypatch):
     person.click("page.Scenes")
     person.scroll_to("scene.over-the-wall")
     person.click("scene.over-the-wall")
-    person.until(lambda: desk.game["heading"] == "Level 1 of 8")
+    person.until(lambda: desk.game["heading"] == "Level 1 of 11")
     time_is_over(person)
     person.click("next")
-    person.until(lambda: desk.game["heading"] == "Level 2 of 8")
+    person.until(lambda: desk.game["heading"] == "Level 2 of 11")
     assert session.scene.title == wt.Scene.load("spill").title
 
 

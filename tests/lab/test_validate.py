@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from wavetank import Scene, WavetankError, cli
+from wavetank.cli import experiments
 from wavetank.lab import validate as room
 from wavetank.lab.cases import CASES, coiling
 from wavetank.lab.cases.case import Case, Figure, Outcome, measured, surface
@@ -38,7 +39,7 @@ OPEN = {
 
 
 def test_the_help_names_all_cases():
-    assert cli.CASE_NAMES.split(", ") == sorted(case.name for case in CASES)
+    assert experiments.CASE_NAMES.split(", ") == sorted(case.name for case in CASES)
 
 
 @pytest.mark.parametrize("name", QUICK)

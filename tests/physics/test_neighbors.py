@@ -13,6 +13,7 @@ from wavetank.physics.coefficients import coefficients
 from wavetank.physics.integrate import forget_predictions
 from wavetank.physics.neighbors import new_grid, reorder
 from wavetank.physics.pairs import count_neighbors
+from wavetank.simulation import arrays
 from wavetank.simulation.simulation import Simulation
 
 
@@ -74,8 +75,9 @@ def test_same_as_a_tree_for_any_cloud(seed, count, dim, extent):
     check(x, 0.1)
 
 
-def test_a_crowd_larger_than_its_list_is_listed_completely():
+def test_a_crowd_larger_than_its_list_is_listed_completely(monkeypatch):
     """600 particles in one place: every one has 599 neighbours, far beyond the room of a list at the start."""
+    monkeypatch.setattr(arrays, "CROWD", 600)
     x = np.random.default_rng(0).normal(0, 1e-3, (600, 3)).astype(np.float32)
     sim = Simulation(wt.Scene(spacing=0.1, fluids=[wt.Points(positions=x)]))
     assert all(len(found) == 599 for found in neighbor_sets(sim))
@@ -117,6 +119,7 @@ def test_more_lists_than_an_array_can_hold_are_refused():
 
 
 def test_a_list_that_would_grow_too_long_is_refused_and_kept(monkeypatch):
+    monkeypatch.setattr(arrays, "CROWD", 400)
     sim = Simulation(wt.Scene(spacing=0.1, fluids=[wt.Points(positions=np.zeros((400, 2)))], gravity=(0.0, 0.0)))
     room = sim.world.grid.room
     monkeypatch.setattr(neighbors, "MAX_ENTRIES", 50 * room)

@@ -113,8 +113,7 @@ class Coupling:
     def yielding(self, rotations: np.ndarray, slow: float) -> np.ndarray:
         """Return by how much bodies are to be faster [n, 6] for the step to be taken again; 0 for those that are not.
 
-        Those yield whose velocity is wrong by more than `slow` [m/s] and that are lighter than the water that goes
-        along; what heavier ones are owed can wait for the next step. Bodies that lie against others, and are held by
+        Those yield whose velocity is wrong by more than `slow` [m/s]. Bodies that lie against others, and are held by
         more than water, yield once.
         """
         asked = self.owed
@@ -129,7 +128,7 @@ class Coupling:
         self.along[~known] = np.maximum(self.along, least)[~known]
         step, alone = self.solved(rotations, asked), self.solved(rotations, asked, 0.0)
         wrong = np.maximum(np.linalg.norm(alone[:, :3], axis=1), np.linalg.norm(alone[:, 3:], axis=1) * self.reaches)
-        patient = (self.masses > self.along[:, 0]) | (self._touching & self._moved.any(axis=1))
+        patient = self._touching & self._moved.any(axis=1)
         step[(wrong <= slow) | patient] = 0.0
         self._asked = asked
         return step

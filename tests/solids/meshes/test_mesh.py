@@ -62,7 +62,7 @@ def test_a_scene_of_several_parts_is_put_together(tmp_path):
         (
             "none.obj",
             None,
-            r"there is no mesh file .*none.obj; bundled models are: wavetank/bathtub.obj, wavetank/knot.obj",
+            r"there is no mesh file .*none.obj; bundled models are: wavetank/bathtub.obj, wavetank/boat.obj",
         ),
         ("empty.obj", "", r"empty.obj"),
         ("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", r"points.obj has no faces"),
@@ -157,7 +157,7 @@ def test_commands_open_no_files(scene_file, monkeypatch):
     monkeypatch.chdir(scene_file.parent)
     session = Session(wt.Scene.load("weightless-drop").changed(spacing=0.003))
     with pytest.raises(
-        wt.WavetankError, match=r"path = 'thing.obj' is not a bundled model \(wavetank/bathtub.obj, wavetank/knot.obj"
+        wt.WavetankError, match=r"path = 'thing.obj' is not a bundled model \(wavetank/bathtub.obj, wavetank/boat.obj"
     ):
         session.apply(LoadScene(text=SCENE))
     solid = {"shape": "mesh", "path": "thing.obj", "center": (0.4, 0.4, 0.4), "size": 0.2}
