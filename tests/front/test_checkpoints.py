@@ -138,10 +138,16 @@ def test_what_is_no_checkpoint_is_one_sentence(change, words, tmp_path, monkeypa
     assert "\n" not in str(report.value)
 
 
+def heed_signals() -> None:
+    """Undo what the shell of these tests may hand on: background jobs ignore Ctrl-C, `nohup` a closed terminal."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 def process(*arguments: str) -> subprocess.Popen:
     return subprocess.Popen(
         [sys.executable, "-m", "wavetank", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        start_new_session=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        start_new_session=True, preexec_fn=heed_signals,
     )  # fmt: skip
 
 
@@ -203,6 +209,7 @@ def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path, 
     here = replacing._here()
     names = {
         f".a.mp4.{here}-{dead.pid}.partial": False,
+        f".a.usdc.{here}-{dead.pid}.partial.usdc": False,
         f".a.mp4.{here}-{os.getpid()}.partial": True,
         f".a.mp4.abcdef-{dead.pid}.partial": True,  # of another machine
         f"a.mp4.{here}-{dead.pid}.partial": True,

@@ -153,16 +153,11 @@ class _Clip:
 
     def save(self, path: Path) -> None:
         """Write the layer; a file of that name is replaced in one move."""
-        # USD tells the format by the suffix: the partial file needs it too.
-        with replacing(path) as partial:
-            growing = partial.with_name(partial.name + ".usdc")
+        with replacing(path, suffixed=True) as partial:
             try:
-                self.layer.Export(str(growing))
-                growing.replace(partial)
+                self.layer.Export(str(partial))
             except Exception as error:
                 raise WavetankError(f"{str(path)!r} cannot be written: {str(error).splitlines()[-1]}.") from error
-            finally:
-                growing.unlink(missing_ok=True)
 
 
 def _value(kind: str, value: Any) -> Any:

@@ -82,10 +82,8 @@ def build_static(plan: Plan, instant: Instant, solids: dict[str, str], folder: P
         _solids(static, plan, instant, solids)
     _surroundings(static, plan)
     for stage, name in ((manifest, "manifest.usda"), (static, "static.usdc")):
-        with replacing(folder / name) as partial:
-            growing = partial.with_name(f"{partial.name}{Path(name).suffix}")
-            stage.GetRootLayer().Export(str(growing))
-            growing.replace(partial)
+        with replacing(folder / name, suffixed=True) as partial:
+            stage.GetRootLayer().Export(str(partial))
 
 
 def _materials(stage: Any, plan: Plan) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from wavetank.foundation.errors import WavetankError
 
-_LEFT = re.compile(r"\..+\.([0-9a-f]{6})-(\d+)\.partial")
+_LEFT = re.compile(r"\..+\.([0-9a-f]{6})-(\d+)\.partial(\.\w+)?")
 _swept: set[Path] = set()
 
 
@@ -71,12 +71,15 @@ def make_folder(path: str | Path) -> Path:
 
 
 @contextlib.contextmanager
-def replacing(path: str | Path, *, lasting: bool = False) -> Iterator[Path]:
+def replacing(path: str | Path, *, lasting: bool = False, suffixed: bool = False) -> Iterator[Path]:
     """Give a temporary path to write to; it takes the place of `path` on success and is removed on an error.
 
-    A `lasting` file is on the disk before it gets its name, so that it outlives a power cut too.
+    A `lasting` file is on the disk before it gets its name, so that it outlives a power cut too. A `suffixed` one ends
+    as `path` does already, for writers that tell the format by the name.
     """
     partial = partial_path(path)
+    if suffixed:
+        partial = partial.with_name(partial.name + Path(path).suffix)
     try:
         yield partial
         if lasting:
