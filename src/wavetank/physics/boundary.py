@@ -274,9 +274,11 @@ def near_bodies(x, p, solids: SolidSet, h):
     near = 0
     way = 1.2 * h + (p - x).norm()
     for k in range(solids.tank_count, solids.count):
-        away = (p - solids.position[k]).norm()
-        margin = way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(solids.reach[k], away)
-        if away < solids.reach[k] + margin:
+        reach = solids.reach[k]
+        farthest = reach + way + solids.sweep[k][0] + solids.sweep[k][1] * reach
+        away = (p - solids.position[k]).norm_sqr()
+        if away < farthest * farthest:
+            margin = way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(reach, qd.sqrt(away))
             if signed_distance(solids, k, p).w < margin:
                 near |= 1 << bit_of(k, solids)
     return near

@@ -24,7 +24,7 @@ from wavetank.scene.scene import Scene
 from wavetank.simulation.added_mass import added_mass
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
-from wavetank.simulation.coupling import TOLERANCE, Coupling
+from wavetank.simulation.coupling import Coupling
 from wavetank.simulation.joints import put_joint
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.solids.distance import PARTS
@@ -71,6 +71,9 @@ class Bodies(Mapping[str, Body]):
             put_joint(self.engine, self.world, self.handles, solids, joint)
         self._weigh_all(numbers)
         solids.feel({body.number: (body.dry.center, body.unit) for body in self.members})
+        self.numbers = np.array([body.number for body in self.members])
+        self.units = np.array([body.unit for body in self.members])  # 1/m
+        self.wet_masses = np.array([body.wet.mass for body in self.members])  # kg
         self.pieces = self._pieces()
 
     @override
@@ -212,8 +215,7 @@ class Bodies(Mapping[str, Body]):
         sums = download(world.solids.reaction).astype(float).reshape(-1, PARTS)
         upload(world.solids.reaction, np.zeros(sums.size, np.int32))
         particle = blend(world.materials, self.scene).largest_density * self.scene.spacing**self.dim
-        rows = sums[[body.number for body in self.members]] / np.array([[body.unit] for body in self.members])
-        coupling, wet = self.coupling, np.array([body.wet.mass for body in self.members])
+        rows, coupling, wet = sums[self.numbers] / self.units[:, None], self.coupling, self.wet_masses
         scale = np.repeat(np.stack([np.ones(len(wet)), coupling.reaches], axis=1), 3, axis=1) * (particle / dt)
         grid = rows[:, OF_GRID : OF_GRID + 6] * scale
         force = carried(dt, self.scene.frame_time) * coupling.carried + grid / dt
@@ -229,8 +231,7 @@ class Bodies(Mapping[str, Body]):
 
         The step of `dt` [s] is then to be taken again: the water pushed as if the body could not give way.
         """
-        fastest = float(np.linalg.norm(self.coupling.velocity[:, :3], axis=1).max())
-        slow = TOLERANCE * max(float(np.linalg.norm(self.gravity) * self.scene.spacing) ** 0.5, fastest)
+        slow = float(np.linalg.norm(self.gravity) * self.scene.spacing) ** 0.5
         rotations = self._rotations()
         steps = self.coupling.yielding(rotations, slow)
         moved, real = np.flatnonzero(steps.any(axis=1)), np.zeros_like(steps)

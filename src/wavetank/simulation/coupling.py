@@ -12,30 +12,37 @@ for one that falls as the body gives way, P = P_before - k (dv - dv_before), whe
     (m + k) dv = P_before + k dv_before + m g dt + O
 
 What turns out to be wrong of it, O = the right-hand side of the first equation less the left, is made up for in the
-next step; no momentum is lost, whatever k is. That is stable where k is more than three quarters of what it really is.
-Where it is by far wrong, where a body hits the water, the body yields by O / (m + k) and the step is taken again. Two
-answers of the water say what k is (their secant), which the next steps go by; deep in the water it is that of an
-ellipsoid (`added_mass.py`).
+steps that follow; no momentum is lost, whatever k is. Where it is by far wrong, as where a light body hits the water,
+the body yields by O / (m + k) and the step is taken again. Two answers of the water say what k is (their secant), which
+the next steps go by; deep in the water it is that of an ellipsoid (`added_mass.py`).
+
+The engine's impulse in contact and joints, (m + k) dv_c, leaves k dv_c to the water, and what the water does not take
+throws the body back: one that is out of the water would bounce with a restitution of k / m, more than one where it is
+light. So no more is taken to go along with a body that is hardly wet than as far as water carries it.
 
     code       symbol       meaning                                                          unit
     impulse    P            what the water gave in a step                                    kg m/s, kg m^2/s
     change     dv_before    change of velocity in the step before, without how it yielded    m/s, rad/s
     along      k            mass and moment of inertia of the water that goes along          kg, kg m^2
-    due        m g dt + O   what a body gets by this step but for P,
-    given      m dv         and what it has got; the engine's own change dv_c (contact, joints) moved k as well, so
-                            that of its momentum (m + k) dv_c a body has not got k dv_c
+    due        m g dt + O   what a body gets by this step but for P,                         kg m/s, kg m^2/s
+    given      m dv         and what it has got; of the engine's (m + k) dv_c that is but m dv_c
+    before     v            velocity at the end of the step before                           m/s, rad/s
+    seen_push  P            of the step before, and
+    seen_gain  dv           what a body's velocity has changed by in it: from step to step they say what k is by
+    sums                    least squares: sums of -dP ddv and of ddv^2, motion and turn, that fade by `STAYS`
 """
 
 import numpy as np
 
 from wavetank.foundation.rotations import matrix_of
 
-TOLERANCE = 0.1  # of sqrt(g d), or of the fastest body: change of a body's velocity that is worth a second step
+TOLERANCE = 0.05  # of sqrt(g d), or of its speed: a body's wrong velocity, times k / m, that is worth a second step
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
 AT_ONCE = 0.2  # of what is owed: more would ring
 TOUCH = 1e-4  # m/s: change of velocity by the engine that is contact
 STAYS = 0.9  # share that is left after a step of what was seen of how much water goes along
 MOST = 4.0  # of the water that goes along with an immersed body: most that is believed
+BLOCKS = (slice(0, 3), slice(3, 6))  # motion and turn, columns of a row
 ROWS = (
     "impulse", "due", "given", "change", "carried", "by_grid", "velocity", "before", "seen_push", "seen_gain",
 )  # fmt: skip
@@ -54,9 +61,11 @@ class Coupling:
         self.by_grid = np.zeros((count, 6))  # N, N m: by the pressure of the grid
         self.velocity, self.change = np.zeros((count, 6)), np.zeros((count, 6))  # m/s, rad/s
         self.along = np.zeros((count, 2))  # kg, kg m^2
-        self.before, self.seen_push, self.seen_gain = (np.zeros((count, 6)) for _ in range(3))
+        self.before, self.seen_gain = np.zeros((count, 6)), np.zeros((count, 6))  # m/s, rad/s
+        self.seen_push = np.zeros((count, 6))  # kg m/s, kg m^2/s
         self.sums = np.zeros((count, 2, 2))
-        self.immersed = np.zeros(count)
+        self.immersed = np.zeros(count)  # share of their volume
+        self._heavy = np.zeros(count)  # N
         self.held = np.zeros(count, bool)  # they have no momentum of their own
         self.lasted = 0.0  # s, of the last step
         self._asked = np.zeros((count, 6))  # what was owed at the try before,
@@ -70,6 +79,7 @@ class Coupling:
 
     def begin(self, rotations: np.ndarray, gravity: np.ndarray, dt: float) -> np.ndarray:
         """Return the velocities [n, 6] for a step of `dt` [s] of bodies that are turned so [n, 4], but for contact."""
+        self._heavy = self.masses * np.linalg.norm(gravity)
         self._learn()
         owed = self.owed
         weight = np.zeros_like(owed)
@@ -99,37 +109,41 @@ class Coupling:
         self.before = self.velocity.copy()
         push, way = self.impulse - self.seen_push, gained - self.seen_gain
         self.seen_push, self.seen_gain = self.impulse.copy(), gained
-        for block, part in ((slice(0, 3), 0), (slice(3, 6), 1)):
+        for part, block in enumerate(BLOCKS):
             now = np.stack([-(push[:, block] * way[:, block]).sum(axis=1), (way[:, block] ** 2).sum(axis=1)], axis=1)
             self.sums[:, part] = STAYS * self.sums[:, part] + now
-        found = self.sums[..., 0] / np.maximum(self.sums[..., 1], 1e-30)
-        self.along = np.clip(found, self.taken()[:, None] * self.added, MOST * self.added)
+        self.along = self._bounded(self.sums[..., 0] / np.maximum(self.sums[..., 1], 1e-30))
 
-    def taken(self) -> np.ndarray:
-        """Share of `added` that goes along: that of a plate on the surface is a third of a cube's (Lamb 1932, 108)."""
-        touched = self.impulse.any(axis=1)
-        return np.maximum(np.cbrt(self.immersed), np.where(touched, AFLOAT, 0.0))
+    def _bounded(self, along: np.ndarray) -> np.ndarray:
+        """Return what is believed of so much water [n, 2] that goes along.
+
+        The least is a share of `added`: that of a plate on the surface is a third of a cube's (Lamb 1932, 108).
+        """
+        pushed = np.linalg.norm(self.impulse[:, :3], axis=1)
+        carried = np.minimum(1.0, pushed / np.maximum(self._heavy * self.lasted, 1e-30))
+        least = np.maximum(np.cbrt(self.immersed), AFLOAT * carried)
+        return np.clip(along, least[:, None] * self.added, MOST * self.added)
 
     def yielding(self, rotations: np.ndarray, slow: float) -> np.ndarray:
         """Return by how much bodies are to be faster [n, 6] for the step to be taken again; 0 for those that are not.
 
-        Those yield whose velocity is wrong by more than `slow` [m/s]. Bodies that lie against others, and are held by
-        more than water, yield once.
+        Those yield whose velocity is wrong by more than the water can make up for later: too much of `slow` [m/s], or
+        of their own, the more the heavier the water is that goes along. Bodies that lie against others, and are held
+        by more than water, yield once.
         """
         asked = self.owed
-        least = self.taken()[:, None] * self.added
-        known = self._moved.any(axis=1)
-        own = self.weighed(rotations, self._moved)
-        for block, part in ((slice(0, 3), 0), (slice(3, 6), 1)):
-            way = self._moved[:, block]
-            less = ((self._asked - asked - own)[:, block] * way).sum(axis=1)
-            found = less / np.where(known, np.maximum((way**2).sum(axis=1), 1e-30), 1.0)
-            self.along[known, part] = np.clip(found, least[:, part], MOST * self.added[:, part])[known]
-        self.along[~known] = np.maximum(self.along, least)[~known]
+        known = np.asarray(self._moved.any(axis=1))
+        less = (self._asked - asked - self.weighed(rotations, self._moved)) * self._moved
+        found = np.stack([less[:, block].sum(axis=1) for block in BLOCKS], axis=1)
+        ways = np.stack([(self._moved[:, block] ** 2).sum(axis=1) for block in BLOCKS], axis=1)
+        self.along = self._bounded(np.where(known[:, None], found / np.maximum(ways, 1e-30), self.along))
         step, alone = self.solved(rotations, asked), self.solved(rotations, asked, 0.0)
-        wrong = np.maximum(np.linalg.norm(alone[:, :3], axis=1), np.linalg.norm(alone[:, 3:], axis=1) * self.reaches)
-        patient = self._touching & self._moved.any(axis=1)
-        step[(wrong <= slow) | patient] = 0.0
+        heavier = self.along / np.stack([self.masses, np.linalg.norm(self.tensors, 2, axis=(1, 2))], axis=1)
+        wrong = np.stack([np.linalg.norm(alone[:, block], axis=1) for block in BLOCKS], axis=1) * heavier
+        wrong[:, 1] *= self.reaches
+        speeds = np.linalg.norm(self.velocity[:, :3], axis=1)
+        patient = self._touching & known
+        step[(wrong.max(axis=1) <= TOLERANCE * np.maximum(slow, speeds)) | patient] = 0.0
         self._asked = asked
         return step
 

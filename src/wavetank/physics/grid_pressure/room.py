@@ -107,7 +107,7 @@ def nearest_wall(grid: CoarseGrid, solids: SolidSet, n):
         center.z = 0.0
     nearest = vec4(0.0, 1.0, 0.0, 4.0 * edge)
     for k in range(solids.tank_count, solids.count):
-        if (center - solids.position[k]).norm() < solids.reach[k] + 4.0 * edge and nearest.w > -2.0 * edge:
+        if (center - solids.position[k]).norm() - solids.reach[k] < nearest.w and nearest.w > -2.0 * edge:
             value = signed_distance(solids, k, center)
             if value.w < nearest.w:
                 nearest = value
