@@ -152,3 +152,22 @@ def test_what_nobody_thought_of_pauses_and_is_told(playing, watching, monkeypatc
     assert any("The command 'view' failed" in note and "a pipe has burst" in note for note in watcher.notes)
     assert any("The water is paused: RuntimeError, a pipe has burst" in note for note in watcher.notes)
     assert world.thread.is_alive() and world.session.paused
+
+
+def test_only_who_failed_is_told(playing, watching):
+    """What a driver's command fails for goes to the driver; who watches sees the water."""
+    world = playing(POOL)
+    driver, watcher = watching(world.socket), watching(world.socket)
+    watcher.wait_for_pictures()
+    failing = [{"do": "remove-solid", "name": "no-such-solid"}, {"do": "load", "text": "spacing = -1"}]
+    for table in failing:
+        driver.send(table)
+    assert driver.wait_for_note("no-such-solid") and driver.wait_for_note("spacing")
+    watcher.send({"do": "remove-solid", "name": "of the watcher"})
+    assert watcher.wait_for_note("You are watching")
+    for _ in range(20):  # the same over and over is said once a second
+        driver.send(failing[0])
+    watcher.wait_for_pictures(watcher.pictures + 3, 10.0)
+    assert not any("no-such-solid" in note or "spacing" in note for note in watcher.notes), watcher.notes
+    assert not any("watching" in note for note in driver.notes)
+    assert sum("no-such-solid" in note for note in driver.notes) <= 4
