@@ -21,7 +21,7 @@ def play(
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the page; 0 takes any free one.")] = None,
     host: Annotated[str, typer.Option(help="Address to listen on; beyond 127.0.0.1 others may come in.")] = "127.0.0.1",
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
-    record: Annotated[Path | None, typer.Option(help="Write the session to this TOML file at the end.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Write the session to this TOML file, every few seconds.")] = None,
     particles: Annotated[
         int | None,
         typer.Option(min=0, help="Choose the spacing for about so many; 0 keeps the scene's. Without SCENE: 6000."),
