@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test lint figures gallery validation fuzz soak lowest newest clean
+.PHONY: demo test lint figures gallery validation fuzz promises soak lowest newest clean
 
 demo: .venv/demo-ready
 	$(BIN)/wavetank run obstacle-tank --seconds 4 --fps 30 --size 1280x720 --video --name demo --out out
@@ -43,6 +43,14 @@ COUNT ?= 20000
 fuzz: .venv/test-ready
 	$(BIN)/python tests/fuzz/long.py --count $(COUNT)
 	WAVETANK_FUZZ=long $(BIN)/python -m pytest -q tests/fuzz/test_attacks.py tests/front/test_floods.py tests/simulation/test_exact.py
+
+# Every bundled scene over FRAMES frames: one thread, two threads, restored, killed and gone on, the same digest after each;
+# and 100 times kill -9. An hour. make promises FRAMES=30 KILLS=5 is shorter.
+FRAMES ?= 200
+KILLS ?= 100
+promises: .venv/test-ready
+	$(BIN)/python tests/promises.py scenes --frames $(FRAMES)
+	$(BIN)/python tests/promises.py kills --count $(KILLS)
 
 # An hour of playing, switching scenes, coming and going, exporting: memory and speed over time. make soak MINUTES=5 is shorter.
 MINUTES ?= 60

@@ -25,6 +25,7 @@ import numpy as np
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.memory import free_memory, in_words
 
+BLOCK = 1 << 22  # bytes that are read at once
 LARGEST_TEXT = 200_000_000  # bytes of a scene or a recording: a million particles one by one
 DEEPEST = 40  # arrays, tables and dotted keys within each other
 MOST_VALUES = 20_000_000  # numbers, texts, tables of a text
@@ -104,7 +105,11 @@ def read_bytes(path: str | Path, most: int, what: str) -> bytes:
     """Return what is in a regular file of at most `most` bytes; raises `WavetankError`."""
     with opened(path, most, what) as file:
         try:
-            return file.read(most + 1)[:most]
+            blocks, left = [], most
+            while left and (block := file.read(min(left, BLOCK))):  # room for all that is allowed is not taken at once
+                blocks.append(block)
+                left -= len(block)
+            return b"".join(blocks)
         except OSError as error:
             raise WavetankError(f"{named(path)}: the {what} cannot be read: {error.strerror or error}.") from None
 
