@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test lint figures gallery validation fuzz soak lowest newest clean
+.PHONY: demo test lint figures gallery validation fuzz promises blender soak lowest newest clean
 
 demo: .venv/demo-ready
 	$(BIN)/wavetank run obstacle-tank --seconds 4 --fps 30 --size 1280x720 --video --name demo --out out
@@ -44,6 +44,18 @@ fuzz: .venv/test-ready
 	$(BIN)/python tests/fuzz/long.py --count $(COUNT)
 	WAVETANK_FUZZ=long $(BIN)/python -m pytest -q tests/fuzz/test_attacks.py tests/front/test_floods.py tests/simulation/test_exact.py
 
+# Every bundled scene over FRAMES frames: one thread, two threads, restored, killed and gone on, the same digest after each;
+# and 100 times kill -9. An hour. make promises FRAMES=30 KILLS=5 is shorter.
+FRAMES ?= 200
+KILLS ?= 100
+promises: .venv/test-ready
+	$(BIN)/python tests/promises.py scenes --frames $(FRAMES)
+	$(BIN)/python tests/promises.py kills --count $(KILLS)
+
+# Blender opens a run by the add-on in examples/blender, in an environment of its own; says so where it cannot be had.
+blender: .venv/test-ready
+	$(BIN)/python tests/blender.py || test $$? -eq 77
+
 # An hour of playing, switching scenes, coming and going, exporting: memory and speed over time. make soak MINUTES=5 is shorter.
 MINUTES ?= 60
 soak: .venv/test-ready
@@ -54,7 +66,7 @@ lowest newest: .venv/test-ready
 	$(BIN)/python tests/dependencies.py $@
 
 clean:
-	rm -rf .venv .venv-lowest .venv-newest out
+	rm -rf .venv .venv-blender .venv-lowest .venv-newest out
 
 .venv/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

@@ -9,26 +9,9 @@ from pathlib import Path
 import av
 import pytest
 
-from wavetank import cli
-
 
 def process(*arguments: str) -> subprocess.CompletedProcess:
     return subprocess.run([sys.executable, "-m", "wavetank", *arguments], capture_output=True, text=True, timeout=300)
-
-
-@pytest.fixture
-def wavetank(monkeypatch, capsys):
-    """The command line in this process, where the start and the end of one are not what is tested."""
-
-    def run(*arguments: str) -> subprocess.CompletedProcess:
-        monkeypatch.setattr("sys.argv", ["wavetank", *arguments])
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as end:
-            cli.main()
-        said = capsys.readouterr()
-        return subprocess.CompletedProcess(arguments, end.value.code or 0, said.out, said.err)
-
-    return run
 
 
 def pictures(path: Path) -> list:

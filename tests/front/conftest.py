@@ -3,6 +3,7 @@
 import threading
 
 import pytest
+from watcher import Watcher
 
 import wavetank as wt
 from wavetank.front.page.server import WebFront
@@ -44,3 +45,16 @@ def playing():
     yield play
     for world in worlds:
         world.close()
+
+
+@pytest.fixture
+def watching():
+    watchers = []
+
+    def watch(url: str) -> Watcher:
+        watchers.append(Watcher(url))
+        return watchers[-1]
+
+    yield watch
+    for watcher in watchers:
+        watcher.close()

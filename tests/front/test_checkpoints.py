@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import wavetank as wt
+from wavetank.formats.run_folder import RunFolder
 from wavetank.front.checkpoints import begun
 from wavetank.front.headless import Order, go_on, record
 
@@ -112,6 +113,19 @@ def test_a_damaged_checkpoint_gives_way_to_the_one_before(whole, tmp_path, monke
     same(tmp_path, whole)
     with pytest.raises(wt.WavetankError, match="a run that was completed keeps no checkpoints"):
         go_on(tmp_path)
+
+
+def test_a_run_goes_on_where_another_one_has_been(whole, tmp_path, monkeypatch):
+    """What a later run left in the folder is no part of the one that goes on."""
+    with monkeypatch.context() as patch, pytest.raises(Crash):
+        crash_at(patch, 12)
+        record(started(), order(tmp_path, video=True))
+    record(wt.Simulation(wt.Scene.load("drop-2d")), Order(tmp_path, 0.1, 30.0, (64, 48), name="other"))
+    figures = go_on(tmp_path)
+    assert figures["digest"] == json.loads((whole / "stats.json").read_text())["digest"]
+    folder = RunFolder.open(tmp_path)
+    assert folder.run.name == "run" and folder.run.fps == 20.0 and folder.scene.tank.size == (1.2, 0.8)
+    assert films(tmp_path / "run.mp4") == 21
 
 
 @pytest.mark.parametrize(

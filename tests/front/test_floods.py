@@ -2,15 +2,14 @@
 
 import json
 import os
-import re
 import socket as sockets
 import threading
 import time
 import urllib.error
 import urllib.request
-from pathlib import Path
 
 import pytest
+from watcher import resident
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
@@ -21,52 +20,6 @@ POOL = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6)), fluids=[wt.Block(lo
 TEXT = "spacing = 0.05\ntank.size = [1.0, 0.6]\nfluids = [{ lower = [0, 0], upper = [0.5, 0.4] }]\n"
 LONG = os.environ.get("WAVETANK_FUZZ") == "long"  # make fuzz
 SECONDS, SHARE = (5.0, 0.5) if LONG else (2.0, 0.3)  # beside other tests pictures come as they may
-
-
-class Watcher:
-    """Someone honest at the page, who shows every picture and asks for the next."""
-
-    def __init__(self, url: str) -> None:
-        self.socket, self.pictures, self.notes = connect(url, max_size=None), 0, []
-        self._ended = False
-        self._thread = threading.Thread(target=self._look, daemon=True)
-        self._thread.start()
-
-    def _look(self) -> None:
-        while not self._ended:
-            try:
-                message = self.socket.recv(timeout=1.0)
-                if isinstance(message, bytes):
-                    self.pictures += 1
-                    self.socket.send('{"do": "ack"}')
-                else:
-                    table = json.loads(message)
-                    self.notes += table.get("notes", []) + ([table["text"]] if table["type"] == "note" else [])
-            except TimeoutError:
-                continue
-            except ConnectionClosed:
-                return
-
-    def rate(self, seconds: float) -> float:
-        """Pictures a second."""
-        before = self.pictures
-        time.sleep(seconds)
-        return (self.pictures - before) / seconds
-
-    def close(self) -> None:
-        self._ended = True
-        self.socket.close()
-
-
-def wait_for_pictures(watcher: Watcher) -> None:
-    end = time.monotonic() + 120
-    while watcher.pictures < 5 and time.monotonic() < end:
-        time.sleep(0.05)
-
-
-def resident() -> float:
-    """Memory of this process [MB], the server's."""
-    return int(re.search(r"VmRSS:\s+(\d+)", Path("/proc/self/status").read_text())[1]) / 1024
 
 
 SOLID = {"do": "add-solid", "solid": {"shape": "box", "center": [0.8, 0.1], "size": [0.05, 0.05]}}
@@ -83,20 +36,23 @@ FLOODS = {
 
 
 @pytest.mark.parametrize("name", FLOODS if LONG else ["scenes", "solids", "bookmarks"])
-def test_who_watches_keeps_half_of_the_pictures(playing, name):
+def test_who_watches_keeps_half_of_the_pictures(playing, watching, name):
     world = playing(POOL)
-    watcher = Watcher(world.socket)
-    flooder = connect(world.socket, max_size=None)
+    with connect(world.socket, max_size=None) as flooder:
+        flood_and_watch(world, watching(world.socket), flooder, FLOODS[name])
+
+
+def flood_and_watch(world, watcher, flooder, tables: list[dict]) -> None:
     flooder.send('{"do": "drive"}')
-    wait_for_pictures(watcher)
-    for table in FLOODS[name]:  # kernels that this needs
+    watcher.wait_for_pictures()
+    for table in tables:  # kernels that this needs
         flooder.send(json.dumps(table))
     time.sleep(1.0)
     calm = watcher.rate(SECONDS)
     before, ended, sent = resident(), threading.Event(), [0]
 
     def flood() -> None:
-        texts = [json.dumps(table) for table in FLOODS[name]]
+        texts = [json.dumps(table) for table in tables]
         try:
             while not ended.is_set():
                 for text in texts:
@@ -115,7 +71,6 @@ def test_who_watches_keeps_half_of_the_pictures(playing, name):
     assert flooded >= SHARE * calm, f"{flooded:.1f} of {calm:.1f} pictures a second"
     assert grown < 100, f"{grown:.0f} MB"
     assert world.thread.is_alive()
-    watcher.close()
 
 
 def answer(port: int, request: bytes) -> bytes:
@@ -154,10 +109,10 @@ def test_headers_are_on_every_answer(playing):
             assert "\r\nserver:" not in head
 
 
-def test_downloads_do_not_stop_the_water(playing):
+def test_downloads_do_not_stop_the_water(playing, watching):
     world = playing(POOL)
-    watcher = Watcher(world.socket)
-    wait_for_pictures(watcher)
+    watcher = watching(world.socket)
+    watcher.wait_for_pictures()
     calm, ended, codes = watcher.rate(SECONDS), threading.Event(), set()
 
     def ask() -> None:
@@ -176,14 +131,13 @@ def test_downloads_do_not_stop_the_water(playing):
     ended.set()
     assert codes <= {200, 429} and 200 in codes
     assert flooded >= SHARE * calm, f"{flooded:.1f} of {calm:.1f} pictures a second"
-    watcher.close()
 
 
-def test_what_nobody_thought_of_pauses_and_is_told(playing, monkeypatch):
+def test_what_nobody_thought_of_pauses_and_is_told(playing, watching, monkeypatch):
     monkeypatch.delenv("WAVETANK_STRICT_DOOR", raising=False)
     world = playing(POOL)
-    watcher = Watcher(world.socket)
-    wait_for_pictures(watcher)
+    watcher = watching(world.socket)
+    watcher.wait_for_pictures()
 
     def fail(*arguments):
         raise RuntimeError("a pipe\nhas burst")
@@ -194,10 +148,26 @@ def test_what_nobody_thought_of_pauses_and_is_told(playing, monkeypatch):
     monkeypatch.setitem(rules.RULES, SetView, fail)
     watcher.socket.send('{"do": "view", "view": "particles"}')
     monkeypatch.setattr(type(world.session), "_fit_frame", fail)
-    end = time.monotonic() + 60
-    while time.monotonic() < end and not any("The water is paused" in note for note in watcher.notes):
-        time.sleep(0.05)
+    assert watcher.wait_for_note("The water is paused")
     assert any("The command 'view' failed" in note and "a pipe has burst" in note for note in watcher.notes)
     assert any("The water is paused: RuntimeError, a pipe has burst" in note for note in watcher.notes)
     assert world.thread.is_alive() and world.session.paused
-    watcher.close()
+
+
+def test_only_who_failed_is_told(playing, watching):
+    """What a driver's command fails for goes to the driver; who watches sees the water."""
+    world = playing(POOL)
+    driver, watcher = watching(world.socket), watching(world.socket)
+    watcher.wait_for_pictures()
+    failing = [{"do": "remove-solid", "name": "no-such-solid"}, {"do": "load", "text": "spacing = -1"}]
+    for table in failing:
+        driver.send(table)
+    assert driver.wait_for_note("no-such-solid") and driver.wait_for_note("spacing")
+    watcher.send({"do": "remove-solid", "name": "of the watcher"})
+    assert watcher.wait_for_note("You are watching")
+    for _ in range(20):  # the same over and over is said once a second
+        driver.send(failing[0])
+    watcher.wait_for_pictures(watcher.pictures + 3, 10.0)
+    assert not any("no-such-solid" in note or "spacing" in note for note in watcher.notes), watcher.notes
+    assert not any("watching" in note for note in driver.notes)
+    assert sum("no-such-solid" in note for note in driver.notes) <= 4

@@ -7,7 +7,6 @@ half, or anything ended that should not have.
 """
 
 import argparse
-import json
 import random
 import sys
 import tempfile
@@ -16,45 +15,25 @@ import time
 import urllib.request
 from pathlib import Path
 
-from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
-
 import wavetank as wt
 from wavetank.formats.npz import write_npz
 from wavetank.front.page.server import WebFront
 from wavetank.scene.scene import bundled_levels, bundled_scenes
 from wavetank.session.session import Session
 
-HERE = Path(__file__).parent
+sys.path.insert(0, str(Path(__file__).parents[1] / "front"))
+
+from watcher import Watcher, resident
+
 TOOLS = ("pour", "stir", "push", "freeze", "dye", "cut", "explosion", "magnet", "drain", "blow", "waves", "tilt")
 
 
-def resident() -> float:
-    text = Path("/proc/self/status").read_text()
-    return int(text.partition("VmRSS:")[2].split()[0]) / 1024
-
-
-class Player:
+class Player(Watcher):
     """Somebody at the page, who looks at pictures and acts by chance."""
 
     def __init__(self, url: str, seed: int) -> None:
-        self.url, self.chance = url, random.Random(seed)
-        self.socket = connect(url, max_size=None)
-        self.pictures, self.ended = 0, False
-        self.thread = threading.Thread(target=self.look, daemon=True)
-        self.thread.start()
-
-    def look(self) -> None:
-        while not self.ended:
-            try:
-                message = self.socket.recv(timeout=2.0)
-                if isinstance(message, bytes):
-                    self.pictures += 1
-                    self.socket.send('{"do": "ack"}')
-            except TimeoutError:
-                continue
-            except ConnectionClosed:
-                return
+        super().__init__(url)
+        self.chance = random.Random(seed)
 
     def act(self) -> None:
         pick = self.chance.random()
@@ -67,11 +46,7 @@ class Player:
         else:
             tables = [{"do": "set", "name": "viscosity", "value": x}, {"do": "rewind", "time": 0.5}]
         for table in tables:
-            self.socket.send(json.dumps(table))
-
-    def close(self) -> None:
-        self.ended = True
-        self.socket.close()
+            self.send(table)
 
 
 def main() -> int:
@@ -93,7 +68,7 @@ def main() -> int:
     pictures = 0
     while time.monotonic() - began < 60 * minutes:
         number += 1
-        driver.socket.send(json.dumps({"do": "load", "name": names[number % len(names)]}))
+        driver.send({"do": "load", "name": names[number % len(names)]})
         start, pictures = time.monotonic(), driver.pictures
         others = [Player(url, number + k) for k in range(chance.randint(0, 3))]
         while time.monotonic() - start < 6.0:

@@ -257,6 +257,38 @@ def test_a_recording_that_is_none(tmp_path):
         assert str(report.value).startswith(str(path))
 
 
+OFTEN = "import wavetank.front.recorder as r; r.EVERY = 0.2; from wavetank.cli import main; main()"
+
+
+def test_a_killed_session_keeps_its_recording(tmp_path):
+    """Killed in the middle of play, with a hand in the water: the file is whole, and replays to its digest."""
+    from websockets.sync.client import connect
+
+    path = tmp_path / "session.toml"
+    process = subprocess.Popen(
+        [sys.executable, "-c", OFTEN, "play", "drop-2d", "--web", "--no-browser", "--port", "0", "--record", str(path)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    port, token = re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", process.stdout.readline()).groups()
+    with connect(f"ws://127.0.0.1:{port}/socket?token={token}", max_size=None) as socket:
+        socket.send('{"do": "point-begin", "x": 0.5, "y": 0.7, "tool": "stir"}')
+        socket.send('{"do": "set", "name": "viscosity", "value": 0.2}')
+        end, frames = time.monotonic() + 120, 0
+        while time.monotonic() < end and frames < 10:
+            socket.send('{"do": "point-move", "x": 0.4, "y": 0.6}')
+            message = socket.recv(timeout=240)
+            if not isinstance(message, str):
+                socket.send('{"do": "ack"}')
+            frames = Recording.load(path).frames if path.exists() else 0
+        os.kill(process.pid, signal.SIGKILL)
+    process.communicate(timeout=60)
+    recording = Recording.load(path)
+    assert recording.frames >= 10
+    assert {"tool-begin", "tool-move", "set"} <= {command["do"] for command in recording.commands}
+    *_, again = replay(recording)
+    assert again.sim.digest() == recording.digest
+
+
 def test_play_records_and_replay_repeats(tmp_path):
     """The commands of the command line, with someone at the page."""
     from websockets.sync.client import connect

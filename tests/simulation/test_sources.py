@@ -7,7 +7,7 @@ import pytest
 
 import wavetank as wt
 from wavetank.scene.mouths import MOST_IN_A_ROW, mouth_of
-from wavetank.simulation.jets import outlines
+from wavetank.simulation.jets import closing_speed, jet_of, outlines
 
 FLAT = wt.Tank(size=(1.0, 0.8))
 
@@ -252,3 +252,45 @@ def test_mouths_are_outlined_where_they_are():
     assert np.array_equal(mouth[0], mouth[-1])
     assert np.linalg.norm(hole - [0.5, 0, 0.3], axis=1) == pytest.approx(0.1)
     assert hole[:, 1] == pytest.approx(0.0)
+
+
+def against_each_other(turn: float) -> wt.Scene:
+    """Two jets of 5 m/s that meet: head on, or at 2 x `turn` [rad] to the line between them."""
+    across, down = math.cos(turn), -math.sin(turn)
+    jets = [
+        wt.Emitter(position=(side * 0.4, 0.0, 0.0), direction=(-side * across, down, 0.0), radius=0.16, speed=5.0)
+        for side in (-1.0, 1.0)
+    ]
+    return wt.Scene(spacing=0.04, gravity=(0.0, 0.0, 0.0), emitters=jets, foam=0.0)
+
+
+@pytest.mark.parametrize("turn", [0.0, math.pi / 4])
+def test_jets_that_meet_gain_no_energy(turn):
+    """Nothing but the mouths does work on them (Bernoulli): what comes together has no more energy than what came in.
+
+    Fronts that close at an angle throw a jet ahead of them, at most u (1 + cos b) / sin b fast with the half angle b
+    between the fronts: Birkhoff, MacDougall, Pugh, Taylor, "Explosives with Lined Cavities", J. Appl. Phys. 19, 1948.
+    """
+    sim, shares = wt.Simulation(against_each_other(turn)), []
+    while sim.time < 0.2:
+        sim.step()
+        squares = np.sum(sim.velocities.astype(float) ** 2, axis=1)
+        shares.append(squares.mean() / 25.0)
+    assert max(shares) < 1.02, "1.25 head on where steps follow the speed of either jet"
+    assert shares[-1] < 0.99, "they have met"
+    if turn:
+        assert np.percentile(np.sqrt(squares), 99.5) < 1.1 * 5.0 * (1.0 + math.cos(turn)) / math.sin(turn)
+
+
+def test_jets_that_pass_or_part_take_no_shorter_steps():
+    def closing(*places) -> float:
+        jets = [wt.Emitter(position=at, direction=ahead, radius=0.1, speed=2.0) for at, ahead in places]
+        scene = wt.Scene(spacing=0.05, emitters=jets)
+        return closing_speed(jet_of(scene, jet, 0.0) for jet in jets)
+
+    assert closing(((-1, 0, 0), (1, 0, 0)), ((1, 0, 0), (-1, 0, 0))) == pytest.approx(4.0)
+    assert closing(((-1, 0, 0), (1, -1, 0)), ((1, 0, 0), (-1, -1, 0))) == pytest.approx(2.0 * math.sqrt(2.0))
+    assert closing(((-1, 0, 0), (1, 0, 0)), ((1, 0.5, 0), (-1, 0, 0))) == 0.0, "they pass each other"
+    assert closing(((-1, 0, 0), (-1, 0, 0)), ((1, 0, 0), (1, 0, 0))) == 0.0, "they part"
+    assert closing(((-1, 0, 0), (0, 1, 0)), ((1, 0, 0), (0, 1, 0))) == 0.0, "they go side by side"
+    assert closing(((-1, 0, 0), (1, 0, 0))) == 0.0

@@ -14,14 +14,14 @@ from wavetank.scene.scene import bundled_levels
 
 @app.command()
 def play(
-    scene: Annotated[str, typer.Argument(help="A bundled scene, a level or the path of a TOML file.")] = "",
+    scene: Annotated[str, typer.Argument(help="A bundled scene, a level, a TOML file or a run's folder.")] = "",
     level: Annotated[str, typer.Option(help="A level, by name or number: wavetank scenes lists them.")] = "",
     web: Annotated[bool, typer.Option("--web", help="Serve a page for a browser, whatever there is.")] = False,
     window: Annotated[bool, typer.Option("--window", help="Open a window, or say why there can be none.")] = False,
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the page; 0 takes any free one.")] = None,
     host: Annotated[str, typer.Option(help="Address to listen on; beyond 127.0.0.1 others may come in.")] = "127.0.0.1",
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
-    record: Annotated[Path | None, typer.Option(help="Write the session to this TOML file at the end.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Write the session to this TOML file, every few seconds.")] = None,
     particles: Annotated[
         int | None,
         typer.Option(min=0, help="Choose the spacing for about so many; 0 keeps the scene's. Without SCENE: 6000."),
@@ -31,11 +31,12 @@ def play(
     arch: Arch = "cpu",
 ) -> None:
     """Play with the water in a window or, without a display, a browser: pour, stir, freeze, carry, rewind."""
+    from wavetank.front.kept import as_scene
     from wavetank.front.play import play as begin
     from wavetank.front.play import with_particles
 
     name = _chosen(scene, level)
-    world = configured(name or "obstacle-tank", settings)
+    world = configured(as_scene(name or "obstacle-tank"), settings)
     wanted = particles if particles is not None else 0 if name or settings else 6000
     if wanted:
         world = with_particles(world, wanted)

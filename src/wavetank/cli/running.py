@@ -127,35 +127,49 @@ def _finish(figures: dict[str, Any], as_json: bool) -> None:
 
 @app.command()
 def render(
-    world: Annotated[str, typer.Argument(metavar="SCENE|STATE.npz", help="A scene, or a state that was saved.")],
+    world: Annotated[
+        str,
+        typer.Argument(metavar="SCENE|RUN|STATE.npz|FRAMES.h5", help="What is drawn: a run is named by its folder."),
+    ],
     at: Annotated[
-        float | None, typer.Option(help="Time [s], to which a saved state goes on; its own, or a scene's best moment.")
+        float | None,
+        typer.Option(
+            "--at", "--time", help="Time [s]: a scene's best moment, a state's own, a run's last unless told."
+        ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="The picture, PNG.")] = Path("picture.png"),
+    out: Annotated[Path, typer.Option(help="The picture, PNG; of a run, MP4 or GIF for a film.")] = Path("picture.png"),
     width: Annotated[int, typer.Option(help="Pixels.")] = 1280,
     height: Annotated[int, typer.Option(help="Pixels.")] = 720,
     view: View = None,
     color_by: ColorBy = None,
     cut: Cut = None,
-    quality: Quality = "standard",
+    quality: Annotated[
+        str, typer.Option(help="draft, standard or film, as for run; standard for a picture, draft for a film.")
+    ] = "",
     eye: Annotated[
         str | None, typer.Option(help="Where the camera is [m], as 2,1,3; what it looks at is --target.")
     ] = None,
     target: Annotated[str | None, typer.Option(help="What the camera looks at [m]; the middle unless told.")] = None,
     timings: Annotated[bool, typer.Option("--timings", help="Print the milliseconds of every pass.")] = False,
     settings: Settings = [],  # noqa: B006
-    arch: Arch = "cpu",
+    arch: Annotated[str, typer.Option(help="Back end; cpu, or that of the run unless given.")] = "",
     as_json: Json = False,
 ) -> None:
-    """Draw one picture of a scene or of a saved state."""
+    """Draw one picture of a scene, a saved state or an instant of a run; or a film of a run that is over."""
+    from wavetank.front.kept import FILMS, is_kept
     from wavetank.front.still import take
 
-    scene = None if world.endswith(".npz") else configured(world, settings)
+    kept = is_kept(world) or (world.endswith(".toml") and out.suffix.lower() in FILMS)
+    scene = None if kept or world.endswith(".npz") else configured(world, settings)
     if scene is None and settings:
-        raise WavetankError("--set does not go with a saved state, which has its scene with it.")
+        raise WavetankError("--set does not go with a saved state or a run, which has its scene with it.")
+    if out.suffix.lower() in FILMS:
+        _film(world, out, (width, height), at, kept, as_json, arch=arch, quality=quality or "draft",
+              view=view, color_by=color_by, cut=cut)  # fmt: skip
+        return
     figures = take(
-        world, scene, out, width, height, at=at, arch=arch, quality=quality, eye=eye, target=target, timings=timings,
-        view=view, color_by=color_by, cut=cut,
+        world, scene, out, width, height, at=at, arch=arch, quality=quality or "standard", eye=eye, target=target,
+        timings=timings, view=view, color_by=color_by, cut=cut,
     )  # fmt: skip
     if as_json:
         print(json.dumps(figures))
@@ -165,6 +179,24 @@ def render(
     if timings:
         print(f"{'together':12s} {sum(figures['milliseconds'].values()):8.1f} ms")
     print(out)
+
+
+def _film(
+    world: str, out: Path, size: tuple[int, int], at: float | None, kept: bool, as_json: bool, **options: Any
+) -> None:
+    from wavetank.front.kept import film
+
+    if not kept:
+        raise WavetankError(
+            f"--out {out}: films are made of a run's folder, a recording or an .h5; wavetank run {world} --video "
+            "makes one of a scene."
+        )
+    if at is not None:
+        raise WavetankError(f"--at does not go with a film, {out}, which shows all frames; name a .png.")
+    figures = film(world, out, *size, console=console, **options)
+    print(json.dumps(figures) if as_json else f"{figures['frames']:,} frames\n{out}")
+    if figures["interrupted"]:
+        raise typer.Exit(figures["exit_code"])
 
 
 def _report(figures: dict[str, Any]) -> None:

@@ -118,8 +118,8 @@ def table_rows(group: Any, frame: int) -> dict[str, np.ndarray]:
     return {name: group[name][first : first + count] for name in group if name not in ("first", "count")}
 
 
-def frames_of(path: str | Path, read: Callable[[Any, int], Any], counter: str) -> Iterator[Any]:
-    """Yield what `read` makes of each frame of a file."""
+def frames_of(path: str | Path, read: Callable[[Any, int], Any], counter: str, first: int = 0) -> Iterator[Any]:
+    """Yield what `read` makes of each frame of a file, from the one with the number `first` on."""
     with opened(path) as file:
-        for frame in range(int(file.attrs[counter])):
+        for frame in range(first, int(file.attrs[counter])):
             yield read(file, frame)

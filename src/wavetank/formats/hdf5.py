@@ -138,8 +138,11 @@ def _surfaces(file: Any, frame: int, scene: Scene) -> tuple[WaterSurface, ...]:
     return tuple(found)
 
 
-def read(path: str | Path) -> Iterator[Instant]:
-    """Yield the frames of a file that was written here; raises `WavetankError` for another one."""
+def read(path: str | Path, first: int = 0) -> Iterator[Instant]:
+    """Yield the frames of a file that was written here, from number `first` on.
+
+    Raises `WavetankError` for another file.
+    """
     with opened(path) as file:
         if file.attrs.get("format") != "wavetank" or COUNTER not in file.attrs:
             raise WavetankError(f"{path}: this HDF5 file was not written by wavetank; it has no format and {COUNTER}.")
@@ -164,7 +167,13 @@ def read(path: str | Path) -> Iterator[Instant]:
         read = Instant.read(scene, int(frames["number"][frame]), float(frames["time"][frame]), arrays, standing)
         return dataclasses.replace(read, surfaces=_surfaces(file, frame, scene))
 
-    return frames_of(path, instant, COUNTER)
+    return frames_of(path, instant, COUNTER, first)
+
+
+def times(path: str | Path) -> list[float]:
+    """Return the time of the water [s] at each frame of such a file."""
+    with opened(path) as file:
+        return [float(time) for time in file["frames/time"][: int(file.attrs.get(COUNTER, 0))]]
 
 
 def rate(path: str | Path) -> float:

@@ -131,6 +131,19 @@ class RunFolder:
             return hdf5.read(self._hdf5())
         return (npz.read(path, self.scene) for path in self._archives())
 
+    def instant_at(self, time: float) -> Instant:
+        """Return the frame that was written nearest to a time of the water [s]; raises `WavetankError` without any."""
+        between, archives = self.run.every / self.run.fps, self._archives()
+        number = max(0, round((time - self.run.start) / between))
+        if self._has_tables():
+            number = min(number, len(hdf5.times(self._hdf5())) - 1)
+            found = next(hdf5.read(self._hdf5(), number), None) if number >= 0 else None
+            if found is not None:
+                return found
+        if not archives:
+            raise WavetankError(f"{self.path}: no frame of this run was finished.")
+        return npz.read(archives[min(number, len(archives) - 1)], self.scene)
+
     def _has_tables(self) -> bool:
         return bool({"h5", "hdf5"} & {*self.run.exports}) and self._hdf5().is_file()
 

@@ -7,6 +7,7 @@ WAVETANK_STRICT_DOOR is set, as fuzzers do, lets it through, because then it is 
 
 import ast
 import contextlib
+import functools
 import io
 import json
 import math
@@ -15,7 +16,7 @@ import re
 import stat
 import tomllib
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -24,6 +25,7 @@ import numpy as np
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.memory import free_memory, in_words
 
+BLOCK = 1 << 22  # bytes that are read at once
 LARGEST_TEXT = 200_000_000  # bytes of a scene or a recording: a million particles one by one
 DEEPEST = 40  # arrays, tables and dotted keys within each other
 MOST_VALUES = 20_000_000  # numbers, texts, tables of a text
@@ -103,7 +105,11 @@ def read_bytes(path: str | Path, most: int, what: str) -> bytes:
     """Return what is in a regular file of at most `most` bytes; raises `WavetankError`."""
     with opened(path, most, what) as file:
         try:
-            return file.read(most + 1)[:most]
+            blocks, left = [], most
+            while left and (block := file.read(min(left, BLOCK))):  # room for all that is allowed is not taken at once
+                blocks.append(block)
+                left -= len(block)
+            return b"".join(blocks)
         except OSError as error:
             raise WavetankError(f"{named(path)}: the {what} cannot be read: {error.strerror or error}.") from None
 
@@ -118,19 +124,38 @@ def read_text(path: str | Path, what: str, most: int = LARGEST_TEXT) -> str:
 
 def parse_toml(text: str, origin: str, what: str = "this") -> dict[str, Any]:
     """Return what a TOML text says; raises `WavetankError` for what is none, too deep, too long or too much."""
-    if len(text) > LARGEST_TEXT:
-        raise WavetankError(f"{origin}: this has {len(text):,} characters; at most {LARGEST_TEXT:,} are allowed.")
-    _check_structure(text, origin)
+
+    def load(text: str) -> dict[str, Any]:
+        _check_structure(text, origin)
+        return tomllib.loads(text)
+
+    return _parse(load, text, f"{origin}: this", f"{origin}: {what} is not TOML", LARGEST_TEXT, origin)
+
+
+def parse_json(text: str | bytes, origin: str, most: int = LARGEST_JSON) -> Any:
+    """Return what a JSON text says; raises `WavetankError` for what is none, too deep, or holds NaN."""
+
+    def refuse(name: str) -> None:
+        raise WavetankError(f"{origin} holds {name}; every number must be finite.")
+
+    load = functools.partial(json.loads, parse_constant=refuse)
+    return _parse(load, text, origin, f"{origin} is not JSON", most, origin)
+
+
+def _parse(load: Callable[[Any], Any], text: str | bytes, subject: str, refused: str, most: int, origin: str) -> Any:
+    """Return what a parser makes of a text of at most `most` characters; its errors begin with `refused`."""
+    if len(text) > most:
+        raise WavetankError(f"{subject} has {len(text):,} characters; at most {most:,} are allowed.")
     try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise WavetankError(f"{origin}: {what} is not TOML: {one_line(error)}.") from None
+        plain = load(text)
     except RecursionError:
-        raise WavetankError(f"{origin}: this is nested too deep; {DEEPEST} levels are allowed.") from None
-    except ValueError as error:
-        raise WavetankError(f"{origin}: {what} is not TOML: {one_line(error)}.") from None
-    check_plain(table, origin)
-    return table
+        raise WavetankError(
+            f"{subject} is nested more than {DEEPEST} deep; at most so many levels are allowed."
+        ) from None
+    except ValueError as error:  # errors of both parsers are
+        raise WavetankError(f"{refused}: {one_line(error)}.") from None
+    check_plain(plain, origin)
+    return plain
 
 
 def _check_structure(text: str, origin: str) -> None:
@@ -148,24 +173,6 @@ def _check_structure(text: str, origin: str) -> None:
             raise WavetankError(
                 f"{origin}: line {line} is nested more than {DEEPEST} deep; so many levels are allowed."
             )
-
-
-def parse_json(text: str | bytes, origin: str, most: int = LARGEST_JSON) -> Any:
-    """Return what a JSON text says; raises `WavetankError` for what is none, too deep, or holds NaN."""
-    if len(text) > most:
-        raise WavetankError(f"{origin} has {len(text):,} characters; at most {most:,} are allowed.")
-
-    def refuse(name: str) -> None:
-        raise WavetankError(f"{origin} holds {name}; every number must be finite.")
-
-    try:
-        plain = json.loads(text, parse_constant=refuse)
-    except RecursionError:
-        raise WavetankError(f"{origin} is nested more than {DEEPEST} deep.") from None
-    except ValueError as error:
-        raise WavetankError(f"{origin} is not JSON: {one_line(error)}.") from None
-    check_plain(plain, origin)
-    return plain
 
 
 def check_plain(plain: Any, origin: str) -> None:

@@ -4,6 +4,10 @@ A run's folder has them in `states/`: `NUMBER.npz`, states (`simulation/saved.py
 `film-NUMBER.mp4`, the parts of a video that end there; and `run.json`, which names both states with their SHA-256, what
 was ordered and the figures so far. `run.json` is replaced in one move after the state is on the disk: whenever the
 process ends, it names states that are complete.
+
+It repeats what `run.toml` (`formats/run_folder.py`) says was ordered, on purpose: state, order and figures have to
+change in one move, and `run.toml` belongs to whatever ran in this folder last, which may be another run that wrote no
+checkpoint. What goes on is always what `run.json` says.
 """
 
 import dataclasses

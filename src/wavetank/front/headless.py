@@ -100,10 +100,10 @@ class Order:
         """Options of every picture."""
         return {**self.look, "samples": QUALITIES[self.quality][1]}
 
-    def run(self, sim: Simulation) -> Run:
-        """Return this as the file of a run's folder has it."""
+    def run(self, sim: Simulation, start: float) -> Run:
+        """Return this as the file of a run's folder has it, which began at the time `start` [s] of the water."""
         return Run(
-            name=self.name, arch=sim.arch or "cpu", seconds=self.seconds, start=sim.time, fps=self.fps, size=self.size,
+            name=self.name, arch=sim.arch or "cpu", seconds=self.seconds, start=start, fps=self.fps, size=self.size,
             video=self.video, gif=self.gif, frames=self.frames, exports=[*self.exports], only=[*self.only],
             every=self.every, quality=self.quality,
             look={name: str(value) for name, value in self.look.items() if value is not None},
@@ -180,11 +180,8 @@ class _Work:
         self.start = begun.progress.start if begun else sim.time
         self.done = begun.checkpoint.frame if begun else -1  # number of the last frame that was written
         self.film: FilmInParts | None = None
-        if begun is None or not RunFolder.is_one(order.out):
-            self.folder = RunFolder.create(order.out, order.run(sim), sim.scene)
-        else:
-            self.folder = RunFolder.open(order.out)
-            self.folder.keep_stats(self.done + 1)
+        self.folder = self._folder(order.run(sim, self.start))
+        self.folder.keep_stats(self.done + 1)
         self.checkpoints: Checkpoints | None = None
         if order.checkpoint_every:
             plain = dataclasses.asdict(order)
@@ -193,6 +190,14 @@ class _Work:
             if begun:
                 self.checkpoints.kept = [begun.checkpoint]
                 self.checkpoints.next = sim.time + order.checkpoint_every
+
+    def _folder(self, run: Run) -> RunFolder:
+        """Return the folder of this run; another one's that lies in its place is begun anew."""
+        if self.begun is not None and RunFolder.is_one(self.order.out):
+            folder, other = RunFolder.open(self.order.out), {"wavetank", "arch"}
+            if folder.run.model_dump(exclude=other) == run.model_dump(exclude=other):
+                return folder
+        return RunFolder.create(self.order.out, run, self.sim.scene)
 
     def open_film(self, stack: ExitStack) -> Any:
         """Open the video, in parts where there are checkpoints."""

@@ -1,4 +1,4 @@
-"""`wavetank play`: a session, a front for it, and its recording at the end."""
+"""`wavetank play`: a session, a front for it, and its recording."""
 
 import contextlib
 import os
@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import partial_path
 from wavetank.front.page.gate import is_loopback
+from wavetank.front.recorder import check_folder, recorded
 from wavetank.front.signals import asked_to_end
 from wavetank.scene.scene import Scene
-from wavetank.session.recording import Recording
 from wavetank.session.session import Session
 
 
@@ -78,36 +77,14 @@ def play_in_window(scene: Scene, arch: str, *, record: Path | None = None, most:
     """Play in a window until it is closed."""
     from wavetank.front.window.window import Window
 
-    _check_folder(record)
+    check_folder(record)
     window = Window(Session(scene, arch, most_particles=most))
-    with _stopped_when_asked(window.stop):
+    with _stopped_when_asked(window.stop), recorded(record, window.engine.session, scene, window.engine.loop.ask):
         try:
             window.open()
             window.run()
         finally:
             window.close()
-            _save_recording(record, window.engine.session, scene)
-
-
-def _check_folder(record: Path | None) -> None:
-    if record is None:
-        return
-    if not record.resolve().parent.is_dir():
-        raise WavetankError(f"--record {record}: the folder {record.resolve().parent} is not there; make it first.")
-    if record.is_dir():
-        raise WavetankError(f"--record {record}: this is a folder; name a file in it.")
-    partial = partial_path(record)
-    try:
-        partial.touch()
-        partial.unlink()
-    except OSError as error:
-        raise WavetankError(f"--record {record}: the file cannot be written: {error.strerror or error}.") from None
-
-
-def _save_recording(record: Path | None, session: Session, start: Scene) -> None:
-    if record is not None:
-        Recording.of(session, start).save(record)
-        print(f"session written to {record}", flush=True)
 
 
 def play_in_browser(
@@ -117,7 +94,7 @@ def play_in_browser(
     """Serve a page until Ctrl-C and print one line with its address, token included."""
     from wavetank.front.page.server import WebFront
 
-    _check_folder(record)
+    check_folder(record)
     session = Session(scene, arch, most_particles=most)
     front = WebFront(session, host, port)
     with _stopped_when_asked(front.stop):
@@ -126,11 +103,11 @@ def play_in_browser(
         print(f"wavetank plays at {front.url}{where} (Ctrl-C ends it)", flush=True)
         if browser:
             threading.Thread(target=webbrowser.open, args=(front.url,), daemon=True).start()
-        try:
-            front.run()
-        finally:
-            front.stop()
-            _save_recording(record, session, scene)
+        with recorded(record, session, scene, front.ask):
+            try:
+                front.run()
+            finally:
+                front.stop()
 
 
 def with_particles(scene: Scene, wanted: int) -> Scene:

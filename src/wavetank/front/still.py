@@ -1,13 +1,15 @@
-"""One picture of a scene or of a saved state."""
+"""One picture of a scene, of a saved state or of a run."""
 
 import time
 from pathlib import Path
 from typing import Any
 
+from wavetank.device.compiler import current_backend
 from wavetank.formats import exporter_for
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.replacing import partial_path
 from wavetank.foundation.version import VERSION
+from wavetank.front.kept import frame_at, is_kept
 from wavetank.scene.scene import Scene
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.simulation import Simulation
@@ -27,33 +29,36 @@ SHOWN_AT = {
 
 def take(
     world: str, scene: Scene | None, path: Path, width: int, height: int, *, at: float | None = None,
-    arch: str = "cpu", quality: str = "standard", eye: str | None = None, target: str | None = None,
+    arch: str = "", quality: str = "standard", eye: str | None = None, target: str | None = None,
     timings: bool = False, **options: Any,
 ) -> dict[str, Any]:  # fmt: skip
     """Write a picture with its scene, time and view as metadata, and return what it cost.
 
-    `world` is the name of `scene`, or without one the file of a saved state. With `timings` a second picture is
-    taken, pass by pass, after the kernels are compiled.
+    `world` is the name of `scene`, or without one the file of a saved state, or the folder of a run. With
+    `timings` a second picture is taken, pass by pass, after the kernels are compiled.
     """
     writer = exporter_for(path, "picture")
     partial_path(path)  # what is wrong shows before the work
     supersample, samples = QUALITIES[quality_named(quality)]
     style = {**options, "samples": samples}
     view = Style(**style).kind
-    sim = _open(world, scene, at, arch)
-    renderer, frame = Renderer(width, height, affordable(width, height, supersample)), sim.frame(view.coloured)
+    if scene is None and is_kept(world):
+        frame = frame_at(world, at, arch)
+    else:
+        frame = _open(world, scene, at, arch or "cpu").frame(view.coloured)
+    renderer = Renderer(width, height, affordable(width, height, supersample))
     camera = _camera_of(frame, eye, target, width / max(height, 1))
     began = time.perf_counter()
     image = renderer.render(frame, camera, **style)
     figures: dict[str, Any] = {
-        "file": str(path), "scene": sim.scene.title, "time": sim.time, "view": view.name, "particles": sim.count,
-        "seconds_to_draw": time.perf_counter() - began, "arch": sim.arch,
+        "file": str(path), "scene": frame.scene.title, "time": frame.time, "view": view.name, "particles": frame.count,
+        "seconds_to_draw": time.perf_counter() - began, "arch": current_backend(),
     }  # fmt: skip
     if timings:
         measured: dict[str, float] = {}
         figures["milliseconds"] = measured
         renderer.render(frame, camera, timings=measured, **style)
-    about = {"scene": sim.scene.title, "time": f"{sim.time:.4f} s", "view": view.name, "particles": sim.count}
+    about = {"scene": frame.scene.title, "time": f"{frame.time:.4f} s", "view": view.name, "particles": frame.count}
     writer.write(path, image, about | {"Software": f"wavetank {VERSION}"})
     return figures
 

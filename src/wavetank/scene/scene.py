@@ -61,7 +61,8 @@ class Scene(Timetable, Parameters):
         if not isinstance(values, dict):
             return values
         check_numbers(values)
-        return cls.spread_gravity({**_chosen(values), **values})
+        chosen = {name: value for name, value in _chosen(values).items() if name not in values}
+        return cls.spread_gravity({**values, **chosen})  # what was there keeps its order: digests tell one from another
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":

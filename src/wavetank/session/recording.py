@@ -4,7 +4,7 @@ A command stands with the number of frames that were computed before it. Physics
 the list is the whole session; the digest of the particles at the end tells whether it did.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -38,9 +38,13 @@ class Recording(Model):
     commands: Annotated[list[dict[str, Any]], Field(max_length=MOST_COMMANDS)] = []
 
     @classmethod
-    def of(cls, session: Session, start: Scene) -> "Recording":
+    def of(
+        cls, session: Session, start: Scene, frames: int | None = None, digest: str = "",
+        log: Sequence[tuple[int, Command]] | None = None,
+    ) -> "Recording":  # fmt: skip
         """Return all that was done in `session`, which began with the scene `start`.
 
+        Or all that had been done when it had computed `frames`, with the `digest` and the `log` of that moment.
         Raises `WavetankError` where a script added forces or took some away: what is no command cannot be repeated.
         """
         if session.uncommanded:
@@ -53,10 +57,12 @@ class Recording(Model):
             version=VERSION,
             arch=session.sim.arch,
             most_particles=session.most_particles,
-            frames=session.ticks,
-            digest=session.sim.digest(),
+            frames=session.ticks if frames is None else frames,
+            digest=digest or session.sim.digest(),
             scene=start.table(),
-            commands=[{"frame": frame, **table_of(command)} for frame, command in session.log],
+            commands=[
+                {"frame": frame, **table_of(command)} for frame, command in (session.log if log is None else log)
+            ],
         )
 
     def save(self, path: str | Path) -> None:

@@ -6,6 +6,7 @@ Fronts submit commands from any thread; everything else happens in the one threa
 import math
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 from wavetank.foundation.door import guarded
@@ -34,6 +35,8 @@ EXPENSIVE = (*BEGINNINGS, AddSolid, RemoveSolid, Bookmark, Rewind)  # commands t
 MOST_EXPENSIVE = 8  # of these in the queue
 SPARED, SHORTEST_REST = 2.0, 0.1  # times as long as such a command took, and s at least, none follows it
 LONGEST_NOTE = 400  # characters
+Refused = Callable[[str], None] | None  # is told why a command failed
+Waiting = tuple[Command, Refused]
 MOST_WAITING = 4096  # commands in the queue; what comes on top is dropped
 
 
@@ -53,31 +56,32 @@ class Session(SessionState):
         self.picture_seconds = 0.0  # that the front takes for a picture, for that choice
         self.changes = 0  # grows whenever a picture would look different
         self.uncommanded: set[str] = set()  # forces that came or went without a command: no recording has them
-        self._waiting: list[Command] = []
+        self._waiting: list[Waiting] = []
         self._spared_until = 0.0  # on the clock of the process, until which nothing that takes long is done
         self._latest: dict[Any, int] = {}
         self._lock, self._wake = threading.Lock(), threading.Event()
 
     # --- commands ---
 
-    def submit(self, command: Command) -> bool:
+    def submit(self, command: Command, refused: Refused = None) -> bool:
         """Put a command into the queue, from any thread; say whether there was room.
 
+        Where it fails `refused` is told why, in the simulation's thread; without it, everyone is, by a note.
         Of those that take long few wait, and another beginning takes the place of one that was not reached yet.
         """
         with self._lock:
             slot = command.slot
             if isinstance(command, BEGINNINGS):
-                kept = [other for other in self._waiting if not isinstance(other, BEGINNINGS)]
+                kept = [other for other in self._waiting if not isinstance(other[0], BEGINNINGS)]
                 if len(kept) != len(self._waiting):
                     self._waiting = kept
                     self._latest.clear()
             elif isinstance(command, EXPENSIVE):
-                if sum(isinstance(other, EXPENSIVE) for other in self._waiting) >= MOST_EXPENSIVE:
+                if sum(isinstance(other, EXPENSIVE) for other, _ in self._waiting) >= MOST_EXPENSIVE:
                     return False
             if slot is not None and slot in self._latest:
                 place = self._latest[slot]
-                self._waiting[place] = command.after(self._waiting[place])
+                self._waiting[place] = command.after(self._waiting[place][0]), refused
             elif len(self._waiting) >= MOST_WAITING:
                 return False
             else:
@@ -86,7 +90,7 @@ class Session(SessionState):
                     self._latest.clear()
                 else:
                     self._latest[slot] = len(self._waiting)
-                self._waiting.append(command)
+                self._waiting.append((command, refused))
         self._wake.set()
         return True
 
@@ -99,23 +103,24 @@ class Session(SessionState):
         with self._lock:
             commands, self._waiting = self._waiting, []
             self._latest.clear()
-        for number, command in enumerate(commands):
+        for number, (command, refused) in enumerate(commands):
             if sparing and isinstance(command, EXPENSIVE) and time.perf_counter() < self._spared_until:
                 with self._lock:
                     self._waiting[:0] = commands[number:]
                     self._latest.clear()  # places have changed; what comes joins those behind it only
                 return number
-            self._carry_out(command)
+            self._carry_out(command, refused)
         return len(commands)
 
-    def _carry_out(self, command: Command) -> None:
-        """Carry out one command; whatever goes wrong becomes a note, and the water goes on."""
-        began = time.perf_counter()
+    def _carry_out(self, command: Command, refused: Refused) -> None:
+        """Carry out one command; whatever goes wrong becomes a note to who gave it, and the water goes on."""
+        began, self.refused = time.perf_counter(), refused or self.note
         try:
             with guarded(f"The command {type(command).model_fields['do'].default!r} failed", "command"):
                 self.apply(command)
         except WavetankError as error:
-            self.note(str(error)[:LONGEST_NOTE])
+            self.refused(str(error)[:LONGEST_NOTE])
+        self.refused = self.note
         if isinstance(command, EXPENSIVE):
             end = time.perf_counter()
             self._spared_until = end + max(SPARED * (end - began), SHORTEST_REST)

@@ -1,5 +1,6 @@
 """What a session is about: a world, the hands in it, its past, what is shown of it. Rules act on this."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ class SessionState:
         self.most_particles, self.arch, self.history = most_particles, arch, history
         self.pace = Pace()
         self.notes: list[str] = []  # for the person, one sentence each
+        self.refused: Callable[[str], None] = self.note  # takes what a command may not do, while one is carried out
         self.paused, self.speed, self.steps_left = False, 1.0, 0
         self.frame_parts = 1  # into which a frame is divided
         self.fills_frames = False  # whether frames end with a time step of full length
@@ -90,7 +92,7 @@ class SessionState:
         try:
             act(*arguments)
         except WavetankError as error:
-            hand.notes.append(str(error))
+            self.refused(str(error))
         self.commanded += self.sim.pushed[before:]
         for sentence in hand.notes:
             self.note(sentence)

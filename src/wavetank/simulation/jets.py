@@ -7,7 +7,9 @@ pitch             distance of rows at rest density                              
 """
 
 import dataclasses
+import itertools
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -114,6 +116,30 @@ def jet_of(scene: Scene, emitter: Emitter, clock: float) -> Jet:
         middle, axes, half, is_round=int(emitter.shape in ("disc", "ring")), length=HELD * scene.spacing,
         speed=emitter.pace(mouth) * math.cos(emitter.spread), fall=float(g @ axes[2]),
     ))  # fmt: skip
+
+
+def closing_speed(jets: Iterable[Jet]) -> float:
+    """Return the largest speed [m/s] at which any two jets run into each other; 0 where none do.
+
+    Particles that each go half a spacing in a step lie upon each other after it where they come from two sides, and the
+    constraint then throws them apart faster than they came. Two jets meet where their straight ways come as close as
+    their mouths are large.
+    """
+    mouths = [jet.opening for jet in jets]
+    fastest = 0.0
+    for one, other in itertools.combinations(mouths, 2):
+        (place, speed), (goal, pace) = (
+            (np.array(opening.middle, float), float(opening.speed) * np.array(opening.ahead, float))
+            for opening in (one, other)
+        )
+        way, relative = goal - place, pace - speed
+        approach, square = -float(way @ relative), float(relative @ relative)
+        if approach <= 0.0:
+            continue
+        nearest = np.linalg.norm(way + approach / square * relative)
+        if nearest <= sum(math.hypot(opening.half_across, opening.half_up) for opening in (one, other)):
+            fastest = max(fastest, math.sqrt(square))
+    return fastest
 
 
 def outlines(scene: Scene, time: float) -> list[tuple[str, np.ndarray]]:

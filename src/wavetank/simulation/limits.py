@@ -11,7 +11,9 @@ from wavetank.physics.plan import capillary_speed, pace_of_solids, steps_in
 from wavetank.physics.time_step import largest_speed
 from wavetank.physics.world import World
 from wavetank.scene.forces import Force
+from wavetank.scene.forces.jet import Jet
 from wavetank.scene.scene import Scene
+from wavetank.simulation.jets import closing_speed
 from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.solids.solid import Solid
@@ -28,7 +30,7 @@ def count_steps(
     fastest = largest_speed(world.particles, world.count)
     if not math.isfinite(fastest):
         _refuse(world, ledger)
-    speed = max(solid, fastest)
+    speed = max(solid, fastest, closing_speed(force for force in forces if isinstance(force, Jet)))
     speed += duration * sum(force.largest_acceleration() for force in forces)
     return steps_in(world, scene, duration, speed, box, forced=bool(forces))
 

@@ -1,6 +1,7 @@
 """States of a running world: instants in memory, copies, files, and the one digest by which all are compared."""
 
 import dataclasses
+from abc import ABC, abstractmethod
 from copy import deepcopy
 from pathlib import Path
 from typing import Self
@@ -10,37 +11,37 @@ from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
 from wavetank.scene.schedule import with_gravity
 from wavetank.simulation import snapshot as snapshots
-from wavetank.simulation.bodies import Bodies
 from wavetank.simulation.contents import Contents
 from wavetank.simulation.cost import check_cost
-from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.simulation.saved import read_snapshot, write_snapshot
 from wavetank.simulation.snapshot import Snapshot
 from wavetank.simulation.sources import Sources
 from wavetank.solids.solid import Solid
 
 
-class States(Contents):
-    """How a world is kept and comes back. See `Simulation` for how it moves."""
+class States(Contents, ABC):
+    """How a world is kept and comes back. See `Simulation` for how it moves, and for what is abstract here."""
 
     arch: str | None
-    solids: MovingSolids
-    bodies: Bodies
     forces: list[Force]
     pushed: list[Force]
     gravity_by_hand: tuple[float, ...] | None
 
+    @abstractmethod
     def __init__(self, scene: Scene, arch: str = "cpu") -> None:
-        raise NotImplementedError
+        """Begin with what the scene says."""
 
+    @abstractmethod
     def _fill(self, capacity: int) -> None:
-        raise NotImplementedError
+        """Make an empty world with room for `capacity` particles."""
 
+    @abstractmethod
     def _walls(self) -> list[Solid]:
-        raise NotImplementedError
+        """Return the solids that the tank is."""
 
+    @abstractmethod
     def _renew_solids(self) -> None:
-        raise NotImplementedError
+        """Put the solids as they are now on the device."""
 
     def snapshot(self) -> Snapshot:
         """Return this instant as host arrays, for `resume`."""

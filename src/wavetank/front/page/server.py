@@ -60,7 +60,7 @@ class WebFront:
     def __init__(self, session: Session, host: str = "127.0.0.1", port: int | None = None) -> None:
         self.session, self.start_scene = session, session.scene
         self.viewers = Viewers(session.submit, self._ray, lambda: self._hello)
-        self.viewers.wake = session.wake
+        self.viewers.wake, self.viewers.call = session.wake, self._call
         self.loop = Loop(session, self)
         self.painter, self.ask = self.loop.painter, self.loop.ask
         self._socket = _listen(host, port)

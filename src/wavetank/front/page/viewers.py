@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -13,9 +14,12 @@ from wavetank.session.commands import Command, ToolBegin, ToolEnd, ToolMove, com
 RATE, BURST = 500.0, 1000.0  # messages a second, and at once: more than any hand makes
 MOST_VIEWERS = 16
 LONGEST_SIDE = 8192  # px
+AGAIN = 1.0  # s, after which the same note is worth saying again
 LONGEST_MESSAGE = 2_500_000  # bytes: a dropped scene file
 
 Ray = Callable[[float, float], dict[str, Any]]
+Tell = Callable[[str], None] | None
+Submit = Callable[[Command, Tell], bool]  # takes a command, and who is told in another thread why it failed
 
 
 class Bucket:
@@ -43,6 +47,7 @@ class Viewer:
         self.next_picture: bytes | None = None
         self.is_new = True  # and has not seen one yet
         self.size = (960, 540)
+        self.noted = "", -math.inf  # the last note to this one alone, and when
         self.outbox: asyncio.Queue[dict[str, Any] | bytes] = asyncio.Queue(maxsize=64)
         self.status: dict[str, Any] | None = None  # waits in the outbox; a later one joins it there
 
@@ -57,6 +62,13 @@ class Viewer:
             self.outbox.put_nowait(message)
         elif message is self.status:
             self.status = None
+
+    def note(self, text: str) -> None:
+        """Send a sentence; the same one again at once, and what would be in the way of pictures, is dropped."""
+        now = time.monotonic()
+        if (text != self.noted[0] or now - self.noted[1] > AGAIN) and self.outbox.qsize() < self.outbox.maxsize // 2:
+            self.noted = text, now
+            self.post({"type": "note", "text": text})
 
     def show(self, picture: bytes) -> None:
         """Send a picture as soon as the one before was shown; a later one takes its place until then."""
@@ -87,12 +99,13 @@ class Viewer:
 class Viewers:
     """All sockets, in the order in which they came."""
 
-    def __init__(self, submit: Callable[[Command], bool], ray: Ray, hello: Callable[[], dict[str, Any]]) -> None:
+    def __init__(self, submit: Submit, ray: Ray, hello: Callable[[], dict[str, Any]]) -> None:
         self.submit, self.ray, self.hello = submit, ray, hello
         self.all: list[Viewer] = []
         self.driver: Viewer | None = None
         self.detail = "auto"
         self.wake: Callable[[], None] = lambda: None
+        self.call: Callable[[Callable[[], None]], None] = lambda job: job()  # does a job in the server's event loop
         self.down: set[int] = set()  # pointers of the driver that are down
 
     @property
@@ -152,16 +165,20 @@ class Viewers:
             self.detail = table["detail"]
             self.wake()
         elif do in ("point-begin", "point-move", "point-end"):
-            self._point(table)
-        elif not self.submit(command_of(table)):
+            self._point(table, self._to(viewer))
+        elif not self.submit(command_of(table), self._to(viewer)):
             raise WavetankError("Too much at once: a command was dropped.")
 
-    def _point(self, table: dict[str, Any]) -> None:
+    def _to(self, viewer: Viewer) -> Tell:
+        """Return what tells a viewer, from any thread, and nobody else."""
+        return lambda text: self.call(lambda: viewer.note(text))
+
+    def _point(self, table: dict[str, Any], tell: Tell) -> None:
         """Turn a place in the picture, shares of its width and height, into a ray into the world."""
         pointer = _whole(table, "pointer", 9, least=0)
         if table["do"] == "point-end":
             self.down.discard(pointer)
-            self.submit(ToolEnd(pointer=pointer))
+            self.submit(ToolEnd(pointer=pointer), tell)
             return
         u, v = table.get("x"), table.get("y")
         for share in (u, v):
@@ -170,9 +187,11 @@ class Viewers:
         ray = {"pointer": pointer, **self.ray(float(u or 0.0), float(v or 0.0))}
         if table["do"] == "point-begin":
             self.down.add(pointer)
-            self.submit(ToolBegin.parse({**ray, "tool": table.get("tool"), "options": table.get("options") or {}}))
+            self.submit(
+                ToolBegin.parse({**ray, "tool": table.get("tool"), "options": table.get("options") or {}}), tell
+            )
         else:
-            self.submit(ToolMove.parse(ray))
+            self.submit(ToolMove.parse(ray), tell)
 
     def broadcast(self, message: dict[str, Any]) -> None:
         """Post to everyone."""
@@ -193,7 +212,7 @@ class Viewers:
 
     def _lift_pointers(self) -> None:
         for pointer in self.down:
-            self.submit(ToolEnd(pointer=pointer))
+            self.submit(ToolEnd(pointer=pointer), None)
         self.down.clear()
 
     def _tell_roles(self) -> None:
