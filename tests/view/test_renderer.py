@@ -46,6 +46,9 @@ def test_pictures_repeat_bit_for_bit(splash, view):
 def test_the_order_of_particles_does_not_matter(make_frame, splash, view):
     order = np.random.default_rng(2).permutation(splash.count)
     shuffled = make_frame(splash.scene, splash.positions[order], splash.velocities[order], splash.densities[order])
+    ids = shuffled.id.to_numpy()
+    ids[: splash.count] = order
+    shuffled.id.from_numpy(ids)
     renderer = Renderer(*SIZE)
     assert (renderer.render(shuffled, view=view) == renderer.render(splash, view=view)).all()
 

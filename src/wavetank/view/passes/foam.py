@@ -34,6 +34,7 @@ from wavetank.view.buffers import Buffers, FoamMaps, Pixels
 from wavetank.view.colormaps import rgb_of, to_linear
 from wavetank.view.lens import Lens, from_view, pixels_per_metre, to_pixel, to_view, vec2, vec3, vector
 from wavetank.view.look import Look
+from wavetank.view.optics.chance import bits_of, scrambled
 from wavetank.view.optics.glass import line_cover, slack
 from wavetank.view.optics.maps import corners, gap_at
 from wavetank.view.optics.rays import Box
@@ -148,22 +149,12 @@ def size_and_strength(kind, share, number):
 
 
 @qd.func
-def scrambled(x):
-    """Scramble the bits of an unsigned number (Chris Wellons, "Prospecting for hash functions", 2018)."""
-    x ^= x >> 16
-    x *= qd.u32(0x7FEB352D)
-    x ^= x >> 15
-    x *= qd.u32(0x846CA68B)
-    return x ^ (x >> 16)
-
-
-@qd.func
 def place_in_cloud(number, k, kind, dim: qd.template()):
     """(place of disc `k` of a cloud [d], its instant from -0.5 to 0.5 of the shutter's time, its size about 1).
 
     Foam lies on the water; a cloud is denser in its middle.
     """
-    bits = scrambled(qd.cast(number, qd.u32) * qd.u32(64) + qd.cast(k, qd.u32) + qd.u32(0x9E3779B9))
+    bits = bits_of(number, k)
     more = scrambled(bits)
     per = 1.0 / 2048.0
     a, b = qd.cast(bits & qd.u32(2047), qd.f32) * per, qd.cast((bits >> 11) & qd.u32(1023), qd.f32) * (2.0 * per)
