@@ -203,7 +203,7 @@ def test_the_sky_is_seen_from_below_through_a_window_of_its_size(make_frame, mon
     for color in (0.0, 3.0):
         look = dataclasses.replace(
             pool_look(), zenith=vector(color, color, color), horizon=vector(color, color, color),
-            lamp=vector(0.0, 0.0, 0.0), sparkle=0.0,
+            lamp=vector(0.0, 0.0, 0.0), sparkle=0.0, outdoors=0,
         )  # fmt: skip
         monkeypatch.setattr(renderer_module, "_look", lambda dim, coloured, look=look: look)
         pictures.append(Renderer(160, 120).render(frame, camera).astype(int))
@@ -293,4 +293,4 @@ def test_a_drop_on_the_glass_is_nearly_as_clear_as_the_glass(make_frame):
     )
     change = np.abs(with_drop - without).max(axis=-1)
     assert change[24, 26:30].max() < 20  # what lies flat on the glass: 46 when it mirrored
-    assert change.max() > 50  # its bulge on the other side is seen
+    assert change.max() > 15  # its bulge on the other side is seen, though there are no lamps that it could mirror

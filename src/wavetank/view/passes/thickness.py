@@ -98,8 +98,8 @@ def thickness_in(at, row, column):
 
 @qd.kernel(fastcache=True)
 def add(
-    thickness: Thickness, x: qd.types.ndarray(), alone: qd.types.ndarray(), strips: Strips, lens: Lens, disc: Disc, parts: qd.i32,
-    shared_out: qd.template(), count: qd.i32,
+    thickness: Thickness, x: qd.types.ndarray(), alone: qd.types.ndarray(), strips: Strips, lens: Lens, disc: Disc,
+    parts: qd.i32, shared_out: qd.template(), count: qd.i32,
 ):  # fmt: skip
     """Add up every particle's disc.
 
@@ -148,8 +148,8 @@ def add(
 
 @qd.kernel(fastcache=True)
 def stain(
-    thickness: Thickness, cells: Cells, alone: qd.types.ndarray(), dyes: qd.types.ndarray(), materials: qd.types.ndarray(),
-    stains: qd.types.ndarray(), lens: Lens, disc: Disc, count: qd.i32,
+    thickness: Thickness, cells: Cells, alone: qd.types.ndarray(), dyes: qd.types.ndarray(),
+    materials: qd.types.ndarray(), stains: qd.types.ndarray(), lens: Lens, disc: Disc, count: qd.i32,
 ):  # fmt: skip
     """Add up the discs of coloured particles, as strong as their dye, alone and times its colour.
 
