@@ -70,9 +70,8 @@ def fitted(
 ) -> np.ndarray:
     """Return the weight of each function, linear RGB [TERMS, 3].
 
-    The sky is `BRIGHT` times as bright as one under which a white surface shows `white`, half of its tint is the model's;
-    haze takes its
-    lowest degrees to `horizon`, which the floor fades to.
+    The sky is `BRIGHT` times as bright as one under which a white surface shows `white`, and half of its tint is the
+    model's; haze takes its lowest degrees to `horizon`, which the floor fades to.
     """
     sun = np.array(to_sun) / np.linalg.norm(to_sun)
     count = 4096  # evenly over the half sphere (a Fibonacci lattice)
