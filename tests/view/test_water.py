@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from test_ellipsoids import lattice
 
-from wavetank import Box, Scene, Simulation, Tank
+from wavetank import Block, Box, Scene, Simulation, Tank
 from wavetank.device.compiler import qd
+from wavetank.foundation.materials import Material
 from wavetank.view import renderer as renderer_module
 from wavetank.view.camera import Camera
 from wavetank.view.lens import vector
@@ -125,6 +126,22 @@ def test_dye_colours_the_water_where_it_is(make_frame):
     left, right = (slice(20, 28), slice(24, 28)), (slice(20, 28), slice(36, 40))
     assert dyed[right][..., 0].mean() > dyed[right][..., 2].mean() + 40
     assert np.abs(dyed[left] - clear[left]).max() <= 2
+
+
+def test_a_coloured_world_that_was_saved_has_its_colours(tmp_path):
+    """A state that comes back shows the very picture that it was saved with; its scene has no fluids any more."""
+    red = Material(name="ink", color="#c03020")
+    blocks = [
+        Block(lower=(0, 0, 0), upper=(0.5, 0.4, 0.5), material="ink"), Block(lower=(0.5, 0, 0), upper=(1, 0.4, 0.5))
+    ]  # fmt: skip
+    scene = Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 0.5)), fluids=blocks, materials=[red])
+    sim = Simulation(scene, arch="cpu")
+    sim.step()
+    before = Renderer(96, 64).render(sim.frame()).astype(int)
+    sim.save(tmp_path / "state.npz")
+    after = Renderer(96, 64).render(Simulation.restore(tmp_path / "state.npz").frame()).astype(int)
+    assert (before[..., 0] - before[..., 2]).max() > 40
+    assert (after == before).all()
 
 
 def test_the_shadow_of_dyed_water_has_its_colour(make_frame):

@@ -3,9 +3,10 @@
 A. J. Preetham, P. Shirley, B. Smits, "A practical analytic model for daylight", SIGGRAPH 1999,
 doi:10.1145/311535.311545: Perez' formula for luminance and chromaticity (Eq. 3, Appendix A.2).
 
-The model asks for six exponentials and an arc cosine for a direction, too much for every pixel of rippled water. Here it
-is fitted once for a sun by seven functions of height and of the angle to the sun that need products only (`radiance.sky`
-has the same), by least squares over the upper half of all directions, and scaled to what a white surface shows under it.
+The model asks for six exponentials and an arc cosine for a direction, too much for every pixel of rippled water. Here
+it is fitted once for a sun by seven functions of height and of the angle to the sun that need products only
+(`radiance.sky` has the same), by least squares over the upper half of all directions, and scaled to what a white
+surface shows under it.
 
     code      symbol   meaning                                     unit
     T                  turbidity: 2 clear, 6 hazy                  1

@@ -22,7 +22,7 @@ def background(look: Look, direction):
 
 @qd.func
 def sky(look: Look, direction):
-    """Radiance of the sky without the sun's disc: the functions of `sky.terms`; below the horizon it goes on as there."""
+    """Radiance of the sky but for the sun itself: the functions of `sky.terms`; it goes on below the horizon."""
     u = 1.0 - qd.min(qd.max(direction.y, 0.0), 1.0)
     near = 0.5 + 0.5 * direction.dot(look.to_sun)
     low, near = u * u, near * near
