@@ -55,7 +55,7 @@ def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
     """Fill the depth at which the sun's rays meet the water, likewise."""
     if shot.frame.dim == 3:
         water = water_of(buffers, shot)
-        see(shot, water.ellipsoids, shot.water_sun, water.sunlit.depth, None, True)
+        see(shot, water.ellipsoids, shot.water_sun, water.sunlit.depth, None, False)
 
 
 def see(shot: Shot, ellipsoids: Ellipsoids, lens: Lens, depth: Any, rim: Any, lone: bool) -> None:
