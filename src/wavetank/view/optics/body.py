@@ -59,12 +59,38 @@ def normal_above(sun: Lens, first: qd.template(), at, spacing):
 
 
 @qd.func
+def texel_normal(sun: Lens, first: qd.template(), at, spacing):
+    """The same of the nearest texel, in a quarter of the time: for what is seen through water."""
+    place = to_pixel(sun, to_view(sun, at))
+    row = qd.min(qd.max(qd.cast(place.y, qd.i32), 0), first.shape[0] - 1)
+    column = qd.min(qd.max(qd.cast(place.x, qd.i32), 0), first.shape[1] - 1)
+    z = qd.bit_cast(first[row, column], qd.f32)
+    n = vec3(0.0, 1.0, 0.0)
+    if z < 1e30:
+        n = normal_of(sun, row, column, z, rise_at(row, column, z, 3.0 * spacing, first))
+    return n
+
+
+@qd.func
 def is_wet(sun: Lens, first: qd.template(), walls: Box, at, spacing):
     """Whether the point `at` lies in the water, judged a spacing off panes and floor, where the map has an edge."""
     inset = vec3(spacing, spacing, spacing)
     inner = qd.max(at, walls.lower + inset)
     inner = qd.min(inner, vec3(walls.upper.x - spacing, walls.upper.y, walls.upper.z - spacing))
     return depth_below(sun, first, inner) > 0.0
+
+
+@qd.func
+def about_wet(sun: Lens, first: qd.template(), walls: Box, at, spacing):
+    """The same to the nearest texel, for what is seldom near the surface."""
+    inset = vec3(spacing, spacing, spacing)
+    inner = qd.max(at, walls.lower + inset)
+    inner = qd.min(inner, vec3(walls.upper.x - spacing, walls.upper.y, walls.upper.z - spacing))
+    c = to_view(sun, inner)
+    place = to_pixel(sun, c)
+    row = qd.min(qd.max(qd.cast(place.y, qd.i32), 0), first.shape[0] - 1)
+    column = qd.min(qd.max(qd.cast(place.x, qd.i32), 0), first.shape[1] - 1)
+    return c.z > qd.bit_cast(first[row, column], qd.f32)
 
 
 @qd.func
@@ -113,21 +139,21 @@ def through_body(
     """
     shown, total, done = vec3(0.0, 0.0, 0.0), 0.0, 0
     p, ahead = qd.min(qd.max(at, walls.lower), walls.upper), bent
-    if not is_wet(sun, first, walls, p + 2.0 * optics.spacing * ahead, optics.spacing):
+    if not about_wet(sun, first, walls, p + 2.0 * optics.spacing * ahead, optics.spacing):
         total, done = -1.0, 1
     for bounce in range(3):
         if done == 0:
             wall = wall_ahead(walls, p, ahead)
             n, s = vec3(wall[0], wall[1], wall[2]), wall[3]
-            if not is_wet(sun, first, walls, p + 0.999 * s * ahead, optics.spacing):
+            if not about_wet(sun, first, walls, p + 0.999 * s * ahead, optics.spacing):
                 low = 0.0
-                for _ in range(6):
+                for _ in range(5):
                     middle = 0.5 * (low + s)
                     if is_wet(sun, first, walls, p + middle * ahead, optics.spacing):
                         low = middle
                     else:
                         s = middle
-                n = normal_above(sun, first, p + s * ahead, optics.spacing)
+                n = texel_normal(sun, first, p + s * ahead, optics.spacing)
             total += s
             p += s * ahead
             cosi = ahead.dot(n)

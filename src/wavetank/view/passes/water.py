@@ -26,6 +26,7 @@ from wavetank.view.lens import (
     to_view,
     vec2,
     vec3,
+    vec4,
     vector,
     view_ray,
 )
@@ -54,7 +55,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         walls = box(walls.lower - thick, walls.upper + thick)
     lay(
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit, strips_of(pixels.depth), shot.lens,
-        shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers)), walls, shot.frame.dim,
+        shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers), buffers.supersample), walls,
+        shot.frame.dim,
     )  # fmt: skip
 
 
@@ -101,6 +103,8 @@ def lay(
     """
     for task in range(strips.count):
         row, begin, end = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
+        # What is seen through a body of water is found once for the samples of a pixel that lie beside each other.
+        kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
         for column in range(begin, end):
             result = backdrop.behind[row, column]
             z, back = qd.bit_cast(surface.depth[row, column], qd.f32), qd.bit_cast(pixels.depth[row, column], qd.f32)
@@ -149,9 +153,23 @@ def lay(
                                 if share > 0.0:
                                     n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
                         if share > 0.0:
+                            body = vec4(0.0, 0.0, 0.0, -1.0)
+                            if qd.static(dim == 3):
+                                if walls.upper.x < 1e5 and back > 0.999 * ends[1]:  # a tank, and no solid in it
+                                    pixel = column // optics.samples
+                                    near = qd.abs(at - kept_z) < 0.3 * optics.spacing
+                                    if pixel != kept_pixel or layer != kept_layer or not near:
+                                        ahead = direction.normalized()
+                                        bent = refracted(ahead, n, qd.max(-n.dot(ahead), 0.05))
+                                        kept = through_body(
+                                            pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
+                                            walls, at, origin + at * direction, bent,
+                                        )  # fmt: skip
+                                        kept_z, kept_layer, kept_pixel = at, layer, pixel
+                                    body = kept
                             result += share * shine(
-                                pixels, thickness, backdrop, sunlit, lens, sun, look, optics, walls, row, column, at,
-                                n, origin, direction, ends[1], dim,
+                                pixels, thickness, backdrop, lens, look, optics, walls, row, column, at, n, origin,
+                                direction, body, dim,
                             )  # fmt: skip
                     line = line_cover(pixels.lines[row, column], front, optics.slack)
                     result += look.line_strength * there * line * (look.line - result)
@@ -208,10 +226,13 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
 
 @qd.func
 def shine(
-    pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
-    optics: Optics, walls: Box, row, column, z, normal, origin, direction, last, dim: qd.template(),
+    pixels: Pixels, thickness: Thickness, backdrop: Backdrop, lens: Lens, look: Look, optics: Optics, walls: Box,
+    row, column, z, normal, origin, direction, body, dim: qd.template(),
 ):  # fmt: skip
-    """Radiance of the water that a pixel shows at depth `z` with this normal."""
+    """Radiance of the water that a pixel shows at depth `z` with this normal.
+
+    `body` is what `through_body` found for it; a negative way where it found none.
+    """
     n, pace = normal, direction.norm()
     ahead, at = direction / pace, origin + z * direction
     place = vec2(column + 0.5, row + 0.5)
@@ -225,13 +246,12 @@ def shine(
     bent = refracted(ahead, n, cosi)
     # The least that a drop is thick; in a plane the rim keeps half of the colour.
     tau = qd.max(tau, qd.static(0.15 if dim == 3 else 0.55) * optics.spacing)
-    back = qd.bit_cast(pixels.depth[row, column], qd.f32)
-    travel = qd.min(tau, (back - z) * pace)
+    travel = qd.min(tau, (qd.bit_cast(pixels.depth[row, column], qd.f32) - z) * pace)
     if qd.static(dim == 3):
         travel = above_floor(travel, at, bent)
     c = to_view(lens, at + travel * bent)
     shown = backdrop.behind[row, column]
-    if c.z > lens.near:
+    if c.z > lens.near and body[3] < 0.0:
         there = to_pixel(lens, c)
         r = qd.min(qd.max(qd.cast(there.y, qd.i32), 0), pixels.depth.shape[0] - 1)
         e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), pixels.depth.shape[1] - 1)
@@ -245,12 +265,8 @@ def shine(
         off = smoothstep((gap - 0.05) / 0.2)
         ball = smoothstep((0.75 - layers) / 0.3) * off
         glossy = 1.0 - smoothstep((1.6 - layers) / 0.8) * (1.0 - off)
-        if walls.upper.x < 1e5 and back > 0.999 * last:  # a tank, and no solid in it
-            body = through_body(
-                pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics, walls, z, at, bent
-            )
-            if body[3] >= 0.0:
-                shown, travel, ball = vec3(body[0], body[1], body[2]), body[3], 0.0
+        if body[3] >= 0.0:
+            shown, travel, ball = vec3(body[0], body[1], body[2]), body[3], 0.0
         if ball > 0.0:
             out = 2.0 * bent.dot(ahead) * bent - ahead
             far = behind_drop(pixels, backdrop, lens, look, at + travel * bent, out, row, column, z)
