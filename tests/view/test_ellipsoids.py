@@ -83,6 +83,11 @@ def test_the_inside_of_a_tank_is_left_out_and_its_skin_is_not(make_frame):
     assert (sizes < 0).mean() > 0.1
 
 
+def see_all(shot, water):
+    """Fill the depth and the outlines of the water, lone particles included."""
+    surface.see(shot, water.ellipsoids, shot.lens, water.surface.depth, water.surface.rim, True)
+
+
 @pytest.mark.parametrize("height", [None, 1.2])
 def test_a_drop_is_drawn_as_the_ball_it_is(make_frame, height):
     camera = Camera(eye=CAMERA.eye, target=CAMERA.target, field_of_view=0.8, height=height)
@@ -90,7 +95,7 @@ def test_a_drop_is_drawn_as_the_ball_it_is(make_frame, height):
     renderer = Renderer(WIDTH, HEIGHT)
     shot = renderer.shot(frame, camera)
     ellipsoids.draw(shot, renderer.buffers)
-    surface.draw(shot, renderer.buffers)
+    see_all(shot, renderer.buffers.water)
     depth = renderer.buffers.water.surface.depth.to_numpy().view(np.float32)
     radius = ellipsoids.BALL * D
     exact = entry_depths(camera, (0.45, 0.55, 0.5), radius)
@@ -111,7 +116,7 @@ def test_an_outline_covers_its_share_of_a_pixel(make_frame, height):
         frame = open_water([(0.45 + 0.03 * shift, 0.55 + 0.02 * shift, 0.5)], make_frame)
         shot = renderer.shot(frame, camera)
         ellipsoids.draw(shot, renderer.buffers)
-        surface.draw(shot, renderer.buffers)
+        see_all(shot, renderer.buffers.water)
         seen = renderer.buffers.water.surface
         there, rim = seen.depth.to_numpy() < 0x7F000000, seen.rim.to_numpy() >> 24
         areas.append(np.where(rim > 0, (rim + 0.5) / 127.0, 1.0)[there].sum())

@@ -41,7 +41,7 @@ def wall_of_water(tank_scene, make_frame):
 
 def test_foam_in_front_is_white(wall_of_water):
     bare = picture(wall_of_water(), color_by="#103060", radius=0.8)
-    white = picture(with_foam(wall_of_water(), cloud(center=(0.5, 0.5, 0.75))), color_by="#103060", radius=0.8)
+    white = picture(with_foam(wall_of_water(), cloud(900, center=(0.5, 0.5, 0.75))), color_by="#103060", radius=0.8)
     middle = (slice(28, 36), slice(44, 52))
     assert bare[middle].max() < 180
     assert white[middle].mean() > 200
@@ -93,7 +93,7 @@ def test_total_light_does_not_depend_on_the_size_of_the_picture(wall_of_water):
     """Also where particles are smaller than a pixel, foam covers the same share of the picture."""
     shares = []
     for size in ((48, 32), (192, 128), (768, 512)):
-        look = {"size": size, "color_by": "#103060", "radius": 0.8}
+        look = {"size": size, "color_by": "#707070", "radius": 0.8}  # brighter than the tone mapper's toe
         bare = picture(wall_of_water(), **look) / 255
         foamy = picture(with_foam(wall_of_water(), cloud(150, (0.5, 0.5, 0.75), 0.15)), **look) / 255
         shares.append((foamy**2.2 - bare**2.2).mean())
@@ -167,3 +167,73 @@ def test_foam_lies_over_the_waters_surface_too(tank_scene, make_frame, z, visibl
     foam = with_foam(make_frame(tank_scene, x), cloud(center=(0.5, 0.5, z), spread=0.02))
     change = np.abs(Renderer(WIDTH, HEIGHT).render(foam, FRONT).astype(int) - bare).max()
     assert change > 20 if visible else change == 0
+
+
+def bright(frame_with, frame_without, camera=FRONT, size=(192, 128)):
+    """How much brighter foam makes each pixel."""
+    options = {"color_by": "#103060", "radius": 0.8}
+    return (picture(frame_with, camera, size, **options) - picture(frame_without, camera, size, **options)).sum(axis=2)
+
+
+def widest(marks):
+    """Pixels of the longest unbroken run in any row."""
+    return max(len(run) for row in marks for run in "".join("x" if mark else " " for mark in row).split(" "))
+
+
+def test_no_foam_is_a_ball_near_the_eye(wall_of_water):
+    """A particle a hand's breadth from the eye is many small discs, and none of them a bokeh."""
+    camera = Camera(eye=(0.5, 0.5, 1.0), target=(0.5, 0.5, 0.5))
+    foam = with_foam(wall_of_water(), [(0.5, 0.5, 0.9)], kind=2)
+    white = bright(foam, wall_of_water(), camera, (480, 320)) > 60
+    assert widest(white) < 0.07 * 320
+    assert white.sum() > 200
+    columns = np.flatnonzero(white.any(axis=0))
+    assert np.ptp(columns) > 0.15 * 320
+
+
+def test_what_is_fast_is_drawn_along_its_way(wall_of_water):
+    """A shutter that is open for half a frame sees half of its way."""
+    spread = []
+    for speed in (0.0, 30.0):
+        foam = with_foam(wall_of_water(), [(0.5, 0.5, 0.75)] * 40, kind=1)
+        upload(foam.diffuse.v, np.tile(np.float32([speed, 0, 0]), (43, 1)))
+        rows, columns = np.nonzero(bright(foam, wall_of_water()) > 12)
+        spread.append((np.ptp(rows), np.ptp(columns)))
+    (tall, wide), (tall_fast, wide_fast) = spread
+    pixels = 128 / 1.2 * 2.5 / 2.25  # of a metre
+    assert wide_fast - wide == pytest.approx(0.5 * 30.0 / 60.0 * pixels, rel=0.35)
+    assert abs(tall_fast - tall) <= 3
+    assert abs(tall - wide) <= 0.6 * tall
+
+
+def test_foam_is_seen_through_five_spacings(wall_of_water):
+    """Three spacings below the surface it shows, six below it does not."""
+    below = [
+        bright(with_foam(wall_of_water(), cloud(100, (0.5, 0.5, 0.5 - deep * 0.05), 0.01)), wall_of_water())
+        for deep in (1.0, 3.0, 8.0)
+    ]
+    assert below[0].sum() > below[1].sum() > 0
+    assert below[1].max() > 40
+    assert (below[2] == 0).all()
+
+
+def test_a_heap_of_foam_is_lit_from_the_suns_side(tank_scene, make_frame):
+    """The sun stands on the left: the left slope of a heap is brighter than its right one."""
+    heap = cloud(6000, (0.5, 0.5, 0.5), 0.1)
+    image = picture(with_foam(make_frame(tank_scene, [(0.0, 0.0, 0.0)]), heap, kind=2), size=(192, 128))
+    column, row, _ = FRONT.project((0.5, 0.5, 0.5), 192, 128)[0]
+    row, column, aside = int(row), int(column), 11
+    left, right = (image[row - 3 : row + 4, column + k - 2 : column + k + 3].mean() for k in (-aside, aside))
+    assert left > right + 12
+
+
+def test_foam_stays_within_the_glass(tank_scene, make_frame):
+    """Foam at a pane is not drawn outside of the tank."""
+    foam = [(0.0, y, z) for y in np.linspace(0.3, 0.7, 30) for z in np.linspace(0.3, 0.7, 10)]
+    camera = Camera(eye=(0.0, 0.5, 3.0), target=(0.0, 0.5, 0.5), height=1.2)
+    change = np.abs(
+        picture(with_foam(make_frame(tank_scene, []), foam), camera, (192, 128))
+        - picture(make_frame(tank_scene, []), camera, (192, 128))
+    ).sum(axis=2)
+    assert change[:, 100:].max() > 30
+    assert change[:, :93].max() == 0

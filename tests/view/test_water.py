@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from test_ellipsoids import lattice
 
-from wavetank import Box, Scene, Simulation, Tank
+from wavetank import Block, Box, Scene, Simulation, Tank
 from wavetank.device.compiler import qd
+from wavetank.foundation.materials import Material
 from wavetank.view import renderer as renderer_module
 from wavetank.view.camera import Camera
 from wavetank.view.lens import vector
@@ -127,6 +128,22 @@ def test_dye_colours_the_water_where_it_is(make_frame):
     assert np.abs(dyed[left] - clear[left]).max() <= 2
 
 
+def test_a_coloured_world_that_was_saved_has_its_colours(tmp_path):
+    """A state that comes back shows the very picture that it was saved with; its scene has no fluids any more."""
+    red = Material(name="ink", color="#c03020")
+    blocks = [
+        Block(lower=(0, 0, 0), upper=(0.5, 0.4, 0.5), material="ink"), Block(lower=(0.5, 0, 0), upper=(1, 0.4, 0.5))
+    ]  # fmt: skip
+    scene = Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 0.5)), fluids=blocks, materials=[red])
+    sim = Simulation(scene, arch="cpu")
+    sim.step()
+    before = Renderer(96, 64).render(sim.frame()).astype(int)
+    sim.save(tmp_path / "state.npz")
+    after = Renderer(96, 64).render(Simulation.restore(tmp_path / "state.npz").frame()).astype(int)
+    assert (before[..., 0] - before[..., 2]).max() > 40
+    assert (after == before).all()
+
+
 def test_the_shadow_of_dyed_water_has_its_colour(make_frame):
     """Light that has gone through red water falls on the floor beside the tank (law of Beer and Lambert)."""
     frame = pool(make_frame)
@@ -203,7 +220,7 @@ def test_the_sky_is_seen_from_below_through_a_window_of_its_size(make_frame, mon
     for color in (0.0, 3.0):
         look = dataclasses.replace(
             pool_look(), zenith=vector(color, color, color), horizon=vector(color, color, color),
-            lamp=vector(0.0, 0.0, 0.0), sparkle=0.0,
+            lamp=vector(0.0, 0.0, 0.0), sparkle=0.0, outdoors=0,
         )  # fmt: skip
         monkeypatch.setattr(renderer_module, "_look", lambda dim, coloured, look=look: look)
         pictures.append(Renderer(160, 120).render(frame, camera).astype(int))
@@ -293,4 +310,4 @@ def test_a_drop_on_the_glass_is_nearly_as_clear_as_the_glass(make_frame):
     )
     change = np.abs(with_drop - without).max(axis=-1)
     assert change[24, 26:30].max() < 20  # what lies flat on the glass: 46 when it mirrored
-    assert change.max() > 50  # its bulge on the other side is seen
+    assert change.max() > 15  # its bulge on the other side is seen, though there are no lamps that it could mirror

@@ -39,6 +39,15 @@ class Light:
     step: qd.i32
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class FoamMaps:
+    """Foam over each pixel of the picture, and over each texel of a coarser relief, on the device."""
+
+    sums: qd.types.ndarray()  # i32 [height, width, 3]: optical depth, its part in the sun, and times the water above
+    relief: qd.types.ndarray()  # i32 [texels]: optical depth in 1/4096
+    light: qd.types.ndarray()  # vec2 [texels]: share of the sun and of the sky that its slopes get
+
+
 class Paints:
     """Albedos of solids on the device, written anew when they change."""
 
@@ -62,7 +71,7 @@ class Buffers:
 
     pixels: Pixels
     light: Light | None  # on every pixel; see `with_light`
-    foam: Any  # i32 [height, width, 2]: optical depth of foam in 1/256, and the part of it that the sun reaches
+    foam: FoamMaps
     sun_depth: Any  # i32 [texels, texels]: bits of the depth [m] of what the sun sees first
     solid_box: Any  # i32 [4]: first and last column, first and last row that may show a solid
     paints: Paints  # of solids
@@ -103,6 +112,7 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
     """Return buffers for a picture of `width` x `height` pixels with `supersample`^2 samples in each."""
     shape = (height * supersample, width * supersample)
     # As fine as the picture, within what a shadow needs and a device likes.
+    coarse = (height // 2 + 2, width // 2 + 2)
     texels = min(2048, max(256, shape[0]))
     curve = qd.ndarray(qd.i32, shape=(CURVE_ENTRIES,))
     upload(curve, (255.0 * to_srgb(np.linspace(0.0, 1.0, CURVE_ENTRIES)) + 0.5).astype(np.int32))
@@ -115,7 +125,11 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
             lines=qd.ndarray(qd.i32, shape=shape),
         ),
         light=None,
-        foam=qd.ndarray(qd.i32, shape=(height, width, 2)),
+        foam=FoamMaps(
+            sums=qd.ndarray(qd.i32, shape=(height, width, 3)),
+            relief=qd.ndarray(qd.i32, shape=coarse),
+            light=qd.ndarray(vec2, shape=coarse),
+        ),
         sun_depth=qd.ndarray(qd.i32, shape=(texels, texels)),
         solid_box=qd.ndarray(qd.i32, shape=(4,)),
         paints=Paints(),

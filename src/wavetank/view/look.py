@@ -5,6 +5,7 @@ All colours are linear RGB; lengths are relative to the world, so that a puddle 
 
 import dataclasses
 import functools
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from wavetank.device.compiler import qd
 from wavetank.view.colormaps import rgb_of, to_linear
 from wavetank.view.extent import Extent
 from wavetank.view.lens import vec3, vector
+from wavetank.view.sky import fitted
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -34,12 +36,33 @@ class Look:
     gloss: qd.f32  # strength of the highlight on particles and solids
     sun_size: qd.f32  # tangent of the sun's angular radius: softness of shadows
     shade_depth: qd.f32  # strength of ambient occlusion, about 1
-    lamp: vec3  # radiance of the studio's lamps, which only water mirrors
+    outdoors: qd.i32  # 1 under the sky that these seven are the weights of, see `sky.py`; 0 in a studio
+    sky_even: vec3
+    sky_low: vec3
+    sky_haze: vec3
+    sky_near: vec3
+    sky_near_haze: vec3
+    sky_glow: vec3
+    sky_glare: vec3
+    below: vec3  # radiance of the ground that the water mirrors
+    lamp: vec3  # radiance of the rim of a sheet of water in a plane
     glow: vec3  # radiance of light that comes back out of deep water
     sparkle: qd.f32  # strength of the sun's image in the water
     veil: qd.f32  # share of the sun that a surface of water keeps from what is below
     caustic: qd.f32  # strength of the light that bulges of water gather
     tile: qd.f32  # m: edge of the floor's tiles, 0 for none
+
+
+TURBIDITY = 3.5
+SKY = ("sky_even", "sky_low", "sky_haze", "sky_near", "sky_near_haze", "sky_glow", "sky_glare")
+STUDIO: dict[str, Any] = {"outdoors": 0, "below": vector(0.5, 0.5, 0.5)} | dict.fromkeys(SKY, vector(0.0, 0.0, 0.0))
+
+
+def under_sky(look: Look) -> Look:
+    """Return a look in the open, on the ground that its sun and its sky light."""
+    parts = (tuple(map(float, part)) for part in (look.to_sun, look.sky, look.horizon))
+    weights = {name: vector(*weight) for name, weight in zip(SKY, fitted(*parts, TURBIDITY), strict=True)}
+    return dataclasses.replace(look, outdoors=1, below=_lit_floor(look), **weights)
 
 
 @functools.cache
@@ -62,6 +85,7 @@ def studio() -> Look:
         gloss=0.18,
         sun_size=0.10,
         shade_depth=2.0,
+        **STUDIO,
         lamp=vector(1.5, 1.55, 1.6),
         glow=vector(0.55, 0.75, 0.85),
         sparkle=3.0,
@@ -74,7 +98,7 @@ def studio() -> Look:
 @functools.cache
 def pool() -> Look:
     """A tiled floor in the open: worlds in space, seen as water."""
-    return dataclasses.replace(
+    return under_sky(dataclasses.replace(
         studio(),
         sun=vector(1.25, 1.16, 1.02),
         sky=vector(0.42, 0.50, 0.60),
@@ -86,7 +110,7 @@ def pool() -> Look:
         line=_linear("#eef4f7"),
         tile=0.1,
         sun_size=0.04,
-    )
+    ))  # fmt: skip
 
 
 @functools.cache
@@ -109,6 +133,7 @@ def paper() -> Look:
         gloss=0.0,
         sun_size=0.0,
         shade_depth=1.0,
+        **STUDIO,
         lamp=vector(0.5, 0.55, 0.6),
         glow=vector(0.35, 0.55, 0.70),
         sparkle=0.0,
@@ -132,6 +157,11 @@ def fluid_optics(color: str | None, extent: Extent) -> tuple[np.ndarray, float, 
     seen = np.clip(to_linear(np.array(rgb_of(color or WATER[extent.dim]))), 0.02, 0.98)
     scattering = (0.5 if extent.dim == 3 else 0.9) / usual
     return vector(*(-np.log(seen) / usual)), float(scattering), vector(*seen**0.6)
+
+
+def _lit_floor(look: Look) -> np.ndarray:
+    """Radiance of a floor that nothing shades."""
+    return vector(*(look.floor * (look.to_sun[1] * look.sun + look.sky)))
 
 
 def _linear(color: str) -> np.ndarray:

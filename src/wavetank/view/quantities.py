@@ -82,8 +82,12 @@ class Quantity:
 
 
 def usual(scene: Any) -> str:
-    """Return the quantity that tells most about `scene`: the material where fluids name one, else the speed."""
-    return "material" if any(fluid.material for fluid in scene.fluids) else "speed"
+    """Return the quantity that tells most about `scene`: the material where it has several, else the speed.
+
+    What a saved state has no more are the fluids that it began with, and water may come out of a mouth or a tool; the
+    scene's materials are what tells.
+    """
+    return "material" if scene.materials else "speed"
 
 
 QUANTITIES: dict[str, Quantity] = {

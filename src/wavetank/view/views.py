@@ -10,6 +10,7 @@ from wavetank.view.passes import (
     caustics,
     clip,
     cut,
+    drops,
     ellipsoids,
     flatten,
     floor,
@@ -64,7 +65,7 @@ VIEWS: dict[str, View] = {
         ),
         passes=(
             backdrop.draw, surface.draw, flatten.draw, thickness.draw, water.draw, below.draw,
-            foam.draw_over_water,
+            drops.draw, foam.draw_over_water,
         ),
     ),
     "particles": View(

@@ -25,6 +25,19 @@ class Ellipsoids:
     outward: qd.types.ndarray()  # vec3 [2 capacity]: away from the water, up to about 0.4 long
     size: qd.types.ndarray()  # f32 [2 capacity], m: bound on the radius; negative where nothing is drawn
     edge: qd.types.ndarray()  # i32 [2 capacity]: 1 where its outline may be seen, 0 elsewhere
+    lone: qd.types.ndarray()  # i32 [2 capacity]: 1 where it is a drop of its own, 0 elsewhere
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Drops:
+    """What is known of particles that are drops of their own, on the device; all but `lone` in device order."""
+
+    lone: qd.types.ndarray()  # i32 [capacity], in the order of `cells`: 1 for a drop
+    v: qd.types.ndarray()  # vec3 [capacity], m/s
+    id: qd.types.ndarray()  # i32 [capacity]
+    dye: qd.types.ndarray()  # i32 [capacity]
+    material: qd.types.ndarray()  # i32 [capacity]
+    stains: qd.types.ndarray()  # i32 [materials]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -79,10 +92,23 @@ class WaterBuffers:
     stains: Any  # i32 [materials]: colour of each fluid as a dye, 0 where the scene has one fluid only
     key: tuple[Any, ...]  # what the sizes were made for
 
+    known: dict[tuple[int, ...], Drops] = dataclasses.field(default_factory=dict)  # by the arrays they are of
+
+    def drops(self, frame: Frame) -> Drops:
+        """Return what is known of a frame's drops, the same object for the same arrays."""
+        arrays = (self.ellipsoids.lone, frame.v, frame.id, frame.dye, frame.material, self.stains)
+        key = tuple(map(id, arrays))
+        if key not in self.known:
+            if len(self.known) >= MOST_KNOWN:
+                self.known.clear()
+            self.known[key] = Drops(*arrays)
+        return self.known[key]
+
 
 REACH = 2.2  # d: radius of the neighbourhood of a particle or a point
 LIGHT_STEP = 2  # floor and solids are smooth
 MOST_PARTS, MOST_SUMS = 8, 1 << 23  # of particles whose discs are added apart; numbers that are kept for that
+MOST_KNOWN = 16  # sets of a simulation's arrays, which take turns
 UNIT = 4096.0  # steps of thickness in a spacing
 
 
@@ -150,5 +176,5 @@ def _stains(frame: Frame) -> np.ndarray:
 
 def _ellipsoids(capacity: int) -> Ellipsoids:
     vectors = {name: qd.ndarray(vec3, shape=(2 * capacity,)) for name in ("center", "axes", "mixed", "outward")}
-    size, edge = (qd.ndarray(kind, shape=(2 * capacity,)) for kind in (qd.f32, qd.i32))
-    return Ellipsoids(**vectors, size=size, edge=edge)
+    size, edge, lone = (qd.ndarray(kind, shape=(2 * capacity,)) for kind in (qd.f32, qd.i32, qd.i32))
+    return Ellipsoids(**vectors, size=size, edge=edge, lone=lone)

@@ -24,14 +24,18 @@ class Optics:
     unit: qd.f32  # m per step of it
     spacing: qd.f32  # m
     disc: qd.f32  # m: radius of a particle's disc in a plane
+    slack: qd.f32  # m: depth by which an edge of the tank wins
+    samples: qd.i32  # computed pixels per pixel of the picture, in each direction
+    under: qd.i32  # 1 where the eye is in the water
 
 
-def optics_of(shot: Shot) -> Optics:
+def optics_of(shot: Shot, under: int = 0, samples: int = 1) -> Optics:
     """Return what the fluid of a picture does to light."""
     return remembered(Optics(
         absorption=shot.absorption, scattering=shot.scattering, glow=vector(*(shot.look.glow * shot.tint)),
         usual=shot.usual, coarse=float(coarseness(shot)), unit=shot.extent.spacing / UNIT,
         spacing=shot.extent.spacing, disc=DISC[2] * shot.extent.spacing,
+        slack=2.0 * shot.radius, under=under, samples=samples,
     ))  # fmt: skip
 
 

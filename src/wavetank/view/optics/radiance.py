@@ -13,8 +13,31 @@ def smoothstep(share):
 
 @qd.func
 def background(look: Look, direction):
-    """Radiance of the empty studio in a unit direction."""
-    return look.horizon + (look.zenith - look.horizon) * smoothstep(direction.y * 1.6 + 0.08)
+    """Radiance of the empty studio, or of the open sky, in a unit direction."""
+    result = look.horizon + (look.zenith - look.horizon) * smoothstep(direction.y * 1.6 + 0.08)
+    if look.outdoors == 1:
+        result = sky(look, direction)
+    return result
+
+
+@qd.func
+def sky(look: Look, direction):
+    """Radiance of the sky but for the sun itself: the functions of `sky.terms`; it goes on below the horizon."""
+    u = 1.0 - qd.min(qd.max(direction.y, 0.0), 1.0)
+    near = 0.5 + 0.5 * direction.dot(look.to_sun)
+    low, near = u * u, near * near
+    haze, glow = low * low, near * near
+    haze, glow = haze * haze, glow * glow
+    glare = glow * glow
+    glare = glare * glare
+    result = look.sky_even + low * look.sky_low + haze * (look.sky_haze + near * look.sky_near_haze)
+    return qd.max(result + near * look.sky_near + glow * look.sky_glow + glare * glare * look.sky_glare, 0.0)
+
+
+@qd.func
+def sun_disc(look: Look, direction):
+    """Radiance of the sun itself in a unit direction, with a soft edge: wider than it is, as a lens sees it."""
+    return (30.0 * look.outdoors * smoothstep((direction.dot(look.to_sun) - 0.9992) / 0.0004)) * look.sun
 
 
 @qd.func
@@ -35,18 +58,10 @@ def surface_radiance(look: Look, albedo, n, seen, share, wrap, gloss):
 
 @qd.func
 def environment(look: Look, direction):
-    """Radiance that the water mirrors: the studio, its ground and its lamps."""
+    """Radiance that the water mirrors: the sky, and below the horizon the ground as it is lit."""
     result = background(look, direction)
-    if direction.y < 0.05:
-        share = smoothstep((0.05 - direction.y) / 0.25)
-        result += share * (look.floor * look.ground * 1.4 - result)
-    else:
-        # A wide soft lamp overhead, towards the sun: broad streaks of light on every wave.
-        u = direction.x / (direction.y + 0.15)
-        v = direction.z / (direction.y + 0.15)
-        a = smoothstep((0.75 - qd.abs(u + 0.55)) / 0.18) * smoothstep((1.6 - qd.abs(v + 0.3)) / 0.25)
-        b = smoothstep((0.22 - qd.abs(u - 0.9)) / 0.12) * smoothstep((1.8 - qd.abs(v)) / 0.3)
-        result += look.lamp * (a + 0.6 * b)
+    if direction.y < 0.0:
+        result += smoothstep(-3.0 * direction.y) * (look.below - result)
     return result
 
 

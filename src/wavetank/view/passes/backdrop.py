@@ -13,7 +13,7 @@ from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, optics_of
 from wavetank.view.optics.glass import with_tank
 from wavetank.view.optics.maps import share_of, thickness_at
-from wavetank.view.optics.radiance import background, smoothstep, surface_radiance
+from wavetank.view.optics.radiance import background, smoothstep, sun_disc, surface_radiance
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
@@ -113,7 +113,10 @@ def divide(
                     sun, sky = albedo * look.sun * (look.to_sun.y * share.x), albedo * look.sky * share.y
             backdrop.in_sun[row, column] = (1.0 - far) * sun
             if far > 0.0:
-                sky += far * (background(look, direction.normalized()) - sky)
+                ahead = direction.normalized()
+                sky += far * (background(look, ahead) - sky)
+                if what == 0x7FFFFFFF:  # NOTHING
+                    sky += sun_disc(look, ahead)
             backdrop.in_sky[row, column] = sky
 
 

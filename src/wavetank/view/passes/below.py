@@ -17,9 +17,9 @@ from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, view_ray
 from wavetank.view.look import Look
+from wavetank.view.optics.body import depth_below, normal_above
 from wavetank.view.optics.fluid import Optics, dimmed, optics_of
 from wavetank.view.optics.maps import margins_inside, picture_at
-from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.radiance import environment, glint, smoothstep
 from wavetank.view.optics.rays import Box, box_interval
 from wavetank.view.shot import Shot
@@ -39,41 +39,6 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         pixels, water.surface, water.sunlit, water.backdrop, strips_of(pixels.depth), shot.lens, shot.water_sun,
         shot.look, optics_of(shot), shot.walls, STEPS, HALVINGS,
     )  # fmt: skip
-
-
-@qd.func
-def depth_below(sun: Lens, first: qd.template(), at):
-    """How far [m] the point `at` lies below the surface along the sun's rays, between four texels; -1 outside of it."""
-    c = to_view(sun, at)
-    place = to_pixel(sun, c) - 0.5
-    column, row = qd.cast(qd.floor(place.x), qd.i32), qd.cast(qd.floor(place.y), qd.i32)
-    result = -1.0
-    if row >= 0 and column >= 0 and row < first.shape[0] - 1 and column < first.shape[1] - 1:
-        total, weight = 0.0, 0.0
-        for k in qd.static(range(4)):
-            z = qd.bit_cast(first[row + k // 2, column + k % 2], qd.f32)
-            share = (1.0 - qd.abs(column + k % 2 - place.x)) * (1.0 - qd.abs(row + k // 2 - place.y))
-            if z < 1e30:
-                total += share * z
-                weight += share
-        if weight > 0.25:
-            result = c.z - total / weight
-    return result
-
-
-@qd.func
-def normal_above(sun: Lens, first: qd.template(), at, spacing):
-    """Normal of the surface at the point `at` on it, out of the water, between four texels of the sun's map."""
-    place = to_pixel(sun, to_view(sun, at)) - 0.5
-    n = 1e-6 * -sun.forward
-    for k in qd.static(range(4)):
-        row = qd.min(qd.max(qd.cast(qd.floor(place.y), qd.i32) + k // 2, 0), first.shape[0] - 1)
-        column = qd.min(qd.max(qd.cast(qd.floor(place.x), qd.i32) + k % 2, 0), first.shape[1] - 1)
-        z = qd.bit_cast(first[row, column], qd.f32)
-        if z < 1e30:
-            share = qd.max(1.0 - qd.abs(column - place.x), 0.0) * qd.max(1.0 - qd.abs(row - place.y), 0.0)
-            n += share * normal_of(sun, row, column, z, rise_at(row, column, z, 3.0 * spacing, first))
-    return n.normalized(1e-12)
 
 
 @qd.kernel(fastcache=True)

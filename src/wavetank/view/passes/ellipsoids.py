@@ -84,6 +84,7 @@ def fit(ellipsoids: Ellipsoids, cells: Cells, walls: Box, shape: Shape, dim: qd.
         cell = cells.cell[cells.order[a]]
         ellipsoids.outward[a] = vec3(0.0, 0.0, 0.0)
         ellipsoids.size[count + a] = -1.0
+        ellipsoids.lone[a], ellipsoids.lone[count + a] = 0, 0
         if cells.fill[cell] == 1:
             # Full water all around: a ball, seen through a wall if at all.
             touch, to_wall = near_walls(p, walls, shape.spacing, dim)
@@ -127,6 +128,9 @@ def fit(ellipsoids: Ellipsoids, cells: Cells, walls: Box, shape: Shape, dim: qd.
             diagonal = trust * (shape.least + shape.growth * n) + (1.0 - trust) * shape.ball
             side = trust * shape.growth * o
             touch, to_wall = near_walls(p, walls, shape.spacing, dim)
+            if qd.static(dim == 3):
+                if weight < 3.0 and touch.max() == 0.0:  # no more than two next to it, or some farther off
+                    ellipsoids.lone[a] = 1
             free, share = 1.0 - touch, 1.0
             for k in qd.static(range(dim)):
                 share *= share_before_wall(qd.abs(to_wall[k]) / shape.reach)
@@ -147,6 +151,7 @@ def fit(ellipsoids: Ellipsoids, cells: Cells, walls: Box, shape: Shape, dim: qd.
                 ellipsoids.axes[a], ellipsoids.mixed[a] = squared(diagonal, side)
                 ellipsoids.size[a] = qd.max(diagonal.x, diagonal.y, diagonal.z) + side.norm()
                 if qd.static(dim == 3):
+                    ellipsoids.lone[count + a] = ellipsoids.lone[a]
                     mirror(ellipsoids, a, count + a, p, walls, shape.mirrored)
 
 

@@ -1,18 +1,25 @@
-"""Spray, foam and bubbles: soft bright discs over the picture, thicker where there are more of them.
+"""Spray, foam and bubbles: clouds of fine droplets over the picture, thicker where there are more of them.
 
-Every particle adds its optical depth to the pixels it covers, and the part of it that the sun reaches. Sums of whole
-numbers do not depend on the order of threads, and no sorting by depth is needed: what is added is all of one white
-stuff. The sums are kept per pixel of the picture, not per sample, which is enough for soft things.
+What the simulation moves is a few thousand points; what they stand for is a froth of far smaller things. Each point
+becomes a handful of discs, spread about a spacing and along the way that it goes in half a frame, as a shutter that is
+open for so long sees it. A cloud has its own fixed places, so that nothing flickers, and near the eye it has more and
+smaller discs: none is ever large in the picture, and together they cover the same. Every disc adds its optical depth to
+the pixels it covers, and the part of it that the sun reaches. Sums of whole numbers do not depend on the order of
+threads, and no sorting by depth is needed: what is added is all of one white stuff. The sums are kept per pixel of the
+picture, not per sample, which is enough for soft things. The same depths on a grid as coarse as the spacing give the
+froth a shape (`shape`): it is thick where it is dense, and lit as such a relief is.
 
     code      symbol   meaning                                                              unit
-    tau                optical depth of what lies over a pixel, in 1/256                    1
+    tau                optical depth of what lies over a pixel, in 1/4096                   1
     lit                tau weighted with the share of the sun that arrives                  1
-    r, wide            radius of a particle, and as drawn: no smaller than the pixel grid   px
+    deep               tau weighted with the way through the water above it                 d / 4
+    r, wide            radius of a disc, and as drawn: no smaller than the pixel grid       px
     behind             how far a particle is behind the surface that the pixel shows        m
+    parts              discs of a cloud, a number with a fraction: the last one is fainter  1
 
 The pass reads depth, camera and sun and knows nothing of how the water was drawn: what is a little behind the surface
-shows through it, what is far behind does not. In a 2-D world everything lies in one plane: foam lies on the water, in
-full light, and what flies over white paper is a pale blue.
+shows through it, in the colour of so much water, and what is `DEEPEST` behind does not. In a 2-D world everything lies
+in one plane: foam lies on the water, in full light, and what flies over white paper is a pale blue.
 """
 
 import dataclasses
@@ -23,19 +30,25 @@ import numpy as np
 from wavetank.device.compiler import qd
 from wavetank.device.state import Diffuse, remembered
 from wavetank.solids.distance import lift
-from wavetank.view.buffers import Buffers, Pixels
+from wavetank.view.buffers import Buffers, FoamMaps, Pixels
 from wavetank.view.colormaps import rgb_of, to_linear
-from wavetank.view.lens import Lens, pixels_per_metre, to_pixel, to_view, vec3, vector
+from wavetank.view.lens import Lens, from_view, pixels_per_metre, to_pixel, to_view, vec2, vec3, vector
+from wavetank.view.look import Look
+from wavetank.view.optics.chance import bits_of, scrambled
 from wavetank.view.optics.glass import line_cover, slack
-from wavetank.view.optics.maps import gap_at
+from wavetank.view.optics.maps import corners, gap_at
+from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import water_of
 
-SHOW_THROUGH = 1.0  # d: depth below the surface at which foam shows with 1/e of its strength
-LARGEST = 0.05  # of the picture's height: radius up to which a particle is drawn at its size
+DEEPEST = 5.0  # d: depth below the surface at which foam is no longer seen
 SIZE = {2: 1.7, 3: 1.0}  # of the drawn particles: a plane has fewer of them
 IN_FRONT = 1e9  # m: what shows through everything
-SHADE = vector(0.80, 0.68, 0.55)  # of the sun's light, lost in the shadow: the sky leaves foam a little blue
+PARTS, MOST_PARTS = 10.0, 60.0  # discs of a cloud far from the eye, and next to it
+FINE = 0.0022  # of the picture's height: radius that a disc has before a cloud gets more of them
+LARGEST = 0.02  # of the picture's height: radius up to which a disc is drawn at its size
+SHUTTER = 0.5  # of a frame: time for which it is open
+ALBEDO = 1.15  # of froth: what it scatters on within adds to what a matte surface would give
 PALE = vector(*to_linear(np.array(rgb_of("#6fa8d2"))))
 
 
@@ -44,15 +57,22 @@ class Froth:
     """How spray, foam and bubbles look, on the device."""
 
     size: qd.f32  # m: about that of a particle
-    through: qd.f32  # m: depth below the surface at which foam shows with 1/e of its strength
+    deepest: qd.f32  # m: depth below the surface at which foam is no longer seen
     sunk: qd.f32  # m: how far behind a solid it is still seen
-    largest: qd.f32  # px: radius up to which a particle is drawn at its size
-    white: vec3  # radiance
-    in_air: vec3  # the same over nothing
-    shade: vec3  # radiance that is lost in the shadow
+    fine: qd.f32  # px: radius of a disc from which on a cloud has more of them
+    largest: qd.f32  # px: radius up to which a disc is drawn at its size
+    shutter: qd.f32  # s: time for which it is open
+    in_sun: vec3  # radiance that the sun gives
+    in_sky: vec3  # radiance that everything else gives
+    in_air: vec3  # what both are over nothing in a plane
+    swallow: vec3  # per d / 4: what light loses in the water, both ways
+    parts: qd.f32  # discs of a cloud far from the eye
+    most_parts: qd.f32  # and next to it
+    flat: qd.i32  # 1 in a plane
     line_strength: qd.f32  # share of what is behind an edge of the tank that the edge hides
     slack: qd.f32  # m: depth by which an edge wins
     samples: qd.i32  # computed pixels per pixel of the picture, in each direction
+    grain: qd.i32  # px: texel of the relief
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
@@ -68,36 +88,51 @@ def draw_over_water(shot: Shot, buffers: Buffers) -> None:
 
 def lay(shot: Shot, buffers: Buffers, depth: Any, sunk: float) -> None:
     """Lay spray, foam and bubbles over whatever lies at `depth`; solids hide what is `sunk` [m] behind them."""
-    frame, pixels = shot.frame, buffers.pixels
+    frame, pixels, maps = shot.frame, buffers.pixels, buffers.foam
     if frame.diffuse is None or frame.foam_count == 0:
         return
     froth = froth_of(shot, buffers, sunk)
-    clear(buffers.foam)
+    rows, columns = (int(size) // int(froth.grain) + 2 for size in maps.sums.shape[:2])
+    clear(maps, rows, columns)
     splat(
-        buffers.foam, frame.diffuse, depth, pixels.depth, buffers.sun_depth, shot.lens, shot.sun, froth,
-        frame.foam_count,
+        maps, frame.diffuse, depth, pixels.depth, buffers.sun_depth, shot.lens, shot.sun, shot.walls, froth,
+        frame.dim, frame.foam_count,
     )  # fmt: skip
-    blend(pixels, buffers.foam, depth, froth)
+    shape(maps, shot.lens, shot.look, rows, columns, frame.dim)
+    blend(pixels, maps, depth, froth)
 
 
 def froth_of(shot: Shot, buffers: Buffers, sunk: float) -> Froth:
     """Return how spray, foam and bubbles look in a picture."""
     frame, look, d, flat = shot.frame, shot.look, shot.extent.spacing, shot.frame.dim == 2
-    white = vector(*(look.sun + look.sky))
+    height = buffers.rows / buffers.supersample
+    in_sun, in_sky = vector(*(ALBEDO * look.sun)), vector(*(ALBEDO * look.sky))
     return remembered(Froth(
-        size=SIZE[frame.dim] * d, through=IN_FRONT if flat else SHOW_THROUGH * d, sunk=sunk,
-        largest=max(LARGEST * buffers.rows / buffers.supersample, 1.0), white=white, in_air=PALE if flat else white,
-        shade=vector(*(SHADE * look.sun * (not flat))),
+        size=SIZE[frame.dim] * d, deepest=IN_FRONT if flat else DEEPEST * d, sunk=sunk, fine=max(FINE * height, 0.8),
+        largest=max(LARGEST * height, 1.0), shutter=SHUTTER * frame.scene.frame_time, in_sun=in_sun, in_sky=in_sky,
+        in_air=PALE, swallow=vector(*(0.5 * d * shot.absorption * (not flat))),
         line_strength=look.line_strength if frame.scene.tank else 0.0, slack=slack(shot), samples=buffers.supersample,
+        grain=grain_of(shot, buffers), parts=PARTS, most_parts=MOST_PARTS, flat=int(flat),
     ))  # fmt: skip
 
 
+def grain_of(shot: Shot, buffers: Buffers) -> int:
+    """Return the pixels of a texel of the relief: about a spacing in the middle of the world, at least 2."""
+    lens = shot.lens
+    scale = float(lens.focal) / buffers.supersample
+    if float(lens.perspective) > 0.5:
+        scale /= max(float((shot.extent.middle - lens.eye) @ lens.forward), 0.5 * shot.extent.radius)
+    return max(2, min(64, round(scale * shot.extent.spacing)))
+
+
 @qd.kernel(fastcache=True)
-def clear(foam: qd.types.ndarray()):
+def clear(maps: FoamMaps, rows: qd.i32, columns: qd.i32):
     """No foam anywhere."""
-    for row, column in qd.ndrange(foam.shape[0], foam.shape[1]):
-        foam[row, column, 0] = 0
-        foam[row, column, 1] = 0
+    for row, column in qd.ndrange(maps.sums.shape[0], maps.sums.shape[1]):
+        for k in qd.static(range(3)):
+            maps.sums[row, column, k] = 0
+    for row, column in qd.ndrange(rows, columns):
+        maps.relief[row, column] = 0
 
 
 @qd.func
@@ -114,65 +149,179 @@ def size_and_strength(kind, share, number):
 
 
 @qd.func
+def place_in_cloud(number, k, kind, dim: qd.template()):
+    """(place of disc `k` of a cloud [d], its instant from -0.5 to 0.5 of the shutter's time, its size about 1).
+
+    Foam lies on the water; a cloud is denser in its middle.
+    """
+    bits = bits_of(number, k)
+    more = scrambled(bits)
+    per = 1.0 / 2048.0
+    a, b = qd.cast(bits & qd.u32(2047), qd.f32) * per, qd.cast((bits >> 11) & qd.u32(1023), qd.f32) * (2.0 * per)
+    c, e = qd.cast(bits >> 21, qd.f32) * per, qd.cast(more & qd.u32(2047), qd.f32) * per
+    f, g = qd.cast((more >> 11) & qd.u32(1023), qd.f32) * (2.0 * per), qd.cast(more >> 21, qd.f32) * per
+    tall = 0.35 if kind == 2 else 1.0
+    away = vec3(a + b - 1.0, tall * (c + e - 1.0), f + g - 1.0)
+    if qd.static(dim == 2):
+        away = vec3(a + b - 1.0, c + e - 1.0, 0.0)
+    return away, qd.cast((bits ^ more) & qd.u32(1023), qd.f32) / 1024.0 - 0.5, 0.7 + 0.6 * b
+
+
+@qd.func
 def sunlit(sun: Lens, sun_depth: qd.template(), x, slack):
     """1 where the sun sees the point `x`, 0 where something is in the way."""
     c = to_view(sun, x)
     return qd.select(gap_at(sun_depth, to_pixel(sun, c), c.z - slack) > 0.0, 0.0, 1.0)
 
 
+@qd.func
+def share_seen(behind, deepest):
+    """Share of what lies so far behind a surface that is seen through it."""
+    rest = qd.max(1.0 - qd.max(behind, 0.0) / deepest, 0.0)
+    return rest * rest * rest
+
+
+@qd.func
+def add_disc(maps: FoamMaps, c, middle, wide, strength, light, depth: qd.template(), solid_depth: qd.template(),
+             froth: Froth):  # fmt: skip
+    """Add a disc to the pixels it covers, and return what a pixel in its middle would get of it, in 1/4096."""
+    rows, columns, samples = maps.sums.shape[0], maps.sums.shape[1], froth.samples
+    low_row = qd.max(qd.cast(qd.ceil(qd.max(middle.y - wide - 0.5, -1.0)), qd.i32), 0)
+    low_column = qd.max(qd.cast(qd.ceil(qd.max(middle.x - wide - 0.5, -1.0)), qd.i32), 0)
+    end_row = qd.cast(qd.min(qd.max(middle.y + wide + 0.5, 0.0), rows * 1.0), qd.i32)
+    end_column = qd.cast(qd.min(qd.max(middle.x + wide + 0.5, 0.0), columns * 1.0), qd.i32)
+    added = 0
+    for row in range(low_row, end_row):
+        for column in range(low_column, end_column):
+            away = (row + 0.5 - middle.y) ** 2 + (column + 0.5 - middle.x) ** 2
+            rest = 1.0 - away / (wide * wide)
+            if rest > 0.0:
+                down, across = row * samples + samples // 2, column * samples + samples // 2
+                behind = c.z - qd.bit_cast(depth[down, across], qd.f32) - 0.15 * froth.size
+                wall = qd.bit_cast(solid_depth[down, across], qd.f32)
+                if behind < froth.deepest and c.z - 0.15 * froth.size < wall + froth.sunk:
+                    tau = qd.cast(strength * rest * share_seen(behind, froth.deepest) + 0.5, qd.i32)
+                    if tau > 0:
+                        added += tau
+                        qd.atomic_add(maps.sums[row, column, 0], tau)
+                        if light > 0.5:
+                            qd.atomic_add(maps.sums[row, column, 1], tau)
+                        if behind > 0.0 and behind < 1e3:
+                            deep = tau * qd.min(behind * 4.0 / froth.size, 20.0)
+                            qd.atomic_add(maps.sums[row, column, 2], qd.cast(deep + 0.5, qd.i32))
+    return added
+
+
 @qd.kernel(fastcache=True)
 def splat(
-    foam: qd.types.ndarray(), diffuse: Diffuse, depth: qd.types.ndarray(), solid_depth: qd.types.ndarray(),
-    sun_depth: qd.types.ndarray(), lens: Lens, sun: Lens, froth: Froth, count: qd.i32,
+    maps: FoamMaps, diffuse: Diffuse, depth: qd.types.ndarray(), solid_depth: qd.types.ndarray(),
+    sun_depth: qd.types.ndarray(), lens: Lens, sun: Lens, walls: Box, froth: Froth, dim: qd.template(),
+    count: qd.i32,
 ):  # fmt: skip
-    """Add the optical depth of every particle to the pixels it covers."""
-    d, samples = froth.size, froth.samples
+    """Add the optical depth of every particle to the pixels it covers, and to the relief."""
+    d, samples, grain = froth.size, froth.samples, froth.grain
     for i in range(count):
         x = lift(diffuse.x[i])
         c = to_view(lens, x)
         if c.z > lens.near:
             radius, strength = size_and_strength(diffuse.kind[i], diffuse.age[i] / diffuse.life[i], diffuse.id[i])
-            r = qd.min(radius * d * pixels_per_metre(lens, c.z) / samples, froth.largest)
-            wide = qd.max(r, 0.8)
-            # What is smaller than a pixel is as faint as it is small.
-            strength *= 256.0 * (r / wide) ** 2
-            middle = to_pixel(lens, c) / samples
-            low_row = qd.max(qd.cast(qd.ceil(qd.max(middle.y - wide - 0.5, -1.0)), qd.i32), 0)
-            low_column = qd.max(qd.cast(qd.ceil(qd.max(middle.x - wide - 0.5, -1.0)), qd.i32), 0)
-            end_row = qd.cast(qd.min(qd.max(middle.y + wide + 0.5, 0.0), foam.shape[0] * 1.0), qd.i32)
-            end_column = qd.cast(qd.min(qd.max(middle.x + wide + 0.5, 0.0), foam.shape[1] * 1.0), qd.i32)
-            light = -1.0
-            for row in range(low_row, end_row):
-                for column in range(low_column, end_column):
-                    away = (row + 0.5 - middle.y) ** 2 + (column + 0.5 - middle.x) ** 2
-                    rest = 1.0 - away / (wide * wide)
-                    down, across = row * samples + samples // 2, column * samples + samples // 2
-                    behind = c.z - qd.bit_cast(depth[down, across], qd.f32) - radius * d
-                    wall = qd.bit_cast(solid_depth[down, across], qd.f32)
-                    if rest > 0.0 and behind < 4.0 * froth.through and c.z - radius * d < wall + froth.sunk:
-                        if light < 0.0:
-                            light = sunlit(sun, sun_depth, x, 2.0 * d)
-                        tau = qd.cast(strength * rest * qd.exp(-qd.max(behind, 0.0) / froth.through) + 0.5, qd.i32)
-                        if tau > 0:
-                            qd.atomic_add(foam[row, column, 0], tau)
-                            if light > 0.5:
-                                qd.atomic_add(foam[row, column, 1], tau)
+            scale = d * pixels_per_metre(lens, c.z) / samples  # px of a spacing
+            middle, reach = to_pixel(lens, c) / samples, 1.5 * scale + 2.0
+            if (
+                middle.x > -reach and middle.y > -reach
+                and middle.x < maps.sums.shape[1] + reach and middle.y < maps.sums.shape[0] + reach
+            ):  # fmt: skip
+                # As many discs as keep each of them small; all together cover what one of that radius would.
+                parts = qd.min(qd.max((radius * scale / froth.fine) ** 2, froth.parts), froth.most_parts)
+                each = radius * scale * qd.sqrt(1.0 / parts)
+                way = lift(diffuse.v[i]) * froth.shutter
+                light = sunlit(sun, sun_depth, x, 2.0 * d)
+                added = 0
+                for k in range(qd.cast(qd.ceil(parts), qd.i32)):
+                    away, instant, own = place_in_cloud(diffuse.id[i], k, diffuse.kind[i], dim)
+                    at = x + d * away + instant * way
+                    for axis in qd.static(range(dim)):  # not outside of the glass
+                        at[axis] = qd.min(qd.max(at[axis], walls.lower[axis]), walls.upper[axis])
+                    p = to_view(lens, at)
+                    if p.z > lens.near:
+                        r = qd.min(each * own, froth.largest)
+                        wide = qd.max(r, 1.1)
+                        # What is smaller than a pixel is as faint as it is small.
+                        full = 4096.0 * strength * (r / wide) ** 2 * qd.min(parts - k, 1.0)
+                        added += add_disc(
+                            maps, p, to_pixel(lens, p) / samples, wide, full, light, depth, solid_depth, froth
+                        )
+                if added > 0:
+                    texel = middle / grain - 0.5
+                    row, column = qd.cast(qd.floor(texel.y), qd.i32), qd.cast(qd.floor(texel.x), qd.i32)
+                    per = added / qd.cast(grain * grain, qd.f32)
+                    for n in qd.static(range(4)):
+                        down, across = row + n // 2, column + n % 2
+                        share = (1.0 - qd.abs(texel.y - down)) * (1.0 - qd.abs(texel.x - across))
+                        if (
+                            down >= 0 and across >= 0 and down * grain < maps.sums.shape[0]
+                            and across * grain < maps.sums.shape[1]
+                        ):  # fmt: skip
+                            qd.atomic_add(maps.relief[down, across], qd.cast(qd.min(share * per, 1e6) + 0.5, qd.i32))
+
+
+@qd.func
+def height_at(maps: FoamMaps, row, column, rows, columns):
+    """Height of the relief [texels], smoothed over 3 x 3 texels; froth that is deep in the picture is a flat heap."""
+    total = 0
+    for n in qd.static(range(9)):
+        r = qd.min(qd.max(row + qd.static(n // 3 - 1), 0), rows - 1)
+        c = qd.min(qd.max(column + qd.static(n % 3 - 1), 0), columns - 1)
+        total += qd.static((1, 2, 1, 2, 4, 2, 1, 2, 1)[n]) * maps.relief[r, c]
+    return 0.7 * qd.log(1.0 + total * (1.0 / (16.0 * 4096.0)))
 
 
 @qd.kernel(fastcache=True)
-def blend(pixels: Pixels, foam: qd.types.ndarray(), depth: qd.types.ndarray(), froth: Froth):
-    """Lay the sums over the picture: white or, over nothing, what it is in air, less where the sun is hidden."""
+def shape(maps: FoamMaps, lens: Lens, look: Look, rows: qd.i32, columns: qd.i32, dim: qd.template()):
+    """Find what share of sun and sky each texel of the relief gets: more where it faces them, less in its dells."""
+    for row, column in qd.ndrange(rows, columns):
+        sun, sky = 1.0, 1.0
+        if qd.static(dim == 3):
+            here = height_at(maps, row, column, rows, columns)
+            left, right = (
+                height_at(maps, row, column - 1, rows, columns),
+                height_at(maps, row, column + 1, rows, columns),
+            )
+            above, below = (
+                height_at(maps, row - 1, column, rows, columns), height_at(maps, row + 1, column, rows, columns)
+            )  # fmt: skip
+            # Foam lies on water: its plain faces up as much as the eye.
+            n = from_view(lens, vec3(left - right, below - above, -0.35)) + vec3(0.0, 0.35, 0.0)
+            n = n.normalized(1e-6)
+            dell = left + right + above + below - 4.0 * here
+            sun = qd.max((n.dot(look.to_sun) + 0.2) / 1.2, 0.0)
+            sky = (0.65 + 0.35 * n.y) * (1.0 - qd.min(qd.max(0.8 * dell, 0.0), 0.5))
+        maps.light[row, column] = vec2(sun, sky)
+
+
+@qd.kernel(fastcache=True)
+def blend(pixels: Pixels, maps: FoamMaps, depth: qd.types.ndarray(), froth: Froth):
+    """Lay the sums over the picture: what sun and sky give them or, over nothing, what it is in air."""
     samples = froth.samples
-    for foam_row, foam_column in qd.ndrange(foam.shape[0], foam.shape[1]):
-        tau = foam[foam_row, foam_column, 0]
+    for foam_row, foam_column in qd.ndrange(maps.sums.shape[0], maps.sums.shape[1]):
+        tau = maps.sums[foam_row, foam_column, 0]
         if tau > 0:
-            hidden = froth.shade * (1.0 - foam[foam_row, foam_column, 1] / qd.cast(tau, qd.f32))
-            most = 1.0 - qd.exp(-tau / 256.0)
+            per = 1.0 / qd.cast(tau, qd.f32)
+            place = vec2(foam_column + 0.5, foam_row + 0.5) / qd.cast(froth.grain, qd.f32)
+            r, c, r1, c1, v, u = corners(place, maps.light.shape[0], maps.light.shape[1], 1.001)
+            top = maps.light[r, c] + u * (maps.light[r, c1] - maps.light[r, c])
+            low = maps.light[r1, c] + u * (maps.light[r1, c1] - maps.light[r1, c])
+            share = top + v * (low - top)
+            # Froth scatters: a fifth of the sun comes around whatever is in the way.
+            sun = share.x * (0.2 + 0.8 * maps.sums[foam_row, foam_column, 1] * per)
+            under = qd.exp(-maps.sums[foam_row, foam_column, 2] * per * froth.swallow)
+            white = under * (sun * froth.in_sun + share.y * froth.in_sky)
+            most = 1.0 - qd.exp(-tau / 4096.0)
             for row in range(foam_row * samples, foam_row * samples + samples):
                 for column in range(foam_column * samples, foam_column * samples + samples):
-                    light, cover = froth.white - hidden, most
-                    if depth[row, column] == 0x7F000000:  # FARTHEST
-                        light = froth.in_air - hidden
+                    light, cover = white, most
+                    if froth.flat == 1 and depth[row, column] == 0x7F000000:  # FARTHEST
+                        light = froth.in_air
                     if froth.line_strength > 0.0:  # the tank's edges stay in front
                         here = qd.bit_cast(depth[row, column], qd.f32)
                         cover *= 1.0 - froth.line_strength * line_cover(pixels.lines[row, column], here, froth.slack)

@@ -39,6 +39,7 @@ class Limits:
 
     largest: qd.f32  # px: radius up to which it is
     away: qd.f32  # how much one faces away that no eye can see
+    lone: qd.i32  # 1 where lone particles count, 0 where they are drops of their own
     gap: qd.f32  # m: what an outline stands before by more, it stands out from
 
 
@@ -47,21 +48,24 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     water = water_of(buffers, shot)
     if shot.hasty:
         water.surface.rim.fill(0)
-    see(shot, water.ellipsoids, shot.lens, water.surface.depth, None if shot.hasty else water.surface.rim)
+    see(shot, water.ellipsoids, shot.lens, water.surface.depth, None if shot.hasty else water.surface.rim, False)
 
 
 def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
     """Fill the depth at which the sun's rays meet the water, likewise."""
     if shot.frame.dim == 3:
         water = water_of(buffers, shot)
-        see(shot, water.ellipsoids, shot.water_sun, water.sunlit.depth, None)
+        see(shot, water.ellipsoids, shot.water_sun, water.sunlit.depth, None, False)
 
 
-def see(shot: Shot, ellipsoids: Ellipsoids, lens: Lens, depth: Any, rim: Any) -> None:
-    """Fill `depth` with the water as `lens` sees it, and `rim`, if any, with what its outlines cover in part."""
+def see(shot: Shot, ellipsoids: Ellipsoids, lens: Lens, depth: Any, rim: Any, lone: bool) -> None:
+    """Fill `depth` with the water as `lens` sees it, and `rim`, if any, with what its outlines cover in part.
+
+    Without `lone` particles these are left to the drops.
+    """
     count, turns = shot.frame.count, max(threads(), 1)
     limits = remembered(Limits(
-        largest=max(LARGEST * depth.shape[0], 2.0), away=AWAY, gap=GAP * shot.extent.spacing,
+        largest=max(LARGEST * depth.shape[0], 2.0), away=AWAY, lone=int(lone), gap=GAP * shot.extent.spacing,
     ))  # fmt: skip
     splat(
         depth, depth if rim is None else rim, ellipsoids, strips_of(depth), lens, shot.walls, limits,
@@ -93,7 +97,7 @@ def splat(
             for image in range(2):
                 j = i + image * count
                 ellipsoids.edge[j] = 0
-                if ellipsoids.size[j] > 0.0:
+                if ellipsoids.size[j] > 0.0 and ellipsoids.lone[j] <= limits.lone:
                     if may_be_seen(ellipsoids, j, image, lens, walls, limits.away):
                         ellipsoids.edge[j] = fill_ellipse(
                             depth, rim, ellipsoids, j, lens, limits, qd.static(1 if soft else 0)

@@ -32,29 +32,35 @@ class Disc:
     radius: qd.f32  # m
     peak: qd.f32  # steps
     coarse: qd.f32  # pixels per texel
+    lone: qd.i32  # 1 where lone particles count, 0 where they are drops of their own
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill the thickness as the eye sees it."""
     water = water_of(buffers, shot)
-    add_up(shot, water, water.thickness, shot.lens, float(coarseness(shot)))
+    add_up(shot, water, water.thickness, shot.lens, float(coarseness(shot)), lone=shot.frame.dim == 2)
 
 
 def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
     """Fill the thickness as the sun sees it; a 2-D world has no shadows."""
     if shot.frame.dim == 3:
         water = water_of(buffers, shot)
-        add_up(shot, water, water.sun_thickness, shot.water_sun, 1.0)
+        add_up(shot, water, water.sun_thickness, shot.water_sun, 1.0, lone=True)
 
 
-def add_up(shot: Shot, water: WaterBuffers, thickness: Thickness, lens: Lens, coarse: float) -> None:
+def add_up(shot: Shot, water: WaterBuffers, thickness: Thickness, lens: Lens, coarse: float, lone: bool) -> None:
     """Fill maps with the discs of particles; the texel (r, c) holds the pixels from coarse r, c on."""
     frame, cells = shot.frame, water.cells
-    disc = remembered(Disc(radius=DISC[frame.dim] * shot.extent.spacing, peak=peak(frame.dim), coarse=coarse))
+    disc = remembered(
+        Disc(radius=DISC[frame.dim] * shot.extent.spacing, peak=peak(frame.dim), coarse=coarse, lone=int(lone))
+    )
     rows, columns = thickness.water.shape
     parts = int(thickness.sums.shape[0]) // int(rows * columns)
-    add(thickness, cells.x, strips_of(thickness.water), lens, disc, parts, int(threads() > 0), frame.count)
-    stain(thickness, cells, frame.dye, frame.material, water.stains, lens, disc, frame.count)
+    add(
+        thickness, cells.x, water.ellipsoids.lone, strips_of(thickness.water), lens, disc, parts, int(threads() > 0),
+        frame.count,
+    )  # fmt: skip
+    stain(thickness, cells, water.ellipsoids.lone, frame.dye, frame.material, water.stains, lens, disc, frame.count)
 
 
 def peak(dim: int) -> float:
@@ -92,8 +98,8 @@ def thickness_in(at, row, column):
 
 @qd.kernel(fastcache=True)
 def add(
-    thickness: Thickness, x: qd.types.ndarray(), strips: Strips, lens: Lens, disc: Disc, parts: qd.i32,
-    shared_out: qd.template(), count: qd.i32,
+    thickness: Thickness, x: qd.types.ndarray(), alone: qd.types.ndarray(), strips: Strips, lens: Lens, disc: Disc,
+    parts: qd.i32, shared_out: qd.template(), count: qd.i32,
 ):  # fmt: skip
     """Add up every particle's disc.
 
@@ -111,6 +117,8 @@ def add(
                     if run % parts == part:
                         for i in range(64 * run, qd.min(64 * run + 64, count)):
                             at, box = disc_of(lens, disc, x[i], disc.peak, rows, columns)
+                            if alone[i] > disc.lone:
+                                box[1] = -1
                             for row in range(box[0], box[1] + 1):
                                 begin = (part * rows + row) * columns
                                 for column in range(box[2], box[3] + 1):
@@ -129,6 +137,8 @@ def add(
             thickness.water[row, column] = 0
         for i in range(count):
             at, box = disc_of(lens, disc, x[i], disc.peak, rows, columns)
+            if alone[i] > disc.lone:
+                box[1] = -1
             for row in range(box[0], box[1] + 1):
                 for column in range(box[2], box[3] + 1):
                     more = qd.cast(thickness_in(at, row, column) + 0.5, qd.i32)
@@ -138,8 +148,8 @@ def add(
 
 @qd.kernel(fastcache=True)
 def stain(
-    thickness: Thickness, cells: Cells, dyes: qd.types.ndarray(), materials: qd.types.ndarray(),
-    stains: qd.types.ndarray(), lens: Lens, disc: Disc, count: qd.i32,
+    thickness: Thickness, cells: Cells, alone: qd.types.ndarray(), dyes: qd.types.ndarray(),
+    materials: qd.types.ndarray(), stains: qd.types.ndarray(), lens: Lens, disc: Disc, count: qd.i32,
 ):  # fmt: skip
     """Add up the discs of coloured particles, as strong as their dye, alone and times its colour.
 
@@ -162,7 +172,7 @@ def stain(
             own = dyes[cells.order[a]]
             if own == 0:
                 own = stains[materials[cells.order[a]]]
-        if own != 0:
+        if own != 0 and alone[a] <= disc.lone:
             strength = disc.peak * ((own >> 24) & 127) / 127.0
             at, box = disc_of(lens, disc, cells.x[a], strength, rows, columns)
             color = dyed(vec3(0.0, 0.0, 0.0), own | (127 << 24))

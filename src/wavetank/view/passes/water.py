@@ -26,13 +26,15 @@ from wavetank.view.lens import (
     to_view,
     vec2,
     vec3,
+    vec4,
     vector,
     view_ray,
 )
 from wavetank.view.look import Look
+from wavetank.view.optics.body import through_body
 from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, refracted
-from wavetank.view.optics.glass import line_cover, slack
+from wavetank.view.optics.glass import line_cover
 from wavetank.view.optics.maps import margins_inside, picture_at, thickness_at
 from wavetank.view.optics.marks import rim_cover, rim_key
 from wavetank.view.optics.normals import normal_of, rise_at
@@ -41,7 +43,7 @@ from wavetank.view.optics.radiance import environment, glint, smoothstep
 from wavetank.view.optics.rays import Box, box
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
-from wavetank.view.water_buffers import Backdrop, Thickness, WaterSurface, water_of
+from wavetank.view.water_buffers import Backdrop, SunlitWater, Thickness, WaterSurface, water_of
 from wavetank.view.weights import under_water
 
 
@@ -52,8 +54,9 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         thick = vector(0.0, 0.0, 10.0 * shot.extent.spacing)
         walls = box(walls.lower - thick, walls.upper + thick)
     lay(
-        pixels, water.surface, water.thickness, water.backdrop, strips_of(pixels.depth), shot.lens, shot.look,
-        optics_of(shot), walls, slack(shot), under_water(shot, buffers), shot.frame.dim,
+        pixels, water.surface, water.thickness, water.backdrop, water.sunlit, strips_of(pixels.depth), shot.lens,
+        shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers), buffers.supersample), walls,
+        shot.frame.dim,
     )  # fmt: skip
 
 
@@ -92,19 +95,21 @@ def sheet_normal(thickness: qd.template(), lens: Lens, optics: Optics, walls: Bo
 
 @qd.kernel(fastcache=True)
 def lay(
-    pixels: Pixels, surface: WaterSurface, thickness: Thickness, backdrop: Backdrop, strips: Strips, lens: Lens,
-    look: Look, optics: Optics, walls: Box, slack: qd.f32, under: qd.i32, dim: qd.template(),
+    pixels: Pixels, surface: WaterSurface, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater,
+    strips: Strips, lens: Lens, sun: Lens, look: Look, optics: Optics, walls: Box, dim: qd.template(),
 ):  # fmt: skip
     """Shade every pixel that shows water, and copy the backdrop to the others; `surface.nearest` is filled with the
     nearer of its depth and the backdrop's.
     """
     for task in range(strips.count):
         row, begin, end = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
+        # What is seen through a body of water is found once for the samples of a pixel that lie beside each other.
+        kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
         for column in range(begin, end):
             result = backdrop.behind[row, column]
             z, back = qd.bit_cast(surface.depth[row, column], qd.f32), qd.bit_cast(pixels.depth[row, column], qd.f32)
             front = 1.7e38
-            if under == 1:
+            if optics.under == 1:
                 result = from_within(thickness.water, lens, optics, row, column, back, result)
             elif z < 1e30:
                 ray = view_ray(lens, row, column)
@@ -148,11 +153,25 @@ def lay(
                                 if share > 0.0:
                                     n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
                         if share > 0.0:
+                            body = vec4(0.0, 0.0, 0.0, -1.0)
+                            if qd.static(dim == 3):
+                                if walls.upper.x < 1e5 and back > 0.999 * ends[1]:  # a tank, and no solid in it
+                                    pixel = column // optics.samples
+                                    near = qd.abs(at - kept_z) < 0.3 * optics.spacing
+                                    if pixel != kept_pixel or layer != kept_layer or not near:
+                                        ahead = direction.normalized()
+                                        bent = refracted(ahead, n, qd.max(-n.dot(ahead), 0.05))
+                                        kept = through_body(
+                                            pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
+                                            walls, at, origin + at * direction, bent,
+                                        )  # fmt: skip
+                                        kept_z, kept_layer, kept_pixel = at, layer, pixel
+                                    body = kept
                             result += share * shine(
                                 pixels, thickness, backdrop, lens, look, optics, walls, row, column, at, n, origin,
-                                direction, dim,
+                                direction, body, dim,
                             )  # fmt: skip
-                    line = line_cover(pixels.lines[row, column], front, slack)
+                    line = line_cover(pixels.lines[row, column], front, optics.slack)
                     result += look.line_strength * there * line * (look.line - result)
                     if there < 0.5:
                         front = 1.7e38
@@ -208,9 +227,12 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
 @qd.func
 def shine(
     pixels: Pixels, thickness: Thickness, backdrop: Backdrop, lens: Lens, look: Look, optics: Optics, walls: Box,
-    row, column, z, normal, origin, direction, dim: qd.template(),
+    row, column, z, normal, origin, direction, body, dim: qd.template(),
 ):  # fmt: skip
-    """Radiance of the water that a pixel shows at depth `z` with this normal."""
+    """Radiance of the water that a pixel shows at depth `z` with this normal.
+
+    `body` is what `through_body` found for it; a negative way where it found none.
+    """
     n, pace = normal, direction.norm()
     ahead, at = direction / pace, origin + z * direction
     place = vec2(column + 0.5, row + 0.5)
@@ -229,7 +251,7 @@ def shine(
         travel = above_floor(travel, at, bent)
     c = to_view(lens, at + travel * bent)
     shown = backdrop.behind[row, column]
-    if c.z > lens.near:
+    if c.z > lens.near and body[3] < 0.0:
         there = to_pixel(lens, c)
         r = qd.min(qd.max(qd.cast(there.y, qd.i32), 0), pixels.depth.shape[0] - 1)
         e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), pixels.depth.shape[1] - 1)
@@ -243,6 +265,8 @@ def shine(
         off = smoothstep((gap - 0.05) / 0.2)
         ball = smoothstep((0.75 - layers) / 0.3) * off
         glossy = 1.0 - smoothstep((1.6 - layers) / 0.8) * (1.0 - off)
+        if body[3] >= 0.0:
+            shown, travel, ball = vec3(body[0], body[1], body[2]), body[3], 0.0
         if ball > 0.0:
             out = 2.0 * bent.dot(ahead) * bent - ahead
             far = behind_drop(pixels, backdrop, lens, look, at + travel * bent, out, row, column, z)
