@@ -86,7 +86,7 @@ def read_keys(desk: Desk) -> None:
     if imgui.is_key_pressed(name.escape):
         desk.help = False
     for key, which, repeats in (
-        ("Escape", name.escape, True), ("Tab", name.tab, False), ("ArrowLeft", name.left_arrow, True),
+        ("Escape", name.escape, True), ("ArrowLeft", name.left_arrow, True),
         ("ArrowRight", name.right_arrow, True), ("ArrowUp", name.up_arrow, True), ("ArrowDown", name.down_arrow, True),
     ):  # fmt: skip
         if imgui.is_key_pressed(which, repeats):
