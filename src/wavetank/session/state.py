@@ -88,6 +88,8 @@ class SessionState:
         self.chosen_camera: Camera | None = None
         self.lit, self.upright = "", None
         self.history.keep(sim.snapshot())
+        if self.patient:  # what begins moves, whatever was before
+            self.paused, self.steps_left = False, 0
         self.wait_for_hand()
 
     def _leave(self, coming: int) -> None:
@@ -113,8 +115,8 @@ class SessionState:
 
     def wait_for_hand(self) -> None:
         """Let a level that has just begun wait for the first touch, where the front is `patient`."""
-        if self.patient and self.game is not None and not self.sim.frame_number:
-            self.paused = self.waits = True
+        self.waits = self.patient and self.game is not None and not self.sim.frame_number
+        self.paused = self.paused or self.waits
 
     def note(self, sentence: str) -> None:
         """Keep a sentence for the person; fronts show it and take it away."""

@@ -20,6 +20,7 @@ from wavetank.front.window.stage import Stage
 from wavetank.session.session import Session
 
 BEAT = 1.0 / 60.0  # s: between two pictures of the window
+NARROW = 64.0  # em: in a narrower window the panel has no place of its own
 GAP = 8.0  # px between its parts
 
 
@@ -35,7 +36,7 @@ class Window:
         self._shown = 0  # number of the picture on it
         self._pictures: deque[float] = deque(maxlen=120)  # when the last ones came
         self._params = self._settings(size)
-        self._stopped = False
+        self._stopped = self._was_narrow = False
 
     def open(self) -> None:
         """Open the window and let the water move."""
@@ -115,7 +116,11 @@ class Window:
         self._upload()
         em, room = imgui.get_font_size(), imgui.get_io().display_size
         rail, side, top, bottom = 9.0 * em, 22.5 * em if self.desk.panel else 0.0, 2.6 * em, 3.7 * em
-        wide = room.x - rail - 3 * GAP - (side + GAP if side else 0.0)
+        narrow = room.x < NARROW * em
+        if narrow and not self._was_narrow:  # there the panel lies over the picture, and comes when it is asked for
+            self.desk.panel, side = False, 0.0
+        self._was_narrow = narrow
+        wide = room.x - rail - 3 * GAP - (side + GAP if side and not narrow else 0.0)
         shown = self._plate.texture if self._plate is not None else None
         texture = imgui.ImTextureRef(shown.glo) if shown is not None else None
         stage = (ImVec2(2 * GAP + rail, top), ImVec2(max(64.0, wide), max(64.0, room.y - top - bottom - 2 * GAP)))

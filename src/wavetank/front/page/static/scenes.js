@@ -45,7 +45,6 @@ function draw(canvas, scene) {
 function begin(scene) {
   const left = last > 0.5;
   send({ do: "load", name: scene.name, particles: fitted && !scene.goal ? fits[scene.name]?.particles ?? 0 : 0 });
-  if (!scene.goal) send({ do: "pause", on: false });
   if (left) note("Another scene.", ["Undo", () => send({ do: "undo" })]);
   tell("chosen", scene);
 }
@@ -74,7 +73,7 @@ function detail(here) {
     range.style.setProperty("--share", `${100 * range.value / (here.length - 1)}%`);
   };
   range.oninput = show;
-  range.onchange = () => { send({ do: "reset", parameters: { spacing: here[range.value].spacing } }); send({ do: "pause", on: false }); };
+  range.onchange = () => { send({ do: "reset", parameters: { spacing: here[range.value].spacing } }); };
   show();
   box.append(make("label", { for: "detail", textContent: "Detail" }), range, text);
 }

@@ -4,7 +4,7 @@ import { find, icon, make, note, pretty, say } from "./make.js";
 import { on, send } from "./link.js";
 
 let speeds = [[1, "1 ×"]];
-const now = { time: 0, paused: false, speed: 1, past: [0, 0], bookmarks: [], game: null };
+const now = { time: 0, paused: false, speed: 1, past: [0, 0], bookmarks: [] };
 const scrub = find("scrub"), speed = find("speed");
 const marks = new Map(); // bookmark -> time at which it was set, as seen here
 let held = 0;
@@ -23,7 +23,6 @@ export const time = {
   reset: () => {
     const left = now.time > 0.5;
     send({ do: "reset" });
-    if (!now.game) send({ do: "pause", on: false });
     if (left) note("The scene begins anew.", ["Undo", () => send({ do: "undo" })]);
   },
   faster: (by) => send({ do: "speed", factor: speeds[Math.min(speeds.length - 1, Math.max(0, closest(now.speed) + by))][0] }),
