@@ -66,8 +66,9 @@ def test_keys_alone(open_page, browser, tmp_path, monkeypatch):  # noqa: F811
     until(lambda: not session.hands)
     browser.wait_for("!document.querySelector('#banner').hidden")
     assert browser.run(FOCUS) == "retry"
-    tab_to(browser, "tab-look")
-    press(browser, "Enter")
+    tab_to(browser, "tab-scenes")  # the one that is chosen; arrows go to the others
+    press(browser, "ArrowRight")
+    assert browser.run(FOCUS) == "tab-look"
     text = browser.run(
         "(async () => (await fetch([...document.querySelectorAll('#look a')]"
         ".find(a => a.download === 'session.toml').href)).text())()"
@@ -198,7 +199,7 @@ def test_a_phone_by_touch_alone(open_page, browser, tmp_path, monkeypatch, sides
         if sides[0] < sides[1]:
             cut = browser.run(
                 "[...document.querySelectorAll('#tools button')].map(b => b.getBoundingClientRect()).find(b => b.left <"
-                "innerWidth - 8 && b.right > innerWidth - 8)"
+                "innerWidth - 8 && b.right > innerWidth - 8) !== undefined"
             )
             assert cut
         assert browser.complaints() == []
@@ -232,7 +233,7 @@ def test_the_aim_lies_on_the_water_and_lights_what_would_be_taken(open_page, bro
     session = world.session
     width, height = world.front.painter.wanted
     until(lambda: session.sim.time > 0.1)
-    browser.run("document.querySelector('[data-tool=stir]').click()")
+    browser.run("document.querySelector('[data-tool=stir]').click(); document.querySelector('.fold').click()")
     middle = session.sight.project([[0.3, 0.3, 0.2]], width, height)[0]
     browser.mouse("mouseMoved", *browser.center("#picture", middle[0] / width, middle[1] / height))
     browser.wait_for("document.querySelectorAll('#aim polyline[points*=\" \"]').length === 4")

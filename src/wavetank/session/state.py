@@ -36,6 +36,8 @@ class World:
     game: Game | None
     history: History
     camera: Camera | None
+    paused: bool
+    waits: bool
 
 
 class SessionState:
@@ -99,7 +101,7 @@ class SessionState:
             return
         if self.sim.frame_number or self.former is None:
             fits = cost_of(self.scene).bytes + coming <= MOST_BYTES
-            self.former = World(self.scene, self.sim, self.game, self.history, self.chosen_camera) if fits else None
+            self.former = self._present() if fits else None
         self.history = History(self.history.memory)
 
     def undo(self) -> None:
@@ -108,10 +110,16 @@ class SessionState:
             raise WavetankError("There is nothing to undo: no world was left by a reset or another scene.")
         self.lift_all()
         then = self.former
-        self.former = World(self.scene, self.sim, self.game, self.history, self.chosen_camera)
+        self.former = self._present()
         self.scene, self.sim, self.game, self.history = then.scene, then.sim, then.game, then.history
         self.chosen_camera = then.camera
-        self.lit, self.upright, self.waits = "", None, False
+        self.lit, self.upright, self.steps_left = "", None, 0
+        self.paused, self.waits = then.paused, then.waits
+
+    def _present(self) -> World:
+        return World(
+            self.scene, self.sim, self.game, self.history, self.chosen_camera, self.paused, self.waits
+        )  # fmt: skip
 
     def wait_for_hand(self) -> None:
         """Let a level that has just begun wait for the first touch, where the front is `patient`."""

@@ -113,6 +113,8 @@ def _card(desk: Desk, game: dict[str, Any], box: Box) -> None:
         done = max(7.0, game["progress"] * right)
         draw.add_rect_filled(at, ImVec2(at.x + done, at.y + 7), ink(GOOD if game["progress"] >= 1.0 else WARM), 7.0)
         imgui.dummy(ImVec2(right, 7))
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    desk.places["card.goal"] = (low.x, low.y, high.x, high.y)
 
 
 def _banner(desk: Desk, game: dict[str, Any], box: Box) -> None:

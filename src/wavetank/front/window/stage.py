@@ -41,6 +41,7 @@ class Stage:
         imgui.begin("stage", None, int(flags | imgui.WindowFlags_.no_bring_to_front_on_focus))
         imgui.pop_style_var()
         self.box = (at.x, at.y, size.x, size.y)
+        self.desk.places["part.stage"] = (at.x, at.y, at.x + size.x, at.y + size.y)
         pixels = imgui.get_io().display_framebuffer_scale
         self.desk.engine.size = (max(32, round(size.x * pixels.x)), max(32, round(size.y * pixels.y)))
         imgui.set_next_item_allow_overlap()
@@ -179,6 +180,7 @@ class Stage:
             with floating("card", ImVec2(at.x + 12, at.y + self.box[3] - 4.2 * em), 7.0 * em), heading(em):
                 imgui.text(hand["label"])
                 hint(hand["sentence"])
+            self._place("card.tool")
             return
         with floating("card", ImVec2(at.x + 12, at.y + 12), wide):
             with heading(em):
@@ -191,6 +193,11 @@ class Stage:
                 chosen = control(self.desk, about, value, group=f"{hand['name']}.")
                 if chosen is not None:
                     self.desk.options[about["name"]] = chosen
+        self._place("card.tool")
+
+    def _place(self, name: str) -> None:
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        self.desk.places[name] = (low.x, low.y, high.x, high.y)
 
     def _running(self, at: ImVec2) -> None:
         """Buttons that stop what goes on by itself."""

@@ -59,4 +59,5 @@ on("status", ({ world, game }) => {
   if (world) update(world);
   // In a level the water stays as it is: what cannot be changed takes no focus.
   for (const part of [find("everyday"), find("more")]) part.inert = Boolean(game);
+  find("water").tabIndex = game ? 0 : -1; // what scrolls must be reached
 });
