@@ -52,10 +52,14 @@ const ACTIONS = {
 };
 
 // On a phone nobody has a right button: what fingers do is said once, where there is room for it.
-if (matchMedia("(pointer: coarse)").matches && !localStorage.getItem("wavetank gestures")) {
+function gestures(event) {
+  if (event.pointerType !== "touch") return;
+  removeEventListener("pointerdown", gestures, true);
+  if (localStorage.getItem("wavetank gestures")) return;
   localStorage.setItem("wavetank gestures", "told");
-  on("open", () => note("One finger uses the tool. Two turn the view, and zoom when they part.", ["Got it", () => {}]));
+  note("One finger uses the tool. Two turn the view, and zoom when they part.", ["Got it", () => {}]);
 }
+addEventListener("pointerdown", gestures, true);
 
 function help() {
   const dialog = find("help");
