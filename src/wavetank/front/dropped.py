@@ -50,7 +50,8 @@ def _triangles(text: str, file: str) -> tuple[np.ndarray, np.ndarray]:
         words: list[Any] = line.split()
         try:
             if words[:1] == ["v"]:
-                corners.append([float(word) for word in words[1:4]])
+                x, y, z = (float(word) for word in words[1:4])
+                corners.append([x, y, z])
             elif words[:1] == ["f"]:
                 around = [int(word.split("/")[0]) for word in words[1:]]
                 around = [k - 1 if k > 0 else len(corners) + k for k in around]
