@@ -140,9 +140,14 @@ def _outline(name: str, scene: Scene) -> dict[str, Any]:
             is_round = solid.shape in ("sphere", "capsule")
             shapes.append({"what": "solid", "round": is_round, **_box(solid.origin - half, solid.origin + half)})
     return {
-        "name": name, "title": scene.title or name, "dim": scene.dim, "count": round(_count(scene)), "shapes": shapes,
+        "name": name, "title": scene.title or name, "dim": scene.dim, "count": _about(_count(scene)), "shapes": shapes,
         "lower": extent.lower.tolist(), "upper": extent.upper.tolist(), "goal": scene.goal.text if scene.goal else "",
     }  # fmt: skip
+
+
+def _about(count: float) -> int:
+    """Return two digits of an estimate: what solids and packings leave out is known once it is made."""
+    return int(float(f"{count:.2g}"))
 
 
 def _count(scene: Scene) -> float:

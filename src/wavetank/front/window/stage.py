@@ -16,6 +16,7 @@ from wavetank.session.commands import Orbit, Pan, ToolBegin, ToolEnd, ToolMove, 
 
 TURN = 3.2  # rad for a drag over the height of the picture
 RINGS = (("drop", "#ffffff", 1.4), ("foot", "#ffffff", 1.4), ("ring", GROUND, 4.0), ("ring", "#ffffff", 1.6))
+BETWEEN, SELDOM = 0.05, 0.6  # s between two questions where a hand would act, while it moves and while it rests
 FLIGHT = 0.8  # heights in view a second
 
 
@@ -29,6 +30,7 @@ class Stage:
         self.box = (0.0, 0.0, 1.0, 1.0)  # x, y, width, height of the picture [px]
         self._sent: tuple[float, float] | None = None
         self._asked: Any = None  # a question where the hand would act
+        self._asked_at = 0.0  # s
         self._question: tuple[Any, ...] = ("",)
         self._aim: dict[str, Any] = {}  # the last answer
 
@@ -166,10 +168,14 @@ class Stage:
             self._aim = asked.result()
         self._asked = None
         question = (tool, self._share() if tool else (0.0, 0.0), reach, self.desk.status["ticks"])
-        if question != self._question and (tool or self._question[0]):
+        now = imgui.get_time()
+        moved = question[:3] != self._question[:3]
+        rests = now - self._asked_at < (BETWEEN if moved else SELDOM)
+        if question != self._question and (tool or self._question[0]) and not (rests and tool):
+            self._asked_at = now
             (u, v), engine, size = question[1], self.desk.engine, self.desk.engine.painter.wanted
             self._asked = engine.ask(lambda: aim(engine.session, tool, u, v, reach, size))
-        self._question = question
+            self._question = question
 
     def _card(self, at: ImVec2) -> None:
         """The tool in hand and its options."""

@@ -7,12 +7,13 @@ import { hand } from "./tools.js";
 const drawing = find("aim"), under = svg("polyline", { class: "under" }), ring = svg("polyline", {}), drop = svg("polyline", { class: "drop" }), foot = svg("polyline", { class: "drop" }), cross = find("cross");
 drawing.append(drop, foot, under, ring);
 
-let place = null, asked = 0, told = "";
+const BETWEEN = 50, SELDOM = 600; // ms between two questions while the pointer moves, and while it rests: each takes time from the water
+let place = null, asked = 0, answered = 0, told = "";
 
 /** Say where the pointer is, as shares of the picture; null where it is not over it. */
 export function hover(at) {
   place = at;
-  ask();
+  if (!at || performance.now() - answered > BETWEEN) ask();
 }
 
 /** Ask what is there: one question at a time; the answer asks again where the pointer has moved on. */
@@ -44,13 +45,14 @@ function show(aim) {
 
 on("aim", (aim) => {
   asked = 0;
-  if (!place) { show(null); return; }
+  if (!place) { ask(); return; }
   show(aim);
   const key = `${place.x} ${place.y} ${hand.tool.name} ${JSON.stringify(hand.options)}`;
-  if (key !== told) requestAnimationFrame(ask);
+  answered = performance.now();
+  if (key !== told) setTimeout(ask, BETWEEN);
 });
 // Under a pointer that rests the water moves.
-on("status", ({ paused }) => { if (place && !paused) ask(); });
+on("status", ({ paused }) => { if (place && !paused && performance.now() - answered > SELDOM) ask(); });
 on("closed", () => { place = null; asked = 0; show(null); });
 
 // --- by keys ---

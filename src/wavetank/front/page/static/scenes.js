@@ -44,17 +44,19 @@ function draw(canvas, scene) {
 /** Begin a scene, as fine as this machine can compute in real time unless it is wanted in full; a level as it is. */
 function begin(scene) {
   const left = last > 0.5;
-  send({ do: "load", name: scene.name, particles: fitted && !scene.goal ? fits[scene.name]?.particles ?? 0 : 0 });
+  send({ do: "load", name: scene.name, particles: coarser(scene) ? fits[scene.name].particles : 0 });
   if (left) note("Another scene.", ["Undo", () => send({ do: "undo" })]);
   tell("chosen", scene);
 }
 
+/** Whether a scene begins with fewer particles than it has; both numbers are rounded. */
+const coarser = (scene) => fitted && !scene.goal && (fits[scene.name]?.particles ?? Infinity) < 0.93 * scene.count;
+
 /** What a card says below its title. */
 function size(scene) {
-  const fit = fits[scene.name], whole = scene.count.toLocaleString("en");
+  const fit = fits[scene.name], whole = `≈ ${scene.count.toLocaleString("en")}`;
   if (scene.goal || !fit) return `${scene.dim}-D · ${whole}`;
-  const coarser = fitted && fit.particles < scene.count;
-  return `${scene.dim}-D · ${coarser ? `${fit.particles.toLocaleString("en")} of ${whole}` : whole} · ${pace(coarser ? fit.pace : fit.full)}`;
+  return `${scene.dim}-D · ${coarser(scene) ? `≈ ${fit.particles.toLocaleString("en")} of ${scene.count.toLocaleString("en")}` : whole} · ${pace(coarser(scene) ? fit.pace : fit.full)}`;
 }
 
 const pace = (value) => (value >= 0.95 ? "real time" : `${pretty(value, value < 0.1 ? 1 : 2)} ×`);
@@ -85,7 +87,7 @@ function build({ scenes, title, dim }) {
     const canvas = make("canvas", { width: 264, height: 198 });
     draw(canvas, scene);
     const stars = scene.goal ? make("em", { data: { level: scene.name } }) : null;
-    return make("button", { title: scene.goal || `${scene.title}: ${scene.dim}-D, ${scene.count.toLocaleString("en")} particles`, data: { title: `${scene.dim} ${scene.title}`, scene: scene.name }, onclick: () => begin(scene) },
+    return make("button", { title: scene.goal || `${scene.title}: ${scene.dim}-D, about ${scene.count.toLocaleString("en")} particles`, data: { title: `${scene.dim} ${scene.title}`, scene: scene.name }, onclick: () => begin(scene) },
       canvas, make("span", { textContent: scene.title }), sizes[scene.name] = make("small", { textContent: size(scene) }), stars);
   };
   const heading = (textContent) => make("h3", { textContent });

@@ -83,8 +83,9 @@ canvas.onpointerdown = (event) => {
 
 canvas.onpointermove = (event) => {
   const at = where(event);
-  if (event.pointerType === "mouse" || pointers.size === 1) hover(at);
   const pointer = pointers.get(event.pointerId);
+  const looks = pointer && pointer.mode !== "tool"; // then nothing is aimed at, and no time spent on it
+  if (event.pointerType === "mouse" || pointers.size === 1) hover(looks ? null : at);
   if (!pointer) return;
   const [dx, dy] = [at.x - pointer.x, at.y - pointer.y];
   Object.assign(pointer, at);
