@@ -39,7 +39,17 @@ function reach() {
 }
 
 const points = (list) => list.map((p) => p.join()).join(" ");
+/** Draw it in a box no larger than it is: all that lies over the picture is put together with it, picture by picture. */
 function show(aim) {
+  const all = [...aim?.ring ?? [], ...aim?.drop ?? [], ...aim?.foot ?? []];
+  drawing.style.display = all.length ? "" : "none";
+  if (all.length) {
+    const [us, vs] = [all.map((p) => p[0]), all.map((p) => p[1])];
+    const [left, top] = [Math.max(0, Math.min(...us) - 0.01), Math.max(0, Math.min(...vs) - 0.01)];
+    const [width, height] = [Math.max(0.01, Math.min(1, Math.max(...us) + 0.01) - left), Math.max(0.01, Math.min(1, Math.max(...vs) + 0.01) - top)];
+    drawing.setAttribute("viewBox", `${left} ${top} ${width} ${height}`);
+    Object.assign(drawing.style, { left: `${100 * left}%`, top: `${100 * top}%`, width: `${100 * width}%`, height: `${100 * height}%` });
+  }
   for (const [line, list] of [[ring, aim?.ring], [under, aim?.ring], [drop, aim?.drop], [foot, aim?.foot]]) line.setAttribute("points", points(list ?? []));
 }
 
