@@ -70,7 +70,7 @@ def test_a_person_plays(open_page, browser):
 
     # A slider.
     before = session.sim.viscosity
-    x, y = browser.center("[aria-label=viscosity][type=range]", 0.8)
+    x, y = browser.center("[aria-label=Viscosity][type=range]", 0.8)
     browser.mouse("mousePressed", x, y)
     browser.mouse("mouseReleased", x, y)
     until(lambda: session.sim.viscosity > before + 0.3)

@@ -272,6 +272,8 @@ LEVEL = wt.Scene(
 
 def time_is_over(person) -> None:
     def wait() -> None:
+        assert person.session.waits, "for the first touch"
+        person.session.paused = person.session.waits = False
         person.session.game.elapsed = person.session.game.goal.seconds
 
     person.window.engine.ask(wait).result()

@@ -26,6 +26,7 @@ RAY = {"origin": (0.3, 0.2, 5.0), "direction": (0.0, 0.0, -1.0)}
 EXAMPLES = [
     c.SetParameter(name="viscosity", value=0.2), c.SetParameter(name="gravity", value=(1.0, -2.0)),
     c.Reset(parameters={"spacing": 0.06}), c.LoadScene(name="drop-2d"), c.LoadScene(text="spacing = 0.1"),
+    c.LoadScene(name="drop", particles=4000), c.Undo(), c.SetView(axis="x", place=0.25), c.Zoom(factor=0.8, x=0.2),
     c.ToolBegin(tool="pour", options={"aim": "ahead", "width": 0.2, "keep": True}, **RAY), c.ToolMove(**RAY, pointer=3),
     c.ToolEnd(pointer=3), c.ToolStop(tool="pour"), c.MoveSolid(name="ball", position=(0.5, 0.3), rotation=0.5),
     c.AddSolid(solid=wt.Box(center=(0.1, 0.2), size=(0.1, 0.1))), c.RemoveSolid(name="ball"), c.Pause(on=False),

@@ -9,7 +9,7 @@ import typer
 
 from wavetank import WavetankError
 from wavetank.cli.options import Arch, Json, Settings, app, configured, console, size_of
-from wavetank.scene.scene import bundled_levels
+from wavetank.scene.scene import bundled_levels, with_particles
 
 
 @app.command()
@@ -20,6 +20,9 @@ def play(
     window: Annotated[bool, typer.Option("--window", help="Open a window, or say why there can be none.")] = False,
     port: Annotated[int | None, typer.Option(min=0, max=65535, help="Port of the page; 0 takes any free one.")] = None,
     host: Annotated[str, typer.Option(help="Address to listen on; beyond 127.0.0.1 others may come in.")] = "127.0.0.1",
+    token: Annotated[
+        str, typer.Option(envvar="WAVETANK_TOKEN", help="Token of the page's link; made anew each time without.")
+    ] = "",
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")] = False,
     record: Annotated[Path | None, typer.Option(help="Write the session to this TOML file, every few seconds.")] = None,
     particles: Annotated[
@@ -33,7 +36,6 @@ def play(
     """Play with the water in a window or, without a display, a browser: pour, stir, freeze, carry, rewind."""
     from wavetank.front.kept import as_scene
     from wavetank.front.play import play as begin
-    from wavetank.front.play import with_particles
 
     name = _chosen(scene, level)
     world = configured(as_scene(name or "obstacle-tank"), settings)
@@ -41,7 +43,8 @@ def play(
     if wanted:
         world = with_particles(world, wanted)
     begin(
-        world, arch, window=window, web=web, host=host, port=port, browser=not no_browser, record=record, most=most
+        world, arch, window=window, web=web, host=host, port=port, browser=not no_browser, record=record, most=most,
+        token=token,
     )  # fmt: skip
 
 

@@ -11,13 +11,18 @@ from wavetank.foundation.params import PARAMETERS, Parameters
 from wavetank.front.keys import KEYS, LOOK, SPEEDS
 from wavetank.front.picture import Painter
 from wavetank.front.theme import PAINTS
+from wavetank.front.units import readable, units
 from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
 from wavetank.session.session import Session
 from wavetank.session.tools import TOOLS, describe
-from wavetank.view.choices import colorings, views
+from wavetank.view.choices import colorings, options, views
+from wavetank.view.colormaps import ENTRIES, table, to_srgb
 from wavetank.view.extent import ENDLESS, extent_of
+from wavetank.view.quantities import QUANTITIES
+from wavetank.view.views import VIEWS
 
+SHADES = 48  # colours of a legend
 EVERYDAY = ("gravity", "viscosity", "vorticity", "iterations", "substeps", "spacing")  # shown first
 
 
@@ -40,15 +45,43 @@ def everything(session: Session) -> dict[str, Any]:
 def world(session: Session) -> dict[str, Any]:
     """Return what changes with the scene and its parameters."""
     scene, extent = session.sim.scene, extent_of(session.sim.scene)
+    size = float((extent.upper - extent.lower).max())
     return {
         "title": scene.title,
         "dim": scene.dim,
-        "size": float((extent.upper - extent.lower).max()),
+        "size": size,
+        "units": units(size, scene.dim),
         "arch": session.sim.arch,
         "values": {p.name: getattr(scene, p.name) for p in PARAMETERS},
         "view": session.view or views()[0],
         "color_by": session.color_by,
+        "painted": painted(session),
+        "legend": legend(session),
+        "cut": session.cut,
+        "undo": session.former.scene.title if session.former else None,
+        "game": session.game is not None,
     }
+
+
+def painted(session: Session) -> str:
+    """Return the coloring that is seen, an empty text where particles have none."""
+    return str(options(session.view, session.color_by).get("color_by", ""))
+
+
+def legend(session: Session) -> dict[str, Any] | None:
+    """Return what the colours of the picture mean: a title, colours from the first to the last, round numbers."""
+    color_by, scene = painted(session), session.sim.scene
+    if color_by not in QUANTITIES or not VIEWS[session.view or views()[0]].coloured:
+        return None
+    quantity = QUANTITIES[color_by]
+    if quantity.palette:
+        names = [[material.name, material.color] for material in scene.palette()]
+        return {"title": color_by, "colors": [color for _, color in names], "names": names}
+    low, high = quantity.limits(scene)
+    colors = to_srgb(table(quantity.colormap)[:: max(1, ENTRIES // SHADES)])
+    hexes = ["#" + "".join(f"{round(255 * float(part)):02x}" for part in color) for color in colors]
+    title = f"{(quantity.title or color_by).capitalize()} [{readable(quantity.unit)}]"
+    return {"title": title, "colors": hexes, "ticks": [low, 0.5 * (low + high), high]}
 
 
 def status(session: Session, painter: Painter) -> dict[str, Any]:
@@ -56,7 +89,7 @@ def status(session: Session, painter: Painter) -> dict[str, Any]:
     pace, times = session.pace, session.history.times
     return {
         "time": session.sim.time, "frame": session.sim.frame_number, "ticks": session.ticks,
-        "count": session.sim.count, "paused": session.paused, "speed": session.speed,
+        "count": session.sim.count, "paused": session.paused, "waits": session.waits, "speed": session.speed,
         "pace": pace.measured if not session.paused else 0.0, "fps": pace.frames_per_second,
         "late": pace.is_late(session.speed) and not session.paused,
         "picture_ms": 1e3 * painter.seconds, "frame_ms": 1e3 * session.sim.seconds_per_frame,
@@ -78,8 +111,8 @@ def _parameter(p: Any) -> dict[str, Any]:
     if isinstance(p.default, str):
         choices = list(getattr(Parameters.model_fields[p.name].annotation, "__args__", ()))
     return {
-        "name": p.name, "default": p.default, "low": p.low, "high": p.high, "unit": p.unit, "symbol": p.symbol,
-        "sentence": p.sentence, "live": p.live, "everyday": p.name in EVERYDAY, "choices": choices,
+        "name": p.name, "default": p.default, "low": p.low, "high": p.high, "unit": readable(p.unit),
+        "symbol": p.symbol, "sentence": p.sentence, "live": p.live, "everyday": p.name in EVERYDAY, "choices": choices,
         "whole": isinstance(p.default, int),
     }  # fmt: skip
 
@@ -107,9 +140,14 @@ def _outline(name: str, scene: Scene) -> dict[str, Any]:
             is_round = solid.shape in ("sphere", "capsule")
             shapes.append({"what": "solid", "round": is_round, **_box(solid.origin - half, solid.origin + half)})
     return {
-        "name": name, "title": scene.title or name, "dim": scene.dim, "count": round(_count(scene)), "shapes": shapes,
+        "name": name, "title": scene.title or name, "dim": scene.dim, "count": _about(_count(scene)), "shapes": shapes,
         "lower": extent.lower.tolist(), "upper": extent.upper.tolist(), "goal": scene.goal.text if scene.goal else "",
     }  # fmt: skip
+
+
+def _about(count: float) -> int:
+    """Return two digits of an estimate: what solids and packings leave out is known once it is made."""
+    return int(float(f"{count:.2g}"))
 
 
 def _count(scene: Scene) -> float:

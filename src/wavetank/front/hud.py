@@ -91,7 +91,7 @@ class Hud:
 
     def _in_picture(self, points: np.ndarray, size: tuple[int, int]) -> list[Place]:
         """Return points in space [m] as shares of a picture, none where one of them is behind the eye."""
-        places = self.session.camera.project(points, *size)[:, :2] / size
+        places = self.session.sight.project(points, *size)[:, :2] / size
         seen = all(math.isfinite(part) for part in places.reshape(-1))
         return [[round(float(u), 5), round(float(v), 5)] for u, v in places] if seen else []
 

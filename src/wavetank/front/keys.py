@@ -27,7 +27,9 @@ KEYS = (
     Key("h", "H", "See all", command={"do": "home"}),
     Key("Escape", "Esc", "Stop all tools", command={"do": "tool-stop"}),
     Key("f", "F", "Full screen", "full-screen", page_only=True),
-    Key("Tab", "Tab", "Panel", "panel"),
+    Key("c", "C", "Controls: the panel", "panel"),
+    Key("z", "Z", "Undo a reset or a change of scene", command={"do": "undo"}),
+    Key("Enter", "Enter", "Use the tool by keys: arrows aim, Enter puts it down and lifts it", "aim", page_only=True),
     Key("+", "+ −", "Closer, farther", command={"do": "zoom", "factor": 0.85}),
     Key("-", command={"do": "zoom", "factor": 1.18}),
     Key("ArrowLeft", "Arrows", "Turn", command={"do": "orbit", "azimuth": -0.12}),
@@ -42,7 +44,7 @@ SPEEDS = ((1 / 16, "1/16 ×"), (1 / 8, "1/8 ×"), (1 / 4, "1/4 ×"), (1 / 2, "1/
 
 #: a tool of the fronts alone, which makes no command
 LOOK: dict[str, Any] = {
-    "name": "look", "label": "Look", "key": "l", "options": [], "cursor": False,
+    "name": "look", "label": "Look", "key": "l", "options": [], "cursor": False, "takes": "",
     "icon": "M2 12c3-5 6.500-7 10-7s7 2 10 7c-3 5-6.500 7-10 7s-7-2-10-7zM12 9a3 3 0 1 1 0 6 3 3 0 0 1 0-6",
     "sentence": "Drag to turn the view. With any tool: right button or two fingers turn, wheel or pinch zooms, middle "
     "button or Shift moves.",

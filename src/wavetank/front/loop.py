@@ -73,7 +73,8 @@ class Loop:
     """Turns a session, paints it and tells how it stands, until `stop`."""
 
     def __init__(self, session: Session, audience: Audience, figures_every: float = FIGURES_SELDOM) -> None:
-        session.smooth = True
+        session.smooth = session.patient = True
+        session.wait_for_hand()
         self.session, self.audience, self.figures_every = session, audience, figures_every
         self.painter, self.hud = Painter(session), Hud(session)
         self._jobs, self._stopped = Jobs(session.wake), threading.Event()

@@ -3,12 +3,14 @@
 import io
 import math
 import time
+from typing import Any
 
 import numpy as np
 from PIL import Image
 
 from wavetank.session.session import Session
 from wavetank.view.choices import options
+from wavetank.view.extent import extent_of
 from wavetank.view.renderer import Renderer
 
 AFFORD = 0.025  # s that a picture may take while the water moves
@@ -54,6 +56,18 @@ class Painter:
         """Whether this picture is worth a search for neighbours: only where densities are seen."""
         return options(self.session.view, self.session.color_by).get("color_by") == "density"
 
+    def _options(self) -> dict[str, Any]:
+        session = self.session
+        chosen = options(session.view, session.color_by)
+        if session.lit in session.sim.solids.names:
+            chosen["lit"] = session.sim.solids.find(session.lit)
+        if chosen["view"] == "slice":
+            extent, (axis, place) = extent_of(session.sim.scene), session.cut
+            axis = axis if extent.dim == 3 else "z"
+            low, high = (float(side["xyz".index(axis)]) for side in (extent.lower, extent.upper))
+            chosen["cut"] = f"{axis}={low + place * (high - low):.6g}"
+        return chosen
+
     def is_due(self, now: float) -> bool:
         """Say whether the water can spare the time for a picture.
 
@@ -79,8 +93,8 @@ class Painter:
         self.last_size = (width, height)
         began = time.perf_counter()
         image = self._renderer(width, height).render(
-            self.session.sim.frame(measured=self._needs_densities), self.session.camera, legend=False,
-            hasty=share < 1.0, **options(self.session.view, self.session.color_by),
+            self.session.sim.frame(measured=self._needs_densities), self.session.sight, legend=False,
+            hasty=share < 1.0, **self._options(),
         )  # fmt: skip
         self.seconds = time.perf_counter() - began
         self.session.picture_seconds += 0.2 * (self.seconds - self.session.picture_seconds)
@@ -110,6 +124,13 @@ class Painter:
         while len(self._renderers) > 4:
             del self._renderers[next(iter(self._renderers))]
         return renderer
+
+
+def png(image: np.ndarray) -> bytes:
+    """Pack a picture without loss."""
+    stream = io.BytesIO()
+    Image.fromarray(image).save(stream, "PNG")
+    return stream.getvalue()
 
 
 def jpeg(image: np.ndarray) -> bytes:

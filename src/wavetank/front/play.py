@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import sys
 import threading
 import webbrowser
@@ -19,7 +20,7 @@ from wavetank.session.session import Session
 
 def play(
     scene: Scene, arch: str, *, window: bool = False, web: bool = False, host: str = "127.0.0.1",
-    port: int | None = None, browser: bool = True, record: Path | None = None, most: int = 200_000,
+    port: int | None = None, browser: bool = True, record: Path | None = None, most: int = 200_000, token: str = "",
 ) -> None:  # fmt: skip
     """Open a window where there can be one, else serve the page and say why; `window` insists, `web` never tries.
 
@@ -35,7 +36,7 @@ def play(
         if window:
             raise WavetankError(f"--window: {reason}.")
         print(f"no window: {reason}; here is the page instead", flush=True)
-    play_in_browser(scene, arch, host=host, port=port, browser=browser, record=record, most=most)
+    play_in_browser(scene, arch, host=host, port=port, browser=browser, record=record, most=most, token=token)
 
 
 def why_no_window() -> str | None:
@@ -89,17 +90,19 @@ def play_in_window(scene: Scene, arch: str, *, record: Path | None = None, most:
 
 def play_in_browser(
     scene: Scene, arch: str, *, host: str = "127.0.0.1", port: int | None = None, browser: bool = True,
-    record: Path | None = None, most: int = 200_000,
+    record: Path | None = None, most: int = 200_000, token: str = "",
 ) -> None:  # fmt: skip
-    """Serve a page until Ctrl-C and print one line with its address, token included."""
-    from wavetank.front.page.server import WebFront
+    """Serve a page until Ctrl-C and print one line with its address, token included: `token`, or one made anew."""
+    from wavetank.front.page.server import PORT, WebFront
 
     check_folder(record)
     session = Session(scene, arch, most_particles=most)
-    front = WebFront(session, host, port)
+    front = WebFront(session, host, port, _checked_token(token))
     with _stopped_when_asked(front.stop):
         front.start()
         where = "" if is_loopback(host) else " (anyone with this link can steer; it is not encrypted)"
+        if port is None and front.port != PORT:
+            print(f"port {PORT} is taken, so this is {front.port}; --port says which one it must be", flush=True)
         print(f"wavetank plays at {front.url}{where} (Ctrl-C ends it)", flush=True)
         if browser:
             threading.Thread(target=webbrowser.open, args=(front.url,), daemon=True).start()
@@ -110,12 +113,13 @@ def play_in_browser(
                 front.stop()
 
 
-def with_particles(scene: Scene, wanted: int) -> Scene:
-    """Return the scene with a spacing that makes about so many particles."""
-    count = sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
-    if not count:
-        return scene
-    return scene.changed(spacing=float(f"{scene.spacing * (count / wanted) ** (1.0 / scene.dim):.3g}"))
+def _checked_token(token: str) -> str | None:
+    if token and not re.fullmatch(r"[A-Za-z0-9_-]{12,200}", token):
+        raise WavetankError(
+            "--token must be 12 to 200 letters, digits, - or _, as `openssl rand -hex 16` makes them: who knows it can "
+            "steer; leave it out for one that is made anew."
+        )
+    return token or None
 
 
 @contextlib.contextmanager

@@ -300,6 +300,14 @@ class Scene(Timetable, Parameters):
         return type(self).parse(self._table(factor))
 
 
+def with_particles(scene: Scene, wanted: int) -> Scene:
+    """Return the scene with a spacing that makes about `wanted` particles; one without fluid as it is."""
+    count = sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
+    if not count:
+        return scene
+    return scene.changed(spacing=float(f"{scene.spacing * (count / wanted) ** (1.0 / scene.dim):.3g}"))
+
+
 def _chosen(values: dict[str, Any]) -> dict[str, Any]:
     """Return the parameters that the preset and the quality among `values` stand for."""
     preset, quality = values.get("preset", "standard"), values.get("quality", "standard")

@@ -20,6 +20,7 @@ LONGEST_TEXT = 2_000_000  # characters of a scene file
 
 Length = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST, allow_inf_nan=False)]
 Point = tuple[Length, Length, Length]
+Share = Annotated[float, Field(ge=-2, le=3, allow_inf_nan=False)]
 Angle = Annotated[float, Field(ge=-1e4, le=1e4, allow_inf_nan=False)]  # rad
 Name = Annotated[str, Field(max_length=80)]
 Pointer = Annotated[int, Field(ge=0, le=9)]
@@ -65,12 +66,20 @@ class LoadScene(Command):
     do: Literal["load"] = "load"
     name: Name = ""
     text: Annotated[str, Field(max_length=LONGEST_TEXT)] = ""
+    file: Annotated[str, Field(max_length=200)] = ""  # what the text is called where something is wrong with it
+    particles: Annotated[int, Field(ge=0, le=100_000_000)] = 0  # about how many; 0 is as many as the scene says
 
     @model_validator(mode="after")
     def _one_of_both(self) -> "LoadScene":
         if bool(self.name) == bool(self.text):
-            raise ValueError("load: give either the name of a bundled scene or the text of a scene file.")
+            raise ValueError("give either the name of a bundled scene or the text of a scene file.")
         return self
+
+
+class Undo(Command):
+    """Go back to the world that was left by the last reset or scene, as it was; once more, and come back."""
+
+    do: Literal["undo"] = "undo"
 
 
 class _Ray(Command):
@@ -241,11 +250,15 @@ class Zoom(Command):
     do: Literal["zoom"] = "zoom"
     fusible: ClassVar = ("do",)
     factor: Annotated[float, Field(ge=0.01, le=100, allow_inf_nan=False)]
+    x: Share = 0.5  # of the picture's width and height: the place that stays where it is
+    y: Share = 0.5
 
     def after(self, earlier: Command) -> Command:
         """Factors multiply."""
         assert isinstance(earlier, Zoom)
-        return Zoom.model_construct(factor=min(100.0, max(0.01, self.factor * earlier.factor)))
+        return Zoom.model_construct(
+            factor=min(100.0, max(0.01, self.factor * earlier.factor)), x=self.x, y=self.y
+        )  # fmt: skip
 
 
 class Home(Command):
@@ -255,17 +268,27 @@ class Home(Command):
 
 
 class SetView(Command):
-    """Choose what is drawn: a view of the renderer, and what particles are coloured by."""
+    """Choose what is drawn: a view of the renderer, what particles are coloured by, where a slice lies."""
 
     do: Literal["view"] = "view"
     fusible: ClassVar = ("do",)
     view: Name = ""
     color_by: Name = ""
+    axis: Literal["", "x", "y", "z"] = ""  # across which a slice lies
+    place: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = None  # of it along that, 0 to 1
+
+    def after(self, earlier: Command) -> Command:
+        """What is not said again stays as it was said."""
+        assert isinstance(earlier, SetView)
+        return SetView.model_construct(
+            view=self.view or earlier.view, color_by=self.color_by or earlier.color_by,
+            axis=self.axis or earlier.axis, place=earlier.place if self.place is None else self.place,
+        )  # fmt: skip
 
 
 COMMANDS: tuple[type[Command], ...] = (
-    SetParameter, Reset, LoadScene, ToolBegin, ToolMove, ToolEnd, ToolStop, MoveSolid, AddSolid, RemoveSolid, Pause,
-    Step, Speed, FrameLength, Rewind, Bookmark, SetCamera, Orbit, Pan, Zoom, Home, SetView,
+    SetParameter, Reset, LoadScene, Undo, ToolBegin, ToolMove, ToolEnd, ToolStop, MoveSolid, AddSolid, RemoveSolid,
+    Pause, Step, Speed, FrameLength, Rewind, Bookmark, SetCamera, Orbit, Pan, Zoom, Home, SetView,
 )  # fmt: skip
 _BY_NAME: dict[str, type[Command]] = {kind.model_fields["do"].default: kind for kind in COMMANDS}
 _TABLE: TypeAdapter[dict[str, Any]] = TypeAdapter(dict[str, Any])

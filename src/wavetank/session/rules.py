@@ -6,13 +6,16 @@ from typing import Any
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import LIVE, Parameters
-from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
+from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes, with_particles
 from wavetank.session import commands as c
 from wavetank.session.history import BOOKMARKS
 from wavetank.session.state import MOST_SOLIDS, SessionState
 from wavetank.session.tools import Hand
 from wavetank.simulation.snapshot import Packed
 from wavetank.view.camera import Camera
+from wavetank.view.extent import extent_of
+
+CLOSEST, WIDEST = 8.0, 6.0  # of a picture's height: spacings, and sizes of the world
 
 
 def set_parameter(state: SessionState, command: c.SetParameter) -> None:
@@ -25,6 +28,8 @@ def set_parameter(state: SessionState, command: c.SetParameter) -> None:
     if name == "gravity" and isinstance(value, tuple) and math.hypot(*value) > c.STRONGEST:
         raise WavetankError(f"gravity = {value} is too strong; its length must be at most {c.STRONGEST:g} m/s^2.")
     setattr(state.sim, name, value)
+    if name == "gravity":
+        state.upright = None
 
 
 def reset(state: SessionState, command: c.Reset) -> None:
@@ -41,14 +46,21 @@ def reset(state: SessionState, command: c.Reset) -> None:
 def load(state: SessionState, command: c.LoadScene) -> None:
     """Begin another scene. Only bundled names: a command may come from afar, and must not open files."""
     if command.text:
-        scene = Scene.from_text(command.text, "scene", files=False)
+        scene = Scene.from_text(command.text, command.file or "scene", files=False)
     elif command.name in (*bundled_scenes(), *bundled_levels()):
         scene = Scene.load(command.name)
     else:
         known = ", ".join((*bundled_scenes(), *bundled_levels()))
         raise WavetankError(f"{command.name!r} is not a bundled scene; those are {known}.")
+    if command.particles and scene.goal is None:
+        scene = with_particles(scene, command.particles)
     state.lift_all()
     state.begin(scene)
+
+
+def undo(state: SessionState, command: c.Undo) -> None:
+    """Go back to the world that was left."""
+    state.undo()
 
 
 def tool_begin(state: SessionState, command: c.ToolBegin) -> None:
@@ -60,6 +72,10 @@ def tool_begin(state: SessionState, command: c.ToolBegin) -> None:
         state.lift(tool.name)
     hand = Hand(state.sim, command.origin, command.direction, state.most_particles, tool.through_water)
     state.hands[command.pointer] = (tool, hand)
+    if tool.tilts and state.upright is None:
+        state.upright = tuple(state.sim.gravity)
+    if state.waits:
+        state.paused = state.waits = False
     state.let_act(hand, tool.begin, hand)
 
 
@@ -114,12 +130,12 @@ def remove_solid(state: SessionState, command: c.RemoveSolid) -> None:
 
 def pause(state: SessionState, command: c.Pause) -> None:
     """Stop time, or let it run."""
-    state.paused, state.steps_left = command.on, 0
+    state.paused, state.steps_left, state.waits = command.on, 0, False
 
 
 def step(state: SessionState, command: c.Step) -> None:
     """Stop time and compute a few frames."""
-    state.paused = True
+    state.paused, state.waits = True, False
     state.steps_left += command.frames
 
 
@@ -176,8 +192,12 @@ def pan(state: SessionState, command: c.Pan) -> None:
 
 
 def zoom(state: SessionState, command: c.Zoom) -> None:
-    """Come closer or go away."""
-    state.camera = state.camera.zoom(command.factor)
+    """Come closer or go away, no farther than there is something to be seen; a place of the picture stays."""
+    camera, extent = state.camera, extent_of(state.sim.scene)
+    nearest = math.log(CLOSEST * extent.spacing / camera.visible_height)
+    farthest = math.log(WIDEST * 2.0 * extent.radius / camera.visible_height)
+    factor = math.exp(min(max(math.log(command.factor), min(nearest, 0.0)), max(farthest, 0.0)))
+    state.camera = camera.zoom(factor, state.aspect * (command.x - 0.5), 0.5 - command.y)
 
 
 def home(state: SessionState, command: c.Home) -> None:
@@ -187,13 +207,18 @@ def home(state: SessionState, command: c.Home) -> None:
 
 def view(state: SessionState, command: c.SetView) -> None:
     """Choose what is drawn."""
-    from wavetank.view.choices import colorings, views
+    from wavetank.view.choices import colorings, showing, views
 
     for what, value, allowed in (("view", command.view, views()), ("color_by", command.color_by, colorings())):
         if value and value not in allowed and not (what == "color_by" and _is_color(value)):
             raise WavetankError(f"{what} = {value!r} is not known; it must be one of {', '.join(allowed)}.")
     state.view = command.view or state.view
     state.color_by = command.color_by or state.color_by
+    if command.color_by and not command.view:  # who asks for a colour wants to see it
+        state.view = showing(state.view, command.color_by)
+    if command.axis or command.place is not None:
+        axis, place = state.cut
+        state.cut = (command.axis or axis, place if command.place is None else command.place)
 
 
 def _is_color(value: str) -> bool:
@@ -202,7 +227,7 @@ def _is_color(value: str) -> bool:
 
 Rule = Callable[[SessionState, Any], None]
 RULES: dict[type[c.Command], Rule] = {
-    c.SetParameter: set_parameter, c.Reset: reset, c.LoadScene: load, c.ToolBegin: tool_begin,
+    c.SetParameter: set_parameter, c.Reset: reset, c.LoadScene: load, c.Undo: undo, c.ToolBegin: tool_begin,
     c.ToolMove: tool_move, c.ToolEnd: tool_end, c.ToolStop: tool_stop, c.MoveSolid: move_solid,
     c.AddSolid: add_solid, c.RemoveSolid: remove_solid, c.Pause: pause, c.Step: step, c.Speed: speed,
     c.FrameLength: frame_length, c.Rewind: rewind, c.Bookmark: bookmark, c.SetCamera: camera, c.Orbit: orbit,

@@ -1,5 +1,6 @@
 """What a session is about: a world, the hands in it, its past, what is shown of it. Rules act on this."""
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -27,6 +28,19 @@ MOST_SOLIDS = 300  # in a session: each is looked for by every particle near it
 CARRY_PACE = 0.8  # of sqrt(g L): how fast a command carries a solid
 
 
+@dataclasses.dataclass(frozen=True)
+class World:
+    """A world that was left, as it was."""
+
+    scene: Scene
+    sim: Simulation
+    game: Game | None
+    history: History
+    camera: Camera | None
+    paused: bool
+    waits: bool
+
+
 class SessionState:
     """One running world with all that commands change, and no time that passes by itself: see `Session`."""
 
@@ -36,9 +50,16 @@ class SessionState:
         self.notes: list[str] = []  # for the person, one sentence each
         self.refused: Callable[[str], None] = self.note  # takes what a command may not do, while one is carried out
         self.paused, self.speed, self.steps_left = False, 1.0, 0
+        self.patient = False  # whether a level begins with the first touch of a hand
+        self.waits = False  # for it
         self.frame_parts = 1  # into which a frame is divided
         self.fills_frames = False  # whether frames end with a time step of full length
         self.view, self.color_by = "", "speed"
+        self.cut = ("z", 0.5)  # of a slice: the axis across it, and where along that, 0 to 1
+        self.former: World | None = None  # what the last reset or scene left
+        self.lit = ""  # name of the solid that a hand would take
+        self.upright: tuple[float, ...] | None = None  # gravity [m/s^2] before a hand tilted the tank
+        self.per_particle = 0.0  # s of a step, as fronts have measured it
         self.aspect = 16 / 9  # of the picture, set by the front
         self.hands: dict[int, tuple[Tool, Hand]] = {}
         self.running: dict[str, tuple[Tool, Hand]] = {}
@@ -65,11 +86,47 @@ class SessionState:
             sim.scene.assign("most_particles", min(scene.most_particles or self.most_particles, self.most_particles))
         sim.load_kernels()
         game = Game(scene.goal, sim.frame(measured=False)) if scene.goal else None
+        self._leave(cost.bytes)
         self.scene, self.sim, self.game = scene, sim, game
         self.hands, self.running, self.moving = {}, {}, {}
         self.chosen_camera: Camera | None = None
-        self.history.clear()
+        self.lit, self.upright = "", None
         self.history.keep(sim.snapshot())
+        if self.patient:  # what begins moves, whatever was before
+            self.paused, self.steps_left = False, 0
+        self.wait_for_hand()
+
+    def _leave(self, coming: int) -> None:
+        """Keep the world there is, for `undo`, where it has moved, and both it and the one of `coming` bytes fit."""
+        if not hasattr(self, "sim"):
+            self.history.clear()
+            return
+        if self.sim.frame_number or self.former is None:
+            fits = cost_of(self.scene).bytes + coming <= MOST_BYTES
+            self.former = self._present() if fits else None
+        self.history = History(self.history.memory)
+
+    def undo(self) -> None:
+        """Exchange the world with the one that was left last, to the last bit; raises `WavetankError` without one."""
+        if self.former is None:
+            raise WavetankError("There is nothing to undo: no world was left by a reset or another scene.")
+        self.lift_all()
+        then = self.former
+        self.former = self._present()
+        self.scene, self.sim, self.game, self.history = then.scene, then.sim, then.game, then.history
+        self.chosen_camera = then.camera
+        self.lit, self.upright, self.steps_left = "", None, 0
+        self.paused, self.waits = then.paused, then.waits
+
+    def _present(self) -> World:
+        return World(
+            self.scene, self.sim, self.game, self.history, self.chosen_camera, self.paused, self.waits
+        )  # fmt: skip
+
+    def wait_for_hand(self) -> None:
+        """Let a level that has just begun wait for the first touch, where the front is `patient`."""
+        self.waits = self.patient and self.game is not None and not self.sim.frame_number
+        self.paused = self.paused or self.waits
 
     def note(self, sentence: str) -> None:
         """Keep a sentence for the person; fronts show it and take it away."""
@@ -85,6 +142,17 @@ class SessionState:
     @camera.setter
     def camera(self, camera: Camera | None) -> None:
         self.chosen_camera = camera
+
+    @property
+    def sight(self) -> Camera:
+        """The camera as pictures show it: a tank that a hand tilts is seen tilted, and gravity points down."""
+        if self.upright is None:
+            return self.camera
+        return self.camera.turned_with(self.upright, self.sim.gravity)
+
+    def camera_of(self, tool: str) -> Camera:
+        """The camera that a tool's rays come from; one that tilts the tank stays with the room."""
+        return self.camera if tool in TOOL_NAMES and TOOL_NAMES[tool].tilts else self.sight
 
     def let_act(self, hand: Hand, act: Any, *arguments: Any) -> None:
         """Let a tool act; what it has to say, and what it may not do, becomes a note."""
@@ -102,6 +170,8 @@ class SessionState:
         """End the tool of a pointer (a number), or one that goes on by itself (a name)."""
         tool, held = self.hands.pop(hand) if isinstance(hand, int) else self.running.pop(hand)
         self.let_act(held, tool.end, held)
+        if tool.tilts and not getattr(tool, "stay", False):
+            self.upright = None
 
     def lift_all(self) -> None:
         """End all tools."""

@@ -105,7 +105,7 @@ class Contents:
             v=world.particles.v, rho=world.scratch.rho, id=world.particles.id, material=world.particles.material,
             solids=world.solids,
             diffuse=world.pool.now if world.pool else None, foam_count=world.pool.count if world.pool else 0,
-            dye=world.particles.dye, stand=self.standing,
+            frozen=world.particles.frozen, frozen_count=world.frozen, dye=world.particles.dye, stand=self.standing,
         )  # fmt: skip
 
     def standing(self) -> tuple[Standing, ...]:

@@ -34,6 +34,8 @@ class Frame:
     dye: Any  # device ndarray i32 [capacity]: 0 or strength << 24 | red << 16 | green << 8 | blue, see `state.py`
     material: Any  # device ndarray i32 [capacity]: number of the material, see `Scene.palette`
     solids: SolidSet
+    frozen: Any = None  # device ndarray i32 [capacity]: 1 where a particle is ice
+    frozen_count: int = 0  # of them
     diffuse: Diffuse | None = None  # spray, foam and bubbles in device arrays, packed at the front
     foam_count: int = 0  # of them
     stand: Callable[[], tuple[Standing, ...]] = tuple  # asks where the solids stand

@@ -15,6 +15,7 @@ Point = tuple[float, float, float]
 
 #: Three-quarter view from slightly above: azimuth from +z towards +x, elevation above the horizon [rad].
 FRAMING_AZIMUTH, FRAMING_ELEVATION = math.radians(30.0), math.radians(20.0)
+UPRIGHT = 0.85  # width over height of a picture below which it is upright
 STEEPEST = math.radians(89.0)  # an orbit stops short of the pole, where `up` has no meaning
 NEAREST, FARTHEST = 1e-3, 1e4  # m: how close and how far zooming goes
 
@@ -73,20 +74,49 @@ class Camera:
         around = math.atan2(offset[0], offset[2]) + azimuth
         return self._looking_from(around, new, self.distance)
 
-    def zoom(self, factor: float) -> "Camera":
-        """Show `factor` times as much height: below 1 comes closer, above 1 goes away."""
+    def zoom(self, factor: float, right: float = 0.0, up: float = 0.0) -> "Camera":
+        """Show `factor` times as much height: below 1 comes closer, above 1 goes away.
+
+        What is `right` and `up` of the middle, in shares of the visible height, stays where it is in the picture.
+        """
         if not (math.isfinite(factor) and factor > 0.0):
             raise WavetankError(f"zoom factor = {factor} must be a positive number; below 1 comes closer.")
         if self.height is not None:
-            return dataclasses.replace(self, height=max(NEAREST, min(FARTHEST, self.height * factor)))
+            height = max(NEAREST, min(FARTHEST, self.height * factor))
+            aside = self.pan((1.0 - height / self.height) * right, (1.0 - height / self.height) * up)
+            return dataclasses.replace(aside, height=height)
         distance = max(NEAREST, min(FARTHEST, self.distance * factor))
-        offset = np.subtract(self.eye, self.target) * (distance / self.distance)
-        return dataclasses.replace(self, eye=_point(np.add(self.target, offset)))
+        share = distance / self.distance
+        aside = self.pan((1.0 - share) * right, (1.0 - share) * up)
+        offset = np.subtract(aside.eye, aside.target) * share
+        return dataclasses.replace(aside, eye=_point(np.add(aside.target, offset)))
 
     def pan(self, right: float, up: float, ahead: float = 0.0) -> "Camera":
         """Move eye and target by these shares of the visible height."""
         shift = self.visible_height * (np.array([right, up, ahead]) @ self._axes)
         return dataclasses.replace(self, eye=_point(np.add(self.eye, shift)), target=_point(np.add(self.target, shift)))
+
+    def turned_with(self, before: Sequence[float], after: Sequence[float]) -> "Camera":
+        """Turn around the target as a vector [2 or 3] did: in the picture it points where it pointed before."""
+        a, b = (np.array([*vector, 0.0][:3], float) for vector in (before, after))
+        lengths = float(np.linalg.norm(a)), float(np.linalg.norm(b))
+        if min(lengths) < 1e-9:
+            return self
+        a, b = a / lengths[0], b / lengths[1]
+        axis, cosine = np.cross(a, b), float(a @ b)
+        if cosine < -0.9999:
+            axis, cosine = np.array([0.0, 0.0, 1e-9]), -1.0
+        sine = float(np.linalg.norm(axis))
+        if sine < 1e-12:
+            return self
+        axis /= sine
+
+        def turned(v: np.ndarray) -> np.ndarray:  # Rodrigues
+            along: np.ndarray = v * cosine + np.cross(axis, v) * sine + axis * float(axis @ v) * (1.0 - cosine)
+            return along
+
+        eye = np.add(self.target, turned(np.subtract(self.eye, self.target)))
+        return dataclasses.replace(self, eye=_point(eye), up=_point(turned(np.array(self.up))))
 
     def ray(self, column: float, row: float, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         """Return origin [m] and unit direction of the ray through a place in a picture of `width` x `height` px."""
@@ -142,8 +172,16 @@ def _front(kind: type[Camera], extent: Extent, aspect: float) -> Camera:
 
 def _three_quarter(kind: type[Camera], extent: Extent, aspect: float) -> Camera:
     """Step back until all corners are in view, and move the target until they sit in the middle."""
+    if aspect >= UPRIGHT:
+        return _framed(kind, extent, aspect, FRAMING_AZIMUTH, FRAMING_ELEVATION)
+    # An upright picture shows a long world from nearer its end and more from above, where it looks largest.
+    places = [(math.radians(turn), math.radians(rise)) for turn in (30, 45, 60, 70) for rise in (20, 30, 40)]
+    return min((_framed(kind, extent, aspect, *place) for place in places), key=lambda camera: camera.distance)
+
+
+def _framed(kind: type[Camera], extent: Extent, aspect: float, azimuth: float, elevation: float) -> Camera:
     margin = 1.12
-    target, toward = extent.middle.copy(), _direction(FRAMING_AZIMUTH, FRAMING_ELEVATION)
+    target, toward = extent.middle.copy(), _direction(azimuth, elevation)
     camera = kind(eye=_point(target + toward), target=_point(target))
     right, up, _ = camera._axes
     steep = math.tan(0.5 * camera.field_of_view) / margin

@@ -18,6 +18,14 @@ def colorings() -> list[str]:
     return list(QUANTITIES)
 
 
+def showing(view: str, color_by: str) -> str:
+    """Return the view in which a coloring is seen: the one there is, or particles where that has other colours."""
+    kind = VIEWS[view or USUAL]
+    if kind.coloured or (color_by.startswith("#") and kind.name == USUAL):
+        return view
+    return USUAL if color_by.startswith("#") else "particles"
+
+
 def options(view: str, color_by: str) -> dict[str, Any]:
     """Return the renderer's arguments for a choice of both; water has no colour but that of its fluid."""
     kind = VIEWS[view or USUAL]

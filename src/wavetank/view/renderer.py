@@ -20,6 +20,7 @@ from wavetank.view.colormaps import ENTRIES, table
 from wavetank.view.extent import Extent, extent_of
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
 from wavetank.view.look import Look, fluid_optics, paper, pool, studio, usual_depth
+from wavetank.view.optics.dyes import ICE, ICE_IN_WATER, lay_ice
 from wavetank.view.passes import tonemap
 from wavetank.view.quantities import QUANTITIES, Coloring, usual
 from wavetank.view.shot import Shot
@@ -51,6 +52,7 @@ class Renderer:
         self._colors = qd.ndarray(vec3, shape=(ENTRIES,))
         self._colors_name = ""
         self._stages = Stages()
+        self._seen: Any = None  # i32 [capacity]: dyes as they are seen where there is ice
         self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
 
     def render(
@@ -77,6 +79,7 @@ class Renderer:
     def shot(self, frame: Frame, camera: Camera | None = None, style: Style | None = None) -> Shot:
         """Return what the passes need to know of a picture."""
         style = style or Style()
+        frame = self._with_ice(frame, style)
         extent = extent_of(frame.scene)
         camera = camera or Camera.framing_extent(extent, self.width / self.height)
         look = _look(extent.dim, style.kind.coloured)
@@ -103,8 +106,18 @@ class Renderer:
             tint=tint,
             usual=usual_depth(extent),
             plane=style.plane(extent, frame.scene.tank is not None),
+            lit=-1 if style.lit is None else style.lit,
             hasty=style.hasty,
         )
+
+    def _with_ice(self, frame: Frame, style: Style) -> Frame:
+        """Return the frame with the dyes that are seen: its own, and white where there is ice."""
+        if not frame.frozen_count:
+            return frame
+        if self._seen is None or self._seen.shape[0] < frame.dye.shape[0]:
+            self._seen = qd.ndarray(qd.i32, shape=(frame.dye.shape[0],))
+        lay_ice(frame.dye, frame.frozen, self._seen, ICE if style.kind.coloured else ICE_IN_WATER, frame.count)
+        return dataclasses.replace(frame, dye=self._seen)
 
     def _begin(self, style: Style, shot: Shot, timings: Timings) -> int:
         """Find what does not depend on the eye, and return the number of the shape in whose light water is seen."""

@@ -32,6 +32,7 @@ class Style:
     radius: float | None = None  # of a drawn particle, in spacings
     cut: str | None = None  # where a slice lies: an axis, as "z", or an axis and a place in m, as "z=0.35"
     legend: bool = True
+    lit: int | None = None  # number of a solid that shines, as under a pointer
     hasty: bool = False  # leave out what movement hides: smooth outlines, every second look of the sun at the water
     samples: int = 1  # pictures, each from a slightly other eye and sun, that are averaged
 

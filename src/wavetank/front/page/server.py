@@ -9,6 +9,8 @@ import concurrent.futures
 import importlib.resources
 import math
 import mimetypes
+import os
+import secrets
 import socket
 import threading
 import time
@@ -26,10 +28,13 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.front.about import everything
+from wavetank.front.aim import aim
+from wavetank.front.dropped import command_for
+from wavetank.front.fitting import fits
 from wavetank.front.loop import Loop, News
 from wavetank.front.page.gate import HEADERS, Gate
-from wavetank.front.page.viewers import LONGEST_MESSAGE, Viewers
-from wavetank.front.picture import jpeg
+from wavetank.front.page.viewers import LONGEST_MESSAGE, Viewer, Viewers
+from wavetank.front.picture import jpeg, png
 from wavetank.front.theme import style_sheet
 from wavetank.session.pace import share_interpreter
 from wavetank.session.recording import Recording
@@ -57,10 +62,14 @@ class Protocol(H11Protocol):
 class WebFront:
     """Serves one session."""
 
-    def __init__(self, session: Session, host: str = "127.0.0.1", port: int | None = None) -> None:
+    def __init__(
+        self, session: Session, host: str = "127.0.0.1", port: int | None = None, token: str | None = None
+    ) -> None:  # fmt: skip
         self.session, self.start_scene = session, session.scene
-        self.viewers = Viewers(session.submit, self._ray, lambda: self._hello)
+        self.viewers = Viewers(session.submit, self._ray, lambda: {**self._hello, "run": self.run_number})
         self.viewers.wake, self.viewers.call = session.wake, self._call
+        self.viewers.fit, self.viewers.aim, self.viewers.drop_mesh = self._fit, self._aim, self._drop_mesh
+        self.run_number = secrets.token_hex(8)  # other than that of any run before
         self.loop = Loop(session, self)
         self.painter, self.ask = self.loop.painter, self.loop.ask
         self._socket = _listen(host, port)
@@ -69,10 +78,10 @@ class WebFront:
         shown = socket.gethostname() if everywhere else f"[{host}]" if ":" in host and "[" not in host else host
         app = Starlette(routes=[
             Route("/", self._page), Route("/page/{file}", self._file), Route("/recording.toml", self._recording),
-            Route("/scene.toml", self._scene),
+            Route("/scene.toml", self._scene), Route("/picture.png", self._picture),
             WebSocketRoute("/socket", self.viewers.serve),
         ])  # fmt: skip
-        self.gate = Gate(app, host, self.port)
+        self.gate = Gate(app, host, self.port, token)
         self.url = f"http://{shown}:{self.port}/?token={self.gate.token}"
         self._server = uvicorn.Server(uvicorn.Config(
             self.gate, log_level="error", access_log=False, lifespan="off", ws="websockets-sansio",
@@ -184,16 +193,47 @@ class WebFront:
         if events is not None and not events.is_closed():
             events.call_soon_threadsafe(act)
 
-    def _ray(self, u: float, v: float) -> dict[str, Any]:
+    def _ray(self, u: float, v: float, tool: str) -> dict[str, Any]:
         width, height = self.painter.wanted
-        origin, direction = self.session.camera.ray(u * width, v * height, width, height)
+        origin, direction = self.session.camera_of(tool).ray(u * width, v * height, width, height)
         return {"origin": tuple(map(float, origin)), "direction": tuple(map(float, direction))}
+
+    def _answer(self, viewer: Viewer, job: Callable[[], dict[str, Any]]) -> None:
+        """Post to one viewer what a job in the simulation's thread comes to; what is wrong becomes a note."""
+
+        def done() -> dict[str, Any]:
+            try:
+                return job()
+            except WavetankError as error:
+                return {"type": "note", "text": str(error)[:400]}
+
+        def tell(answer: concurrent.futures.Future[Any]) -> None:
+            if not answer.cancelled() and answer.exception() is None:
+                self._call(lambda: viewer.post(answer.result()))
+
+        self.ask(done).add_done_callback(tell)
+
+    def _fit(self, viewer: Viewer) -> None:
+        self._answer(viewer, lambda: fits(self.session))
+
+    def _aim(self, viewer: Viewer, tool: str, u: float, v: float, reach: float) -> None:
+        size = self.painter.wanted
+        self._answer(viewer, lambda: {"type": "aim", **aim(self.session, tool, u, v, reach, size)})
+
+    def _drop_mesh(self, viewer: Viewer, text: str, file: str) -> None:
+        def job() -> dict[str, Any]:
+            self.session.submit(command_for(self.session, text, file))
+            return {"type": "note", "text": f"{file} is a solid now; carry it with Grab."}
+
+        self._answer(viewer, job)
 
     async def _page(self, request: Request) -> Response:
         return _packaged("index.html")
 
     async def _file(self, request: Request) -> Response:
         name = request.path_params["file"]
+        if name == "run":
+            return Response(self.run_number, media_type="text/plain")
         return Response(style_sheet(), media_type="text/css") if name == "theme.css" else _packaged(name)
 
     async def _recording(self, request: Request) -> Response:
@@ -202,15 +242,23 @@ class WebFront:
     async def _scene(self, request: Request) -> Response:
         return await self._download("scene.toml", lambda: self.session.present_scene().text())
 
-    async def _download(self, name: str, make: Callable[[], str]) -> Response:
-        """Return a text that the simulation's thread makes, as a file; not too many at once, which the water feels."""
+    async def _picture(self, request: Request) -> Response:
+        def made() -> bytes:
+            return png(self.painter.paint(sharp=True))
+
+        return await self._download("wavetank.png", made, "image/png")
+
+    async def _download(
+        self, name: str, make: Callable[[], str | bytes], kind: str = "application/toml"
+    ) -> Response:  # fmt: skip
+        """Return what the simulation's thread makes, as a file; not too many at once, which the water feels."""
         if self._downloads >= MOST_DOWNLOADS:
             return Response(
                 "too many downloads at once; try again\n", status_code=429, media_type="text/plain",
                 headers={"retry-after": "1"},
             )  # fmt: skip
 
-        def made() -> str:
+        def made() -> str | bytes:
             try:
                 return make()
             except WavetankError as error:
@@ -224,7 +272,7 @@ class WebFront:
                 await asyncio.sleep(max(0.0, self._spared_until - time.monotonic()))
                 text = await asyncio.wrap_future(self.ask(made))
                 self._spared_until = time.monotonic() + REST
-            return Response(text, media_type="application/toml", headers=headers)
+            return Response(text, media_type=kind, headers=headers)
         except WavetankError as error:
             return Response(f"{error}\n", status_code=409, media_type="text/plain")
         finally:
@@ -248,6 +296,8 @@ def _listen(host: str, port: int | None) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for number in ports:
         listener = socket.socket(family, socket.SOCK_STREAM)
+        if os.name == "posix":  # else the port of a run that has ended is refused for a minute
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listener.bind((host, number))
             listener.listen(64)

@@ -17,7 +17,7 @@ LONGEST_SIDE = 8192  # px
 AGAIN = 1.0  # s, after which the same note is worth saying again
 LONGEST_MESSAGE = 2_500_000  # bytes: a dropped scene file
 
-Ray = Callable[[float, float], dict[str, Any]]
+Ray = Callable[[float, float, str], dict[str, Any]]
 Tell = Callable[[str], None] | None
 Submit = Callable[[Command, Tell], bool]  # takes a command, and who is told in another thread why it failed
 
@@ -106,6 +106,10 @@ class Viewers:
         self.detail = "auto"
         self.wake: Callable[[], None] = lambda: None
         self.call: Callable[[Callable[[], None]], None] = lambda job: job()  # does a job in the server's event loop
+        self.fit: Callable[[Viewer], None] = lambda viewer: None
+        self.aim: Callable[[Viewer, str, float, float, float], None] = lambda *given: None
+        self.drop_mesh: Callable[[Viewer, str, str], None] = lambda *given: None
+        self.tool = ""  # that the driver's pointer put down last
         self.down: set[int] = set()  # pointers of the driver that are down
 
     @property
@@ -159,11 +163,19 @@ class Viewers:
             self._lift_pointers()
             self.driver = viewer
             self._tell_roles()
+        elif do == "fit":
+            self.fit(viewer)
+        elif do == "hover" and viewer is not self.driver:
+            viewer.post({"type": "aim"})
         elif viewer is not self.driver:
             raise WavetankError("You are watching; take the helm to join in.")
         elif do == "detail" and table.get("detail") in ("auto", "full", "half"):
             self.detail = table["detail"]
             self.wake()
+        elif do == "hover":
+            self.aim(viewer, *_hovered(table))
+        elif do == "mesh":
+            self.drop_mesh(viewer, str(table.get("text", "")), str(table.get("file", "the mesh"))[:200])
         elif do in ("point-begin", "point-move", "point-end"):
             self._point(table, self._to(viewer))
         elif not self.submit(command_of(table), self._to(viewer)):
@@ -180,11 +192,9 @@ class Viewers:
             self.down.discard(pointer)
             self.submit(ToolEnd(pointer=pointer), tell)
             return
-        u, v = table.get("x"), table.get("y")
-        for share in (u, v):
-            if isinstance(share, bool) or not isinstance(share, int | float) or not -2.0 <= share <= 3.0:
-                raise WavetankError("a pointer's x and y must be shares of the picture, numbers around 0 to 1.")
-        ray = {"pointer": pointer, **self.ray(float(u or 0.0), float(v or 0.0))}
+        if table["do"] == "point-begin":
+            self.tool = str(table.get("tool"))[:80]
+        ray = {"pointer": pointer, **self.ray(*_place(table), self.tool)}
         if table["do"] == "point-begin":
             self.down.add(pointer)
             self.submit(
@@ -228,6 +238,25 @@ def _table(message: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(table, dict):
         raise WavetankError("a message must be a JSON object with the key 'do'.")
     return table
+
+
+def _place(table: dict[str, Any]) -> tuple[float, float]:
+    """Return a place in the picture, as shares of its width and height."""
+    u, v = table.get("x"), table.get("y")
+    for share in (u, v):
+        if isinstance(share, bool) or not isinstance(share, int | float) or not -2.0 <= share <= 3.0:
+            raise WavetankError("a pointer's x and y must be shares of the picture, numbers around 0 to 1.")
+    return float(u or 0.0), float(v or 0.0)
+
+
+def _hovered(table: dict[str, Any]) -> tuple[str, float, float, float]:
+    """Return tool, place and reach of a pointer over the picture; no tool where it has left it."""
+    if "x" not in table:
+        return "", 0.0, 0.0, 0.0
+    reach = table.get("reach", 0.0)
+    if isinstance(reach, bool) or not isinstance(reach, int | float) or not 0.0 <= reach <= 2.0:
+        raise WavetankError("reach must be a share of the world, a number from 0 to 2.")
+    return str(table.get("tool", ""))[:80], *_place(table), float(reach)
 
 
 def _whole(table: dict[str, Any], key: str, most: int, least: int = 1) -> int:

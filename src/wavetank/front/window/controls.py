@@ -31,7 +31,8 @@ def control(desk: Desk, about: dict[str, Any], value: Any, *, group: str = "") -
     hint(about["sentence"] + (" Takes a reset." if waits else ""))
     imgui.same_line(start + LABEL * full)
     imgui.set_next_item_width(-1)
-    result = _draw(f"##{key}", about, value)
+    factor, unit = desk.world["units"].get(about["unit"], (1.0, about["unit"]))
+    result = _draw(f"##{key}", {**about, "factor": factor, "shown_unit": unit}, value)
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     desk.places[key] = (low.x, low.y, high.x, high.y)
     if default is not None and imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0):
@@ -59,12 +60,14 @@ def _slider(label: str, about: dict[str, Any], value: Any) -> Any:
     # Where the range spans decades, a straight slider would jump over most of them.
     bent = high - low >= 100 or (low > 0 and high / low > 200)
     flags = imgui.SliderFlags_.always_clamp | (imgui.SliderFlags_.logarithmic if bent else imgui.SliderFlags_.none)
-    unit = f" {about['unit']}" if about["unit"] else ""
+    factor, unit = about["factor"], f" {about['shown_unit']}" if about["shown_unit"] else ""
     if about.get("whole", isinstance(about["default"], int)):
         changed, number = imgui.slider_int(label, int(value), int(low), int(high), f"%d{unit}", int(flags))
         return number if changed else None
-    changed, real = imgui.slider_float(label, float(value), float(low), float(high), f"%.3g{unit}", int(flags))
-    return min(high, max(low, float(f"{real:.4g}"))) if changed else None
+    changed, real = imgui.slider_float(
+        label, factor * float(value), factor * low, factor * high, f"%.3g{unit.replace('%', '%%')}", int(flags)
+    )
+    return min(high, max(low, float(f"{real / factor:.4g}"))) if changed else None
 
 
 def _color(label: str, value: str) -> str | None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.front.about import everything
+from wavetank.front.dropped import command_for
 from wavetank.front.keys import LOOK
 from wavetank.front.window.engine import Engine
 from wavetank.scene.scene import Scene
@@ -146,7 +147,10 @@ class Desk:
             self.say(f"{path.name} cannot be read: {error}.")
             return
         if not text:
-            self.say(f"{path.name} is empty; drop the TOML file of a scene.")
+            self.say(f"{path.name} is empty; drop the TOML file of a scene, or an OBJ.")
+            return
+        if path.suffix.lower() == ".obj":
+            self._place_mesh(text, path.name)
             return
         if "mesh" in text:  # a command opens no files: the mesh goes into the text
             try:
@@ -154,12 +158,24 @@ class Desk:
             except WavetankError as error:
                 self.say(str(error))
                 return
-        self.begin(text=text)
+        self.begin(text=text, file=path.name[:200])
+
+    def _place_mesh(self, text: str, file: str) -> None:
+        """Let the mesh of an OBJ become a solid; what is wrong with it becomes a note."""
+        session = self.engine.session
+
+        def job() -> str:
+            try:
+                session.submit(command_for(session, text, file))
+            except WavetankError as error:
+                return str(error)
+            return f"{file} is a solid now; carry it with Grab."
+
+        self.engine.ask(job).add_done_callback(lambda answer: self.engine.notes.put(answer.result()))
 
     def begin(self, **which: str) -> None:
         """Begin a bundled scene or level by `name`, or one whose file says `text`."""
-        from wavetank.session.commands import LoadScene, Pause
+        from wavetank.session.commands import LoadScene
 
         self.pending.clear()
         self.engine.do(LoadScene, **which)
-        self.engine.do(Pause, on=False)

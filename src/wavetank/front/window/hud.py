@@ -108,11 +108,15 @@ def _card(desk: Desk, game: dict[str, Any], box: Box) -> None:
         imgui.push_text_wrap_pos(0.0)
         imgui.text_unformatted(game["text"].replace(" %", "\u00a0%"))
         imgui.pop_text_wrap_pos()
+        if desk.status["waits"]:
+            imgui.text_colored(rgba(WARM), "Time begins with your first touch.")
         at = imgui.get_cursor_screen_pos()
         draw.add_rect_filled(at, ImVec2(at.x + right, at.y + 7), ink(RAISED), 7.0)
         done = max(7.0, game["progress"] * right)
         draw.add_rect_filled(at, ImVec2(at.x + done, at.y + 7), ink(GOOD if game["progress"] >= 1.0 else WARM), 7.0)
         imgui.dummy(ImVec2(right, 7))
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    desk.places["card.goal"] = (low.x, low.y, high.x, high.y)
 
 
 def _banner(desk: Desk, game: dict[str, Any], box: Box) -> None:

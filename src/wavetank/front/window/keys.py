@@ -13,7 +13,7 @@ from wavetank.session.commands import Bookmark, Pause, Reset, Rewind, Speed, com
 POINTER = (
     ("left button", "Use the tool"), ("right button", "Turn the view"), ("right, W A S D Q E", "Fly"),
     ("middle, Shift", "Move the view"), ("wheel", "Zoom"), ("double click a slider", "Its default"),
-    ("Ctrl, click a slider", "Type a value"), ("drop a TOML file", "Open the scene"),
+    ("Ctrl, click a slider", "Type a value"), ("drop a TOML file, an OBJ", "Open the scene, place a solid"),
 )  # fmt: skip
 
 
@@ -31,7 +31,6 @@ def begin_again(desk: Desk) -> None:
     """Begin the scene anew, with what waits for that."""
     desk.engine.do(Reset, parameters=dict(desk.pending))
     desk.pending.clear()
-    desk.engine.do(Pause, on=False)
 
 
 def change_pace(desk: Desk, steps: int) -> None:
@@ -86,7 +85,7 @@ def read_keys(desk: Desk) -> None:
     if imgui.is_key_pressed(name.escape):
         desk.help = False
     for key, which, repeats in (
-        ("Escape", name.escape, True), ("Tab", name.tab, False), ("ArrowLeft", name.left_arrow, True),
+        ("Escape", name.escape, True), ("ArrowLeft", name.left_arrow, True),
         ("ArrowRight", name.right_arrow, True), ("ArrowUp", name.up_arrow, True), ("ArrowDown", name.down_arrow, True),
     ):  # fmt: skip
         if imgui.is_key_pressed(which, repeats):

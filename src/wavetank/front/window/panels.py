@@ -137,14 +137,20 @@ def _look(desk: Desk) -> None:
     view = pills([(name, words(name)) for name in about["views"]], world["view"])
     if view:
         desk.engine.do(SetView, view=view)
+    if world["view"] == "slice" and world["dim"] == 3:
+        axis, place = world["cut"]
+        across = pills([(name, f"across {name}") for name in "xyz"], axis)
+        if across:
+            desk.engine.do(SetView, axis=across)
+        imgui.set_next_item_width(-1)
+        changed, share = imgui.slider_float("##slice", 100.0 * place, 0.0, 100.0, "%.0f %% along it")
+        if changed:
+            desk.engine.do(SetView, place=min(1.0, max(0.0, share / 100.0)))
     title("Colour by")
-    color = pills([*((name, words(name)) for name in about["colorings"]), *PAINTS], world["color_by"])
+    color = pills([*((name, words(name)) for name in about["colorings"]), *PAINTS], world["painted"])
     if color:
-        from wavetank.view.views import VIEWS
-
-        # Water keeps the colour of its fluid: who asks for a quantity wants to see particles.
-        takes = color.startswith("#") or VIEWS[world["view"]].coloured
-        desk.engine.do(SetView, color_by=color, view="" if takes else "particles")
+        desk.engine.do(SetView, color_by=color)
+    _legend(world["legend"])
     title("Picture")
     detail = pills(DETAILS, desk.engine.detail)
     if detail:
@@ -152,6 +158,28 @@ def _look(desk: Desk) -> None:
         desk.engine.ask(lambda: setattr(desk.engine.session, "changes", desk.engine.session.changes + 1))
     width, height = desk.engine.painter.last_size
     imgui.text_colored(rgba(SOFT), f"{width} × {height} pixels in {desk.status['picture_ms']:.0f} ms")
+
+
+def _legend(legend: dict[str, Any] | None) -> None:
+    """Show what the colours mean."""
+    if legend is None:
+        return
+    draw, at, em = imgui.get_window_draw_list(), imgui.get_cursor_screen_pos(), imgui.get_font_size()
+    if "names" in legend:
+        for name, color in legend["names"]:
+            at = imgui.get_cursor_screen_pos()
+            draw.add_rect_filled(at, ImVec2(at.x + em, at.y + em), ink(color), 3.0)
+            imgui.dummy(ImVec2(1.4 * em, em))
+            imgui.same_line()
+            imgui.text(name)
+        return
+    wide, colors = imgui.get_content_region_avail().x, legend["colors"]
+    for k, color in enumerate(colors):
+        left = at.x + wide * k / len(colors)
+        draw.add_rect_filled(ImVec2(left, at.y), ImVec2(left + wide / len(colors) + 1.0, at.y + 0.7 * em), ink(color))
+    imgui.dummy(ImVec2(wide, 0.8 * em))
+    low, _, high = legend["ticks"]
+    imgui.text_colored(rgba(SOFT), f"{low:g} to {high:g}   {legend['title']}")
 
 
 def _curves(desk: Desk) -> None:

@@ -39,7 +39,7 @@ def _card(desk: Desk, scene: dict[str, Any], size: ImVec2, tall: float) -> None:
         desk.begin(name=scene["name"])
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     desk.places[f"scene.{scene['name']}"] = (low.x, low.y, high.x, high.y)
-    hint(scene["goal"] or f"{scene['title']}: {scene['dim']}-D, {scene['count']:,} particles")
+    hint(scene["goal"] or f"{scene['title']}: {scene['dim']}-D, about {scene['count']:,} particles")
     current = (scene["title"], scene["dim"]) == (desk.world["title"], desk.world["dim"])
     draw, em, hovered = imgui.get_window_draw_list(), imgui.get_font_size(), imgui.is_item_hovered()
     end = ImVec2(at.x + size.x, at.y + size.y)
@@ -52,7 +52,9 @@ def _card(desk: Desk, scene: dict[str, Any], size: ImVec2, tall: float) -> None:
         best = desk.shown.scores.get(scene["name"], {}).get("stars", 0)
         stars(best, ImVec2(at.x + 8, at.y + tall + 1.35 * em), 0.95 * em)
     else:
-        draw.add_text(ImVec2(at.x + 8, at.y + tall + 1.25 * em), ink(SOFT), f"{scene['dim']}-D · {scene['count']:,}")
+        draw.add_text(
+            ImVec2(at.x + 8, at.y + tall + 1.25 * em), ink(SOFT), f"{scene['dim']}-D · about {scene['count']:,}"
+        )
     draw.pop_clip_rect()
 
 

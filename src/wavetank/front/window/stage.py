@@ -6,14 +6,17 @@ from typing import Any
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from wavetank.front.aim import aim
 from wavetank.front.theme import ACCENT, GROUND, LINE, NOTE, SOFT, TEXT
 from wavetank.front.window.controls import control, words
 from wavetank.front.window.desk import Desk
-from wavetank.front.window.hud import draw_game
-from wavetank.front.window.look import button, floating, heading, ink
+from wavetank.front.window.hud import WIDE, draw_game
+from wavetank.front.window.look import button, floating, heading, hint, ink
 from wavetank.session.commands import Orbit, Pan, ToolBegin, ToolEnd, ToolMove, Zoom
 
 TURN = 3.2  # rad for a drag over the height of the picture
+RINGS = (("drop", "#ffffff", 1.4), ("foot", "#ffffff", 1.4), ("ring", GROUND, 4.0), ("ring", "#ffffff", 1.6))
+BETWEEN, SELDOM = 0.05, 0.6  # s between two questions where a hand would act, while it moves and while it rests
 FLIGHT = 0.8  # heights in view a second
 
 
@@ -26,6 +29,10 @@ class Stage:
         self.button = 0
         self.box = (0.0, 0.0, 1.0, 1.0)  # x, y, width, height of the picture [px]
         self._sent: tuple[float, float] | None = None
+        self._asked: Any = None  # a question where the hand would act
+        self._asked_at = 0.0  # s
+        self._question: tuple[Any, ...] = ("",)
+        self._aim: dict[str, Any] = {}  # the last answer
 
     def draw(self, texture: Any, at: ImVec2, size: ImVec2) -> None:
         """Draw the picture in a window of its own and turn what happens on it into commands."""
@@ -36,6 +43,7 @@ class Stage:
         imgui.begin("stage", None, int(flags | imgui.WindowFlags_.no_bring_to_front_on_focus))
         imgui.pop_style_var()
         self.box = (at.x, at.y, size.x, size.y)
+        self.desk.places["part.stage"] = (at.x, at.y, at.x + size.x, at.y + size.y)
         pixels = imgui.get_io().display_framebuffer_scale
         self.desk.engine.size = (max(32, round(size.x * pixels.x)), max(32, round(size.y * pixels.y)))
         imgui.set_next_item_allow_overlap()
@@ -68,7 +76,8 @@ class Stage:
     def ray(self, u: float, v: float) -> dict[str, Any]:
         """Return the ray through a place of the picture, given as shares of width and height."""
         _, _, width, height = self.box
-        origin, direction = self.desk.engine.session.camera.ray(u * width, v * height, width, height)  # type: ignore[arg-type]
+        camera = self.desk.engine.session.camera_of(self.desk.tool)
+        origin, direction = camera.ray(u * width, v * height, width, height)  # type: ignore[arg-type]
         return {"origin": tuple(map(float, origin)), "direction": tuple(map(float, direction))}
 
     def _pointer(self, hovered: bool) -> None:
@@ -117,7 +126,8 @@ class Stage:
     def _wheel(self) -> None:
         turned = imgui.get_io().mouse_wheel
         if turned:
-            self.desk.engine.do(Zoom, factor=min(1.6, max(0.6, math.exp(-0.12 * turned))))
+            u, v = self._share()
+            self.desk.engine.do(Zoom, factor=min(1.6, max(0.6, math.exp(-0.12 * turned))), x=u, y=v)
 
     def _fly(self, seconds: float) -> None:
         """Move eye and target together with W A S D Q E; a flat world has no way in."""
@@ -133,21 +143,52 @@ class Stage:
     # --- over the picture ---
 
     def _ring(self, hovered: bool) -> None:
-        """Show how far the tool reaches."""
+        """Show where and how far the tool reaches: on the surface that the pointer meets, with a line to the floor."""
         hand, options = self.desk.hand, self.desk.options | self.desk.fixed
-        if not hand["cursor"] or not (hovered or self.mode == "tool") or self.mode in ("orbit", "pan"):
-            return
+        shows = (hovered or self.mode == "tool") and self.mode not in ("orbit", "pan") and hand["name"] != "look"
         declared = {about["name"]: about["default"] for about in hand["options"]} | options
-        share = declared.get("radius", 0.5 * declared.get("width", 0.1))
-        radius = max(4.0, share * self.desk.world["size"] / self.desk.status["height"] * self.box[3])
-        draw, mouse = imgui.get_window_draw_list(), imgui.get_io().mouse_pos
-        draw.add_circle(mouse, radius + 1.0, ink(GROUND, 0.45), 64, 1.5)
-        draw.add_circle(mouse, radius, ink("#ffffff", 0.75), 64, 1.5)
+        reach = declared.get("radius", 0.5 * declared.get("width", 0.1)) if hand["cursor"] else 0.0
+        self._ask(hand["name"] if shows else "", reach)
+        if not shows:
+            return
+        (x, y, width, height), draw = self.box, imgui.get_window_draw_list()
+        draw.push_clip_rect(ImVec2(x, y), ImVec2(x + width, y + height), True)
+        for part, color, wide in RINGS:
+            points: list[Any] = [ImVec2(x + u * width, y + v * height) for u, v in self._aim.get(part, ())]
+            if points:
+                draw.add_polyline(points, ink(color, 0.75), wide, 0)
+        draw.pop_clip_rect()
+
+    def _ask(self, tool: str, reach: float) -> None:
+        """Ask where the hand would act, one question at a time."""
+        asked = self._asked
+        if asked is not None and not asked.done():
+            return
+        if asked is not None and asked.exception() is None:
+            self._aim = asked.result()
+        self._asked = None
+        question = (tool, self._share() if tool else (0.0, 0.0), reach, self.desk.status["ticks"])
+        now = imgui.get_time()
+        moved = question[:3] != self._question[:3]
+        rests = now - self._asked_at < (BETWEEN if moved else SELDOM)
+        if question != self._question and (tool or self._question[0]) and not (rests and tool):
+            self._asked_at = now
+            (u, v), engine, size = question[1], self.desk.engine, self.desk.engine.painter.wanted
+            self._asked = engine.ask(lambda: aim(engine.session, tool, u, v, reach, size))
+            self._question = question
 
     def _card(self, at: ImVec2) -> None:
         """The tool in hand and its options."""
         em, hand = imgui.get_font_size(), self.desk.hand
-        with floating("card", ImVec2(at.x + 12, at.y + 12), 17.5 * em):
+        room = self.box[2] - (12.0 + 12.0 + (WIDE * em + 12.0 if self.desk.game else 0.0))
+        wide = min(17.5 * em, max(room, 7.0 * em))
+        if wide < 14.0 * em or self.box[3] < 24.0 * em:  # no room for sliders: the tool's name
+            with floating("card", ImVec2(at.x + 12, at.y + self.box[3] - 4.2 * em), 7.0 * em), heading(em):
+                imgui.text(hand["label"])
+                hint(hand["sentence"])
+            self._place("card.tool")
+            return
+        with floating("card", ImVec2(at.x + 12, at.y + 12), wide):
             with heading(em):
                 imgui.text(hand["label"])
             imgui.push_text_wrap_pos(0.0)
@@ -158,6 +199,11 @@ class Stage:
                 chosen = control(self.desk, about, value, group=f"{hand['name']}.")
                 if chosen is not None:
                     self.desk.options[about["name"]] = chosen
+        self._place("card.tool")
+
+    def _place(self, name: str) -> None:
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        self.desk.places[name] = (low.x, low.y, high.x, high.y)
 
     def _running(self, at: ImVec2) -> None:
         """Buttons that stop what goes on by itself."""

@@ -29,6 +29,12 @@ def header(desk: Desk, pictures_in_a_second: int) -> None:
     pace = "paused" if status["paused"] else f"{status['pace']:.2f} s of water a second"
     if late:
         pace = f"too slow for {status['speed']:g} × real time: {status['pace']:.2f} ×"
+    free = imgui.get_window_width() - imgui.get_item_rect_max().x + imgui.get_window_pos().x - 4.0 * em
+    for shorter in (f"{status['count']:,} particles", ""):
+        if imgui.calc_text_size(text).x + imgui.calc_text_size(pace).x + 20 < free:
+            break
+        text = shorter
+        pace = f"{status['pace']:.2f} ×" if late and not shorter else pace
     wide = imgui.calc_text_size(text).x + imgui.calc_text_size(pace).x + 20 + 2.2 * em
     imgui.same_line(imgui.get_window_width() - wide - 0.8 * em)
     imgui.text_colored(rgba(SOFT), text)

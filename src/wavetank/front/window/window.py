@@ -20,6 +20,7 @@ from wavetank.front.window.stage import Stage
 from wavetank.session.session import Session
 
 BEAT = 1.0 / 60.0  # s: between two pictures of the window
+NARROW = 64.0  # em: in a narrower window the panel has no place of its own
 GAP = 8.0  # px between its parts
 
 
@@ -35,7 +36,7 @@ class Window:
         self._shown = 0  # number of the picture on it
         self._pictures: deque[float] = deque(maxlen=120)  # when the last ones came
         self._params = self._settings(size)
-        self._stopped = False
+        self._stopped = self._was_narrow = False
 
     def open(self) -> None:
         """Open the window and let the water move."""
@@ -115,6 +116,10 @@ class Window:
         self._upload()
         em, room = imgui.get_font_size(), imgui.get_io().display_size
         rail, side, top, bottom = 9.0 * em, 22.5 * em if self.desk.panel else 0.0, 2.6 * em, 3.7 * em
+        narrow = room.x < NARROW * em
+        if narrow and not self._was_narrow:  # there the panel comes when it is asked for, in place of the line of time
+            self.desk.panel, side = False, 0.0
+        self._was_narrow = narrow
         wide = room.x - rail - 3 * GAP - (side + GAP if side else 0.0)
         shown = self._plate.texture if self._plate is not None else None
         texture = imgui.ImTextureRef(shown.glo) if shown is not None else None
@@ -126,9 +131,10 @@ class Window:
             self._tools()
         imgui.end()
         self.stage.draw(texture, *stage)
-        if self._part("time", ImVec2(2 * GAP + rail, room.y - GAP - bottom), ImVec2(stage[1].x, bottom)):
-            timeline.footer(self.desk)
-        imgui.end()
+        if not (narrow and side):
+            if self._part("time", ImVec2(2 * GAP + rail, room.y - GAP - bottom), ImVec2(stage[1].x, bottom)):
+                timeline.footer(self.desk)
+            imgui.end()
         if side:
             if self._part("panel", ImVec2(room.x - GAP - side, top), ImVec2(side, room.y - top - GAP)):
                 panel(self.desk)
@@ -137,6 +143,7 @@ class Window:
         keys.read_keys(self.desk)
 
     def _part(self, name: str, at: ImVec2, size: ImVec2, *, bare: bool = False) -> bool:
+        self.desk.places[f"part.{name}"] = (at.x, at.y, at.x + size.x, at.y + size.y)
         imgui.set_next_window_pos(at)
         imgui.set_next_window_size(size)
         flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
@@ -151,11 +158,15 @@ class Window:
         draw, gap = imgui.get_window_draw_list(), 4.0
         wide = 0.5 * (imgui.get_content_region_avail().x - gap)
         running = self.desk.status["running"]
+        rows = (len(self.desk.rail) + 1) // 2
+        each = imgui.get_content_region_avail().y / rows - imgui.get_style().item_spacing.y
+        named = each >= 3.2 * em  # else there is room for icons alone, whose names are told under the pointer
+        tall = min(3.5 * em, each) if named else max(2.0 * em, min(3.5 * em, each))
         for n, tool in enumerate(self.desk.rail):
             if n % 2:
                 imgui.same_line(0, gap)
             at = imgui.get_cursor_screen_pos()
-            size = ImVec2(wide, 3.5 * em)
+            size = ImVec2(wide, tall)
             if imgui.invisible_button(tool["name"], size):
                 self.desk.tool = tool["name"]
             end = ImVec2(at.x + size.x, at.y + size.y)
@@ -167,7 +178,10 @@ class Window:
             if tool["name"] in running:
                 draw.add_rect(at, end, ink(ACCENT), 9.0)
             color = ink(ACCENT if on else SOFT)
-            draw_icon(draw, tool["icon"], ImVec2(at.x + 0.5 * (wide - 1.4 * em), at.y + 0.45 * em), 1.4 * em, color)
+            over = 0.45 * em if named else 0.5 * (tall - 1.4 * em)
+            draw_icon(draw, tool["icon"], ImVec2(at.x + 0.5 * (wide - 1.4 * em), at.y + over), 1.4 * em, color)
+            if not named:
+                continue
             text = imgui.calc_text_size(tool["label"])
             draw.add_text(ImVec2(at.x + 0.5 * (wide - text.x), end.y - 1.4 * em), color, tool["label"])
 

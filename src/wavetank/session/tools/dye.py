@@ -19,8 +19,8 @@ class Dye(Tool):
     icon: ClassVar[str] = "M12 3c4 5 6 8 6 11a6 6 0 0 1-12 0c0-3 2-6 6-11zM9 14a3 3 0 0 0 3 3"
     key: ClassVar[str] = "9"
 
-    radius: float = option(0.06, 0.01, 0.5, "L", "Radius of the brush.")
-    color: Color = option("#e0446a", None, None, "color", "Colour.")
+    radius: float = option(0.1, 0.01, 0.5, "L", "Radius of the brush.")
+    color: Color = option("#ff2458", None, None, "color", "Colour.")
     strength: float = option(1.0, 0.05, 1.0, "", "How strong the colour is.")
     _last: np.ndarray | None = PrivateAttr(None)
 

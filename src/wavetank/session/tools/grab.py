@@ -26,9 +26,10 @@ class Grab(Tool):
     key: ClassVar[str] = "g"
     cursor_radius: ClassVar[bool] = False
     through_water: ClassVar[bool] = True
+    takes: ClassVar[str] = "solid"
 
     pace: float = option(0.8, 0.05, 2.0, "√(gL)", "Largest speed it is carried at.")
-    strength: float = option(1.0, 0.01, 10.0, "water", "Most that it lifts, in weights of a cube of water of L/4.")
+    strength: float = option(1.0, 0.01, 10.0, "cubes", "Most that it lifts, in weights of a cube of water of L/4.")
     _held: str = PrivateAttr("")
     _point: np.ndarray | None = PrivateAttr(None)
     _offset: np.ndarray | None = PrivateAttr(None)

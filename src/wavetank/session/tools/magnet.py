@@ -18,8 +18,8 @@ class Magnet(Tool):
     icon: ClassVar[str] = "M6 4v8a6 6 0 0 0 12 0V4M6 8h4M14 8h4M10 4v8a2 2 0 0 0 4 0V4M6 4h4M14 4h4"
     key: ClassVar[str] = "3"
 
-    radius: float = option(0.2, 0.02, 1.0, "L", "How far it reaches.")
-    strength: float = option(4.0, -20.0, 20.0, "9.81 m/s²", "Acceleration in the middle; negative repels.")
+    radius: float = option(0.25, 0.02, 1.0, "L", "How far it reaches.")
+    strength: float = option(10.0, -20.0, 20.0, "9.81 m/s²", "Acceleration in the middle; negative repels.")
     keep: bool = option(False, None, None, "", "Goes on when you let go.")
 
     @override

@@ -18,8 +18,8 @@ class Push(Tool):
     icon: ClassVar[str] = "M4 12h13m-5-5 5 5-5 5M20 5v14"
     key: ClassVar[str] = "1"
 
-    radius: float = option(0.09, 0.01, 0.5, "L", "Radius of the hand.")
-    grip: float = option(25.0, 1.0, 100.0, "1/s", "How firmly it holds the water.")
+    radius: float = option(0.13, 0.01, 0.5, "L", "Radius of the hand.")
+    grip: float = option(60.0, 1.0, 100.0, "1/s", "How firmly it holds the water.")
 
     @override
     def hold(self, hand: Hand, duration: float) -> None:

@@ -18,6 +18,7 @@ class Remove(Tool):
     key: ClassVar[str] = "x"
     cursor_radius: ClassVar[bool] = False
     through_water: ClassVar[bool] = True
+    takes: ClassVar[str] = "solid"
 
     @override
     def begin(self, hand: Hand) -> None:

@@ -23,8 +23,9 @@ class Shove(Tool):
     key: ClassVar[str] = "v"
     cursor_radius: ClassVar[bool] = False
     through_water: ClassVar[bool] = True
+    takes: ClassVar[str] = "body"
 
-    strength: float = option(0.3, 0.01, 5.0, "water", "Force, in weights of a cube of water of L/4.")
+    strength: float = option(0.3, 0.01, 5.0, "cubes", "Force, in weights of a cube of water of L/4.")
     _held: str = PrivateAttr("")
     _point: np.ndarray | None = PrivateAttr(None)
 

@@ -20,6 +20,7 @@ class Tilt(Tool):
     icon: ClassVar[str] = "M5 8l12-4 3 11-12 4zM6.500 13c4 1 8-3 12 .5M3 21h18"
     key: ClassVar[str] = "t"
     cursor_radius: ClassVar[bool] = False
+    tilts: ClassVar[bool] = True
 
     most: float = option(50.0, 5.0, 180.0, "°", "Largest angle.")
     stay: bool = option(False, None, None, "", "Stays tilted when you let go.")

@@ -27,6 +27,8 @@ class Tool(Model):
     key: ClassVar[str] = ""
     through_water: ClassVar[bool] = False  # whether the pointer reaches what is under the surface
     cursor_radius: ClassVar[bool] = True  # whether fronts show `radius` around the pointer
+    tilts: ClassVar[bool] = False  # whether it leans the tank, which pictures then show
+    takes: ClassVar[str] = ""  # solid or body, where a click takes hold of one: fronts light it up
 
     @property
     def lasting(self) -> bool:
@@ -60,7 +62,7 @@ def describe(tool: type[Tool]) -> dict[str, Any]:
         })  # fmt: skip
     return {
         "name": tool.name, "label": tool.label, "sentence": tool.sentence, "icon": tool.icon, "key": tool.key,
-        "cursor": tool.cursor_radius, "options": options,
+        "cursor": tool.cursor_radius, "takes": tool.takes, "options": options,
     }  # fmt: skip
 
 

@@ -15,6 +15,16 @@ def dyed(clear_color, dye):
     return color
 
 
+ICE, ICE_IN_WATER = 127 << 24 | 0xEAF4FB, 127 << 24 | 0x8484D4  # what ice is dyed with: white would be clear in water
+
+
+@qd.kernel(fastcache=True)
+def lay_ice(dye: qd.types.ndarray(), frozen: qd.types.ndarray(), seen: qd.types.ndarray(), ice: qd.i32, count: qd.i32):
+    """Write the dyes that are seen: ice is white, whatever colour its water had."""
+    for i in range(count):
+        seen[i] = qd.select(frozen[i] == 1, ice, dye[i])
+
+
 @qd.func
 def dye_at(dye: qd.template(), place):
     """(dyed part of the thickness [steps], mean linear colour) at a place in texels, between the four nearest."""

@@ -27,6 +27,7 @@ from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 
 UNBOUNDED = 1e4  # m
+SHINE, LIT = np.array((0.3, 1.0, 1.6), np.float32), 0.6  # linear RGB of what shines, and how much of it is that
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -66,6 +67,8 @@ def colors_of(shot: Shot) -> np.ndarray:
     for number, solid in enumerate(shot.frame.scene.solids, solids.tank_count):
         if solid.color and number < solids.count:
             colors[number] = to_linear(np.array(rgb_of(solid.color)))
+    if 0 <= shot.lit < solids.count:
+        colors[shot.lit] += LIT * (SHINE - colors[shot.lit])
     return colors
 
 

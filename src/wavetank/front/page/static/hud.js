@@ -5,7 +5,7 @@ import { on, send } from "./link.js";
 
 const hud = find("hud"), banner = find("banner"), drawing = find("regions"), names = find("region-names");
 const EDGES = [[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [5, 7], [7, 6], [6, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
-let regions = [], game = null, shown = "";
+let regions = [], game = null, shown = "", waits = false, lit = null;
 
 let outlined = "";
 function drawRegions() {
@@ -29,15 +29,15 @@ function drawRegions() {
   });
 }
 
-const stars = (count) => make("span", { className: "stars", "aria-label": `${count} stars` }, ...[1, 2, 3].map((k) => make("i", { className: k <= count ? "on" : "", textContent: "★" })));
-const again = () => { send({ do: "reset" }); send({ do: "pause", on: false }); };
-const go = (name) => { send({ do: "load", name }); send({ do: "pause", on: false }); };
+const stars = (count) => make("span", { className: "stars", role: "img", "aria-label": `${count} stars` }, ...[1, 2, 3].map((k) => make("i", { className: k <= count ? "on" : "", textContent: "★" })));
+const again = () => send({ do: "reset" }); // a level waits for the first touch
+const go = (name) => send({ do: "load", name });
 const seconds = (value) => `${value.toFixed(1)} s`;
 
 const parts = {
-  level: make("small"), text: make("p"), bar: make("div", { className: "bar" }, make("div")), clock: make("b"), stars: make("span"), strokes: make("span"),
+  level: make("small"), text: make("p"), begin: make("p", { className: "begin", textContent: "Time begins with your first touch." }), bar: make("div", { className: "bar" }, make("div")), clock: make("b"), stars: make("span"), strokes: make("span"),
 };
-hud.append(make("div", { className: "line" }, parts.level, parts.strokes, parts.stars, parts.clock), parts.text, parts.bar);
+hud.append(make("div", { className: "line" }, parts.level, parts.strokes, parts.stars, parts.clock), parts.text, parts.begin, parts.bar);
 
 function showHud() {
   hud.hidden = !game;
@@ -47,7 +47,8 @@ function showHud() {
   say(parts.text, game.text.replaceAll(" %", "\u00a0%"));
   say(parts.clock, seconds(left));
   parts.clock.classList.toggle("short", left < 5 && !game.outcome && !game.endured);
-  parts.stars.replaceChildren(stars(game.stars));
+  if (lit !== game.stars) parts.stars.replaceChildren(stars(lit = game.stars));
+  parts.begin.hidden = !waits;
   say(parts.strokes, game.strokes === null ? "" : `${game.strokes} left`);
   const bar = parts.bar.firstChild;
   bar.style.width = `${100 * game.progress}%`;
@@ -70,11 +71,13 @@ function showBanner() {
     ...(won ? [stars(game.stars)] : []),
     make("p", { textContent: game.verdict }),
     make("div", { className: "row" }, skip, retry, next));
+  // Who plays by keys goes on from here; who types elsewhere is left alone.
+  if (document.activeElement === document.body || document.activeElement === find("picture")) (next ?? retry).focus({ preventScroll: true });
 }
 
 on("regions", (told) => { regions = told.regions; drawRegions(); });
 on("status", (status) => {
-  game = status.game;
+  ({ game, waits } = status);
   document.body.classList.toggle("playing-level", Boolean(game));
   showHud(); showBanner(); drawRegions();
 });

@@ -2,7 +2,8 @@
 
 import { colour, find, make, note, pretty, say, words } from "./make.js";
 import { link, on, send } from "./link.js";
-import { seen, snapshot } from "./stage.js";
+import { control } from "./slider.js";
+import { seen } from "./stage.js";
 
 const rows = {};
 const past = {};
@@ -19,12 +20,13 @@ function build() {
   const figures = make("div", { id: "figures" });
   find("look").replaceChildren(
     ...(about.views.length > 1 ? pills("View", about.views.map((v) => [v, words(v)]), about.view, (view) => send({ do: "view", view })) : []),
-    ...pills("Colour by", colours, about.color_by, (color_by) => send({ do: "view", color_by })),
+    ...(about.view === "slice" ? slice() : []),
+    ...pills("Colour by", colours, about.painted, (color_by) => send({ do: "view", color_by })),
     ...pills("Picture", [["auto", "Automatic"], ["full", "Sharp"], ["half", "Fast"]], detail, (value) => { detail = value; send({ do: "detail", detail }); build(); }),
     make("h3", { textContent: "Measured" }), figures,
     make("h3", { textContent: "Keep" }),
     make("div", { className: "links" },
-      make("button", { textContent: "Save this picture", onclick: save }),
+      make("a", { href: link("/picture.png"), download: "wavetank.png", textContent: "Save this picture, sharp" }),
       make("a", { href: link("/scene.toml"), download: "scene.toml", textContent: "Save what is there as a scene" }),
       make("a", { href: link("/recording.toml"), download: "session.toml", textContent: "Save this session, to be replayed" })));
   for (const [key, label] of [["error", "Compression, mean"], ["energy", "Kinetic energy"], ["frame", "Frame computed in"], ["picture", "Picture painted in"]]) {
@@ -34,12 +36,28 @@ function build() {
   }
 }
 
-function save() {
-  const blob = snapshot();
-  if (!blob) return;
-  const url = URL.createObjectURL(blob);
-  make("a", { href: url, download: "wavetank.jpg" }).click();
-  setTimeout(() => URL.revokeObjectURL(url), 1000);
+/** Where the slice lies. */
+function slice() {
+  const [axis, place] = about.cut;
+  const move = control({ name: "place", label: "Where along it", low: 0, high: 100, unit: "%", straight: true, sentence: "Where the slice lies, from end to end of the world." }, 100 * place,
+    (value) => send({ do: "view", place: value / 100 }));
+  return [...(about.dim === 3 ? pills("Slice across", ["x", "y", "z"].map((name) => [name, name]), axis, (name) => send({ do: "view", axis: name })) : []),
+    ...(about.dim === 3 ? [move.element] : [])];
+}
+
+/** What the colours mean, over the picture. */
+function legend() {
+  const box = find("legend"), told = about.legend;
+  box.hidden = !told;
+  if (!told) return;
+  const bar = make("canvas", { width: told.colors.length, height: 1 }), g = bar.getContext("2d");
+  told.colors.forEach((color, k) => { g.fillStyle = color; g.fillRect(k, 0, 1, 1); });
+  box.replaceChildren(...(told.names ? told.names.map(([name, color]) => {
+    const patch = make("i");
+    patch.style.background = color;
+    return make("span", { className: "key" }, patch, name);
+  }) : [make("span", { textContent: told.title }), bar,
+    make("span", { className: "ends" }, ...told.ticks.map((value) => make("b", { textContent: pretty(value) })))]));
 }
 
 function plot(key, value, text) {
@@ -62,6 +80,8 @@ const stats = { count: make("b"), rate: make("b"), error: make("b") };
 const wide = (...parts) => make("span", { className: "wide" }, ...parts);
 const unit = make("span");
 find("stats").append(wide(stats.count, " particles · "), stats.rate, unit, wide(" · compression ", stats.error));
+const behind = make("span");
+find("late").append(behind, wide(" real time"));
 find("late").title = "This machine is slower than real time; the water slows down rather than cheat.";
 
 let pictures = [performance.now(), 0], paused = false;
@@ -72,9 +92,14 @@ setInterval(() => {
   say(stats.rate, rests ? "paused" : rate.toFixed(0));
   say(unit, rests ? "" : " fps");
 }, 1000);
-on("hello", (hello) => { about = hello; build(); });
+on("hello", (hello) => { about = hello; build(); legend(); });
 on("status", (status) => {
-  if (status.world) { about = { ...about, ...status.world }; build(); }
+  if (status.world) {
+    const before = JSON.stringify([about.view, about.painted, about.cut?.[0], about.dim]);
+    about = { ...about, ...status.world };
+    if (JSON.stringify([about.view, about.painted, about.cut[0], about.dim]) !== before) build(); // a slider that is moved stays
+    legend();
+  }
   plot("error", status.density_error_mean ?? 0, `${(100 * (status.density_error_mean ?? 0)).toFixed(2)} %`);
   plot("energy", status.kinetic_energy ?? 0, `${pretty(status.kinetic_energy ?? 0)} J`);
   plot("frame", status.frame_ms || 0, `${pretty(status.frame_ms || 0)} ms`);
@@ -83,7 +108,7 @@ on("status", (status) => {
   paused = status.paused;
   say(stats.error, `${(100 * (status.density_error_mean ?? 0)).toFixed(2)} %`);
   find("late").hidden = !status.late;
-  say(find("late"), `${status.pace.toFixed(2)} × real time`);
+  say(behind, `${status.pace.toFixed(2)} ×`);
   status.notes.forEach(note);
 });
 on("note", ({ text }) => note(text));

@@ -1,9 +1,10 @@
 // Scenes as small drawings; any scene file can be dropped on the page.
 
-import { colour, find, make, note } from "./make.js";
-import { on, send } from "./link.js";
+import { colour, find, make, note, pretty } from "./make.js";
+import { on, send, tell } from "./link.js";
+import { control } from "./slider.js";
 
-let current = "";
+let current = "", fits = {}, fitted = true, inLevel = false;
 
 /** A drawing of boxes and balls: flat for 2-D, from above the corner for 3-D. */
 function draw(canvas, scene) {
@@ -40,20 +41,63 @@ function draw(canvas, scene) {
   for (const [a, b] of edges) { g.beginPath(); g.moveTo(...to(all[a])); g.lineTo(...to(all[b])); g.stroke(); }
 }
 
+/** Begin a scene, as fine as this machine can compute in real time unless it is wanted in full; a level as it is. */
+function begin(scene) {
+  const left = last > 0.5;
+  send({ do: "load", name: scene.name, particles: coarser(scene) ? fits[scene.name].particles : 0 });
+  if (left) note("Another scene.", ["Undo", () => send({ do: "undo" })]);
+  tell("chosen", scene);
+}
+
+/** Whether a scene begins with fewer particles than it has; both numbers are rounded. */
+const coarser = (scene) => fitted && !scene.goal && (fits[scene.name]?.particles ?? Infinity) < 0.93 * scene.count;
+
+/** What a card says below its title. */
+function size(scene) {
+  const fit = fits[scene.name], whole = `≈ ${scene.count.toLocaleString("en")}`;
+  if (scene.goal || !fit) return `${scene.dim}-D · ${whole}`;
+  return `${scene.dim}-D · ${coarser(scene) ? `≈ ${fit.particles.toLocaleString("en")} of ${scene.count.toLocaleString("en")}` : whole} · ${pace(coarser(scene) ? fit.pace : fit.full)}`;
+}
+
+const pace = (value) => (value >= 0.95 ? "real time" : `${pretty(value, value < 0.1 ? 1 : 2)} ×`);
+
+/** How fine the water is: a slider over what the machine can be expected to make of it. */
+function detail(here) {
+  const box = find("scenes-detail");
+  box.replaceChildren();
+  if (here.length < 2 || inLevel) return;
+  const text = make("p"), now = here.reduce((best, one, k) => (Math.abs(Math.log(one.particles / count)) < Math.abs(Math.log(here[best].particles / count)) ? k : best), 0);
+  const range = make("input", { type: "range", min: 0, max: here.length - 1, step: 1, value: now, id: "detail" });
+  const show = () => {
+    const { particles, pace: speed } = here[range.value];
+    text.textContent = `About ${particles.toLocaleString("en")} particles: ${speed >= 0.95 ? "real time" : `${pretty(speed, 2)} × real time`} on this machine`;
+    range.setAttribute("aria-valuetext", text.textContent);
+    range.style.setProperty("--share", `${100 * range.value / (here.length - 1)}%`);
+  };
+  range.oninput = show;
+  range.onchange = () => { send({ do: "reset", parameters: { spacing: here[range.value].spacing } }); };
+  show();
+  box.append(make("label", { for: "detail", textContent: "Detail" }), range, text);
+}
+
 function build({ scenes, title, dim }) {
+  known = scenes;
+  const fit = make("input", { type: "checkbox", id: "fit", checked: fitted, onchange: () => { fitted = fit.checked; write(); } });
   const card = (scene) => {
     const canvas = make("canvas", { width: 264, height: 198 });
     draw(canvas, scene);
     const stars = scene.goal ? make("em", { data: { level: scene.name } }) : null;
-    return make("button", { title: scene.goal || `${scene.title}: ${scene.dim}-D, ${scene.count.toLocaleString("en")} particles`, data: { title: `${scene.dim} ${scene.title}`, scene: scene.name }, onclick: () => { send({ do: "load", name: scene.name }); send({ do: "pause", on: false }); } },
-      canvas, make("span", { textContent: scene.title }), make("small", { textContent: `${scene.dim}-D · ${scene.count.toLocaleString("en")}` }), stars);
+    return make("button", { title: scene.goal || `${scene.title}: ${scene.dim}-D, about ${scene.count.toLocaleString("en")} particles`, data: { title: `${scene.dim} ${scene.title}`, scene: scene.name }, onclick: () => begin(scene) },
+      canvas, make("span", { textContent: scene.title }), sizes[scene.name] = make("small", { textContent: size(scene) }), stars);
   };
   const heading = (textContent) => make("h3", { textContent });
+  sizes = {};
   const [levels, others] = [scenes.filter((scene) => scene.goal), scenes.filter((scene) => !scene.goal)];
-  const file = make("input", { type: "file", accept: ".toml", hidden: true, onchange: () => open(file.files[0]) });
-  const pick = make("button", { className: "quiet", textContent: "Open a scene file …", onclick: () => file.click() });
+  const file = make("input", { type: "file", accept: ".toml,.obj", hidden: true, onchange: () => open(file.files[0]) });
+  const pick = make("button", { className: "quiet", textContent: "Open a file …", onclick: () => file.click() });
   pick.style.gridColumn = "1 / -1"; pick.style.padding = "9px";
-  find("scenes").replaceChildren(heading("Levels"), ...levels.map(card), heading("Scenes"), ...others.map(card), pick, file, make("p", { textContent: "Or drop a scene's TOML file anywhere on this page." }));
+  find("scenes").replaceChildren(make("div", { id: "scenes-detail" }), make("div", { className: "fit" }, fit, make("label", { for: "fit", textContent: "Fit scenes to this machine" })),
+    heading("Levels"), ...levels.map(card), heading("Scenes"), ...others.map(card), pick, file, make("p", { textContent: "Or drop it anywhere on this page: the TOML file of a scene begins it, an OBJ becomes a solid." }));
   named({ title, dim });
 }
 
@@ -65,13 +109,20 @@ function named({ title, dim }) {
 
 async function open(file) {
   if (!file) return;
-  if (file.size > 2_000_000) { note(`${file.name} is too large for a scene file.`); return; }
-  send({ do: "load", text: await file.text() });
+  if (file.size > 2_000_000) { note(`${file.name} has ${pretty(file.size / 1e6, 2)} MB; at most 2 MB can be opened here.`); return; }
+  const text = await file.text();
+  if (/\.obj$/i.test(file.name)) send({ do: "mesh", text, file: file.name });
+  else send({ do: "load", text, file: file.name.slice(0, 200) });
+  tell("chosen", null);
 }
 
+let known = [], sizes = {}, count = 0, last = 0;
+const write = () => { for (const scene of known) if (sizes[scene.name]) sizes[scene.name].textContent = size(scene); };
 on("hello", build);
-on("status", ({ world, scores }) => {
-  if (world) named(world);
+on("fit", (told) => { fits = told.scenes; write(); detail(told.here); });
+on("status", ({ world, scores, game, count: now, time }) => {
+  inLevel = Boolean(game); count = now; last = time;
+  if (world) { named(world); if (!find("scenes").hidden) send({ do: "fit" }); }
   for (const place of find("scenes").querySelectorAll("em")) {
     const stars = scores[place.dataset.level]?.stars ?? 0, text = "★".repeat(stars) + "☆".repeat(3 - stars);
     if (place.textContent !== text) place.textContent = text;

@@ -1,13 +1,14 @@
 // The picture, and hands on it: the tool with one pointer, the camera with the other buttons, the wheel or two fingers.
 
-import { find } from "./make.js";
-import { on, send } from "./link.js";
+import { find, note } from "./make.js";
+import { on, pending, send } from "./link.js";
 import { hand } from "./tools.js";
+import { hover, leave } from "./aim.js";
 
-const canvas = find("picture"), stage = find("stage"), ring = find("ring"), veil = find("veil");
+const canvas = find("picture"), stage = find("stage"), veil = find("veil"), busy = find("busy");
 const context = canvas.getContext("2d", { alpha: false, desynchronized: true }); // a third less work for the browser
 const pointers = new Map(); // id -> { x, y, mode }
-let dim = 3, size = 1, height = 1, tooling = null, pinch = 0, last = null;
+let dim = 3, tooling = null, pinch = 0;
 export const seen = { pictures: 0, bytes: 0 };
 
 on("picture", async (blob) => {
@@ -19,15 +20,29 @@ on("picture", async (blob) => {
   context.drawImage(bitmap, 0, 0);
   bitmap.close();
   seen.pictures += 1; seen.bytes += blob.size;
-  last = blob;
   veil.classList.add("gone");
 });
 on("closed", () => { find("veil-text").textContent = "The connection is gone; trying again …"; veil.classList.remove("gone"); pointers.clear(); tooling = null; });
+on("refused", (ours) => {
+  find("veil-text").textContent = ours ? "wavetank was started anew, and this page belongs to the run before: open the link that it printed."
+    : "This page opens with the link that wavetank printed, token included.";
+});
 on("open", () => { tellSize(); });
-on("hello", (world) => { dim = world.dim; size = world.size; });
-on("status", (status) => { height = status.height; if (status.world) ({ dim, size } = status.world); place(); });
+on("anew", () => note("wavetank was started anew: what was here before is gone with it."));
 
-export const snapshot = () => last;
+// A scene that is made for the first time is compiled; until then no picture comes and nothing is told.
+const WAIT = 1500; // ms without a word after which the page says why
+let heard = performance.now(), waitsFor = "";
+on("hello", () => { heard = performance.now(); waitsFor = "first"; });
+on("status", () => { heard = performance.now(); waitsFor = waitsFor === "scene" ? "" : waitsFor; busy.hidden = true; });
+on("picture", () => { waitsFor = ""; heard = performance.now(); });
+setInterval(() => {
+  if (performance.now() - heard < WAIT || !pending()) return;
+  if (veil.classList.contains("gone")) busy.hidden = false;
+  else if (waitsFor === "first") find("veil-text").textContent = "Compiling, once: the next start takes seconds.";
+}, 300);
+on("hello", (world) => { dim = world.dim; });
+on("status", ({ world }) => { if (world) ({ dim } = world); });
 
 function tellSize() {
   const ratio = Math.min(window.devicePixelRatio || 1, 1.5);
@@ -41,16 +56,6 @@ const where = (event) => {
   return { x: (event.clientX - box.left) / box.width, y: (event.clientY - box.top) / box.height, width: box.width, height: box.height };
 };
 
-let mouse = null;
-function place() {
-  const share = hand.options.radius ?? hand.tool.options.find((about) => about.name === "radius")?.default ?? (hand.options.width ?? 0.1) / 2;
-  ring.hidden = !mouse || !hand.tool.cursor;
-  if (ring.hidden) return;
-  const radius = Math.max(4, share * size / height * mouse.height);
-  ring.style.width = ring.style.height = `${2 * radius}px`;
-  ring.style.transform = `translate(${mouse.x * mouse.width - radius}px, ${mouse.y * mouse.height - radius}px)`;
-}
-
 function modeOf(event) {
   if (event.pointerType !== "mouse") return hand.tool.name === "look" ? "orbit" : "tool";
   if (event.button === 1 || (event.shiftKey && event.button !== 2)) return "pan";
@@ -61,6 +66,7 @@ function modeOf(event) {
 canvas.onpointerdown = (event) => {
   event.preventDefault();
   canvas.focus({ preventScroll: true });
+  leave();
   canvas.setPointerCapture(event.pointerId);
   pointers.set(event.pointerId, { ...where(event), mode: modeOf(event) });
   if (pointers.size === 2) {
@@ -77,8 +83,9 @@ canvas.onpointerdown = (event) => {
 
 canvas.onpointermove = (event) => {
   const at = where(event);
-  if (event.pointerType === "mouse" || pointers.size === 1) { mouse = at; place(); }
   const pointer = pointers.get(event.pointerId);
+  const looks = pointer && pointer.mode !== "tool"; // then nothing is aimed at, and no time spent on it
+  if (event.pointerType === "mouse" || pointers.size === 1) hover(looks ? null : at);
   if (!pointer) return;
   const [dx, dy] = [at.x - pointer.x, at.y - pointer.y];
   Object.assign(pointer, at);
@@ -88,7 +95,7 @@ canvas.onpointermove = (event) => {
   else if (pointer.mode === "both") {
     turn(dx / 2, dy / 2, at);
     const now = spread();
-    if (now > 0 && pinch > 0) send({ do: "zoom", factor: Math.min(2, Math.max(0.5, pinch / now)) });
+    if (now > 0 && pinch > 0) send({ do: "zoom", factor: Math.min(2, Math.max(0.5, pinch / now)), ...middle() });
     pinch = now;
   }
 };
@@ -110,6 +117,12 @@ function spread() {
   return a && b ? Math.hypot((a.x - b.x) * a.width, (a.y - b.y) * a.height) : 0;
 }
 
+/** Between the fingers. */
+function middle() {
+  const [a, b] = [...pointers.values()];
+  return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 };
+}
+
 function lift() {
   if (tooling === null) return;
   if (next) send({ do: "point-move", ...next });
@@ -120,13 +133,14 @@ function lift() {
 const up = (event) => {
   if (event.pointerId === tooling) lift();
   pointers.delete(event.pointerId);
-  if (event.pointerType !== "mouse" && !pointers.size) { mouse = null; place(); }
+  if (event.pointerType !== "mouse" && !pointers.size) hover(null);
 };
 canvas.onpointerup = up;
 canvas.onpointercancel = up;
-canvas.onpointerleave = () => { if (!pointers.size) { mouse = null; place(); } };
+canvas.onpointerleave = () => { if (!pointers.size) hover(null); };
 canvas.oncontextmenu = (event) => event.preventDefault();
 canvas.addEventListener("wheel", (event) => {
   event.preventDefault();
-  send({ do: "zoom", factor: Math.min(1.6, Math.max(0.6, Math.exp(0.0012 * event.deltaY * (event.deltaMode ? 30 : 1)))) });
+  const { x, y } = where(event);
+  send({ do: "zoom", factor: Math.min(1.6, Math.max(0.6, Math.exp(0.0012 * event.deltaY * (event.deltaMode ? 30 : 1)))), x, y });
 }, { passive: false });

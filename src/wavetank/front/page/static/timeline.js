@@ -1,6 +1,6 @@
 // Time: play, step, back, the scrubber with its bookmarks, the pace.
 
-import { find, icon, make, pretty, say } from "./make.js";
+import { find, icon, make, note, pretty, say } from "./make.js";
 import { on, send } from "./link.js";
 
 let speeds = [[1, "1 ×"]];
@@ -20,7 +20,11 @@ export const time = {
   toggle: () => send({ do: "pause", on: !now.paused }),
   step: () => send({ do: "step" }),
   back: () => send({ do: "rewind", time: Math.max(0, now.time - 1) }),
-  reset: () => { send({ do: "reset" }); send({ do: "pause", on: false }); },
+  reset: () => {
+    const left = now.time > 0.5;
+    send({ do: "reset" });
+    if (left) note("The scene begins anew.", ["Undo", () => send({ do: "undo" })]);
+  },
   faster: (by) => send({ do: "speed", factor: speeds[Math.min(speeds.length - 1, Math.max(0, closest(now.speed) + by))][0] }),
   bookmark: () => {
     const name = `${pretty(now.time, 3)} s`;
@@ -47,6 +51,7 @@ on("status", (status) => {
   const [from, to] = [status.past[0], Math.max(status.past[1], status.time, status.past[0] + 0.1)];
   if (performance.now() - held > 400) {
     Object.assign(scrub, { min: from, max: to, value: status.time });
+    scrub.setAttribute("aria-valuetext", `${status.time.toFixed(1)} s`);
     scrub.style.setProperty("--share", `${100 * (status.time - from) / (to - from)}%`);
   }
   say(clock, status.time.toFixed(2));
@@ -54,6 +59,7 @@ on("status", (status) => {
     icon_ = status.paused;
     find("play").replaceChildren(icon(icon_ ? "M8 5v14l11-7z" : "M7 5h3.500v14H7zM13.500 5H17v14h-3.500z"));
     find("play").title = icon_ ? "Play (space)" : "Pause (space)";
+    find("play").setAttribute("aria-label", icon_ ? "Play" : "Pause");
   }
   if (document.activeElement !== speed) speed.value = speeds[closest(status.speed)][0];
   const list = JSON.stringify(status.bookmarks);
@@ -69,8 +75,10 @@ on("status", (status) => {
 });
 
 function flag(name) {
-  const result = make("button", { title: `${name}: click to go there, right click to forget it`, "aria-label": `Bookmark ${name}` });
+  const result = make("button", { title: `${name}: click to go there, right click (Delete) to forget it`, "aria-label": `Bookmark ${name}` });
   result.onclick = () => send({ do: "bookmark", name, action: "go" });
-  result.oncontextmenu = (event) => { event.preventDefault(); send({ do: "bookmark", name, action: "forget" }); };
+  const forget = (event) => { event.preventDefault(); send({ do: "bookmark", name, action: "forget" }); };
+  result.oncontextmenu = forget;
+  result.onkeydown = (event) => { if (event.key === "Delete") forget(event); };
   return result;
 }

@@ -1,13 +1,13 @@
 // The rail of tools, the card with the options of the one in hand, and those that go on by themselves.
 
-import { find, icon, make, words } from "./make.js";
+import { find, icon, make, narrow, words } from "./make.js";
 import { on, send } from "./link.js";
 import { control } from "./slider.js";
 
 let look = { name: "look", options: [], cursor: false }; // until the server tells
 const chosen = new Map(); // options by tool
 const buttons = new Map();
-export const hand = { tool: look, options: {} };
+export const hand = { tool: look, options: {}, fixed: {} };
 export let tools = [look];
 
 export function choose(name) {
@@ -22,15 +22,15 @@ export function choose(name) {
 }
 
 let allowed = null; // by the level: tools and their fixed options
-let folded = matchMedia("(max-width: 760px)").matches;
+let folded = narrow.matches;
 
 function card(tool) {
   const box = find("tool-card");
-  const fixed = allowed?.[tool.name] ?? {};
+  const fixed = hand.fixed = allowed?.[tool.name] ?? {};
   const options = tool.options.filter((about) => !(about.name in fixed)).map((about) =>
     control(about, hand.options[about.name] ?? about.default, (v) => { hand.options[about.name] = v; }).element);
-  const fold = make("button", { className: "quiet fold", title: "Fold" }, icon("M6 15l6-6 6 6"));
-  fold.onclick = () => { folded = !folded; box.classList.toggle("folded", folded); };
+  const fold = make("button", { className: "quiet fold", title: "Options", "aria-label": `Options of ${tool.label}`, "aria-expanded": !folded }, icon("M6 15l6-6 6 6"));
+  fold.onclick = () => { folded = !folded; box.classList.toggle("folded", folded); fold.setAttribute("aria-expanded", !folded); };
   box.replaceChildren(make("h2", { textContent: tool.label }), fold, make("p", { textContent: tool.sentence }), ...options);
   box.classList.toggle("folded", folded);
   box.hidden = false;
@@ -52,7 +52,8 @@ on("hello", ({ tools: list }) => {
 });
 
 let told = "", rules = "";
-on("status", ({ running, game }) => {
+on("status", ({ running, game, world }) => {
+  if (world) card(hand.tool); // lengths are others in a world of another size
   // A level has its own tools; what it fixes has no slider.
   const now = JSON.stringify(game?.tools ?? null);
   if (now !== rules) {
@@ -65,7 +66,7 @@ on("status", ({ running, game }) => {
   told = running.join();
   for (const [name, button] of buttons) button.classList.toggle("on", running.includes(name));
   find("running").replaceChildren(...running.map((name) =>
-    make("button", { textContent: `${words(name)}  ✕`, title: "Stop it", onclick: () => send({ do: "tool-stop", tool: name }) })));
+    make("button", { textContent: `${words(name)}  ✕`, title: "Stop it", "aria-label": `Stop ${name}`, onclick: () => send({ do: "tool-stop", tool: name }) })));
 });
 
 /** Whether the level, if there is one, has this tool. */

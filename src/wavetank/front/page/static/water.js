@@ -1,6 +1,6 @@
 // The panel of parameters: drawn from their declarations; what is live acts at once, the rest waits for a reset.
 
-import { find, make } from "./make.js";
+import { find, make, pretty, words } from "./make.js";
 import { on, send } from "./link.js";
 import { control } from "./slider.js";
 import { dial } from "./dial.js";
@@ -17,7 +17,7 @@ function set(about, value) {
 
 function showPending() {
   find("pending").hidden = pending.size === 0;
-  find("pending").querySelector("p").textContent = [...pending].map(([name, value]) => `${name.replaceAll("_", " ")} = ${value}`).join(", ");
+  find("pending").querySelector("p").textContent = [...pending].map(([name, value]) => `${words(name)} = ${typeof value === "number" ? pretty(value, 4) : value}`).join(", ");
 }
 
 find("pending").querySelector("button").onclick = () => {
@@ -31,8 +31,10 @@ function build({ parameters, values }) {
   everyday.replaceChildren(); more.replaceChildren(); controls.clear();
   for (const about of [...parameters].sort((a, b) => (b.name === "gravity") - (a.name === "gravity"))) {
     let made;
-    if (about.name === "gravity") made = dial((v) => set(about, v));
-    else {
+    if (about.name === "gravity") {
+      made = dial((v) => set(about, v));
+      made.show(values.gravity);
+    } else {
       const range = about.name === "spacing" ? { low: values.spacing / 2, high: values.spacing * 2, default: null } : {};
       made = control({ ...about, ...range }, values[about.name], (v) => set(about, v));
       if (!about.live) made.element.querySelector("label").append(make("small", { textContent: "at restart", title: "Takes effect when the water starts again" }));
@@ -53,4 +55,9 @@ function update(world) {
 }
 
 on("hello", (hello) => { declared = hello.parameters; shown = `${hello.title} ${hello.dim}`; build(hello); });
-on("status", ({ world }) => { if (world) update(world); });
+on("status", ({ world, game }) => {
+  if (world) update(world);
+  // In a level the water stays as it is: what cannot be changed takes no focus.
+  for (const part of [find("everyday"), find("more")]) part.inert = Boolean(game);
+  find("water").tabIndex = game ? 0 : -1; // what scrolls must be reached
+});

@@ -1,0 +1,66 @@
+"""Where a hand would act: a ring on the surface that its ray meets, a line to the floor, and what it would take."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from wavetank.foundation.errors import WavetankError
+from wavetank.session.session import Session
+from wavetank.session.tools import TOOL_NAMES
+from wavetank.session.tools.hand import Hand
+
+CORNERS = 40  # of the ring
+FOOT = 0.35  # of the ring: how large its mark on the floor is
+
+Place = list[float]  # u, v: shares of the picture's width and height
+
+
+def aim(session: Session, tool: str, u: float, v: float, reach: float, size: tuple[int, int]) -> dict[str, Any]:
+    """Return ring, line to the floor and its mark there as shares of a picture of `size` [px]; light up what is taken.
+
+    `u` and `v` are the pointer's place in that picture, `reach` the radius as a share of the world, 0 for no ring.
+    """
+    kind = TOOL_NAMES.get(tool)
+    if kind is None:
+        light(session, "")
+        return {}
+    camera, (width, height) = session.camera_of(tool), size
+    held = next((hand for other, hand in session.hands.values() if other.name == tool), None)
+    if held is None:
+        ray = camera.ray(u * width, v * height, width, height)
+        held = Hand(session.sim, *ray, session.most_particles, kind.through_water)  # type: ignore[arg-type]
+        takes = held.hit.kind == "solid" and (
+            kind.takes == "solid" or (kind.takes == "body" and _is_body(session, held))
+        )
+        light(session, held.hit.name if takes else "")
+    if not reach:
+        return {}
+    flat, center, radius = session.sim.scene.dim == 2, held.point, held.radius(reach)
+    around = [2.0 * math.pi * k / CORNERS for k in range(CORNERS + 1)]
+    turns = np.array([(math.cos(a), math.sin(a), 0.0) if flat else (math.cos(a), 0.0, math.sin(a)) for a in around])
+    result = {"ring": _seen(session, center + radius * turns, size)}
+    floor = np.array([center[0], held.lower[1], center[2]])
+    if not flat and center[1] - floor[1] > held.spacing:
+        result["drop"] = _seen(session, np.array([center, floor]), size)
+        result["foot"] = _seen(session, floor + FOOT * radius * turns, size)
+    return result
+
+
+def light(session: Session, name: str) -> None:
+    """Light up the solid of that name, and no other."""
+    if session.lit != name:
+        session.lit = name
+        session.changes += 1
+
+
+def _is_body(session: Session, hand: Hand) -> bool:
+    try:
+        return hand.hit.name in session.sim.bodies
+    except WavetankError:
+        return False
+
+
+def _seen(session: Session, points: np.ndarray, size: tuple[int, int]) -> list[Place]:
+    places = session.sight.project(points, *size)[:, :2] / size
+    return [[round(float(u), 4), round(float(v), 4)] for u, v in places] if np.isfinite(places).all() else []
