@@ -29,8 +29,10 @@ CARRY_PACE = 0.8  # of sqrt(g L): how fast a command carries a solid
 class SessionState:
     """One running world with all that commands change, and no time that passes by itself: see `Session`."""
 
-    def __init__(self, scene: Scene, arch: str, most_particles: int, history: History) -> None:
-        self.most_particles, self.arch, self.history = most_particles, arch, history
+    def __init__(
+        self, scene: Scene, arch: str, most_particles: int, history: History, own: Simulation | None = None
+    ) -> None:
+        self.most_particles, self.arch, self.history, self.own = most_particles, arch, history, own
         self.pace = Pace()
         self.notes: list[str] = []  # for the person, one sentence each
         self.paused, self.speed, self.steps_left = False, 1.0, 0
@@ -42,10 +44,16 @@ class SessionState:
         self.running: dict[str, tuple[Tool, Hand]] = {}
         self.moving: dict[str, tuple[Any, Any]] = {}
         self.commanded: list[Force] = []  # forces that tools push with in the next frame
-        self.begin(scene)
+        if own is None:
+            self.begin(scene)
+        else:
+            self._enter(scene, own)
 
     def begin(self, scene: Scene) -> None:
-        """Start a scene; raises `WavetankError` and changes nothing where it is too large."""
+        """Start a scene; raises `WavetankError` and changes nothing where it is too large.
+
+        A simulation of someone's own begins it as the object that it is, with the forces that were given to it.
+        """
         count = sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
         if count > self.most_particles:
             raise WavetankError(
@@ -61,6 +69,14 @@ class SessionState:
         sim = Simulation(scene, self.arch)
         if scene.emitters:
             sim.scene.assign("most_particles", min(scene.most_particles or self.most_particles, self.most_particles))
+        if self.own is not None:
+            extra = [force for force in self.own.forces if force not in self.own.scene.forces]
+            self.own.become(sim)
+            sim = self.own
+            sim.forces += extra
+        self._enter(scene, sim)
+
+    def _enter(self, scene: Scene, sim: Simulation) -> None:
         sim.load_kernels()
         game = Game(scene.goal, sim.frame(measured=False)) if scene.goal else None
         self.scene, self.sim, self.game = scene, sim, game

@@ -23,7 +23,6 @@ from wavetank.solids.solid import Solid
 class States(Contents):
     """How a world is kept and comes back. See `Simulation` for how it moves."""
 
-    arch: str | None
     solids: MovingSolids
     bodies: Bodies
     forces: list[Force]
@@ -41,6 +40,11 @@ class States(Contents):
 
     def _renew_solids(self) -> None:
         raise NotImplementedError
+
+    def become(self, other: Self) -> None:
+        """Take over all that `other` is, which must not be used any more; who holds this object holds that world."""
+        self.__dict__.clear()
+        self.__dict__.update(other.__dict__)
 
     def snapshot(self) -> Snapshot:
         """Return this instant as host arrays, for `resume`."""
