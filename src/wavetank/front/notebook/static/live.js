@@ -63,10 +63,10 @@ function render({ model, el }) {
 
   // --- the picture that the notebook keeps stands above, until there is a live one ---
   function hidePoster() {
-    for (let node = el, up = 0; node && up < 8 && !poster; node = node.parentElement, up += 1) {
+    // It is the output before this one; what is outside of the cell's outputs is not looked at.
+    for (let node = el, up = 0; node && up < 8 && !node.matches(".jp-OutputArea, .jp-Cell, .output_container"); node = node.parentElement, up += 1) {
       const before = node.previousElementSibling;
-      if (before?.querySelector("img") && !before.querySelector("canvas, iframe, video")) poster = before;
-      if (before && !poster) break;
+      if (before?.querySelector("img") && !before.querySelector("canvas")) { poster = before; break; }
     }
     if (poster) poster.style.display = "none";
   }
