@@ -63,13 +63,16 @@ def lab(tmp_path):
 
 def press(browser, key, code, number, held):
     for kind in ("keyDown", "keyUp"):
-        browser.call("Input.dispatchKeyEvent", type=kind, key=key, code=code, windowsVirtualKeyCode=number, modifiers=held)  # fmt: skip
+        browser.call(
+            "Input.dispatchKeyEvent", type=kind, key=key, code=code, windowsVirtualKeyCode=number, modifiers=held
+        )
 
 
 def test_played_saved_and_opened_again_without_a_kernel(lab, tmp_path):
     address, ask = lab
     path = tmp_path / "pool.ipynb"
-    cells = [{"cell_type": "code", "source": cell, "metadata": {}, "outputs": [], "execution_count": None} for cell in CELLS]  # fmt: skip
+    empty = {"cell_type": "code", "metadata": {}, "outputs": [], "execution_count": None}
+    cells = [{**empty, "source": cell} for cell in CELLS]
     about = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
     path.write_text(json.dumps({"cells": cells, "metadata": about, "nbformat": 4, "nbformat_minor": 4}))
     browser = Browser(tmp_path / "first", 1280, 1100)
@@ -78,6 +81,8 @@ def test_played_saved_and_opened_again_without_a_kernel(lab, tmp_path):
         browser.wait_for(IS_IDLE, 120)
         browser.click(".jp-CodeCell .cm-content")
         press(browser, "Enter", "Enter", 13, 8)
+        time.sleep(20)
+        browser.picture(__import__("pathlib").Path("/tmp/nbvenv/jl.png"))
         browser.wait_for(f"{SAID}.includes('particles')", 90)
         browser.wait_for(f"parseFloat({SAID}.slice(4)) > 5", 90)  # the first picture that is kept is of t = 4 s or so
         # The picture that is kept is out of sight while there is a live one.

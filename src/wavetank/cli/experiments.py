@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from wavetank import Scene, WavetankError
-from wavetank.cli.options import Arch, Json, SceneName, app, console
+from wavetank.cli.options import Arch, Json, Plain, SceneName, app, console
 
 CASE_NAMES = (
     "buckling, buoyancy, calm-vorticity, coiling, column, creep, cup, drop, elliptical-drop, emitter, energy, "
@@ -40,7 +40,7 @@ def converge(
             print(path)
 
 
-@app.command()
+@app.command(cls=Plain)
 def validate(
     cases: Cases = [],  # noqa: B006
     quick: Annotated[bool, typer.Option("--quick", help="Coarser and shorter runs with bounds of their own.")] = False,
@@ -62,7 +62,7 @@ def validate(
         raise WavetankError(f"{len(wrong)} of {total} figures are out of their bounds: {'; '.join(wrong)}.")
 
 
-@app.command()
+@app.command(cls=Plain)
 def bench(
     scenes: Annotated[
         list[str], typer.Argument(metavar="[SCENE]... [SIZE]...", help="Scenes, and further sizes.")
@@ -110,14 +110,15 @@ def doctor(
     if compare is not None:
         _compare_backends(compare, as_json)
         return
-    from wavetank.lab.doctor import examine
+    from wavetank.front.play import why_no_window
+    from wavetank.lab.doctor import examine, told
 
-    findings = examine()
+    findings = examine(why_no_window())
     if as_json:
         print(json.dumps(findings))
         return
     table = Table("what", "found", "note")
-    for row in findings["checks"]:
+    for row in told(findings["checks"]):
         table.add_row(row["name"], row["found"], row["note"])
     Console().print(table)
 

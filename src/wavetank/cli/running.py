@@ -20,11 +20,13 @@ from wavetank.cli.options import (
     Quality,
     SceneName,
     Settings,
+    Size,
     View,
     app,
     configured,
     console,
     names_in,
+    picture_name,
     size_of,
 )
 from wavetank.scene.scene import bundled_levels, scene_schema
@@ -71,7 +73,9 @@ def run(
     only: Only = "",
     every: Annotated[int, typer.Option(help="Export only each so manyth frame.")] = 1,
     fps: Annotated[float, typer.Option(help="Frames per second of water in video and files.")] = 30.0,
-    size: Annotated[str, typer.Option(help="Width x height of pictures.")] = "1280x720",
+    size: Annotated[
+        str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of a picture; 1280x720 unless told, of a GIF 640x360.")
+    ] = "",
     view: View = None,
     color_by: ColorBy = None,
     cut: Cut = None,
@@ -92,7 +96,7 @@ def run(
 
     world = configured(scene, settings)
     order = Order(
-        out, seconds, fps, size_of(size), name or Path(scene).stem, video=video, gif=gif, frames=frames,
+        out, seconds, fps, size_of(size or "1280x720"), name or Path(scene).stem, small_gif=not size, video=video, gif=gif, frames=frames,
         exports=names_in(export), only=names_in([only]), every=every, quality=quality,
         look={"view": view, "color_by": color_by, "cut": cut},
         checkpoint_every=checkpoint_every,
@@ -131,9 +135,10 @@ def render(
     at: Annotated[
         float | None, typer.Option(help="Time [s], to which a saved state goes on; its own, or a scene's best moment.")
     ] = None,
-    out: Annotated[Path, typer.Option(help="The picture, PNG.")] = Path("picture.png"),
-    width: Annotated[int, typer.Option(help="Pixels.")] = 1280,
-    height: Annotated[int, typer.Option(help="Pixels.")] = 720,
+    out: Annotated[Path | None, typer.Option(help="The picture, PNG; named after what is on it unless told.")] = None,
+    size: Size = "1280x720",
+    width: Annotated[int | None, typer.Option(hidden=True)] = None,  # both: what --size was called before
+    height: Annotated[int | None, typer.Option(hidden=True)] = None,
     view: View = None,
     color_by: ColorBy = None,
     cut: Cut = None,
@@ -153,8 +158,11 @@ def render(
     scene = None if world.endswith(".npz") else configured(world, settings)
     if scene is None and settings:
         raise WavetankError("--set does not go with a saved state, which has its scene with it.")
+    across, down = size_of(size)
+    out = out or picture_name(world, at, view, color_by)
+    across, down = (across if width is None else width), (down if height is None else height)
     figures = take(
-        world, scene, out, width, height, at=at, arch=arch, quality=quality, eye=eye, target=target, timings=timings,
+        world, scene, out, across, down, at=at, arch=arch, quality=quality, eye=eye, target=target, timings=timings,
         view=view, color_by=color_by, cut=cut,
     )  # fmt: skip
     if as_json:
