@@ -260,6 +260,8 @@ def test_doctor_says_what_works(wavetank):
         assert Path(notes[cache].removesuffix(" (may be deleted)")).is_absolute()
         assert rows[cache] == "empty" or rows[cache].endswith(("bytes", "kB", "MB", "GB"))
     said = wavetank("doctor").stdout
+    assert all(f"wavetank[{extra}]" in note for name, extra in (("anywidget", "notebook"), ("h5py", "hdf5"))
+               if rows[name] == "missing" for note in [notes[name]])  # fmt: skip
     assert "patches of the compiler" in said and "patch: " not in said  # one line, not one each
 
 

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
+from rich.markup import escape
+from rich.table import Column, Table
 
 from wavetank import Scene, WavetankError
 from wavetank.cli.options import Arch, Json, Plain, SceneName, app, console
@@ -117,9 +118,9 @@ def doctor(
     if as_json:
         print(json.dumps(findings))
         return
-    table = Table("what", "found", "note")
+    table = Table("what", "found", Column("note", overflow="fold"))
     for row in told(findings["checks"]):
-        table.add_row(row["name"], row["found"], row["note"])
+        table.add_row(*(escape(row[key]) for key in ("name", "found", "note")))  # wavetank[window] is no markup
     Console().print(table)
 
 

@@ -96,7 +96,8 @@ def run(
 
     world = configured(scene, settings)
     order = Order(
-        out, seconds, fps, size_of(size or "1280x720"), name or Path(scene).stem, small_gif=not size, video=video, gif=gif, frames=frames,
+        out, seconds, fps, size_of(size or "1280x720"), name or Path(scene).stem, small_gif=not size,
+        video=video, gif=gif, frames=frames,
         exports=names_in(export), only=names_in([only]), every=every, quality=quality,
         look={"view": view, "color_by": color_by, "cut": cut},
         checkpoint_every=checkpoint_every,
