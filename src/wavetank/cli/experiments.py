@@ -59,8 +59,9 @@ def validate(
     else:
         Console(width=None if sys.stdout.isatty() else 150).print(table(result))
     if wrong := out_of_bounds(result):
-        total = result["passed"] + result["failed"]
-        raise WavetankError(f"{len(wrong)} of {total} figures are out of their bounds: {'; '.join(wrong)}.")
+        total, known = result["passed"] + result["failed"], sum("(known: " in figure for figure in wrong)
+        news = f", {'all' if known == len(wrong) else known} of them known" if known else ""
+        raise WavetankError(f"{len(wrong)} of {total} figures are out of their bounds{news}: {'; '.join(wrong)}.")
 
 
 @app.command(cls=Plain)

@@ -29,7 +29,7 @@ from wavetank.cli.options import (
     picture_name,
     size_of,
 )
-from wavetank.scene.scene import bundled_levels, scene_schema
+from wavetank.scene.scene import bundled_counts, bundled_levels, scene_schema
 
 
 @app.command()
@@ -46,18 +46,21 @@ def scenes(
     rows = [(name, Scene.load(name)) for name in bundled_scenes()]
     levels, best = [(name, Scene.load(name)) for name in bundled_levels()], scores()
     if as_json:
-        about = {name: {"title": s.title, "dim": s.dim, "spacing": s.spacing} for name, s in rows}
+        about = {
+            name: {"title": s.title, "dim": s.dim, "spacing": s.spacing, "particles": bundled_counts()[name]}
+            for name, s in rows
+        }
         games = {name: {"title": s.title, "goal": s.goal.text, "best": best.get(name)} for name, s in levels if s.goal}
         print(json.dumps({**about, "levels": games}))
         return
     table = Table("scene", "title", "world", "particles")
     for name, scene in rows:
-        table.add_row(name, scene.title, f"{scene.dim}-D", f"{len(scene.particles()[0]):,}")
+        table.add_row(name, scene.title, f"{scene.dim}-D", f"{bundled_counts()[name]:,}")
     Console().print(table)
     board = Table("level", "goal", "particles", "stars")
     for name, scene in levels:
         stars = best.get(name, {}).get("stars", 0)
-        board.add_row(name, scene.goal.text if scene.goal else "", f"{len(scene.particles()[0]):,}", "*" * stars)
+        board.add_row(name, scene.goal.text if scene.goal else "", f"{bundled_counts()[name]:,}", "*" * stars)
     Console().print(board)
 
 

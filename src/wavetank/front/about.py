@@ -12,7 +12,7 @@ from wavetank.front.keys import KEYS, LOOK, SPEEDS
 from wavetank.front.picture import Painter
 from wavetank.front.theme import PAINTS
 from wavetank.scene.fluids import Points
-from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
+from wavetank.scene.scene import Scene, bundled_counts, bundled_levels, bundled_scenes
 from wavetank.session.session import Session
 from wavetank.session.tools import TOOLS, describe
 from wavetank.view.choices import colorings, views
@@ -107,13 +107,9 @@ def _outline(name: str, scene: Scene) -> dict[str, Any]:
             is_round = solid.shape in ("sphere", "capsule")
             shapes.append({"what": "solid", "round": is_round, **_box(solid.origin - half, solid.origin + half)})
     return {
-        "name": name, "title": scene.title or name, "dim": scene.dim, "count": round(_count(scene)), "shapes": shapes,
+        "name": name, "title": scene.title or name, "dim": scene.dim, "count": bundled_counts()[name], "shapes": shapes,
         "lower": extent.lower.tolist(), "upper": extent.upper.tolist(), "goal": scene.goal.text if scene.goal else "",
     }  # fmt: skip
-
-
-def _count(scene: Scene) -> float:
-    return sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
 
 
 def _box(lower: np.ndarray, upper: np.ndarray) -> dict[str, Any]:
