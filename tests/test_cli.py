@@ -11,6 +11,7 @@ import av
 import pytest
 
 from wavetank import cli
+from wavetank.scene.summary import bundled_counts
 
 ROOT = Path(__file__).parent.parent
 
@@ -244,6 +245,24 @@ def test_scenes_and_schema(wavetank, tmp_path):
     schema = json.loads(wavetank("scenes", "--schema").stdout)
     assert schema["properties"]["viscosity"]["maximum"] == 1.0
     assert "obstacle-tank" in wavetank("scenes").stdout
+
+
+def test_a_scene_that_needs_a_missing_package_spoils_nothing():
+    """Without trimesh the list, the cards of the page and all other scenes are there."""
+    code = """
+import sys
+sys.modules["trimesh"] = None
+from wavetank import cli
+from wavetank.front.about import scenes
+cards = {card["name"]: card for card in scenes()}
+print(len(cards), bool(cards["dam-break"]["shapes"]))
+sys.argv = ["wavetank", "scenes"]
+cli.main()
+"""
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
+    assert said.returncode == 0, said.stderr
+    assert said.stdout.startswith(f"{len(bundled_counts())} True")
+    assert "dam-break" in said.stdout and ": first pip install 'wavetank[mesh]'" in said.stdout
 
 
 def test_doctor_says_what_works(wavetank):

@@ -5,7 +5,8 @@ import pytest
 
 import wavetank as wt
 from wavetank.front.about import scenes
-from wavetank.scene.scene import bundled_counts, bundled_levels
+from wavetank.scene.scene import bundled_levels
+from wavetank.scene.summary import bundled_counts
 from wavetank.simulation.simulation import Simulation
 
 

@@ -29,7 +29,8 @@ from wavetank.cli.options import (
     picture_name,
     size_of,
 )
-from wavetank.scene.scene import bundled_counts, bundled_levels, scene_schema
+from wavetank.scene.scene import bundled_levels, scene_schema
+from wavetank.scene.summary import bundled_counts, bundled_title
 
 
 @app.command()
@@ -43,7 +44,12 @@ def scenes(
         return
     from wavetank.session.scores import scores
 
-    rows = [(name, Scene.load(name)) for name in bundled_scenes()]
+    rows, missing = [], []
+    for name in bundled_scenes():
+        try:
+            rows.append((name, Scene.load(name)))
+        except WavetankError as error:  # a package that it needs
+            missing.append((name, str(error).rpartition(": pip")[2]))
     levels, best = [(name, Scene.load(name)) for name in bundled_levels()], scores()
     if as_json:
         about = {
@@ -56,7 +62,11 @@ def scenes(
     table = Table("scene", "title", "world", "particles")
     for name, scene in rows:
         table.add_row(name, scene.title, f"{scene.dim}-D", f"{bundled_counts()[name]:,}")
+    for name, command in missing:
+        table.add_row(name, bundled_title(name), "", f"{bundled_counts()[name]:,}")
     Console().print(table)
+    for name, command in missing:
+        print(f"{name}: first pip{command}")
     board = Table("level", "goal", "particles", "stars")
     for name, scene in levels:
         stars = best.get(name, {}).get("stars", 0)

@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import PARAMETERS, Parameters
 from wavetank.front.keys import KEYS, LOOK, SPEEDS
 from wavetank.front.picture import Painter
 from wavetank.front.theme import PAINTS
 from wavetank.scene.fluids import Points
-from wavetank.scene.scene import Scene, bundled_counts, bundled_levels, bundled_scenes
+from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
+from wavetank.scene.summary import bundled_counts, bundled_title
 from wavetank.session.session import Session
 from wavetank.session.tools import TOOLS, describe
 from wavetank.view.choices import colorings, views
@@ -87,7 +89,16 @@ def _parameter(p: Any) -> dict[str, Any]:
 @functools.cache
 def scenes() -> list[dict[str, Any]]:
     """Return name, title, number of particles and outline of every bundled level and scene; levels have a goal."""
-    return [_outline(name, Scene.load(name)) for name in (*bundled_levels(), *bundled_scenes())]
+    return [_card(name) for name in (*bundled_levels(), *bundled_scenes())]
+
+
+def _card(name: str) -> dict[str, Any]:
+    """A scene as a card; one that needs a package that is missing here says so when it is chosen."""
+    try:
+        return _outline(name, Scene.load(name))
+    except WavetankError:
+        box = {"lower": [0.0] * 3, "upper": [1.0] * 3, "shapes": [], "dim": 3, "goal": ""}
+        return {"name": name, "title": bundled_title(name), "count": bundled_counts()[name], **box}
 
 
 def _outline(name: str, scene: Scene) -> dict[str, Any]:

@@ -344,15 +344,6 @@ def bundled_scenes() -> list[str]:
 
 
 @functools.cache
-def bundled_counts() -> dict[str, int]:
-    """Return how many particles each bundled scene and level begins with, those in solids left out."""
-    counts: dict[str, int] = json.loads(
-        (importlib.resources.files("wavetank.scene") / "counts.json").read_text("utf-8")
-    )
-    return counts
-
-
-@functools.cache
 def bundled_levels() -> tuple[str, ...]:
     """Names of the levels that come with the package, in the order in which they are played."""
     goals = {name: Scene.load(name).goal for name in _names("levels")}

@@ -1,6 +1,26 @@
-"""A scene in one line."""
+"""A scene in one line; what is known of bundled ones without making them."""
 
+import functools
+import importlib.resources
+import json
+import tomllib
 from typing import Any
+
+
+@functools.cache
+def bundled_counts() -> dict[str, int]:
+    """Return how many particles each bundled scene and level begins with, those in solids left out."""
+    text = (importlib.resources.files("wavetank.scene") / "counts.json").read_text("utf-8")
+    counts: dict[str, int] = json.loads(text)
+    return counts
+
+
+def bundled_title(name: str) -> str:
+    """Return the title of a bundled scene or level, even of one that needs a package which is missing here."""
+    folder = importlib.resources.files("wavetank.scene")
+    files = [folder / kind / f"{name}.toml" for kind in ("scenes", "levels")]
+    text = next(file for file in files if file.is_file()).read_text("utf-8")
+    return str(tomllib.loads(text).get("title", name))
 
 
 def summary(scene: Any) -> str:
