@@ -172,6 +172,7 @@ def test_architecture_names_every_file_and_no_other():
         "scene/scenes/*.toml",
         "scene/levels/*.toml",
         "front/page/static/*",
+        "front/notebook/static/*",
         "solids/models/*.obj",
         "solids/models/*.png",
     }

@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -8,6 +9,10 @@ from pathlib import Path
 
 import av
 import pytest
+
+from wavetank.scene.summary import bundled_counts
+
+ROOT = Path(__file__).parent.parent
 
 
 def process(*arguments: str) -> subprocess.CompletedProcess:
@@ -125,6 +130,45 @@ def test_render_draws_scenes_and_states(wavetank, tmp_path):
     assert not (tmp_path / "d.png").exists()
 
 
+def test_pictures_are_named_after_what_is_on_them(wavetank, tmp_path, monkeypatch):
+    """The commands under the pictures of README.md leave a file each; sizes are said in one way."""
+    from PIL import Image
+
+    monkeypatch.chdir(tmp_path)
+    for more in ((), ("--view", "particles"), ("--view", "slice"), ("--at", "0.1"), ("--color-by", "#ff0000")):
+        result = wavetank("render", "drop-2d", "--set", "spacing=0.05", "--size", "96x54", "--quality", "draft", *more)
+        assert result.returncode == 0, result.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "drop-2d-0.1s.png", "drop-2d-ff0000.png", "drop-2d-particles.png", "drop-2d-slice.png", "drop-2d.png",
+    ]  # fmt: skip
+    assert Image.open("drop-2d-slice.png").size == (96, 54)
+    assert "--size = '96' is not allowed" in wavetank("render", "drop-2d", "--size", "96").stderr
+    lines = re.findall(r"`wavetank render ([^`]*)`", (ROOT / "README.md").read_text())
+    names = {(line.split()[0], *re.findall(r"--(?:view|at) (\S+)", line)) for line in lines if "--out" not in line}
+    assert len(names) >= len({line for line in lines if "--out" not in line}) - 1  # one is shown twice, finer
+
+
+def test_several_formats_in_one_word_and_a_small_gif(wavetank, tmp_path):
+    from PIL import Image
+
+    run = ("run", "drop-2d", "--seconds", "0.05", "--set", "spacing=0.05", "--fps", "20", "--out", str(tmp_path))
+    result = wavetank(*run, "--export", "npz,ply", "--export", "csv", "--gif")
+    assert result.returncode == 0, result.stderr
+    assert {path.suffix for path in tmp_path.iterdir()} >= {".npz", ".ply", ".csv", ".gif"}
+    with Image.open(tmp_path / "drop-2d.gif") as picture:
+        assert picture.size == (640, 360)
+    assert wavetank(*run, "--gif", "--size", "800x450").returncode == 0
+    with Image.open(tmp_path / "drop-2d.gif") as picture:
+        assert picture.size == (800, 450)  # what is asked for
+
+
+@pytest.mark.parametrize("command", ["scenes", "run", "render", "play", "replay", "resume", "export", "import",
+                                     "converge", "validate", "bench", "doctor"])  # fmt: skip
+def test_help_is_for_people(wavetank, command):
+    text = wavetank(command, "--help").stdout
+    assert "list[" not in text and "--width" not in text
+
+
 def test_a_broken_scene_file_is_one_line(wavetank, tmp_path):
     path = tmp_path / "mine.toml"
     for text, words in (
@@ -187,6 +231,24 @@ def test_scenes_and_schema(wavetank, tmp_path):
     assert "obstacle-tank" in wavetank("scenes").stdout
 
 
+def test_a_scene_that_needs_a_missing_package_spoils_nothing():
+    """Without trimesh the list, the cards of the page and all other scenes are there."""
+    code = """
+import sys
+sys.modules["trimesh"] = None
+from wavetank import cli
+from wavetank.front.about import scenes
+cards = {card["name"]: card for card in scenes()}
+print(len(cards), bool(cards["dam-break"]["shapes"]))
+sys.argv = ["wavetank", "scenes"]
+cli.main()
+"""
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
+    assert said.returncode == 0, said.stderr
+    assert said.stdout.startswith(f"{len(bundled_counts())} True")
+    assert "dam-break" in said.stdout and ": first pip install 'wavetank[mesh]'" in said.stdout
+
+
 def test_doctor_says_what_works(wavetank):
     findings = json.loads(wavetank("doctor", "--json").stdout)
     rows = {row["name"]: row["found"] for row in findings["checks"]}
@@ -194,6 +256,16 @@ def test_doctor_says_what_works(wavetank):
     assert rows["back end cpu"] == "works"
     assert rows["back end metal"] in ("not here", "available")
     assert wavetank("doctor").returncode == 0
+    assert rows["display"] in ("window", "page only")
+    assert {"pysplashsurf", "rapier3d", "usd-core", "h5py", "anywidget"} <= set(rows)
+    notes = {row["name"]: row["note"] for row in findings["checks"]}
+    for cache in ("cache of kernels", "cache of meshes"):
+        assert Path(notes[cache].removesuffix(" (may be deleted)")).is_absolute()
+        assert rows[cache] == "empty" or rows[cache].endswith(("bytes", "kB", "MB", "GB"))
+    said = wavetank("doctor").stdout
+    assert all(f"wavetank[{extra}]" in note for name, extra in (("anywidget", "notebook"), ("h5py", "hdf5"))
+               if rows[name] == "missing" for note in [notes[name]])  # fmt: skip
+    assert "patches of the compiler" in said and "patch: " not in said  # one line, not one each
 
 
 def test_converge_draws_the_reports_figures(wavetank, tmp_path):

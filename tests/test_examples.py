@@ -21,3 +21,6 @@ def test_example_runs(path, tmp_path):
 
 def test_there_are_examples():
     assert len(EXAMPLES) >= 4
+    assert [path.name[:2] for path in EXAMPLES] == [
+        f"{number:02d}" for number in range(len(EXAMPLES))
+    ]  # none is skipped

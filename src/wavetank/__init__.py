@@ -28,7 +28,7 @@ from wavetank.solids.motion import Keyframe, Motion, sampled
 from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
 
 if TYPE_CHECKING:
-    from wavetank.front.notebook import show
+    from wavetank.front.notebook.show import show
     from wavetank.session import commands
     from wavetank.session.recording import Recording, replay
     from wavetank.session.session import Session
@@ -55,7 +55,7 @@ LATER = {
     "commands": "wavetank.session.commands",
     "render": "wavetank.view.renderer",
     "replay": "wavetank.session.recording",
-    "show": "wavetank.front.notebook",
+    "show": "wavetank.front.notebook.show",
 }
 
 

@@ -190,23 +190,6 @@ def test_one_drives_the_others_watch(playing):
         wait_until(lambda: world.session.sim.viscosity == 0.2)
 
 
-def test_a_notebook_shows_the_same_page():
-    sim = wt.Simulation(POOL)
-    sim.advance(0.1)
-    shown = wt.show(sim)
-    try:
-        assert shown.session.sim.time == sim.time
-        assert "<iframe src=" in shown._repr_html_()
-        assert status_of(shown.url) == 200
-        assert (
-            "frame-ancestors 'self' http://127.0.0.1:* http://localhost:*"
-            in (urllib.request.urlopen(shown.url).headers["content-security-policy"])
-        )
-    finally:
-        shown.stop()
-    assert not shown._thread.is_alive()
-
-
 def test_one_picture_is_on_its_way_at_a_time(playing):
     world = playing(POOL)
     with connect(world.socket, max_size=None) as socket:

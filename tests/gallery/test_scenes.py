@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 import wavetank as wt
+from wavetank.front.about import scenes
+from wavetank.scene.scene import bundled_levels
+from wavetank.scene.summary import bundled_counts
 from wavetank.simulation.simulation import Simulation
 
 
@@ -27,6 +30,13 @@ def test_scene_runs_and_shows(name):
     assert image.std() > 10
     colourful = np.ptp(image.astype(int), axis=2) > 60
     assert 0.01 < colourful.mean() < 0.9, "the fluids fill a fair part of the picture"
+
+
+@pytest.mark.parametrize("name", [*wt.bundled_scenes(), *bundled_levels()])
+def test_card_command_line_and_world_count_alike(name):
+    """A new scene's count goes into scene/counts.json: {name: number}."""
+    assert bundled_counts()[name] == Simulation(wt.Scene.load(name)).count
+    assert next(card["count"] for card in scenes() if card["name"] == name) == bundled_counts()[name]
 
 
 @pytest.mark.parametrize("name", wt.bundled_scenes())

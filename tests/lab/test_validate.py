@@ -15,6 +15,7 @@ from wavetank.lab.cases.case import Case, Figure, Outcome, measured, surface
 from wavetank.lab.cases.cup import holds, within
 from wavetank.lab.cases.cup import scene as cups
 from wavetank.lab.cases.elliptical_drop import hull_area
+from wavetank.lab.cases.known import KNOWN, Known
 from wavetank.lab.cases.martin_moyce import A, front
 from wavetank.lab.cases.packing import settled
 from wavetank.lab.cases.seeds import world
@@ -28,16 +29,6 @@ QUICK = ["still-tank", "column", "martin-moyce", "lobovsky", "standing-wave", "e
          "buckling", "tension-drop", "calm-vorticity", "emitter", "buoyancy", "heave", "water-entry"]  # fmt: skip
 
 
-#: Figures that do not reach their bounds yet (docs/method.md, "What is still open"), kept from getting worse.
-OPEN = {
-    "elliptical-drop: area at tau = 1, error": (-4.0, 15.0),  # a hull of few particles; the full run has 2 %
-    # docs/bodies.md, "What it is compared with"
-    "buoyancy: 2-D, 0.5: v_rms at rest": (0.0, 0.06), "buoyancy: 2-D, 8: v_rms at rest": (0.0, 0.03),
-    "heave: 2-D barge, heave: half a period, over linear theory's": (0.8, 1.35),
-    "heave: 2-D barge, roll: half a period, over linear theory's": (0.9, 1.1),
-}  # fmt: skip
-
-
 def test_the_help_names_all_cases():
     assert experiments.CASE_NAMES.split(", ") == sorted(case.name for case in CASES)
 
@@ -45,10 +36,10 @@ def test_the_help_names_all_cases():
 @pytest.mark.parametrize("name", QUICK)
 def test_quick_case_is_within_its_bounds(name):
     result = room.validate([name], quick=True)
-    assert [figure for figure in room.out_of_bounds(result) if figure not in OPEN] == []
+    assert [figure for figure in room.out_of_bounds(result) if "(known: " not in figure] == []
     for figure in result["cases"][name]["figures"]:
-        low, high = OPEN.get(f"{name}: {figure['name']}", (-math.inf, math.inf))
-        assert low <= figure["value"] <= high, figure["name"]
+        entry = KNOWN.get(f"{name}: {figure['name']}")
+        assert entry is None or entry.low <= figure["value"] <= entry.high, figure["name"]
 
 
 def test_names_and_titles_are_unique():
@@ -202,6 +193,22 @@ def test_command(value, code, monkeypatch, capsys, tmp_path):
         assert "1 of 1 figures are out of their bounds: invented: depth." in lines[0]
     assert (tmp_path / "invented" / "invented.csv").read_text().split() == ["time,level", "0.0,3.0", "1.0,"]
     assert (tmp_path / "invented" / "invented.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(("value", "quick", "said"), [
+    (1.5, True, "bounds, all of them known: invented: depth (known: the floor is young)"),
+    (3.0, True, "bounds: invented: depth."),  # worse than what is known
+    (1.5, False, "bounds: invented: depth."),
+])  # fmt: skip
+def test_quick_runs_say_which_failures_are_known(value, quick, said, monkeypatch, capsys):
+    monkeypatch.setattr(room, "CASES", (invented(value),))
+    monkeypatch.setitem(KNOWN, "invented: depth", Known(0.0, 2.0, "the floor is young"))
+    monkeypatch.setattr(sys, "argv", ["wavetank", "validate", *(["--quick"] if quick else [])])
+    with pytest.raises(SystemExit) as leave:
+        cli.main()
+    printed = capsys.readouterr()
+    assert leave.value.code == 1 and said in printed.err
+    assert ("known" in printed.out) == ("known" in said)
 
 
 def test_without_a_folder_nothing_is_written(monkeypatch, capsys, tmp_path):

@@ -332,7 +332,7 @@ def test_play_records_and_replay_repeats(tmp_path):
 
 
 class Lift(Force):
-    """A force of one's own, as in examples/05."""
+    """A force of one's own, as in examples/04."""
 
     def apply(self, particles, count, dt, time):
         pass

@@ -12,7 +12,10 @@ from wavetank.cli.options import Json, Only, app, console, names_in
 @app.command()
 def export(
     source: Annotated[Path, typer.Argument(metavar="RUN|STATE.npz|RECORDING.toml|FRAMES.h5", help="What was kept.")],
-    to: Annotated[list[str], typer.Option(help="Formats: usd, vtkhdf, vtp, h5, npz, csv, ply, obj; several as a,b.")],
+    to: Annotated[
+        list[str],
+        typer.Option(metavar="FORMATS", help="Formats: usd, vtkhdf, vtp, h5, npz, csv, ply, obj; several as a,b."),
+    ],
     out: Annotated[Path | None, typer.Option(help="Folder for the files; where the source is unless told.")] = None,
     only: Only = "",
     every: Annotated[int, typer.Option(help="Write only each so manyth frame.")] = 1,

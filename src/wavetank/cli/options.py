@@ -1,29 +1,44 @@
 """What several commands share: the application, options that they have in common, and how texts become values."""
 
 import tomllib
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from typer.core import TyperCommand
 
 from wavetank import Scene, WavetankError, __version__
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 console = Console(stderr=True)
+PYTHONS = "<list[str]>"
 
 SceneName = Annotated[str, typer.Argument(help="A bundled scene or the path of a TOML file.")]
 Settings = Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="Set a key of the scene.")]
 Arch = Annotated[str, typer.Option(help="Back end: cpu, gpu (the best there is), cuda, vulkan, metal, amdgpu.")]
+Size = Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of a picture.")]
 View = Annotated[str | None, typer.Option(help="water, particles, slice or foam; water unless particles are coloured.")]
 Quality = Annotated[str, typer.Option(help="draft, standard (2 x 2 samples a pixel) or film (64 pictures averaged).")]
 ColorBy = Annotated[str | None, typer.Option(help="speed, density, material, foam, or a colour such as #3f99da.")]
 Cut = Annotated[str | None, typer.Option(help="Where a slice lies: z=0.35 for example.")]
 Exports = Annotated[
-    list[str], typer.Option(help="Write each frame: usd, vtkhdf, vtp, h5, npz, csv, ply, obj; several as usd,npz.")
+    list[str],
+    typer.Option(
+        metavar="FORMATS", help="Write each frame: usd, vtkhdf, vtp, h5, npz, csv, ply, obj; several as usd,npz."
+    ),
 ]
 Only = Annotated[str, typer.Option(help="Parts of it: particles, foam, solids, surface; all but the surface.")]
 AllowLarge = Annotated[bool, typer.Option("--allow-large", help="Begin what needs more memory than is free, or hours.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object as the last line.")]
+
+
+class Plain(TyperCommand):
+    """A command whose help says of its arguments what a person types, and not what Python makes of it."""
+
+    def get_help(self, ctx: Any) -> str:
+        """Return the help, with its columns where they were."""
+        return super().get_help(ctx).replace(PYTHONS, " " * len(PYTHONS))
 
 
 @app.callback(invoke_without_command=True)
@@ -57,6 +72,13 @@ def value_of(text: str) -> Any:
 def names_in(texts: list[str]) -> tuple[str, ...]:
     """Return the names in texts such as "usd,npz", each once."""
     return tuple(dict.fromkeys(name.strip() for text in texts for name in text.split(",") if name.strip()))
+
+
+def picture_name(world: str, at: float | None, view: str | None, color_by: str | None) -> Path:
+    """Return the name of a picture that says what is on it, so that two commands leave two files."""
+    seconds = None if at is None else f"{at:g}s"
+    parts = [Path(world).resolve().stem, seconds, view, color_by.lstrip("#") if color_by else None]
+    return Path("-".join(part for part in parts if part) + ".png")
 
 
 def size_of(text: str) -> tuple[int, int]:

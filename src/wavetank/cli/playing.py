@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from wavetank import WavetankError
-from wavetank.cli.options import Arch, Json, Settings, app, configured, console, size_of
+from wavetank.cli.options import Arch, Json, Settings, Size, app, configured, console, size_of
 from wavetank.scene.scene import bundled_levels, with_particles
 
 
@@ -53,7 +53,7 @@ def replay(
     session: Annotated[Path, typer.Argument(help="A session that play or the page recorded.")],
     video: Annotated[Path | None, typer.Option(help="Write an MP4.")] = None,
     fps: Annotated[float, typer.Option(help="Frames per second of the video.")] = 60.0,
-    size: Annotated[str, typer.Option(help="Width x height of the video.")] = "1280x720",
+    size: Size = "1280x720",
     arch: Annotated[str, typer.Option(help="Back end; that of the recording unless given.")] = "",
     as_json: Json = False,
 ) -> None:

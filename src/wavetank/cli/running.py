@@ -20,14 +20,17 @@ from wavetank.cli.options import (
     Quality,
     SceneName,
     Settings,
+    Size,
     View,
     app,
     configured,
     console,
     names_in,
+    picture_name,
     size_of,
 )
 from wavetank.scene.scene import bundled_levels, scene_schema
+from wavetank.scene.summary import bundled_counts, bundled_title
 
 
 @app.command()
@@ -41,21 +44,33 @@ def scenes(
         return
     from wavetank.session.scores import scores
 
-    rows = [(name, Scene.load(name)) for name in bundled_scenes()]
+    rows, missing = [], []
+    for name in bundled_scenes():
+        try:
+            rows.append((name, Scene.load(name)))
+        except WavetankError as error:  # a package that it needs
+            missing.append((name, str(error).rpartition(": pip")[2]))
     levels, best = [(name, Scene.load(name)) for name in bundled_levels()], scores()
     if as_json:
-        about = {name: {"title": s.title, "dim": s.dim, "spacing": s.spacing} for name, s in rows}
+        about = {
+            name: {"title": s.title, "dim": s.dim, "spacing": s.spacing, "particles": bundled_counts()[name]}
+            for name, s in rows
+        }
         games = {name: {"title": s.title, "goal": s.goal.text, "best": best.get(name)} for name, s in levels if s.goal}
         print(json.dumps({**about, "levels": games}))
         return
     table = Table("scene", "title", "world", "particles")
     for name, scene in rows:
-        table.add_row(name, scene.title, f"{scene.dim}-D", f"{len(scene.particles()[0]):,}")
+        table.add_row(name, scene.title, f"{scene.dim}-D", f"{bundled_counts()[name]:,}")
+    for name, command in missing:
+        table.add_row(name, bundled_title(name), "", f"{bundled_counts()[name]:,}")
     Console().print(table)
+    for name, command in missing:
+        print(f"{name}: first pip{command}")
     board = Table("level", "goal", "particles", "stars")
     for name, scene in levels:
         stars = best.get(name, {}).get("stars", 0)
-        board.add_row(name, scene.goal.text if scene.goal else "", f"{len(scene.particles()[0]):,}", "*" * stars)
+        board.add_row(name, scene.goal.text if scene.goal else "", f"{bundled_counts()[name]:,}", "*" * stars)
     Console().print(board)
 
 
@@ -71,7 +86,9 @@ def run(
     only: Only = "",
     every: Annotated[int, typer.Option(help="Export only each so manyth frame.")] = 1,
     fps: Annotated[float, typer.Option(help="Frames per second of water in video and files.")] = 30.0,
-    size: Annotated[str, typer.Option(help="Width x height of pictures.")] = "1280x720",
+    size: Annotated[
+        str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of a picture; 1280x720 unless told, of a GIF 640x360.")
+    ] = "",
     view: View = None,
     color_by: ColorBy = None,
     cut: Cut = None,
@@ -92,7 +109,8 @@ def run(
 
     world = configured(scene, settings)
     order = Order(
-        out, seconds, fps, size_of(size), name or Path(scene).stem, video=video, gif=gif, frames=frames,
+        out, seconds, fps, size_of(size or "1280x720"), name or Path(scene).stem, small_gif=not size,
+        video=video, gif=gif, frames=frames,
         exports=names_in(export), only=names_in([only]), every=every, quality=quality,
         look={"view": view, "color_by": color_by, "cut": cut},
         checkpoint_every=checkpoint_every,
@@ -137,9 +155,13 @@ def render(
             "--at", "--time", help="Time [s]: a scene's best moment, a state's own, a run's last unless told."
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="The picture, PNG; of a run, MP4 or GIF for a film.")] = Path("picture.png"),
-    width: Annotated[int, typer.Option(help="Pixels.")] = 1280,
-    height: Annotated[int, typer.Option(help="Pixels.")] = 720,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="The picture, PNG, named after what is on it unless told; of a run, MP4 or GIF for a film."),
+    ] = None,
+    size: Size = "1280x720",
+    width: Annotated[int | None, typer.Option(hidden=True)] = None,  # both: what --size was called before
+    height: Annotated[int | None, typer.Option(hidden=True)] = None,
     view: View = None,
     color_by: ColorBy = None,
     cut: Cut = None,
@@ -159,16 +181,19 @@ def render(
     from wavetank.front.kept import FILMS, is_kept
     from wavetank.front.still import take
 
+    out = out or picture_name(world, at, view, color_by)
     kept = is_kept(world) or (world.endswith(".toml") and out.suffix.lower() in FILMS)
     scene = None if kept or world.endswith(".npz") else configured(world, settings)
     if scene is None and settings:
         raise WavetankError("--set does not go with a saved state or a run, which has its scene with it.")
+    across, down = size_of(size)
+    across, down = (across if width is None else width), (down if height is None else height)
     if out.suffix.lower() in FILMS:
-        _film(world, out, (width, height), at, kept, as_json, arch=arch, quality=quality or "draft",
+        _film(world, out, (across, down), at, kept, as_json, arch=arch, quality=quality or "draft",
               view=view, color_by=color_by, cut=cut)  # fmt: skip
         return
     figures = take(
-        world, scene, out, width, height, at=at, arch=arch, quality=quality or "standard", eye=eye, target=target,
+        world, scene, out, across, down, at=at, arch=arch, quality=quality or "standard", eye=eye, target=target,
         timings=timings, view=view, color_by=color_by, cut=cut,
     )  # fmt: skip
     if as_json:

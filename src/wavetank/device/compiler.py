@@ -30,8 +30,8 @@ patches.apply_all()
 warnings.filterwarnings("ignore", module=r"quadrants\.lang\._fast_caching")
 
 __all__ = [
-    "BACKENDS", "LANES", "available_backends", "current_backend", "download", "lanes", "qd", "start", "synchronize",
-    "threads", "upload", "watched", "worth_sharing",
+    "BACKENDS", "LANES", "available_backends", "cache_folder", "current_backend", "download", "lanes", "qd", "start",
+    "synchronize", "threads", "upload", "watched", "worth_sharing",
 ]  # fmt: skip
 
 #: Names a user may pass as ``arch``; ``gpu`` means the best one present.
@@ -53,6 +53,13 @@ def available_backends() -> list[str]:
 def current_backend() -> str | None:
     """Return the concrete back end that is running, or None before `start`."""
     return _current
+
+
+def cache_folder() -> pathlib.Path:
+    """Return the folder where compiled kernels are kept, for all programs of this user; it may be deleted."""
+    from quadrants.lang import impl
+
+    return pathlib.Path(impl.default_cfg().offline_cache_file_path)
 
 
 def start(arch: str = "cpu", *, threads: int | None = None) -> str:

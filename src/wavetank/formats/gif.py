@@ -74,4 +74,13 @@ class GifWriter:
         self._pictures = []
 
 
+def resized(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Return a picture, uint8 [height, width, 3], with so many pixels in width and height."""
+    from PIL import Image
+
+    if image.shape[1::-1] == size:
+        return image
+    return np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BOX))
+
+
 write = GifWriter

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import PARAMETERS, Parameters
 from wavetank.front.keys import KEYS, LOOK, SPEEDS
 from wavetank.front.picture import Painter
@@ -14,6 +15,7 @@ from wavetank.front.theme import PAINTS
 from wavetank.front.units import readable, units
 from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
+from wavetank.scene.summary import bundled_counts, bundled_title
 from wavetank.session.session import Session
 from wavetank.session.tools import TOOLS, describe
 from wavetank.view.choices import colorings, options, views
@@ -120,7 +122,16 @@ def _parameter(p: Any) -> dict[str, Any]:
 @functools.cache
 def scenes() -> list[dict[str, Any]]:
     """Return name, title, number of particles and outline of every bundled level and scene; levels have a goal."""
-    return [_outline(name, Scene.load(name)) for name in (*bundled_levels(), *bundled_scenes())]
+    return [_card(name) for name in (*bundled_levels(), *bundled_scenes())]
+
+
+def _card(name: str) -> dict[str, Any]:
+    """A scene as a card; one that needs a package that is missing here says so when it is chosen."""
+    try:
+        return _outline(name, Scene.load(name))
+    except WavetankError:
+        box = {"lower": [0.0] * 3, "upper": [1.0] * 3, "shapes": [], "dim": 3, "goal": ""}
+        return {"name": name, "title": bundled_title(name), "count": bundled_counts()[name], **box}
 
 
 def _outline(name: str, scene: Scene) -> dict[str, Any]:
@@ -140,18 +151,9 @@ def _outline(name: str, scene: Scene) -> dict[str, Any]:
             is_round = solid.shape in ("sphere", "capsule")
             shapes.append({"what": "solid", "round": is_round, **_box(solid.origin - half, solid.origin + half)})
     return {
-        "name": name, "title": scene.title or name, "dim": scene.dim, "count": _about(_count(scene)), "shapes": shapes,
+        "name": name, "title": scene.title or name, "dim": scene.dim, "count": bundled_counts()[name], "shapes": shapes,
         "lower": extent.lower.tolist(), "upper": extent.upper.tolist(), "goal": scene.goal.text if scene.goal else "",
     }  # fmt: skip
-
-
-def _about(count: float) -> int:
-    """Return two digits of an estimate: what solids and packings leave out is known once it is made."""
-    return int(float(f"{count:.2g}"))
-
-
-def _count(scene: Scene) -> float:
-    return sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
 
 
 def _box(lower: np.ndarray, upper: np.ndarray) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from wavetank.formats.gif import LARGEST_RATE, GifWriter
+from wavetank.formats.gif import LARGEST_RATE, GifWriter, resized
 from wavetank.formats.mp4 import VideoWriter
 from wavetank.formats.outputs import Outputs, check_exports, parts_named
 from wavetank.formats.plan import Viewpoint
@@ -32,6 +32,7 @@ from wavetank.view.extent import extent_of
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import QUALITIES, quality_named
 
+GIF_WIDTH = 640  # px
 WORST = ("density_error_mean", "density_error_p99", "speed_max")
 Sink = Callable[[int, Frame, Any], None]  # takes the number of a frame, the frame and its picture (or None)
 
@@ -58,6 +59,7 @@ class Order:
     name: str = "run"  # front part of the files' names
     video: bool = False
     gif: bool = False
+    small_gif: bool = False  # a GIF has pictures of at most GIF_WIDTH: it packs worse than any video
     frames: bool = False  # a picture each
     exports: tuple[str, ...] = ()  # formats of frames
     only: tuple[str, ...] = ()  # parts of a frame that these hold, see `instant.PARTS`; all but the surface without any
@@ -108,6 +110,12 @@ class Order:
             every=self.every, quality=self.quality,
             look={name: str(value) for name, value in self.look.items() if value is not None},
         )  # fmt: skip
+
+    @property
+    def gif_size(self) -> tuple[int, int]:
+        """Pixels of a GIF."""
+        share = min(1.0, GIF_WIDTH / self.size[0]) if self.small_gif else 1.0
+        return max(1, round(share * self.size[0])), max(1, round(share * self.size[1]))
 
     def path(self, suffix: str) -> Path:
         """Return the file of that suffix."""
@@ -239,8 +247,9 @@ def _open_sinks(order: Order, stack: ExitStack, work: _Work) -> dict[str, Sink]:
         film = work.open_film(stack)
         sinks[str(order.path(".mp4"))] = lambda number, frame, image: film.write(image)
     if order.gif:
-        loop = stack.enter_context(GifWriter(order.path(".gif"), *order.size, order.fps))
-        sinks[str(order.path(".gif"))] = lambda number, frame, image: loop.write(image)
+        size = order.gif_size
+        loop = stack.enter_context(GifWriter(order.path(".gif"), *size, order.fps))
+        sinks[str(order.path(".gif"))] = lambda number, frame, image: loop.write(resized(image, size))
     if order.frames:
         sinks[str(order.path("-#####.png"))] = lambda number, frame, image: write_png(
             order.path(f"-{number:05d}.png"), image

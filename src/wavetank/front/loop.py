@@ -90,11 +90,11 @@ class Loop:
     def run(self) -> None:
         """Let the water move until `stop`."""
         while not self._stopped.is_set():
-            self._turn_or_pause()
+            self.turn_or_pause()
             self.session.rest(REST, asleep=not self.audience.looks)
         self.session.drain()  # what was done while the last frame was computed belongs to the recording
 
-    def _turn_or_pause(self) -> None:
+    def turn_or_pause(self) -> None:
         """Turn; what nobody thought of stops the time, is told, and ends nothing."""
         try:
             self.turn()

@@ -5,9 +5,12 @@ import os
 import platform
 import shutil
 import sys
+from pathlib import Path
 from typing import Any
 
 from wavetank.device import compiler, patches
+from wavetank.foundation.folders import cache_folder
+from wavetank.foundation.memory import in_words
 
 _PACKAGES = {
     "quadrants": "", "numpy": "", "pydantic": "", "typer": "", "rich": "", "pillow": "", "av": "", "tomli-w": "",
@@ -16,12 +19,23 @@ _PACKAGES = {
         ("imgui-bundle", "moderngl", "glfw", "svg.path"), "the window of `wavetank play`: pip install wavetank[window]"
     ),
     "trimesh": "solids from OBJ, STL, PLY and GLB files: pip install wavetank[mesh]",
+    "pysplashsurf": "surfaces in OBJ, USD, PLY and others: pip install wavetank[surface]",
+    "rapier3d": "solids that float: pip install wavetank[bodies]",
+    "usd-core": "USD: pip install wavetank[usd]",
+    "h5py": "VTKHDF and tables: pip install wavetank[hdf5]",
+    "anywidget": "`wt.show` in notebooks: pip install wavetank[notebook]",
     "matplotlib": "plots of `wavetank converge` and `validate`: pip install wavetank[plot]",
 }  # fmt: skip
 
 
-def examine() -> dict[str, Any]:
-    """Return versions, back ends and what is missing, as plain data: {"ok": bool, "checks": [...]}."""
+IN_FORCE = "in force"
+
+
+def examine(no_window: str | None = None) -> dict[str, Any]:
+    """Return versions, back ends and what is missing, as plain data: {"ok": bool, "checks": [...]}.
+
+    `no_window` is why there can be no window here, None where there can.
+    """
     checks = [
         _check("wavetank", importlib.metadata.version("wavetank"), ""),
         _check("python", platform.python_version(), sys.executable),
@@ -42,10 +56,12 @@ def examine() -> dict[str, Any]:
         checks.append(_check(f"back end {name}", found, _BACKEND_NOTES.get(name, "") if found == "not here" else ""))
     best = next(iter(available))
     checks.append(_check("--arch gpu", best if best != "cpu" else "not here", "the best graphics processor there is"))
+    checks.append(_check("display", "page only" if no_window else "window", no_window or "`wavetank play` opens one"))
     checks += [
-        _check(f"patch: {patch.name}", "does not fit" if patch.misfit else "in force", _about(patch))
+        _check(f"patch: {patch.name}", "does not fit" if patch.misfit else IN_FORCE, _about(patch))
         for patch in patches.PATCHES
     ]
+    checks += [_cache("cache of kernels", compiler.cache_folder()), _cache("cache of meshes", cache_folder())]
     checks.append(_check("terminal", str(shutil.get_terminal_size()[0]), "columns"))
     return {"ok": not [name for name in missing if not _PACKAGES[name]], "checks": checks}
 
@@ -62,6 +78,20 @@ def _about(patch: patches.Patch) -> str:
     if patch.misfit is None:
         return patch.sentence
     return f"{patch.misfit}; made for Quadrants {' and '.join(patch.versions)}: kernels work, and start slower"
+
+
+def told(checks: list[dict[str, str]]) -> list[dict[str, str]]:
+    """Return the findings as a person wants them: those patches of the compiler that are in force as one line."""
+    quiet = [row for row in checks if row["found"] == IN_FORCE]
+    rows = [row for row in checks if row["found"] != IN_FORCE]
+    return [*rows, _check("patches of the compiler", f"{len(quiet)} in force", "all are told with --json")]
+
+
+def _cache(name: str, folder: Path) -> dict[str, str]:
+    """Say how much lies in a folder that may be deleted at any time."""
+    files = [path for path in folder.rglob("*") if path.is_file()] if folder.is_dir() else []
+    size = in_words(sum(path.stat().st_size for path in files)) if files else "empty"
+    return _check(name, size, f"{folder} (may be deleted)")
 
 
 def _runs() -> bool:

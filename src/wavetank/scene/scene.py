@@ -27,6 +27,7 @@ from wavetank.scene.forces import AnyForce
 from wavetank.scene.goal import Goal
 from wavetank.scene.joints import AnyJoint, check_joints
 from wavetank.scene.schedule import Timetable
+from wavetank.scene.summary import summary
 from wavetank.scene.tank import Tank
 from wavetank.solids.shapes import AnySolid
 
@@ -93,6 +94,11 @@ class Scene(Timetable, Parameters):
             # A whole-scene check runs after the value is in place.
             self.__dict__.update(before)
             raise WavetankError(sentence(report, type(self))) from None
+
+    def __repr__(self) -> str:
+        return summary(self)
+
+    __str__ = __repr__
 
     def _world_dim(self) -> int:
         """Number of dimensions that the tank has, else the first fluid, else gravity."""

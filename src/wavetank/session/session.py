@@ -25,6 +25,7 @@ from wavetank.session.commands import (
 from wavetank.session.history import History
 from wavetank.session.rules import RULES
 from wavetank.session.state import SessionState
+from wavetank.simulation.simulation import Simulation
 
 MOST_PARTICLES = 200_000
 SLUGGISH, SWIFT = 0.045, 0.025  # s: a frame that takes longer is made shorter, one that takes less longer again
@@ -47,9 +48,10 @@ class Session(SessionState):
     """
 
     def __init__(
-        self, scene: Scene, arch: str = "cpu", *, most_particles: int = MOST_PARTICLES, history: History | None = None
-    ) -> None:
-        super().__init__(scene, arch, most_particles, history or History())
+        self, scene: Scene, arch: str = "cpu", *, most_particles: int = MOST_PARTICLES, history: History | None = None,
+        own: Simulation | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(scene, arch, most_particles, history or History(), own)
         self.ticks = 0  # frames computed since the session began, whatever was rewound
         self.log: list[tuple[int, Command]] = []
         self.smooth = False  # whether frames are made shorter on a slow machine
@@ -60,6 +62,15 @@ class Session(SessionState):
         self._spared_until = 0.0  # on the clock of the process, until which nothing that takes long is done
         self._latest: dict[Any, int] = {}
         self._lock, self._wake = threading.Lock(), threading.Event()
+
+    @classmethod
+    def of(cls, sim: Simulation) -> "Session":
+        """Return a session of someone's own simulation, as it is: it stays that object whatever is begun anew.
+
+        What is not done by commands, as `sim.advance` between two turns, is in no recording.
+        """
+        scene = sim.scene.model_copy(deep=True)
+        return cls(scene, sim.arch or "cpu", most_particles=max(MOST_PARTICLES, 2 * sim.count), own=sim)
 
     # --- commands ---
 
@@ -229,8 +240,12 @@ class Session(SessionState):
 
     def rest(self, longest: float = 0.1, *, asleep: bool = False) -> None:
         """Wait until a command comes or a frame is due, at most `longest` [s]; `asleep` no frame is."""
-        running = (not self.paused or self.steps_left) and not asleep
-        wait = min(longest, self.pace.wait(time.perf_counter())) if running else longest
+        wait = self.time_to_rest(longest, asleep=asleep)
         if wait > 0.0:
             self._wake.wait(wait)
         self._wake.clear()
+
+    def time_to_rest(self, longest: float, *, asleep: bool = False) -> float:
+        """Return the time until a frame is due [s], `longest` at most; `asleep` none is."""
+        running = (not self.paused or self.steps_left) and not asleep
+        return min(longest, self.pace.wait(time.perf_counter())) if running else longest

@@ -1,5 +1,6 @@
 """What a session is about: a world, the hands in it, its past, what is shown of it. Rules act on this."""
 
+import copy
 import dataclasses
 from collections.abc import Callable
 from typing import Any
@@ -44,8 +45,10 @@ class World:
 class SessionState:
     """One running world with all that commands change, and no time that passes by itself: see `Session`."""
 
-    def __init__(self, scene: Scene, arch: str, most_particles: int, history: History) -> None:
-        self.most_particles, self.arch, self.history = most_particles, arch, history
+    def __init__(
+        self, scene: Scene, arch: str, most_particles: int, history: History, own: Simulation | None = None
+    ) -> None:
+        self.most_particles, self.arch, self.history, self.own = most_particles, arch, history, own
         self.pace = Pace()
         self.notes: list[str] = []  # for the person, one sentence each
         self.refused: Callable[[str], None] = self.note  # takes what a command may not do, while one is carried out
@@ -65,10 +68,16 @@ class SessionState:
         self.running: dict[str, tuple[Tool, Hand]] = {}
         self.moving: dict[str, tuple[Any, Any]] = {}
         self.commanded: list[Force] = []  # forces that tools push with in the next frame
-        self.begin(scene)
+        if own is None:
+            self.begin(scene)
+        else:
+            self._enter(scene, own)
 
     def begin(self, scene: Scene) -> None:
-        """Start a scene; raises `WavetankError` and changes nothing where it is too large."""
+        """Start a scene; raises `WavetankError` and changes nothing where it is too large.
+
+        A simulation of someone's own begins it as the object that it is, with the forces that were given to it.
+        """
         count = sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
         if count > self.most_particles:
             raise WavetankError(
@@ -85,8 +94,14 @@ class SessionState:
         if scene.emitters:
             sim.scene.assign("most_particles", min(scene.most_particles or self.most_particles, self.most_particles))
         sim.load_kernels()
-        game = Game(scene.goal, sim.frame(measured=False)) if scene.goal else None
         self._leave(cost.bytes)
+        if self.own is not None:
+            sim.forces += [force for force in self.own.forces if force not in self.own.scene.forces]
+        self._enter(scene, self._own(sim))
+
+    def _enter(self, scene: Scene, sim: Simulation) -> None:
+        sim.load_kernels()
+        game = Game(scene.goal, sim.frame(measured=False)) if scene.goal else None
         self.scene, self.sim, self.game = scene, sim, game
         self.hands, self.running, self.moving = {}, {}, {}
         self.chosen_camera: Camera | None = None
@@ -95,6 +110,13 @@ class SessionState:
         if self.patient:  # what begins moves, whatever was before
             self.paused, self.steps_left = False, 0
         self.wait_for_hand()
+
+    def _own(self, sim: Simulation) -> Simulation:
+        """Return the object that is to be that world: someone's own, or `sim` itself."""
+        if self.own is None:
+            return sim
+        self.own.become(sim)
+        return self.own
 
     def _leave(self, coming: int) -> None:
         """Keep the world there is, for `undo`, where it has moved, and both it and the one of `coming` bytes fit."""
@@ -113,14 +135,15 @@ class SessionState:
         self.lift_all()
         then = self.former
         self.former = self._present()
-        self.scene, self.sim, self.game, self.history = then.scene, then.sim, then.game, then.history
+        self.scene, self.sim, self.game, self.history = then.scene, self._own(then.sim), then.game, then.history
         self.chosen_camera = then.camera
         self.lit, self.upright, self.steps_left = "", None, 0
         self.paused, self.waits = then.paused, then.waits
 
     def _present(self) -> World:
+        sim = self.sim if self.own is None else copy.copy(self.sim)  # someone's own object goes on as another world
         return World(
-            self.scene, self.sim, self.game, self.history, self.chosen_camera, self.paused, self.waits
+            self.scene, sim, self.game, self.history, self.chosen_camera, self.paused, self.waits
         )  # fmt: skip
 
     def wait_for_hand(self) -> None:

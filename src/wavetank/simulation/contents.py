@@ -22,6 +22,7 @@ class Contents:
     """What can be read of a world, and written where it has a setter. See `Simulation` for how it moves."""
 
     scene: Scene
+    arch: str | None
     world: World
     ledger: Ledger
     sources: Sources
@@ -30,6 +31,15 @@ class Contents:
     time_steps: int  # of the last frame
     seconds_per_frame: float  # that the last frame took to compute
     _outdated: bool  # whether the water moved since its densities were measured
+
+    def __repr__(self) -> str:
+        """Say what a person would: which scene, how far it has come, how much water."""
+        bodies = f", {len(self.bodies)} bod{'y' if len(self.bodies) == 1 else 'ies'}" if self.bodies else ""
+        title = self.scene.title or "without title"
+        return (
+            f"<Simulation {title!r}: t = {self.time:.3f} s, {self.count:,} particles of {self.scene.spacing:g} m in "
+            f"{self.scene.dim}-D{bodies}, on {self.arch}>"
+        )
 
     @property
     def time(self) -> float:

@@ -11,8 +11,10 @@ from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
 from wavetank.scene.schedule import with_gravity
 from wavetank.simulation import snapshot as snapshots
+from wavetank.simulation.bodies import Bodies
 from wavetank.simulation.contents import Contents
 from wavetank.simulation.cost import check_cost
+from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.simulation.saved import read_snapshot, write_snapshot
 from wavetank.simulation.snapshot import Snapshot
 from wavetank.simulation.sources import Sources
@@ -23,6 +25,8 @@ class States(Contents, ABC):
     """How a world is kept and comes back. See `Simulation` for how it moves, and for what is abstract here."""
 
     arch: str | None
+    solids: MovingSolids
+    bodies: Bodies
     forces: list[Force]
     pushed: list[Force]
     gravity_by_hand: tuple[float, ...] | None
@@ -42,6 +46,11 @@ class States(Contents, ABC):
     @abstractmethod
     def _renew_solids(self) -> None:
         """Put the solids as they are now on the device."""
+
+    def become(self, other: Self) -> None:
+        """Take over all that `other` is, which must not be used any more; who holds this object holds that world."""
+        self.__dict__.clear()
+        self.__dict__.update(other.__dict__)
 
     def snapshot(self) -> Snapshot:
         """Return this instant as host arrays, for `resume`."""

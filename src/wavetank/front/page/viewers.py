@@ -160,7 +160,7 @@ class Viewers:
             viewer.size = (_whole(table, "width", LONGEST_SIDE), _whole(table, "height", LONGEST_SIDE))
             self.wake()
         elif do == "drive":
-            self._lift_pointers()
+            self.lift_pointers()
             self.driver = viewer
             self._tell_roles()
         elif do == "fit":
@@ -216,11 +216,12 @@ class Viewers:
     def _leave(self, viewer: Viewer) -> None:
         self.all.remove(viewer)
         if viewer is self.driver:
-            self._lift_pointers()
+            self.lift_pointers()
             self.driver = self.all[0] if self.all else None
         self._tell_roles()
 
-    def _lift_pointers(self) -> None:
+    def lift_pointers(self) -> None:
+        """Lift the tools that the driver holds."""
         for pointer in self.down:
             self.submit(ToolEnd(pointer=pointer), None)
         self.down.clear()

@@ -1,4 +1,4 @@
-"""What every force has. A force of your own is a subclass with `apply`: see `examples/05_a_force_of_your_own.py`."""
+"""What every force has. A force of your own is a subclass with `apply`: see `examples/04_a_force_of_your_own.py`."""
 
 from collections.abc import Sequence
 from typing import Annotated

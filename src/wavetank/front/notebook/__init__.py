@@ -1,0 +1,1 @@
+"""The water in a cell of a notebook."""

@@ -1,0 +1,251 @@
+// The water in a cell: pictures and status come over the kernel's channel, hands and controls go back on it.
+
+const words = (name) => { const text = name.replaceAll("_", " ").replaceAll("-", " "); return text[0].toUpperCase() + text.slice(1); };
+const pretty = (value, digits = 3) => (Number.isFinite(value) ? String(Number(value.toPrecision(digits))) : "");
+
+function make(tag, attributes = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name in element && !name.startsWith("aria")) element[name] = value; else element.setAttribute(name, value);
+  }
+  element.append(...children);
+  return element;
+}
+
+function icon(path) {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg"), line = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  svg.setAttribute("viewBox", "0 0 24 24");
+  svg.setAttribute("aria-hidden", "true");
+  line.setAttribute("d", path);
+  svg.append(line);
+  return svg;
+}
+
+/** One control from a declaration; `change(value)` hears of it, `show(value)` puts it where the world has it. */
+function control(about, value, change) {
+  const label = words(about.name), title = about.sentence ?? "";
+  if (about.choices?.length || typeof value === "boolean") {
+    const choices = about.choices?.length ? about.choices : ["false", "true"];
+    const select = make("select", { "aria-label": label, title }, ...choices.map((choice) => make("option", { value: choice, textContent: words(choice || "none") })));
+    select.value = String(value);
+    select.onchange = () => change(typeof value === "boolean" ? select.value === "true" : select.value);
+    return { element: make("label", { title }, make("span", { textContent: label }), select), show: (now) => { select.value = String(now); } };
+  }
+  if (about.unit === "color") {
+    const input = make("input", { type: "color", value: value || "#2f9fe8", "aria-label": label });
+    input.oninput = () => change(input.value);
+    return { element: make("label", { title }, make("span", { textContent: label }), input), show: () => {} };
+  }
+  const whole = about.whole ?? Number.isInteger(about.default), low = about.low ?? 0;
+  const high = Math.min(about.high ?? Infinity, Math.max(1, 4 * Math.abs(about.default ?? 1), 2 * Math.abs(value)));
+  const said = make("output", {}), range = make("input", { type: "range", min: low, max: high, step: whole ? 1 : (high - low) / 200, "aria-label": label });
+  const show = (now) => {
+    if (!range.matches(":active")) range.value = now;
+    said.textContent = `${pretty(Number(now))} ${about.unit ?? ""}`;
+    range.setAttribute("aria-valuetext", said.textContent);
+  };
+  range.oninput = () => { const now = Number(Number(range.value).toPrecision(4)); show(now); change(whole ? Math.round(now) : now); };
+  show(value);
+  return { element: make("label", { title }, make("span", { textContent: label }), range, said), show };
+}
+
+function render({ model, el }) {
+  const view = `${Date.now().toString(36)}${Math.random().toString(36).slice(2)}`;
+  const send = (message) => model.send(message);
+  const canvas = make("canvas", { className: "picture", tabIndex: 0, role: "img", "aria-label": "The water. Space pauses, arrows turn the view." });
+  const bar = make("div", { className: "bar" }), tools = make("div", { className: "tools", role: "toolbar", "aria-label": "Tools" });
+  const card = make("div", { className: "card" }), parameters = make("div", { className: "card" }), notes = make("div", { className: "notes", role: "status" });
+  const more = make("details", {}, make("summary", { textContent: "Parameters and looks" }), parameters);
+  const root = make("div", { className: "wavetank-live", "data-lm-suppress-shortcuts": "true", hidden: true }, canvas, bar, tools, card, more, notes);
+  el.append(root);
+
+  let about = null, tool = null, now = {}, world = {}, poster = null, sliders = new Map(), chosen = new Map(), parameter = new Map();
+
+  // --- the picture that the notebook keeps stands above, until there is a live one ---
+  function hidePoster() {
+    // It is the output before this one; what is outside of the cell's outputs is not looked at.
+    for (let node = el, up = 0; node && up < 8 && !node.matches(".jp-OutputArea, .jp-Cell, .output_container"); node = node.parentElement, up += 1) {
+      const before = node.previousElementSibling;
+      if (before?.querySelector("img") && !before.querySelector("canvas")) { poster = before; break; }
+    }
+    if (poster) poster.style.display = "none";
+  }
+
+  async function paint(buffer) {
+    const bitmap = await createImageBitmap(new Blob([buffer], { type: "image/jpeg" })).catch(() => null);
+    send({ do: "ack" });
+    if (!bitmap) return;
+    if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) Object.assign(canvas, { width: bitmap.width, height: bitmap.height });
+    canvas.getContext("2d").drawImage(bitmap, 0, 0);
+    bitmap.close();
+  }
+
+  // --- time ---
+  const pause = make("button", { onclick: () => send({ do: "pause", on: !now.paused }) });
+  const step = make("button", { title: "One frame (.)", "aria-label": "One frame", onclick: () => send({ do: "step" }) }, icon("M6 5l8 7-8 7zM17 5v14"));
+  const back = make("button", { title: "One second back (,)", "aria-label": "One second back", onclick: () => send({ do: "rewind", time: Math.max(0, now.time - 1) }) }, icon("M18 5l-8 7 8 7zM7 5v14"));
+  const again = make("button", { title: "Start again (R)", "aria-label": "Start again", onclick: () => send({ do: "reset" }) }, icon("M5 12a7 7 0 1 0 2.500-5.400M5 4v4h4"));
+  const pace = make("select", { title: "Pace of time", "aria-label": "Pace of time" });
+  const said = make("span", { className: "said" });
+  pace.onchange = () => send({ do: "speed", factor: Number(pace.value) });
+  bar.append(back, pause, step, again, pace, said);
+
+  function showStatus(status) {
+    now = status;
+    pause.replaceChildren(icon(status.paused ? "M7 5l11 7-11 7z" : "M8 5v14M16 5v14"));
+    pause.title = `${status.paused ? "Play" : "Pause"} (Space)`;
+    pause.setAttribute("aria-label", status.paused ? "Play" : "Pause");
+    pace.value = String(status.speed);
+    const slow = status.late ? ` · ${status.pace.toFixed(2)} × real time` : "";
+    said.textContent = `t = ${status.time.toFixed(2)} s · ${status.count.toLocaleString("en")} particles${slow}`;
+    for (const button of tools.children) button.classList.toggle("on", status.running.includes(button.dataset.tool));
+    for (const text of status.notes) note(text);
+    if (status.world) {
+      world = { ...world, ...status.world };
+      for (const [name, slider] of parameter) slider.show(world.values[name]);
+    }
+  }
+
+  function note(text) {
+    const line = make("p", { textContent: text });
+    notes.append(line);
+    setTimeout(() => line.remove(), 8000);
+  }
+
+  // --- tools, parameters, looks: drawn from what the kernel declares ---
+  function choose(name) {
+    tool = about.tools.find((other) => other.name === name);
+    const options = chosen.get(name) ?? {};
+    chosen.set(name, options);
+    for (const button of tools.children) button.setAttribute("aria-pressed", button.dataset.tool === name);
+    canvas.classList.toggle("look", name === "look");
+    sliders = tool.options.map((each) => control(each, options[each.name] ?? each.default, (value) => { options[each.name] = value; }).element);
+    card.replaceChildren(make("p", { textContent: tool.sentence }), ...sliders);
+  }
+
+  function build(hello) {
+    about = world = hello;
+    tools.replaceChildren(...hello.tools.map((each) => {
+      const button = make("button", { title: `${each.label}${each.key ? ` (${each.key.toUpperCase()})` : ""}: ${each.sentence}`, "aria-label": each.label, onclick: () => choose(each.name) }, icon(each.icon));
+      button.dataset.tool = each.name;
+      return button;
+    }));
+    pace.replaceChildren(...hello.speeds.map(([factor, text]) => make("option", { value: String(factor), textContent: text })));
+    parameter = new Map();
+    const live = hello.parameters.filter((each) => each.live && (each.choices.length || typeof each.default !== "object"));
+    for (const each of live) parameter.set(each.name, control(each, hello.values[each.name], (value) => send({ do: "set", name: each.name, value })));
+    const looks = [["view", hello.views, hello.view], ["color_by", hello.colorings, hello.color_by]].map(([name, choices, value]) =>
+      control({ name, choices, sentence: name === "view" ? "What is drawn." : "What particles are coloured by." }, value, (chosen) => send({ do: "view", [name]: chosen })).element);
+    parameters.replaceChildren(...looks, ...[...parameter.values()].map(({ element }) => element));
+    if (!tool) choose("push"); else choose(tool.name);
+    root.hidden = false;
+    hidePoster();
+    tellSize();
+  }
+
+  function tellSize() {
+    const ratio = Math.min(window.devicePixelRatio || 1, 1.5), width = Math.round((canvas.clientWidth || 960) * ratio);
+    send({ do: "size", width: Math.max(1, width), height: Math.max(1, Math.round(width * 9 / 16)) });
+  }
+  let resizing = 0;
+  const watcher = new ResizeObserver(() => { clearTimeout(resizing); resizing = setTimeout(tellSize, 150); });
+  watcher.observe(canvas);
+
+  // --- hands ---
+  const pointers = new Map();
+  let tooling = null, pinch = 0, next = null, beat = 0;
+  const where = (event) => {
+    const box = canvas.getBoundingClientRect();
+    return { x: (event.clientX - box.left) / box.width, y: (event.clientY - box.top) / box.height, shape: box.width / box.height };
+  };
+  const turn = (dx, dy, shape) => send(world.dim === 2 ? { do: "pan", right: -dx * shape, up: dy } : { do: "orbit", azimuth: -3.2 * dx * shape, elevation: 3.2 * dy });
+  const spread = () => { const [a, b] = [...pointers.values()]; return a && b ? Math.hypot((a.x - b.x) * a.shape, a.y - b.y) : 0; };
+  const lift = () => {
+    if (tooling === null) return;
+    if (next) send({ do: "point-move", x: next.x, y: next.y });
+    next = tooling = null;
+    send({ do: "point-end" });
+  };
+  canvas.onpointerdown = (event) => {
+    event.preventDefault();
+    canvas.focus({ preventScroll: true });
+    canvas.setPointerCapture(event.pointerId);
+    const at = where(event), turning = tool?.name === "look" || event.button === 2, sliding = event.button === 1 || event.shiftKey;
+    pointers.set(event.pointerId, { ...at, mode: sliding ? "pan" : turning ? "turn" : "tool" });
+    if (pointers.size === 2) {
+      lift();
+      for (const pointer of pointers.values()) pointer.mode = "both";
+      pinch = spread();
+    } else if (pointers.get(event.pointerId).mode === "tool") {
+      tooling = event.pointerId;
+      send({ do: "point-begin", x: at.x, y: at.y, tool: tool.name, options: chosen.get(tool.name) });
+    }
+  };
+  canvas.onpointermove = (event) => {
+    const pointer = pointers.get(event.pointerId);
+    if (!pointer) return;
+    const at = where(event), [dx, dy] = [at.x - pointer.x, at.y - pointer.y];
+    Object.assign(pointer, at);
+    if (event.pointerId === tooling) {
+      // At most thirty places a second go over the channel, and the last one always does.
+      if (!next) beat = setTimeout(() => { if (next && tooling !== null) send({ do: "point-move", x: next.x, y: next.y }); next = null; }, 33);
+      next = at;
+    } else if (pointer.mode === "turn") turn(dx, dy, at.shape);
+    else if (pointer.mode === "pan") send({ do: "pan", right: -dx * at.shape, up: dy });
+    else if (pointer.mode === "both") {
+      turn(dx / 2, dy / 2, at.shape);
+      const wide = spread();
+      if (wide > 0 && pinch > 0) send({ do: "zoom", factor: Math.min(2, Math.max(0.5, pinch / wide)) });
+      pinch = wide;
+    }
+  };
+  canvas.onpointerup = canvas.onpointercancel = (event) => {
+    if (event.pointerId === tooling) lift();
+    pointers.delete(event.pointerId);
+  };
+  canvas.oncontextmenu = (event) => event.preventDefault();
+  // The wheel belongs to the notebook until the water was clicked.
+  canvas.addEventListener("wheel", (event) => {
+    if (document.activeElement !== canvas && !root.contains(document.activeElement)) return;
+    event.preventDefault();
+    send({ do: "zoom", factor: Math.min(1.6, Math.max(0.6, Math.exp(0.0012 * event.deltaY * (event.deltaMode ? 30 : 1)))) });
+  }, { passive: false });
+
+  const ACTIONS = { pause: () => pause.click(), back: () => back.click(), again: () => again.click() };
+  canvas.onkeydown = (event) => {
+    if (!about || event.ctrlKey || event.metaKey || event.altKey) return;
+    const key = about.keys.find((other) => other.key === event.key || other.key === event.key.toLowerCase());
+    const hit = about.tools.find((other) => other.key && other.key === event.key.toLowerCase());
+    if (key ? !(key.command || ACTIONS[key.action]) : !hit) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (key) (key.command ? send(key.command) : ACTIONS[key.action]()); else choose(hit.name);
+  };
+
+  // --- the channel ---
+  const hear = (message, buffers) => {
+    if (message.type === "picture") paint(buffers[0]);
+    else if (message.type === "hello") build(message);
+    else if (message.type === "status") showStatus(message);
+    else if (message.type === "note") note(message.text);
+    else if (message.type === "end") leave();
+  };
+  const hide = () => send({ do: "hidden", on: document.hidden });
+  function leave() {
+    root.remove();
+    if (poster) poster.style.display = "";
+  }
+  model.on("msg:custom", hear);
+  document.addEventListener("visibilitychange", hide);
+  send({ do: "open", view });
+  return () => {
+    send({ do: "leave", view });
+    model.off("msg:custom", hear);
+    document.removeEventListener("visibilitychange", hide);
+    watcher.disconnect();
+    clearTimeout(beat);
+    leave();
+  };
+}
+
+export default { render };
