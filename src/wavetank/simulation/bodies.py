@@ -183,8 +183,7 @@ class Bodies(Mapping[str, Body]):
         for body in self.members:
             self._hold(body, body.rigid())
         for joint in self.joints.values():
-            if joint.is_driven:
-                joint.drive(clock, dt)
+            joint.drive(clock, dt)
         self.begun = [(handle, self.world.rigid_bodies[handle].position) for handle in self.handles]
         self.begins = {body.number: self.solids.poses[body.number] for body in self.members}
         self._move(dt, share)

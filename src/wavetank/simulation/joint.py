@@ -14,7 +14,7 @@ from wavetank.solids.motion import Pose
 SETTLED = 4.744  # critically damped, 5 % are left after so many times the inverse of the frequency
 STOPS = 1e8  # N m s/rad or N s/m: a motor gives all that it has until it is as fast as it should be
 
-Ends = Callable[[], tuple[Any, Any]]  # of the first solid, and of the second or the world
+Ends = Callable[[], tuple[Pose, Pose]]  # of the first solid, and of the second or the world
 
 
 class LiveJoint:
@@ -25,13 +25,18 @@ class LiveJoint:
     """
 
     def __init__(
-        self, name: str, joint: Joint, axis: Any, engines: Callable[[], Any], ends: tuple[Ends, Ends],
+        self,
+        name: str,
+        joint: Joint,
+        axis: Any,
+        engines: Callable[[], Any],
+        poses: Ends,
         starts: tuple[Pose, Pose, Pose],
-    ) -> None:  # fmt: skip
-        """Watch the `engines` one; `ends` are poses and rigid bodies of both, `starts` both poses and the joint's."""
+    ) -> None:
+        """Watch the `engines` one; `starts` are where both solids and the joint began."""
         self.name, self.joint = name, joint
         self._axis, self._engines, self._starts = axis, engines, starts
-        self._poses, self._rigid = ends
+        self._poses, self._before, self._lasted = poses, 0.0, 0.0
         self.response = joint.response if isinstance(joint, Hinge | Slider) else 0.0
 
     def __repr__(self) -> str:
@@ -48,13 +53,11 @@ class LiveJoint:
 
     @property
     def velocity(self) -> float:
-        """How fast it turns [rad/s] or slides [m/s]. Raises `WavetankError` for one that has no place."""
-        first, second = self._rigid()
-        (place, turn), _ = self._frames(self._poses(), flat=False)
-        along = turned(turn, np.array([1.0, 0.0, 0.0]))
+        """How fast it turned [rad/s] or slid [m/s] in the last step; 0 before the first of this run."""
+        way = self.position - self._before
         if isinstance(self._moving, Hinge):
-            return float((_three(first.angvel) - _three(second.angvel)) @ along)
-        return float((_speed_at(first, place) - _speed_at(second, place)) @ along)
+            way = (way + np.pi) % (2.0 * np.pi) - np.pi
+        return way / self._lasted if self._lasted else 0.0
 
     @property
     def target(self) -> float | None:
@@ -92,15 +95,11 @@ class LiveJoint:
 
     # --- for `Bodies` ---
 
-    @property
-    def is_driven(self) -> bool:
-        """Whether its aim changes by itself."""
-        moving = isinstance(self.joint, Hinge | Slider)
-        return moving and (varies(self.joint.speed) or varies(self.joint.target))  # type: ignore[attr-defined]
-
     def drive(self, time: float, dt: float) -> None:
         """Aim at what expression or keyframes say for the step of `dt` [s] that ends at `time` [s]."""
-        joint = self._moving
+        if not isinstance(self.joint, Hinge | Slider):
+            return
+        joint, self._before, self._lasted = self.joint, self.position, dt
         if varies(joint.target):
             aim = track(joint.target)
             end, begin = float(aim(time)), float(aim(time - dt))
@@ -120,7 +119,7 @@ class LiveJoint:
     def take_over(self, other: "LiveJoint") -> None:
         """Let its motor do what that of `other` did."""
         motor = other._motor if isinstance(self.joint, Hinge | Slider) else None
-        if motor is not None and not self.is_driven:
+        if motor is not None and not (varies(self._moving.speed) or varies(self._moving.target)):
             self._data().set_motor(self._axis, motor.target_pos, motor.target_vel, motor.stiffness, motor.damping)
             self._data().set_motor_max_force(self._axis, motor.max_force)
 
@@ -142,10 +141,10 @@ class LiveJoint:
     def _motor(self) -> Any:
         return self._data().motor(self._axis) if self._moving else None
 
-    def _frames(self, ends: tuple[Pose, Pose], flat: bool = True) -> tuple[Pose, Pose]:
+    def _frames(self, ends: tuple[Pose, Pose]) -> tuple[Pose, Pose]:
         """Return what were the same frames at the start, x along the axis, as both solids have carried them.
 
-        Places of a slider are along the axes of the second one where `flat`.
+        Places of a slider are along the axes of the second one.
         """
         (at, turn), result = self._starts[2], []
         for (position, rotation), (place, before) in zip(ends, self._starts, strict=False):
@@ -153,13 +152,13 @@ class LiveJoint:
             now = product(rotation, product(inverse(before), turn))
             result.append((position + turned(rotation, there), now))
         first, second = result
-        if isinstance(self.joint, Slider) and flat:
+        if isinstance(self.joint, Slider):
             back = inverse(second[1])
             return (turned(back, first[0]), first[1]), (turned(back, second[0]), second[1])
         return first, second
 
     def _aim(self, what: str, value: Any) -> None:
-        if self.is_driven:
+        if varies(self._moving.speed) or varies(self._moving.target):
             raise WavetankError(
                 f"joint {self.name!r} follows what its scene says over time; {what} = {value} cannot be set."
             )
@@ -168,12 +167,3 @@ class LiveJoint:
         if isinstance(value, bool) or not isinstance(value, int | float | np.floating) or not np.isfinite(value):
             raise WavetankError(f"{what} = {value} of joint {self.name!r} must be a finite number.")
         return float(value)
-
-
-def _three(v: Any) -> np.ndarray:
-    return np.array([v.x, v.y, v.z])
-
-
-def _speed_at(rigid: Any, place: np.ndarray) -> np.ndarray:
-    """Velocity [m/s] of a point of a rigid body."""
-    return _three(rigid.velocity_at_point(place.tolist()))

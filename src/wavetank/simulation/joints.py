@@ -53,10 +53,7 @@ def _put(
         other = solids.poses[solids.find(joint.second)] if joint.second else WORLD
         return solids.poses[solids.find(joint.first)], other
 
-    def rigid() -> tuple[Any, Any]:
-        return world().rigid_bodies[ends[0]], world().rigid_bodies[ends[1]]
-
-    live = LiveJoint(name, joint, axis, lambda: world().impulse_joints.get(handle), (poses, rigid), starts)
+    live = LiveJoint(name, joint, axis, lambda: world().impulse_joints.get(handle), poses, starts)
     if isinstance(joint, Hinge | Slider):
         if joint.target is not None:
             live.follow(float(track(joint.target)(0.0)), 0.0)
