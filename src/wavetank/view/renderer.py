@@ -2,7 +2,6 @@
 
 import collections
 import dataclasses
-import functools
 import math
 import time
 from typing import Any
@@ -19,7 +18,7 @@ from wavetank.view.camera import Camera
 from wavetank.view.colormaps import ENTRIES, table
 from wavetank.view.extent import Extent, extent_of
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
-from wavetank.view.look import Look, fluid_optics, paper, pool, studio, usual_depth
+from wavetank.view.look import fluid_optics, usual_depth
 from wavetank.view.optics.dyes import ICE, ICE_IN_WATER, lay_ice
 from wavetank.view.passes import tonemap
 from wavetank.view.quantities import QUANTITIES, Coloring, usual
@@ -82,7 +81,7 @@ class Renderer:
         frame = self._with_ice(frame, style)
         extent = extent_of(frame.scene)
         camera = camera or Camera.framing_extent(extent, self.width / self.height)
-        look = _look(extent.dim, style.kind.coloured)
+        look = style.look(frame)
         quantity, limits, name, colors = style.coloring(frame)
         if name != self._colors_name:
             upload(self._colors, colors)
@@ -200,13 +199,6 @@ def _write_legend(picture: np.ndarray, shot: Shot, style: Style, supersample: in
     legends.write_time(picture, shot.frame.time, shot.frame.count, column)
     if shot.lens.perspective == 0.0:
         legends.draw_scale(picture, shot.lens.focal / supersample)
-
-
-@functools.cache
-def _look(dim: int, coloured: bool) -> Look:
-    if dim == 2:
-        return paper()
-    return studio() if coloured else pool()
 
 
 def _sun_axes(to_sun: Any) -> np.ndarray:
