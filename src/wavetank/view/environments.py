@@ -76,7 +76,7 @@ def look_of(
         return look if environment == "paper" else dataclasses.replace(look, below=lit_floor(look))
     haze, turbidity = HAZES[environment]
     look = dataclasses.replace(look, horizon=linear(haze))
-    return under_sky(_lit_by_the_sun(look), turbidity)
+    return under_sky(look if look.to_sun is plain.to_sun else _lit_by_the_sun(look), turbidity)
 
 
 def _paved(look: Look, floor: str | None) -> Look:

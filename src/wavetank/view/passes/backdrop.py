@@ -13,6 +13,7 @@ from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, optics_of
 from wavetank.view.optics.glass import with_tank
 from wavetank.view.optics.maps import share_of, thickness_at
+from wavetank.view.optics.mixture import along_sun
 from wavetank.view.optics.radiance import background, smoothstep, sun_disc, surface_radiance
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
@@ -72,11 +73,14 @@ def sun_through_water(sunlit: SunlitWater, thickness: Thickness, sun: Lens, look
                 light = 1.0 + (light - 1.0) * qd.min(within / tau, 1.0)
                 tau = qd.min(tau, within)
         if tau > 0.0 or light != 1.0:
-            swallow = optics.absorption
+            swallow, murk = optics.absorption, 0.0
+            if thickness.fluids > 0 and whole > 0.0:
+                found = along_sun(thickness, optics, place)
+                swallow, murk = vec3(found[0], found[1], found[2]), found[3]
             if thickness.stained[0] == 1 and whole > 0.0:
                 swallow = swallowed_by(dye_in(thickness.dye, place, whole / optics.unit), swallow, optics.usual)
             veil = look.veil * (1.0 - qd.exp(-tau * (optics.absorption.x + optics.absorption.y)))
-            through = light * (1.0 - veil) * qd.exp(-0.6 * tau * swallow)
+            through = light * (1.0 - veil) * qd.exp(-tau * (0.6 * swallow + murk))
     return through
 
 

@@ -37,6 +37,7 @@ from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, r
 from wavetank.view.optics.glass import line_cover
 from wavetank.view.optics.maps import margins_inside, picture_at, thickness_at
 from wavetank.view.optics.marks import rim_cover, rim_key
+from wavetank.view.optics.mixture import mixed, murky
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.panes import share_before_wall, share_behind, tank_interval
 from wavetank.view.optics.radiance import environment, glint, smoothstep
@@ -168,8 +169,8 @@ def lay(
                                         kept_z, kept_layer, kept_pixel = at, layer, pixel
                                     body = kept
                             result += share * shine(
-                                pixels, thickness, backdrop, lens, look, optics, walls, row, column, at, n, origin,
-                                direction, body, dim,
+                                pixels, thickness, backdrop, sunlit, lens, sun, look, optics, walls, row, column, at,
+                                n, origin, direction, body, dim,
                             )  # fmt: skip
                     line = line_cover(pixels.lines[row, column], front, optics.slack)
                     result += look.line_strength * there * line * (look.line - result)
@@ -226,8 +227,8 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
 
 @qd.func
 def shine(
-    pixels: Pixels, thickness: Thickness, backdrop: Backdrop, lens: Lens, look: Look, optics: Optics, walls: Box,
-    row, column, z, normal, origin, direction, body, dim: qd.template(),
+    pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
+    optics: Optics, walls: Box, row, column, z, normal, origin, direction, body, dim: qd.template(),
 ):  # fmt: skip
     """Radiance of the water that a pixel shows at depth `z` with this normal.
 
@@ -236,14 +237,17 @@ def shine(
     n, pace = normal, direction.norm()
     ahead, at = direction / pace, origin + z * direction
     place = vec2(column + 0.5, row + 0.5)
-    tau = 0.0
+    tau, raw = 0.0, 0.0
     if qd.static(dim == 2):
         tau = sheet_at(thickness.water, lens, optics, walls, place)
+        raw = thickness_at(thickness.water, place / optics.coarse, optics.unit)
         n = sheet_normal(thickness.water, lens, optics, walls, place)
     else:
         tau = thickness_at(thickness.water, place / optics.coarse, optics.unit)
     cosi = qd.max(-n.dot(ahead), 0.05)
     bent = refracted(ahead, n, cosi)
+    if qd.static(dim == 3):
+        raw = tau
     # The least that a drop is thick; in a plane the rim keeps half of the colour.
     tau = qd.max(tau, qd.static(0.15 if dim == 3 else 0.55) * optics.spacing)
     travel = qd.min(tau, (qd.bit_cast(pixels.depth[row, column], qd.f32) - z) * pace)
@@ -271,13 +275,26 @@ def shine(
             out = 2.0 * bent.dot(ahead) * bent - ahead
             far = behind_drop(pixels, backdrop, lens, look, at + travel * bent, out, row, column, z)
             shown += ball * (far - shown)
-    swallow, tint = optics.absorption, optics.glow
+    swallow, tint, cover, hidden = optics.absorption, optics.glow, 0.0, 0.0
+    color, glow, behind = optics.glow, vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+    if thickness.fluids > 0:
+        swallow, tint, color, cover, glow, hidden, behind = mixed(
+            thickness, look, optics, place, tau, qd.static(dim == 2)
+        )
     if thickness.stained[0] == 1:
-        found = dye_in(thickness.dye, place / optics.coarse, tau / optics.unit)
+        # Of what the map holds: a wall takes as much of the dye's discs as of the water's.
+        found = dye_in(thickness.dye, place / optics.coarse, qd.max(raw, 0.15 * optics.spacing) / optics.unit)
         if found[0] > 0.0:
             swallow = swallowed_by(found, swallow, optics.usual)
             tint += found[0] * (look.glow * vec3(found[1], found[2], found[3]) - tint)
+            color += found[0] * (vec3(found[1], found[2], found[3]) - color)
     result = dimmed(shown, travel, swallow, optics.scattering, tint)
+    if hidden + cover > 0.0:
+        lit = murky(sunlit, sun, look, optics, behind, vec3(0.0, 0.0, 0.0), at, vec3(0.0, 1.0, 0.0), -ahead)
+        result += hidden * (lit * qd.exp(-0.3 * tau * swallow) - result)
+        if cover > 0.0:
+            lit = murky(sunlit, sun, look, optics, color, glow, at, n, -ahead)
+            result += cover * (lit - result)
     if qd.static(dim == 2):  # the rim of the sheet catches the light, and on paper there is nothing to mirror
         # Light comes from above left, and less of it reaches the bottom.
         high = (at.y - walls.lower.y) / (walls.upper.y - walls.lower.y)
