@@ -99,7 +99,16 @@ class WaterBuffers:
     sun_thickness: Thickness
     key: tuple[Any, ...]  # what the sizes were made for
 
-    known: dict[tuple[int, ...], Drops] = dataclasses.field(default_factory=dict)  # by the arrays they are of
+    known: dict[tuple[int, ...], Any] = dataclasses.field(default_factory=dict)  # by what it is made of
+
+    def same(self, kind: Any, *parts: Any) -> Any:
+        """Return a dataclass of these objects, the same one for the same objects."""
+        key = (id(kind), *map(id, parts))
+        if key not in self.known:
+            if len(self.known) >= MOST_KNOWN:
+                self.known.clear()
+            self.known[key] = kind(*parts)
+        return self.known[key]
 
     def drops(self, frame: Frame) -> Drops:
         """Return what is known of a frame's drops, the same object for the same arrays."""
@@ -109,7 +118,8 @@ class WaterBuffers:
             if len(self.known) >= MOST_KNOWN:
                 self.known.clear()
             self.known[key] = Drops(*arrays, fluids.fluids, fluids.matter, fluids.shine)
-        return self.known[key]
+        drops: Drops = self.known[key]
+        return drops
 
 
 REACH = 2.2  # d: radius of the neighbourhood of a particle or a point

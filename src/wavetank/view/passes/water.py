@@ -31,7 +31,7 @@ from wavetank.view.lens import (
     view_ray,
 )
 from wavetank.view.look import Look
-from wavetank.view.optics.body import through_body
+from wavetank.view.optics.body import Inside, through_body
 from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, refracted
 from wavetank.view.optics.glass import line_cover
@@ -42,6 +42,7 @@ from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.panes import share_before_wall, share_behind, tank_interval
 from wavetank.view.optics.radiance import environment, glint, smoothstep
 from wavetank.view.optics.rays import Box, box
+from wavetank.view.passes.solids import colors_of
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import Backdrop, SunlitWater, Thickness, WaterSurface, water_of
@@ -54,10 +55,15 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if shot.frame.dim == 2:  # as deep as the water is drawn
         thick = vector(0.0, 0.0, 10.0 * shot.extent.spacing)
         walls = box(walls.lower - thick, walls.upper + thick)
+    solids = shot.frame.solids
+    # Solids are met by bent rays in a tank only: in the open there is no body of water.
+    world = 4 if shot.frame.dim == 3 and shot.frame.scene.tank and solids.count > solids.tank_count else shot.frame.dim
+    inside = water.same(
+        Inside, walls, solids, buffers.paints.of(colors_of(shot)) if world == 4 else buffers.paints.device
+    )
     lay(
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit, strips_of(pixels.depth), shot.lens,
-        shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers), buffers.supersample), walls,
-        shot.frame.dim,
+        shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers), buffers.supersample), inside, world,
     )  # fmt: skip
 
 
@@ -97,15 +103,18 @@ def sheet_normal(thickness: qd.template(), lens: Lens, optics: Optics, walls: Bo
 @qd.kernel(fastcache=True)
 def lay(
     pixels: Pixels, surface: WaterSurface, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater,
-    strips: Strips, lens: Lens, sun: Lens, look: Look, optics: Optics, walls: Box, dim: qd.template(),
+    strips: Strips, lens: Lens, sun: Lens, look: Look, optics: Optics, inside: Inside, world: qd.template(),
 ):  # fmt: skip
     """Shade every pixel that shows water, and copy the backdrop to the others; `surface.nearest` is filled with the
     nearer of its depth and the backdrop's.
+
+    `world` is 2 for a plane, 3 for space, and 4 for space with solids in a tank.
     """
     for task in range(strips.count):
         row, begin, end = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
         # What is seen through a body of water is found once for the samples of a pixel that lie beside each other.
         kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
+        kept_above = vec4(0.0, 0.0, 0.0, 0.0)
         for column in range(begin, end):
             result = backdrop.behind[row, column]
             z, back = qd.bit_cast(surface.depth[row, column], qd.f32), qd.bit_cast(pixels.depth[row, column], qd.f32)
@@ -115,12 +124,12 @@ def lay(
             elif z < 1e30:
                 ray = view_ray(lens, row, column)
                 origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
-                ends, turns, wall = tank_interval(lens, origin, direction, walls)
+                ends, turns, wall = tank_interval(lens, origin, direction, inside.walls)
                 front = qd.max(z, ends[0])
                 if ends[0] <= ends[1] and front < back:
                     # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
                     wet, there, cover, edge, rise = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0)
-                    if qd.static(dim == 3):
+                    if qd.static(world >= 3):
                         at_pane = ends[0] > lens.near and wall.y == 0.0  # not through the open top
                         if at_pane and z < ends[0] - optics.spacing:
                             wet = 1.0
@@ -146,31 +155,37 @@ def lay(
                         share, n, at = first, wall, front
                         if layer == 1:
                             share = second
-                            if qd.static(dim == 3):
+                            if qd.static(world >= 3):
                                 n = normal_of(lens, row, column, z, rise)
                         elif layer == 2:
                             share, at = cover, edge
-                            if qd.static(dim == 3):
+                            if qd.static(world >= 3):
                                 if share > 0.0:
                                     n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
                         if share > 0.0:
                             body = vec4(0.0, 0.0, 0.0, -1.0)
-                            if qd.static(dim == 3):
-                                if walls.upper.x < 1e5 and back > 0.999 * ends[1]:  # a tank, and no solid in it
+                            above = vec4(0.0, 0.0, 0.0, 0.0)
+                            if qd.static(world >= 3):
+                                # A tank, and without bent rays to meet them no solid in it.
+                                wide = back > 0.999 * ends[1]
+                                if qd.static(world == 4):
+                                    wide = True
+                                if inside.walls.upper.x < 1e5 and wide:
                                     pixel = column // optics.samples
                                     near = qd.abs(at - kept_z) < 0.3 * optics.spacing
                                     if pixel != kept_pixel or layer != kept_layer or not near:
                                         ahead = direction.normalized()
-                                        bent = refracted(ahead, n, qd.max(-n.dot(ahead), 0.05))
-                                        kept = through_body(
+                                        cosi = qd.max(-n.dot(ahead), 0.05)
+                                        kept, kept_above = through_body(
                                             pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
-                                            walls, at, origin + at * direction, bent,
+                                            inside, at, origin + at * direction, refracted(ahead, n, cosi),
+                                            ahead + 2.0 * cosi * n, qd.static(world == 4),
                                         )  # fmt: skip
                                         kept_z, kept_layer, kept_pixel = at, layer, pixel
-                                    body = kept
+                                    body, above = kept, kept_above
                             result += share * shine(
-                                pixels, thickness, backdrop, sunlit, lens, sun, look, optics, walls, row, column, at,
-                                n, origin, direction, body, dim,
+                                pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside.walls, row, column,
+                                at, n, origin, direction, body, above, qd.static(2 if world == 2 else 3),
                             )  # fmt: skip
                     line = line_cover(pixels.lines[row, column], front, optics.slack)
                     result += look.line_strength * there * line * (look.line - result)
@@ -228,11 +243,11 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
 @qd.func
 def shine(
     pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
-    optics: Optics, walls: Box, row, column, z, normal, origin, direction, body, dim: qd.template(),
+    optics: Optics, walls: Box, row, column, z, normal, origin, direction, body, above, dim: qd.template(),
 ):  # fmt: skip
     """Radiance of the water that a pixel shows at depth `z` with this normal.
 
-    `body` is what `through_body` found for it; a negative way where it found none.
+    `body` and `above` are what `through_body` found for it; a negative way where it found none.
     """
     n, pace = normal, direction.norm()
     ahead, at = direction / pace, origin + z * direction
@@ -302,7 +317,9 @@ def shine(
         result += 0.35 * look.lamp * smoothstep((0.85 - tau / optics.spacing) / 0.3)
     else:
         mirror = glossy * (0.02 + 0.98 * (1.0 - cosi) ** 5)
-        result += mirror * (environment(look, ahead + 2.0 * cosi * n) - result)
+        mirrored = environment(look, ahead + 2.0 * cosi * n)
+        mirrored += above[3] * (vec3(above[0], above[1], above[2]) - mirrored)
+        result += mirror * (mirrored - result)
         half = (look.to_sun - ahead).normalized(1e-9)
         result += glint(look, n.dot(half))
     return result
