@@ -23,10 +23,10 @@ from wavetank.solids.distance import SolidSet, signed_distance
 from wavetank.view.lens import Lens, to_pixel, to_view, vec2, vec3, vec4
 from wavetank.view.look import Look
 from wavetank.view.optics.fluid import Optics
-from wavetank.view.optics.maps import margins_inside, picture_at
+from wavetank.view.optics.maps import margins_inside, picture_at, thickness_at
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.radiance import environment, smoothstep, surface_radiance
-from wavetank.view.optics.rays import Box
+from wavetank.view.optics.rays import Box, box_interval
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -36,6 +36,7 @@ class Inside:
     walls: Box
     solids: SolidSet
     paints: qd.types.ndarray()  # vec3 [solids]: their albedo
+    column: qd.types.ndarray()  # i32 [texels, texels]: water along the sun's rays, see `Thickness`
 
 
 @qd.func
@@ -131,6 +132,18 @@ def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usu
 
 
 @qd.func
+def wholeness(sun: Lens, first: qd.template(), column: qd.template(), walls: Box, at, spacing, unit):
+    """How much of a body the water around the point `at` is, 0 to 1: broken water leaves air in the sun's way."""
+    inset = vec3(1.5 * spacing, 0.0, 1.5 * spacing)  # next to a wall the column's discs are cut
+    inner = qd.min(qd.max(at, walls.lower + inset), walls.upper - inset)
+    c = to_view(sun, inner)
+    begins = c.z - qd.max(depth_below(sun, first, inner), 0.0)
+    ends = box_interval(inner - c.z * sun.forward, sun.forward, walls)
+    share = thickness_at(column, to_pixel(sun, c), unit) / qd.max(qd.min(ends[1] - begins, 1e3), unit)
+    return smoothstep((share - 0.3) / 0.45)
+
+
+@qd.func
 def wall_ahead(walls: Box, p, ahead):
     """(outward normal, way [m]) of the wall, the floor or the open top that a ray from a point in the tank meets."""
     way, axis = 1e9, 0
@@ -202,25 +215,32 @@ def through_body(
     depth: qd.template(), picture: qd.template(), first: qd.template(), lens: Lens, sun: Lens, look: Look,
     optics: Optics, inside: Inside, z, at, bent, mirrored, solid: qd.template(),
 ):  # fmt: skip
-    """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, and
-    (radiance, share) of the solid that the ray which is `mirrored` there meets.
+    """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, (radiance,
+    share) of the solid that the ray which is `mirrored` there meets, and how much of a body the water is.
 
-    The way is negative where there is no body of water: less than two spacings of it; nothing is found then but what
-    is mirrored.
+    The way is negative where there is none: less than two spacings of it, or more air than water; nothing is found
+    then but what is mirrored.
     """
-    shown, total, done = vec3(0.0, 0.0, 0.0), 0.0, 0
+    shown, total, done, whole = vec3(0.0, 0.0, 0.0), 0.0, 0, 0.0
     seen_above = vec4(0.0, 0.0, 0.0, 0.0)
     p, ahead = qd.min(qd.max(at, inside.walls.lower), inside.walls.upper), bent
     if not about_wet(sun, first, inside.walls, p + 2.0 * optics.spacing * ahead, optics.spacing):
         total, done = -1.0, 1
-    for bounce in range(qd.static(4 if solid else 3)):
+    else:
+        deep = p + 2.0 * optics.spacing * ahead
+        whole = wholeness(sun, first, inside.column, inside.walls, deep, optics.spacing, optics.unit)
+        if whole <= 0.0:
+            total, done = -1.0, 1
+    # Within, then where solids stand in the way of what leaves, and of what is mirrored.
+    leaves = 0
+    for bounce in range(qd.static(5 if solid else 3)):
         above = 0
         if qd.static(solid):
-            if bounce == 3 and at.y > 0.0:
-                p, ahead, above = at, mirrored, 1
-        if done == 0 or above == 1:
+            if bounce == 4 and at.y > 0.0:
+                p, ahead, above, leaves = at, mirrored, 1, 0
+        if (done == 0 and (bounce < 3 or leaves == 1)) or above == 1:
             n, s = vec3(0.0, 1.0, 0.0), 1e3
-            if above == 0:
+            if above + leaves == 0:
                 wall = wall_ahead(inside.walls, p, ahead)
                 n, s = vec3(wall[0], wall[1], wall[2]), wall[3]
                 if not about_wet(sun, first, inside.walls, p + 0.999 * s * ahead, optics.spacing):
@@ -239,15 +259,21 @@ def through_body(
                     met, place = 1, p + hit.w * ahead
                     normal = vec3(hit.x, hit.y, hit.z)
                     deep = qd.max(depth_below(sun, first, place), 0.0)
-                    sunny = qd.select(above == 1, 1.0, qd.exp(-0.6 * deep * optics.absorption.y))
+                    sunny = qd.select(above + leaves > 0, 1.0, qd.exp(-0.6 * deep * optics.absorption.y))
                     radiance = solid_radiance(
                         depth, picture, inside.paints, lens, look, place, normal, -ahead, k, sunny, optics.spacing
                     )
                     if above == 1:
                         seen_above = vec4(radiance.x, radiance.y, radiance.z, 1.0)
                     else:
-                        shown, total, done = radiance, total + hit.w, 1
-            if met == 0 and above == 0:
+                        shown, done = radiance, 1
+                        if leaves == 0:
+                            total += hit.w
+            if met == 0 and leaves == 1:
+                shown, done = environment(look, ahead), 1
+                if ahead.y < -1e-3:
+                    shown = seen_at(depth, picture, lens, z, p + (qd.max(p.y, 0.0) / -ahead.y) * ahead, shown, solid)
+            elif met == 0 and above == 0:
                 total += s
                 p += s * ahead
                 cosi = ahead.dot(n)
@@ -259,11 +285,16 @@ def through_body(
                     out = ahead
                     if cosi > 0.0:
                         out = 1.33 * ahead + (qd.sqrt(k) - 1.33 * cosi) * n
-                    shown, done = environment(look, out), 1
-                    if out.y < -1e-3:
-                        shown = seen_at(depth, picture, lens, z, p + (qd.max(p.y, 0.0) / -out.y) * out, shown, solid)
+                    if qd.static(solid):
+                        leaves, ahead = 1, out
+                    else:
+                        shown, done = environment(look, out), 1
+                        if out.y < -1e-3:
+                            shown = seen_at(
+                                depth, picture, lens, z, p + (qd.max(p.y, 0.0) / -out.y) * out, shown, solid
+                            )
                 else:
                     ahead -= 2.0 * cosi * n
     if done == 0:
         shown = optics.glow
-    return vec4(shown.x, shown.y, shown.z, total), seen_above
+    return vec4(shown.x, shown.y, shown.z, total), seen_above, whole

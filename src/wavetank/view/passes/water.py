@@ -42,7 +42,7 @@ from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.panes import share_before_wall, share_behind, tank_interval
 from wavetank.view.optics.radiance import environment, glint, smoothstep
 from wavetank.view.optics.rays import Box, box
-from wavetank.view.passes.solids import colors_of
+from wavetank.view.paints import colors_of
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import Backdrop, SunlitWater, Thickness, WaterSurface, water_of
@@ -58,9 +58,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     solids = shot.frame.solids
     # Solids are met by bent rays in a tank only: in the open there is no body of water.
     world = 4 if shot.frame.dim == 3 and shot.frame.scene.tank and solids.count > solids.tank_count else shot.frame.dim
-    inside = water.same(
-        Inside, walls, solids, buffers.paints.of(colors_of(shot)) if world == 4 else buffers.paints.device
-    )
+    paints = buffers.paints.of(colors_of(shot)) if world == 4 else buffers.paints.device
+    inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water)
     lay(
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit, strips_of(pixels.depth), shot.lens,
         shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers), buffers.supersample), inside, world,
@@ -114,7 +113,7 @@ def lay(
         row, begin, end = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
         # What is seen through a body of water is found once for the samples of a pixel that lie beside each other.
         kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
-        kept_above = vec4(0.0, 0.0, 0.0, 0.0)
+        kept_above, kept_whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
         for column in range(begin, end):
             result = backdrop.behind[row, column]
             z, back = qd.bit_cast(surface.depth[row, column], qd.f32), qd.bit_cast(pixels.depth[row, column], qd.f32)
@@ -164,7 +163,7 @@ def lay(
                                     n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
                         if share > 0.0:
                             body = vec4(0.0, 0.0, 0.0, -1.0)
-                            above = vec4(0.0, 0.0, 0.0, 0.0)
+                            above, whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
                             if qd.static(world >= 3):
                                 # A tank, and without bent rays to meet them no solid in it.
                                 wide = back > 0.999 * ends[1]
@@ -176,16 +175,16 @@ def lay(
                                     if pixel != kept_pixel or layer != kept_layer or not near:
                                         ahead = direction.normalized()
                                         cosi = qd.max(-n.dot(ahead), 0.05)
-                                        kept, kept_above = through_body(
+                                        kept, kept_above, kept_whole = through_body(
                                             pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
                                             inside, at, origin + at * direction, refracted(ahead, n, cosi),
                                             ahead + 2.0 * cosi * n, qd.static(world == 4),
                                         )  # fmt: skip
                                         kept_z, kept_layer, kept_pixel = at, layer, pixel
-                                    body, above = kept, kept_above
+                                    body, above, whole = kept, kept_above, kept_whole
                             result += share * shine(
                                 pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside.walls, row, column,
-                                at, n, origin, direction, body, above, qd.static(2 if world == 2 else 3),
+                                at, n, origin, direction, body, above, whole, qd.static(2 if world == 2 else 3),
                             )  # fmt: skip
                     line = line_cover(pixels.lines[row, column], front, optics.slack)
                     result += look.line_strength * there * line * (look.line - result)
@@ -243,11 +242,11 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
 @qd.func
 def shine(
     pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
-    optics: Optics, walls: Box, row, column, z, normal, origin, direction, body, above, dim: qd.template(),
+    optics: Optics, walls: Box, row, column, z, normal, origin, direction, body, above, whole, dim: qd.template(),
 ):  # fmt: skip
     """Radiance of the water that a pixel shows at depth `z` with this normal.
 
-    `body` and `above` are what `through_body` found for it; a negative way where it found none.
+    `body`, `above` and `whole` are what `through_body` found for it; a negative way where it found none.
     """
     n, pace = normal, direction.norm()
     ahead, at = direction / pace, origin + z * direction
@@ -270,7 +269,7 @@ def shine(
         travel = above_floor(travel, at, bent)
     c = to_view(lens, at + travel * bent)
     shown = backdrop.behind[row, column]
-    if c.z > lens.near and body[3] < 0.0:
+    if c.z > lens.near and whole < 1.0:
         there = to_pixel(lens, c)
         r = qd.min(qd.max(qd.cast(there.y, qd.i32), 0), pixels.depth.shape[0] - 1)
         e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), pixels.depth.shape[1] - 1)
@@ -285,7 +284,9 @@ def shine(
         ball = smoothstep((0.75 - layers) / 0.3) * off
         glossy = 1.0 - smoothstep((1.6 - layers) / 0.8) * (1.0 - off)
         if body[3] >= 0.0:
-            shown, travel, ball = vec3(body[0], body[1], body[2]), body[3], 0.0
+            shown += whole * (vec3(body[0], body[1], body[2]) - shown)
+            travel += whole * (body[3] - travel)
+            ball *= 1.0 - whole
         if ball > 0.0:
             out = 2.0 * bent.dot(ahead) * bent - ahead
             far = behind_drop(pixels, backdrop, lens, look, at + travel * bent, out, row, column, z)
