@@ -61,27 +61,27 @@ def test_the_surface_mirrors_what_stands_in_the_water():
     """Aslant, a red wall at the back of the water is mirrored by the surface before it."""
     wall = Box(center=(0.5, 0.75, 0.1), size=(0.8, 0.5, 0.05), color="#ff0000")
     camera = Camera(eye=(0.5, 0.85, 2.4), target=(0.5, 0.6, 0.5))
-    column, row, _ = camera.project(np.array([0.5, 0.6, 0.32]), *SIZE)[0]
+    column, row, _ = camera.project(np.array([0.5, 0.6, 0.6]), *SIZE)[0]
     place = slice(int(row) - 2, int(row) + 3), slice(int(column) - 8, int(column) + 9)
     seen = [picture(filled(solids), camera)[place].reshape(-1, 3).mean(axis=0) for solids in ((wall,), ())]
     warmer = (seen[0][0] - seen[0][2]) - (seen[1][0] - seen[1][2])
-    assert warmer > 20
+    assert warmer > 35
 
 
-def test_the_shadow_of_a_lumpy_film_is_even():
-    """A film two particles thick that hangs high, pushed about by a third of a spacing: its light on the floor varied
-    by a fifth, because every lump was a lens.
+def film(seed):
+    x = lattice((0.1, 0.75, 0.1), (0.9, 0.85, 0.9))
+    x += np.random.default_rng(seed).uniform(-0.45, 0.45, x.shape) * D
+    return frame_of(Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 1.0))), x)
+
+
+def test_the_shadow_of_a_film_does_not_boil():
+    """A film two particles thick whose particles are pushed about: its shadow on the floor hardly shows it.
+
+    The standard deviation of what changes is 1.0 % of the light there; where every lump was a lens it was 2.5 %.
     """
-    random = np.random.default_rng(3)
-    x = lattice((0.1, 0.85, 0.1), (0.9, 0.95, 0.9))
-    x += random.uniform(-0.35, 0.35, x.shape) * D
-    frame = frame_of(Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 1.0))), x)
     camera = Camera(eye=(0.5, 0.5, 4.0), target=(1.05, 0.0, 0.5))
-    sun = "270,50"  # to the left: the shadow lies to the right of the tank
-    image = picture(frame, camera, floor="plain", sun=sun).sum(axis=2)
-    values = []
-    for px in np.linspace(1.1, 1.35, 12):
-        for pz in np.linspace(0.3, 0.7, 12):
-            column, row, _ = camera.project(np.array([px, 0.0, pz]), *SIZE)[0]
-            values.append(image[int(row), int(column)])
-    assert np.std(values) / np.mean(values) < 0.035
+    places = np.array([(x, 0.0, z) for x in np.linspace(1.1, 1.35, 12) for z in np.linspace(0.3, 0.7, 12)])
+    columns, rows, _ = camera.project(places, *SIZE).T.astype(int)
+    light = [picture(film(seed), camera, floor="plain")[rows, columns].sum(axis=1) for seed in range(3, 9)]
+    changes = [np.std(one - other) / np.mean(one) for one, other in zip(light[::2], light[1::2], strict=True)]
+    assert np.mean(changes) < 0.016

@@ -26,7 +26,7 @@ from wavetank.view.optics.fluid import Optics
 from wavetank.view.optics.maps import margins_inside, picture_at, thickness_at
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.radiance import environment, smoothstep, surface_radiance
-from wavetank.view.optics.rays import Box, box_interval
+from wavetank.view.optics.rays import Box
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -133,14 +133,18 @@ def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usu
 
 @qd.func
 def wholeness(sun: Lens, first: qd.template(), column: qd.template(), walls: Box, at, spacing, unit):
-    """How much of a body the water around the point `at` is, 0 to 1: broken water leaves air in the sun's way."""
+    """How much of a body the water around the point `at` is, 0 to 1: broken water leaves air in the sun's way.
+
+    It is 0 where there is none.
+    """
     inset = vec3(1.5 * spacing, 0.0, 1.5 * spacing)  # next to a wall the column's discs are cut
     inner = qd.min(qd.max(at, walls.lower + inset), walls.upper - inset)
     c = to_view(sun, inner)
-    begins = c.z - qd.max(depth_below(sun, first, inner), 0.0)
-    ends = box_interval(inner - c.z * sun.forward, sun.forward, walls)
-    share = thickness_at(column, to_pixel(sun, c), unit) / qd.max(qd.min(ends[1] - begins, 1e3), unit)
-    return smoothstep((share - 0.3) / 0.45)
+    under, result = depth_below(sun, first, inner), 0.0
+    if under > 0.0:
+        column_length = qd.min(wall_ahead(walls, inner, sun.forward)[3] + under, 1e3)
+        result = smoothstep((thickness_at(column, to_pixel(sun, c), unit) / column_length - 0.3) / 0.45)
+    return result
 
 
 @qd.func
@@ -219,24 +223,21 @@ def through_body(
     share) of the solid that the ray which is `mirrored` there meets, and how much of a body the water is.
 
     The way is negative where there is none: less than two spacings of it, or more air than water; nothing is found
-    then but what is mirrored.
+    then but what is mirrored; nothing is where `mirrored` is nought.
     """
-    shown, total, done, whole = vec3(0.0, 0.0, 0.0), 0.0, 0, 0.0
+    shown, total, done = vec3(0.0, 0.0, 0.0), 0.0, 0
     seen_above = vec4(0.0, 0.0, 0.0, 0.0)
     p, ahead = qd.min(qd.max(at, inside.walls.lower), inside.walls.upper), bent
-    if not about_wet(sun, first, inside.walls, p + 2.0 * optics.spacing * ahead, optics.spacing):
+    begun = p + 2.0 * optics.spacing * ahead
+    whole = wholeness(sun, first, inside.column, inside.walls, begun, optics.spacing, optics.unit)
+    if whole <= 0.0:
         total, done = -1.0, 1
-    else:
-        deep = p + 2.0 * optics.spacing * ahead
-        whole = wholeness(sun, first, inside.column, inside.walls, deep, optics.spacing, optics.unit)
-        if whole <= 0.0:
-            total, done = -1.0, 1
     # Within, then where solids stand in the way of what leaves, and of what is mirrored.
     leaves = 0
     for bounce in range(qd.static(5 if solid else 3)):
         above = 0
         if qd.static(solid):
-            if bounce == 4 and at.y > 0.0:
+            if bounce == 4 and mirrored.y != 0.0:
                 p, ahead, above, leaves = at, mirrored, 1, 0
         if (done == 0 and (bounce < 3 or leaves == 1)) or above == 1:
             n, s = vec3(0.0, 1.0, 0.0), 1e3

@@ -5,8 +5,6 @@ tau                 water along the sun's ray before it reaches a point         
 through             share of the sun that is left, per colour                        1
 """
 
-import math
-
 from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers, Light, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec2, vec3, vector, view_ray
@@ -67,22 +65,18 @@ def sun_through_water(sunlit: SunlitWater, thickness: Thickness, sun: Lens, look
     if qd.min(place.x, place.y) > 2.0 and qd.max(place.x, place.y) < texels - 2.0:
         whole = thickness_at(thickness.water, place, optics.unit)
         gathered = thickness_at(sunlit.caustic, place, 1.0 / 4096.0)
-        nearest = qd.bit_cast(sunlit.depth[qd.cast(place.y, qd.i32), qd.cast(place.x, qd.i32)], qd.f32)
-        # Far behind the water its light is as blurred as the sun is wide.
-        wide = 0.0
-        if nearest < 1e30:
-            wide = 2.0 * look.sun_size * qd.max(c.z - nearest - whole, 0.0) * sun.focal
+        nearest, wide = 1e30, 0.0
+        if whole > 0.0:
+            nearest = qd.bit_cast(sunlit.depth[qd.cast(place.y, qd.i32), qd.cast(place.x, qd.i32)], qd.f32)
+            if nearest < 1e30:  # far behind the water its light is as blurred as the sun is wide
+                wide = 2.0 * look.sun_size * qd.max(c.z - nearest - whole, 0.0) * sun.focal
         if wide > 0.5:
-            for k in qd.static(range(8)):
-                off = (
-                    (0.6 + 0.4 * (k % 2))
-                    * wide
-                    * vec2(qd.static(math.cos(0.785398 * k)), qd.static(math.sin(0.785398 * k)))
-                )
+            for k in range(4):
+                off = wide * vec2((k % 2) * 1.6 - 0.8, (k // 2) * 1.6 - 0.8)
                 whole += thickness_at(thickness.water, place + off, optics.unit)
                 gathered += thickness_at(sunlit.caustic, place + off, 1.0 / 4096.0)
-            whole /= 9.0
-            gathered /= 9.0
+            whole *= 0.2
+            gathered *= 0.2
         light = 1.0 + look.caustic * qd.min(gathered, 3.0)
         tau = whole
         if tau > 0.0:

@@ -62,7 +62,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water)
     lay(
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit, strips_of(pixels.depth), shot.lens,
-        shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers), buffers.supersample), inside, world,
+        shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers), buffers.supersample), inside,
+        10 * int(water.thickness.fluids > 0) + world,
     )  # fmt: skip
 
 
@@ -107,7 +108,7 @@ def lay(
     """Shade every pixel that shows water, and copy the backdrop to the others; `surface.nearest` is filled with the
     nearer of its depth and the backdrop's.
 
-    `world` is 2 for a plane, 3 for space, and 4 for space with solids in a tank.
+    `world` is 2 for a plane, 3 for space, and 4 for space with solids in a tank; ten more with several fluids.
     """
     for task in range(strips.count):
         row, begin, end = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
@@ -128,7 +129,7 @@ def lay(
                 if ends[0] <= ends[1] and front < back:
                     # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
                     wet, there, cover, edge, rise = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0)
-                    if qd.static(world >= 3):
+                    if qd.static(world % 10 >= 3):
                         at_pane = ends[0] > lens.near and wall.y == 0.0  # not through the open top
                         if at_pane and z < ends[0] - optics.spacing:
                             wet = 1.0
@@ -154,20 +155,20 @@ def lay(
                         share, n, at = first, wall, front
                         if layer == 1:
                             share = second
-                            if qd.static(world >= 3):
+                            if qd.static(world % 10 >= 3):
                                 n = normal_of(lens, row, column, z, rise)
                         elif layer == 2:
                             share, at = cover, edge
-                            if qd.static(world >= 3):
+                            if qd.static(world % 10 >= 3):
                                 if share > 0.0:
                                     n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
                         if share > 0.0:
                             body = vec4(0.0, 0.0, 0.0, -1.0)
                             above, whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
-                            if qd.static(world >= 3):
+                            if qd.static(world % 10 >= 3):
                                 # A tank, and without bent rays to meet them no solid in it.
                                 wide = back > 0.999 * ends[1]
-                                if qd.static(world == 4):
+                                if qd.static(world % 10 == 4):
                                     wide = True
                                 if inside.walls.upper.x < 1e5 and wide:
                                     pixel = column // optics.samples
@@ -178,13 +179,14 @@ def lay(
                                         kept, kept_above, kept_whole = through_body(
                                             pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
                                             inside, at, origin + at * direction, refracted(ahead, n, cosi),
-                                            ahead + 2.0 * cosi * n, qd.static(world == 4),
+                                            qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), qd.static(world % 10 == 4),
                                         )  # fmt: skip
                                         kept_z, kept_layer, kept_pixel = at, layer, pixel
                                     body, above, whole = kept, kept_above, kept_whole
                             result += share * shine(
                                 pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside.walls, row, column,
-                                at, n, origin, direction, body, above, whole, qd.static(2 if world == 2 else 3),
+                                at, n, origin, direction, body, above, whole, qd.static(min(world % 10, 3)),
+                                qd.static(world >= 10),
                             )  # fmt: skip
                     line = line_cover(pixels.lines[row, column], front, optics.slack)
                     result += look.line_strength * there * line * (look.line - result)
@@ -243,6 +245,7 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
 def shine(
     pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
     optics: Optics, walls: Box, row, column, z, normal, origin, direction, body, above, whole, dim: qd.template(),
+    many: qd.template(),
 ):  # fmt: skip
     """Radiance of the water that a pixel shows at depth `z` with this normal.
 
@@ -293,7 +296,7 @@ def shine(
             shown += ball * (far - shown)
     swallow, tint, cover, hidden = optics.absorption, optics.glow, 0.0, 0.0
     color, glow, behind = optics.glow, vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
-    if thickness.fluids > 0:
+    if qd.static(many):
         swallow, tint, color, cover, glow, hidden, behind = mixed(
             thickness, look, optics, place, tau, qd.static(dim == 2)
         )
@@ -305,12 +308,13 @@ def shine(
             tint += found[0] * (look.glow * vec3(found[1], found[2], found[3]) - tint)
             color += found[0] * (vec3(found[1], found[2], found[3]) - color)
     result = dimmed(shown, travel, swallow, optics.scattering, tint)
-    if hidden + cover > 0.0:
-        lit = murky(sunlit, sun, look, optics, behind, vec3(0.0, 0.0, 0.0), at, vec3(0.0, 1.0, 0.0), -ahead)
-        result += hidden * (lit * qd.exp(-0.3 * tau * swallow) - result)
-        if cover > 0.0:
-            lit = murky(sunlit, sun, look, optics, color, glow, at, n, -ahead)
-            result += cover * (lit - result)
+    if qd.static(many):
+        if hidden + cover > 0.0:
+            lit = murky(sunlit, sun, look, optics, behind, vec3(0.0, 0.0, 0.0), at, vec3(0.0, 1.0, 0.0), -ahead)
+            result += hidden * (lit * qd.exp(-0.3 * tau * swallow) - result)
+            if cover > 0.0:
+                lit = murky(sunlit, sun, look, optics, color, glow, at, n, -ahead)
+                result += cover * (lit - result)
     if qd.static(dim == 2):  # the rim of the sheet catches the light, and on paper there is nothing to mirror
         # Light comes from above left, and less of it reaches the bottom.
         high = (at.y - walls.lower.y) / (walls.upper.y - walls.lower.y)
