@@ -23,7 +23,7 @@ from wavetank.solids.distance import SolidSet, signed_distance
 from wavetank.view.lens import Lens, to_pixel, to_view, vec2, vec3, vec4
 from wavetank.view.look import Look
 from wavetank.view.optics.fluid import Optics
-from wavetank.view.optics.maps import margins_inside, picture_at, thickness_at
+from wavetank.view.optics.maps import margins_inside, picture_at, share_of
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.radiance import environment, smoothstep, surface_radiance
 from wavetank.view.optics.rays import Box
@@ -140,10 +140,23 @@ def wholeness(sun: Lens, first: qd.template(), column: qd.template(), walls: Box
     inset = vec3(1.5 * spacing, 0.0, 1.5 * spacing)  # next to a wall the column's discs are cut
     inner = qd.min(qd.max(at, walls.lower + inset), walls.upper - inset)
     c = to_view(sun, inner)
-    under, result = depth_below(sun, first, inner), 0.0
-    if under > 0.0:
-        column_length = qd.min(wall_ahead(walls, inner, sun.forward)[3] + under, 1e3)
-        result = smoothstep((thickness_at(column, to_pixel(sun, c), unit) / column_length - 0.3) / 0.45)
+    # Both maps between the same four texels.
+    place = to_pixel(sun, c) - 0.5
+    left = qd.min(qd.max(qd.cast(place.x, qd.i32), 0), first.shape[1] - 2)
+    top = qd.min(qd.max(qd.cast(place.y, qd.i32), 0), first.shape[0] - 2)
+    u, v = place.x - left, place.y - top
+    begins, water, weight = 0.0, 0.0, 1e-6
+    for k in qd.static(range(4)):
+        z = qd.bit_cast(first[top + k // 2, left + k % 2], qd.f32)
+        share = share_of(k, v, u)
+        water += share * column[top + k // 2, left + k % 2]
+        if z < 1e30:
+            begins += share * z
+            weight += share
+    under, result = c.z - begins / weight, 0.0
+    if under > 0.0 and weight > 0.25:
+        length = qd.min(wall_ahead(walls, inner, sun.forward)[3] + under, 1e3)
+        result = smoothstep((water * unit / length - 0.3) / 0.45)
     return result
 
 

@@ -179,7 +179,8 @@ def lay(
                                         kept, kept_above, kept_whole = through_body(
                                             pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
                                             inside, at, origin + at * direction, refracted(ahead, n, cosi),
-                                            qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), qd.static(world % 10 == 4),
+                                            qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0),
+                                            qd.static(world % 10 == 4),
                                         )  # fmt: skip
                                         kept_z, kept_layer, kept_pixel = at, layer, pixel
                                     body, above, whole = kept, kept_above, kept_whole
