@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank import Box, Camera, Scene, Tank, WavetankError
+from wavetank import Box, Camera, Scene, Sphere, Tank, WavetankError
 from wavetank.view.environments import ENVIRONMENTS, FLOORS, air_mass, look_of
 from wavetank.view.renderer import Renderer
 
@@ -26,6 +26,13 @@ def test_each_environment_and_floor_is_another_picture(make_frame):
     seen += [picture(frame, view="water", floor=name) for name in FLOORS if name != "tiles"]
     for k, one in enumerate(seen):
         assert all(np.abs(one - other).mean() > 1.0 for other in seen[:k])
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_a_red_ball_is_red_under_any_sky(name, make_frame):
+    ball = Sphere(center=(0.5, 0.3, 0.5), radius=0.2, color="#d02020")
+    red, green, _ = picture(dry(make_frame, solids=[ball]), view="water", environment=name)[52:60, 76:84].mean((0, 1))
+    assert red > green + 60
 
 
 def test_the_shadow_turns_with_the_sun(make_frame):

@@ -57,8 +57,9 @@ def chosen_light(own: Light | None, environment: str | None, sun: str | None, fl
 
 @functools.lru_cache(maxsize=64)
 def look_of(
-    environment: str, azimuth: float | None = None, elevation: float | None = None, floor: str | None = None
-) -> Look:
+    environment: str, azimuth: float | None = None, elevation: float | None = None, floor: str | None = None,
+    dim: int = 3,
+) -> Look:  # fmt: skip
     """Return a look by the name of its environment; the same object for the same light."""
     own = OWN_SUNS.get(environment)
     if own is not None:
@@ -67,6 +68,8 @@ def look_of(
     plain = {"studio": studio, "paper": paper}.get(environment, pool)()
     if environment == "overcast":
         plain = _overcast()
+    if environment == "paper" and dim == 3:  # a plane lies between white panes, and solids in space do not
+        plain = _white_room()
     if azimuth is None and elevation is None and floor is None and environment != "overcast":
         return plain
     look = _paved(plain, floor)
@@ -123,6 +126,11 @@ def _overcast() -> Look:
         zenith=vector(1.35, 1.42, 1.5), ground=vector(0.32, 0.32, 0.31), sun_size=0.25, sparkle=0.0, caustic=0.15,
         solid=pool().solid, line=pool().line,
     )  # fmt: skip
+
+
+@functools.cache
+def _white_room() -> Look:
+    return dataclasses.replace(paper(), glass=0.0, solid=pool().solid, sun_size=0.1)
 
 
 def _named(kind: str, name: str, known: tuple[str, ...]) -> str:

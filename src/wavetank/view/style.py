@@ -94,7 +94,7 @@ class Style:
         """Light and colours: what is asked for, else the scene's, else what is usual for the view."""
         light = chosen_light(frame.scene.light, self.environment, self.sun, self.floor)
         environment = light.environment or usual_environment(frame.dim, self.kind.coloured)
-        return look_of(environment, light.azimuth, light.elevation, light.floor)
+        return look_of(environment, light.azimuth, light.elevation, light.floor, frame.dim)
 
     def particle_radius(self, extent: Extent) -> float:
         """Radius of a drawn particle [m]."""
