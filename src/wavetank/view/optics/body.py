@@ -88,17 +88,17 @@ def texel_normal(sun: Lens, first: qd.template(), at, spacing):
 
 
 @qd.func
-def is_wet(sun: Lens, first: qd.template(), walls: Box, at, spacing):
-    """Whether the point `at` lies in the water, judged a spacing off panes and floor, where the map has an edge."""
+def depth_at(sun: Lens, first: qd.template(), walls: Box, at, spacing):
+    """Depth [m] of the point `at` below the surface, judged a spacing off panes and floor, where the map has edges."""
     inset = vec3(spacing, spacing, spacing)
     inner = qd.max(at, walls.lower + inset)
     inner = qd.min(inner, vec3(walls.upper.x - spacing, walls.upper.y, walls.upper.z - spacing))
-    return depth_below(sun, first, inner) > 0.0
+    return depth_below(sun, first, inner)
 
 
 @qd.func
 def about_wet(sun: Lens, first: qd.template(), walls: Box, at, spacing):
-    """The same to the nearest texel, for what is seldom near the surface."""
+    """Whether the point `at` lies in the water, to the nearest texel, for what is seldom near the surface."""
     inset = vec3(spacing, spacing, spacing)
     inner = qd.max(at, walls.lower + inset)
     inner = qd.min(inner, vec3(walls.upper.x - spacing, walls.upper.y, walls.upper.z - spacing))
@@ -258,13 +258,19 @@ def through_body(
                 wall = wall_ahead(inside.walls, p, ahead)
                 n, s = vec3(wall[0], wall[1], wall[2]), wall[3]
                 if not about_wet(sun, first, inside.walls, p + 0.999 * s * ahead, optics.spacing):
-                    low = 0.0
-                    for _ in range(5):
+                    # Three halvings, and between their ends as if the surface were straight.
+                    low, over, deep = 0.0, 0.0, 0.0
+                    for _ in range(3):
                         middle = 0.5 * (low + s)
-                        if is_wet(sun, first, inside.walls, p + middle * ahead, optics.spacing):
-                            low = middle
+                        found = depth_at(sun, first, inside.walls, p + middle * ahead, optics.spacing)
+                        if found > 0.0:
+                            low, deep = middle, found
                         else:
-                            s = middle
+                            s, over = middle, found
+                    if deep > 0.0 and over < 0.0:
+                        s = low + (s - low) * deep / (deep - qd.max(over, -deep))
+                    else:
+                        s = 0.5 * (low + s)
                     n = texel_normal(sun, first, p + s * ahead, optics.spacing)
             met = 0
             if qd.static(solid):
