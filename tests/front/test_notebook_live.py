@@ -183,8 +183,8 @@ def test_a_reset_keeps_the_object_and_its_forces(shown):
 
 def test_what_is_wrong_is_said_in_the_page_and_the_water_goes_on(shown):
     shown.say(do="set", name="viscosity", value="much")
-    note, _ = shown.custom("note")
-    assert "viscosity" in note["text"]
+    note, _ = shown.custom("status", lambda status: status["notes"])
+    assert "viscosity" in note["notes"][0]
     shown.say(do="nonsense")
     note, _ = shown.custom("note")
     assert "'nonsense' is not a command" in note["text"]

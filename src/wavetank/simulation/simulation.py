@@ -132,11 +132,8 @@ class Simulation(States):
         parts = self.time_steps = whole(self._steps_in(duration))
         self.solids.grow(duration)
         for part in range(parts):
-            start, dt, shares = (
-                self.time + duration * part / parts,
-                duration / parts,
-                (part / parts, (part + 1) / parts),
-            )
+            start, dt = self.time + duration * part / parts, duration / parts
+            shares = part / parts, (part + 1) / parts
             scene = self._scene_at(start + 0.5 * dt)
             if self.bodies:
                 self.bodies.advance(scene.gravity, dt, shares[1], limit)
