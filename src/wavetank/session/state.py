@@ -170,7 +170,7 @@ class SessionState:
     def sight(self) -> Camera:
         """The camera as pictures show it: a tank that a hand tilts is seen tilted, and gravity points down."""
         if self.upright is None:
-            return self.camera
+            return self.camera.tilted(self.sim.scene, self.sim.time)
         return self.camera.turned_with(self.upright, self.sim.gravity)
 
     def camera_of(self, tool: str) -> Camera:

@@ -15,14 +15,14 @@ def dyed(clear_color, dye):
     return color
 
 
-ICE, ICE_IN_WATER = 127 << 24 | 0xEAF4FB, 127 << 24 | 0x8484D4  # what ice is dyed with: white would be clear in water
+ICE = 127 << 24 | 0xEAF4FB  # what ice is dyed with
 
 
 @qd.kernel(fastcache=True)
-def lay_ice(dye: qd.types.ndarray(), frozen: qd.types.ndarray(), seen: qd.types.ndarray(), ice: qd.i32, count: qd.i32):
-    """Write the dyes that are seen: ice is white, whatever colour its water had."""
+def lay_ice(own: qd.types.ndarray(), frozen: qd.types.ndarray(), seen: qd.types.ndarray(), ice: qd.i32, count: qd.i32):
+    """Write what is seen, dyes or materials: ice is `ice`, whatever its water was."""
     for i in range(count):
-        seen[i] = qd.select(frozen[i] == 1, ice, dye[i])
+        seen[i] = qd.select(frozen[i] == 1, ice, own[i])
 
 
 @qd.func
