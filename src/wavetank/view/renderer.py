@@ -20,7 +20,7 @@ from wavetank.view.colormaps import ENTRIES, table
 from wavetank.view.extent import Extent, extent_of
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
 from wavetank.view.look import Look, fluid_optics, paper, pool, studio, usual_depth
-from wavetank.view.optics.dyes import ICE, ICE_IN_WATER, lay_ice
+from wavetank.view.optics.dyes import ICE, lay_ice
 from wavetank.view.passes import tonemap
 from wavetank.view.quantities import QUANTITIES, Coloring, usual
 from wavetank.view.shot import Shot
@@ -116,7 +116,7 @@ class Renderer:
             return frame
         if self._seen is None or self._seen.shape[0] < frame.dye.shape[0]:
             self._seen = qd.ndarray(qd.i32, shape=(frame.dye.shape[0],))
-        lay_ice(frame.dye, frame.frozen, self._seen, ICE if style.kind.coloured else ICE_IN_WATER, frame.count)
+        lay_ice(frame.dye, frame.frozen, self._seen, ICE, frame.count)
         return dataclasses.replace(frame, dye=self._seen)
 
     def _begin(self, style: Style, shot: Shot, timings: Timings) -> int:

@@ -32,7 +32,7 @@ from wavetank.view.lens import (
 )
 from wavetank.view.look import Look
 from wavetank.view.optics.body import through_body
-from wavetank.view.optics.dyes import dye_in, swallowed_by
+from wavetank.view.optics.dyes import dye_in, milk_of, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, refracted
 from wavetank.view.optics.glass import line_cover
 from wavetank.view.optics.maps import margins_inside, picture_at, thickness_at
@@ -271,13 +271,14 @@ def shine(
             out = 2.0 * bent.dot(ahead) * bent - ahead
             far = behind_drop(pixels, backdrop, lens, look, at + travel * bent, out, row, column, z)
             shown += ball * (far - shown)
-    swallow, tint = optics.absorption, optics.glow
+    swallow, tint, scattering = optics.absorption, optics.glow, optics.scattering
     if thickness.stained[0] == 1:
         found = dye_in(thickness.dye, place / optics.coarse, tau / optics.unit)
         if found[0] > 0.0:
             swallow = swallowed_by(found, swallow, optics.usual)
             tint += found[0] * (look.glow * vec3(found[1], found[2], found[3]) - tint)
-    result = dimmed(shown, travel, swallow, optics.scattering, tint)
+            scattering += milk_of(found, optics.usual)
+    result = dimmed(shown, travel, swallow, scattering, tint)
     if qd.static(dim == 2):  # the rim of the sheet catches the light, and on paper there is nothing to mirror
         # Light comes from above left, and less of it reaches the bottom.
         high = (at.y - walls.lower.y) / (walls.upper.y - walls.lower.y)
