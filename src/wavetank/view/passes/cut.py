@@ -87,8 +87,8 @@ def weight_of_ice(frozen: qd.template(), cells: Cells, at, dim: qd.template()):
 @qd.kernel(fastcache=True)
 def lay(
     pixels: Pixels, x: qd.types.ndarray(), v: qd.types.ndarray(), rho: qd.types.ndarray(),
-    material: qd.types.ndarray(), frozen: qd.types.ndarray(), cells: Cells, lens: Lens, plane: Plane, coloring: Coloring, dim: qd.template(),
-    quantity: qd.template(),
+    material: qd.types.ndarray(), frozen: qd.types.ndarray(), cells: Cells, lens: Lens, plane: Plane,
+    coloring: Coloring, dim: qd.template(), quantity: qd.template(),
 ):  # fmt: skip
     """Colour every pixel whose ray meets the plane within the water."""
     for row, column in qd.ndrange(pixels.depth.shape[0], pixels.depth.shape[1]):
