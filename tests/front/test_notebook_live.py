@@ -204,6 +204,20 @@ def test_undo_brings_the_very_bits_back_into_that_very_object(shown):
     shown.run("sim.step()")
 
 
+def test_the_page_is_told_where_a_hand_would_act_and_what_fits(shown):
+    """A ring on the surface, as shares of the picture; choices of detail with the pace to expect."""
+    shown.say(do="hover", x=0.5, y=0.6, tool="stir", reach=0.2)
+    aim, _ = shown.custom("aim")
+    ring = aim["ring"]
+    assert len(ring) > 20 and ring[0] == ring[-1]
+    us, vs = [u for u, _ in ring], [v for _, v in ring]
+    assert (min(us) + max(us)) / 2 == pytest.approx(0.5, abs=0.02)
+    assert (min(vs) + max(vs)) / 2 == pytest.approx(0.6, abs=0.02)
+    shown.say(do="fit")
+    fit, _ = shown.custom("fit")
+    assert set(fit) >= {"here", "scenes"}
+
+
 def test_what_is_wrong_is_said_in_the_page_and_the_water_goes_on(shown):
     shown.say(do="set", name="viscosity", value="much")
     note, _ = shown.custom("note")
