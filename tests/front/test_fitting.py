@@ -7,7 +7,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.front.dropped import command_for
 from wavetank.front.fitting import expected_pace, fits, fitting
 from wavetank.front.play import _checked_token
-from wavetank.front.units import units
+from wavetank.front.units import digits, units
 from wavetank.session.session import Session
 
 
@@ -45,6 +45,11 @@ def test_units_are_worth_what_they_say():
     assert told["√(g/L)"][0] == pytest.approx(1.566, abs=1e-3)
     assert told["cubes"] == (pytest.approx(9810.0), "N")
     assert units(0.5, 2)["L"] == (50.0, "cm")
+
+
+def test_numbers_have_no_powers_of_ten():
+    told = [digits(value) % value for value in (0.0, 0.08, 9.81, 1000.0, 200_000.0, 1e-5, 1.5e-4)]
+    assert told == ["0", "0.08", "9.81", "1000", "200000", "0.0000100", "0.000150"]
 
 
 def test_a_mesh_that_is_none_is_named():

@@ -181,6 +181,43 @@ def test_a_reset_keeps_the_object_and_its_forces(shown):
     assert shown.value("sim.time") > 0
 
 
+def test_undo_brings_the_very_bits_back_into_that_very_object(shown):
+    """A reset is undone, and that once more; the object of the cells stays, and another way to time goes on from it."""
+    shown.run("sim.advance(0.4)")
+    left = shown.value("[sim.digest(), sim.time, sim.count, id(sim)]")
+    shown.say(do="reset")
+    shown.custom("status", lambda status: status["time"] == 0.0)
+    begun = shown.value("sim.digest()")
+    shown.run("sim.step()")  # what the cells hold is the new world, and the one that was left stays as it was
+    shown.say(do="undo")
+    shown.custom("status", lambda status: status["time"] > 0.1)
+    assert shown.value("[sim.digest(), sim.time, sim.count, id(sim)]") == left
+    assert shown.value("[view.sim is sim, view.session.scene.title]") == [True, "Pool"]
+    shown.run("sim.step()")
+    assert shown.value("sim.time") > left[1]
+    shown.say(do="undo")
+    shown.custom("status", lambda status: status["time"] < 0.1)
+    assert shown.value("[id(sim), sim.frame_number]") == [left[3], 1]
+    shown.say(do="reset")
+    shown.custom("status", lambda status: status["time"] == 0.0)
+    assert shown.value("[sim.digest(), id(sim)]") == [begun, left[3]]
+    shown.run("sim.step()")
+
+
+def test_the_page_is_told_where_a_hand_would_act_and_what_fits(shown):
+    """A ring on the surface, as shares of the picture; choices of detail with the pace to expect."""
+    shown.say(do="hover", x=0.5, y=0.6, tool="stir", reach=0.2)
+    aim, _ = shown.custom("aim")
+    ring = aim["ring"]
+    assert len(ring) > 20 and ring[0] == ring[-1]
+    us, vs = [u for u, _ in ring], [v for _, v in ring]
+    assert (min(us) + max(us)) / 2 == pytest.approx(0.5, abs=0.02)
+    assert (min(vs) + max(vs)) / 2 == pytest.approx(0.6, abs=0.02)
+    shown.say(do="fit")
+    fit, _ = shown.custom("fit")
+    assert set(fit) >= {"here", "scenes"}
+
+
 def test_what_is_wrong_is_said_in_the_page_and_the_water_goes_on(shown):
     shown.say(do="set", name="viscosity", value="much")
     note, _ = shown.custom("status", lambda status: status["notes"])

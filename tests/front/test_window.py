@@ -193,6 +193,34 @@ def test_a_tool_pushes_the_water_and_ends(person):
     assert done.count("ToolBegin") == done.count("ToolEnd") == 1 and "ToolMove" in done
 
 
+def test_the_aim_lies_on_the_water_and_lights_what_would_be_taken(person):
+    """Before a click: a ring that lies, a line from its middle to the floor; what Grab would carry shines."""
+    session, stage = person.session, person.window.stage
+    width, height = stage.box[2:]
+    person.desk.tool = "stir"
+    middle = session.sight.project([[0.3, 0.35, 0.2]], width, height)[0]
+    person.move(*person.water(middle[0] / width, middle[1] / height))
+    person.until(lambda: stage._aim.get("drop"))
+    ring, drop = np.array(stage._aim["ring"]) * (width, height), np.array(stage._aim["drop"]) * (width, height)
+    assert np.ptp(ring[:, 0]) > 1.3 * np.ptp(ring[:, 1]), "a circle that lies is seen flat"
+    assert drop[0] == pytest.approx(0.5 * (ring.min(0) + ring.max(0)), abs=0.05 * width)
+    assert drop[1][1] > drop[0][1] + 20, "down, to the floor"
+    assert not session.hands
+    person.look(0.2)
+    x, y = (round(side) for side in stage.box[:2])
+    screen = person.window.screenshot().astype(int)
+    u, v = (round(float(side)) for side in ring[len(ring) // 4])
+    around = screen[y + v - 3 : y + v + 4, x + u - 3 : x + u + 4]
+    assert np.ptp(around.max(axis=2)) > 60, "a bright line with a dark rim"
+    person.desk.tool = "grab"
+    top = session.sight.project([[0.9, 0.199, 0.2]], width, height)[0]
+    person.move(*person.water(top[0] / width, top[1] / height))
+    person.until(lambda: session.lit == "pillar")
+    person.desk.tool = "push"
+    person.move(stage.box[0] + 0.5 * width, 12.0)
+    person.until(lambda: session.lit == "")
+
+
 def test_buttons_wheel_and_keys_move_the_camera(person):
     person.key("h")
     person.until(lambda: person.session.chosen_camera is None)

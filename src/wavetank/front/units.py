@@ -1,5 +1,7 @@
 """What the shares of tools are in a world of a given size, in units that a person reads."""
 
+import math
+
 from wavetank.session.tools.press import REFERENCE
 
 EARTH = 9.81  # m/s^2
@@ -21,3 +23,11 @@ def units(size: float, dim: int) -> dict[str, tuple[float, str]]:
 def readable(unit: str) -> str:
     """Return a unit with raised powers."""
     return unit.replace("^2", "²").replace("^3", "³")
+
+
+def digits(value: float) -> str:
+    """Return the printf format of a number that a person reads: three digits, and never a power of ten."""
+    size = abs(value)
+    if size >= 1000.0:
+        return "%.0f"
+    return f"%.{min(9, 2 - math.floor(math.log10(size)))}f" if 0.0 < size < 1e-3 else "%.3g"

@@ -80,6 +80,7 @@ class Buffers:
     water: Any  # WaterBuffers once a picture of water was taken
     supersample: int  # computed pixels per pixel of the picture, in each direction
     probes: int  # of light per computed pixel: fewer where more pixels are averaged
+    ice: Any = None  # vec [capacity]: places where ice alone is drawn, once it was [m]
 
     @property
     def rows(self) -> int:

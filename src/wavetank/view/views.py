@@ -86,8 +86,8 @@ VIEWS: dict[str, View] = {
     ),
     "foam": View(
         "foam",
-        "spray, foam and bubbles alone",
+        "spray, foam and bubbles alone, and ice",
         coloured=False,
-        passes=(*_CAST, nothing.draw, solids.draw, *_LIT, tank.draw, foam.draw),
+        passes=(*_CAST, nothing.draw, spheres.draw_ice, solids.draw, *_LIT, tank.draw, foam.draw),
     ),
 }  # fmt: skip

@@ -17,8 +17,11 @@ from PIL import Image
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.front.about import everything
+from wavetank.front.aim import aim
+from wavetank.front.fitting import fits
 from wavetank.front.loop import REST, Loop, News
 from wavetank.front.notebook.channel import Channel
+from wavetank.front.page.viewers import Viewer
 from wavetank.front.picture import jpeg
 from wavetank.scene.scene import Scene
 from wavetank.session.commands import Pause
@@ -45,6 +48,7 @@ class Show:
         self._events = _running_events()
         self.channel = Channel(session.submit, self._ray, lambda: everything(session))
         self.channel.heard = self._wake
+        self.channel.viewers.aim, self.channel.viewers.fit = self._aim, self._fit
         self.loop = Loop(session, self)
         self._woken = asyncio.Event()
         self._packer = concurrent.futures.ThreadPoolExecutor(1, "wavetank jpeg")
@@ -218,6 +222,12 @@ class Show:
         if told != self._told:
             self._told = told
             self.channel.tell({"type": "status", **told})
+
+    def _aim(self, viewer: Viewer, tool: str, u: float, v: float, reach: float) -> None:
+        viewer.post({"type": "aim", **aim(self.session, tool, u, v, reach, self.loop.painter.wanted)})
+
+    def _fit(self, viewer: Viewer) -> None:
+        viewer.post(fits(self.session))
 
     def _ray(self, u: float, v: float, tool: str) -> dict[str, Any]:
         width, height = self.loop.painter.wanted

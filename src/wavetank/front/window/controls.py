@@ -5,6 +5,7 @@ from typing import Any
 from imgui_bundle import imgui
 
 from wavetank.front.theme import ACCENT, DYE, SOFT, TEXT, WARM
+from wavetank.front.units import digits
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.look import hint, rgba
 
@@ -64,9 +65,9 @@ def _slider(label: str, about: dict[str, Any], value: Any) -> Any:
     if about.get("whole", isinstance(about["default"], int)):
         changed, number = imgui.slider_int(label, int(value), int(low), int(high), f"%d{unit}", int(flags))
         return number if changed else None
-    changed, real = imgui.slider_float(
-        label, factor * float(value), factor * low, factor * high, f"%.3g{unit.replace('%', '%%')}", int(flags)
-    )
+    shown = factor * float(value)
+    text = f"{digits(shown)}{unit.replace('%', '%%')}"
+    changed, real = imgui.slider_float(label, shown, factor * low, factor * high, text, int(flags))
     return min(high, max(low, float(f"{real / factor:.4g}"))) if changed else None
 
 

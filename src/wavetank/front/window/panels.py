@@ -11,6 +11,7 @@ from imgui_bundle import ImVec2, imgui, implot
 
 from wavetank.formats import exporter_for
 from wavetank.front.theme import ACCENT, GROUND, PAINTS, SOFT, WARM
+from wavetank.front.units import digits
 from wavetank.front.window import keys, scenes
 from wavetank.front.window.controls import control, words
 from wavetank.front.window.desk import Desk
@@ -56,7 +57,7 @@ def _water(desk: Desk) -> None:
         imgui.text_colored(
             rgba(WARM),
             ", ".join(
-                f"{words(name)} = {value:.4g}" if isinstance(value, float) else f"{words(name)} = {value}"
+                f"{words(name)} = {digits(value) % value}" if isinstance(value, float) else f"{words(name)} = {value}"
                 for name, value in desk.pending.items()
             ),
         )

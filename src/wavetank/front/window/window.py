@@ -117,7 +117,7 @@ class Window:
         em, room = imgui.get_font_size(), imgui.get_io().display_size
         rail, side, top, bottom = 9.0 * em, 22.5 * em if self.desk.panel else 0.0, 2.6 * em, 3.7 * em
         narrow = room.x < NARROW * em
-        if narrow and not self._was_narrow:  # there the panel comes when it is asked for, in place of the line of time
+        if narrow and not self._was_narrow:  # there the panel comes when it is asked for
             self.desk.panel, side = False, 0.0
         self._was_narrow = narrow
         wide = room.x - rail - 3 * GAP - (side + GAP if side else 0.0)
@@ -131,12 +131,14 @@ class Window:
             self._tools()
         imgui.end()
         self.stage.draw(texture, *stage)
-        if not (narrow and side):
-            if self._part("time", ImVec2(2 * GAP + rail, room.y - GAP - bottom), ImVec2(stage[1].x, bottom)):
-                timeline.footer(self.desk)
-            imgui.end()
+        below = narrow and side > 0.0  # the panel ends above the line of time, which needs all the width
+        line = ImVec2(room.x - rail - 3 * GAP if below else stage[1].x, bottom)
+        if self._part("time", ImVec2(2 * GAP + rail, room.y - GAP - bottom), line):
+            timeline.footer(self.desk)
+        imgui.end()
         if side:
-            if self._part("panel", ImVec2(room.x - GAP - side, top), ImVec2(side, room.y - top - GAP)):
+            tall = room.y - top - GAP - (bottom + GAP if below else 0.0)
+            if self._part("panel", ImVec2(room.x - GAP - side, top), ImVec2(side, tall)):
                 panel(self.desk)
             imgui.end()
         keys.draw_help(self.desk)

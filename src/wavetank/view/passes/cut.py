@@ -1,7 +1,8 @@
 """A cut through the water: the quantity on a plane, interpolated from the particles around each of its points.
 
 The value is the mean of the neighbours weighted with (1 - q^2)^2 (Shepard's interpolation); where the weights add up to
-less than 0.22 of those of full water, as next to an edge of the tank, there is none.
+less than 0.22 of those of full water, as next to an edge of the tank, there is none. Where neighbours are ice, so is
+as much of the colour as their share of the weights.
 
     code      symbol   meaning                                                  unit
     reach              radius of the neighbourhood, that of the cells           m
@@ -16,6 +17,7 @@ from wavetank.device.state import remembered
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.cells import Cells, sort
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec3, vector, view_ray
+from wavetank.view.optics.dyes import ICE, dyed
 from wavetank.view.quantities import DEVICE_FUNCTIONS, Coloring, color_of
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import water_of
@@ -29,6 +31,7 @@ class Plane:
     normal: vec3  # unit
     offset: qd.f32  # m: from the origin along the normal
     least: qd.f32  # weight of the water that has a value
+    ice: qd.i32  # dye of ice; 0 where there is none
 
 
 def prepare(shot: Shot, buffers: Buffers) -> None:
@@ -40,10 +43,11 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     """Lay the cut over the picture where it is nearer than what is there."""
     frame, cells, (normal, offset) = shot.frame, water_of(buffers, shot).cells, shot.plane
     least = 0.22 * full_weight(cells, shot.extent.spacing, frame.dim)
-    plane = remembered(Plane(normal=vector(*normal), offset=offset, least=least))
+    ice = ICE if frame.frozen_count else 0
+    plane = remembered(Plane(normal=vector(*normal), offset=offset, least=least, ice=ice))
     lay(
-        buffers.pixels, frame.x, frame.v, frame.rho, frame.material, cells, shot.lens, plane, shot.coloring,
-        frame.dim, shot.quantity,
+        buffers.pixels, frame.x, frame.v, frame.rho, frame.material, frame.frozen if ice else frame.material, cells,
+        shot.lens, plane, shot.coloring, frame.dim, shot.quantity,
     )  # fmt: skip
 
 
@@ -66,11 +70,25 @@ def value_at(
     return weight, total
 
 
+@qd.func
+def weight_of_ice(frozen: qd.template(), cells: Cells, at, dim: qd.template()):
+    """The part of the weight at a point that is ice."""
+    c = whole_place(cells, at, dim)
+    total = 0.0
+    for n in range(qd.static(27 if dim == 3 else 9)):
+        cell = cell_beside(cells, c, n, dim)
+        for b in range(cells.start[cell], cells.start[cell + 1]):
+            w = weight_of(cells, b, at)
+            if w > 0.0 and frozen[cells.order[b]] == 1:
+                total += w
+    return total
+
+
 @qd.kernel(fastcache=True)
 def lay(
     pixels: Pixels, x: qd.types.ndarray(), v: qd.types.ndarray(), rho: qd.types.ndarray(),
-    material: qd.types.ndarray(), cells: Cells, lens: Lens, plane: Plane, coloring: Coloring, dim: qd.template(),
-    quantity: qd.template(),
+    material: qd.types.ndarray(), frozen: qd.types.ndarray(), cells: Cells, lens: Lens, plane: Plane,
+    coloring: Coloring, dim: qd.template(), quantity: qd.template(),
 ):  # fmt: skip
     """Colour every pixel whose ray meets the plane within the water."""
     for row, column in qd.ndrange(pixels.depth.shape[0], pixels.depth.shape[1]):
@@ -80,8 +98,13 @@ def lay(
         if qd.abs(across) > 1e-6:
             t = (plane.offset - plane.normal.dot(origin)) / across
             if t > lens.near and t < 1e4 and t < qd.bit_cast(pixels.depth[row, column], qd.f32):
-                weight, total = value_at(x, v, rho, material, cells, origin + t * direction, dim, quantity)
+                at = origin + t * direction
+                weight, total = value_at(x, v, rho, material, cells, at, dim, quantity)
                 if weight > plane.least:
                     pixels.depth[row, column] = qd.bit_cast(t, qd.i32)
                     pixels.surface[row, column] = -1  # SOLID
-                    pixels.color[row, column] = color_of(coloring, total / weight)
+                    color = color_of(coloring, total / weight)
+                    if plane.ice != 0:
+                        share = weight_of_ice(frozen, cells, at, dim) / weight
+                        color += (dyed(color, plane.ice) - color) * share
+                    pixels.color[row, column] = color

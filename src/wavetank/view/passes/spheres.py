@@ -15,6 +15,8 @@ view is drawn smaller rather than cut off, which bounds the work of one particle
 drawn.
 """
 
+from typing import Any
+
 from wavetank.device.compiler import qd
 from wavetank.solids.distance import lift
 from wavetank.view.buffers import Buffers, Pixels
@@ -26,6 +28,8 @@ from wavetank.view.lens import (
     pixels_per_metre,
     point_at,
     to_view,
+    vec2,
+    vec3,
     view_ray,
 )
 from wavetank.view.optics.dyes import dyed
@@ -37,16 +41,43 @@ LARGEST = 0.25  # of the picture's height: radius up to which a ball is drawn at
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Draw the particles into an empty picture: fills depth, surface, normal and color."""
+    draw_at(shot.frame.x, shot, buffers)
+
+
+def draw_at(x: Any, shot: Shot, buffers: Buffers) -> None:
+    """Do so with the particles at the places `x`, a device array [capacity] in their order."""
     frame, pixels, largest = shot.frame, buffers.pixels, max(LARGEST * buffers.rows, 1.0)
-    splat(pixels.depth, frame.x, shot.lens, shot.radius, largest, frame.count)
-    claim(pixels, frame.x, shot.lens, shot.radius, largest, frame.count)
-    paint(pixels, frame.x, frame.v, frame.rho, frame.material, frame.dye, shot.lens, shot.coloring, shot.quantity)
+    splat(pixels.depth, x, shot.lens, shot.radius, largest, frame.count)
+    claim(pixels, x, shot.lens, shot.radius, largest, frame.count)
+    paint(pixels, x, frame.v, frame.rho, frame.material, frame.dye, shot.lens, shot.coloring, shot.quantity)
+
+
+def draw_ice(shot: Shot, buffers: Buffers) -> None:
+    """Draw the particles of ice alone: all others are laid behind the eye."""
+    frame = shot.frame
+    if not frame.frozen_count:
+        return
+    if buffers.ice is None or buffers.ice.shape[0] < frame.x.shape[0] or buffers.ice.element_shape != (frame.dim,):
+        buffers.ice = qd.ndarray(vec2 if frame.dim == 2 else vec3, shape=(frame.x.shape[0],))
+    show_ice(buffers.ice, frame.x, frame.frozen, shot.lens, frame.dim, frame.count)
+    draw_at(buffers.ice, shot, buffers)
 
 
 def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
     """Draw the particles into the sun's depth map."""
     if shot.frame.dim == 3:
         splat(buffers.sun_depth, shot.frame.x, shot.sun, shot.radius, float(buffers.texels), shot.frame.count)
+
+
+@qd.kernel(fastcache=True)
+def show_ice(
+    seen: qd.types.ndarray(), x: qd.types.ndarray(), frozen: qd.types.ndarray(), lens: Lens, dim: qd.template(),
+    count: qd.i32,
+):  # fmt: skip
+    """Write the places of ice, and one that no eye sees for all else."""
+    for i in range(count):
+        for k in qd.static(range(dim)):
+            seen[i][k] = qd.select(frozen[i] == 1, x[i][k], lens.eye[k] - 1e3 * lens.forward[k])
 
 
 @qd.kernel(fastcache=True)

@@ -1,7 +1,7 @@
 // The water in a cell: pictures and status come over the kernel's channel, hands and controls go back on it.
 
 const words = (name) => { const text = name.replaceAll("_", " ").replaceAll("-", " "); return text[0].toUpperCase() + text.slice(1); };
-const pretty = (value, digits = 3) => (Number.isFinite(value) ? String(Number(value.toPrecision(digits))) : "");
+const pretty = (value, digits = 3) => (Number.isFinite(value) ? Number(value.toPrecision(Math.abs(value) >= 1e4 ? 6 : digits)).toLocaleString("en", { maximumFractionDigits: 8 }) : "");
 
 function make(tag, attributes = {}, ...children) {
   const element = document.createElement(tag);
@@ -12,17 +12,17 @@ function make(tag, attributes = {}, ...children) {
   return element;
 }
 
-function icon(path) {
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg"), line = document.createElementNS("http://www.w3.org/2000/svg", "path");
-  svg.setAttribute("viewBox", "0 0 24 24");
-  svg.setAttribute("aria-hidden", "true");
-  line.setAttribute("d", path);
-  svg.append(line);
-  return svg;
+function drawn(tag, attributes, ...children) {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.append(...children);
+  return element;
 }
 
+const icon = (path) => drawn("svg", { viewBox: "0 0 24 24", "aria-hidden": "true" }, drawn("path", { d: path }));
+
 /** One control from a declaration; `change(value)` hears of it, `show(value)` puts it where the world has it. */
-function control(about, value, change) {
+function control(about, value, change, units = {}) {
   const label = words(about.name), title = about.sentence ?? "";
   if (about.choices?.length || typeof value === "boolean") {
     const choices = about.choices?.length ? about.choices : ["false", "true"];
@@ -39,9 +39,10 @@ function control(about, value, change) {
   const whole = about.whole ?? Number.isInteger(about.default), low = about.low ?? 0;
   const high = Math.min(about.high ?? Infinity, Math.max(1, 4 * Math.abs(about.default ?? 1), 2 * Math.abs(value)));
   const said = make("output", {}), range = make("input", { type: "range", min: low, max: high, step: whole ? 1 : (high - low) / 200, "aria-label": label });
+  const [factor, unit] = units[about.unit] ?? [1, about.unit ?? ""]; // shares of the world are said in metres and newtons
   const show = (now) => {
     if (!range.matches(":active")) range.value = now;
-    said.textContent = `${pretty(Number(now))} ${about.unit ?? ""}`;
+    said.textContent = `${pretty(factor * Number(now))} ${unit}`;
     range.setAttribute("aria-valuetext", said.textContent);
   };
   range.oninput = () => { const now = Number(Number(range.value).toPrecision(4)); show(now); change(whole ? Math.round(now) : now); };
@@ -53,10 +54,13 @@ function render({ model, el }) {
   const view = `${Date.now().toString(36)}${Math.random().toString(36).slice(2)}`;
   const send = (message) => model.send(message);
   const canvas = make("canvas", { className: "picture", tabIndex: 0, role: "img", "aria-label": "The water. Space pauses, arrows turn the view." });
+  const rings = ["drop", "foot", "under", "ring"].map((part) => drawn("polyline", { class: part })), legend = make("div", { className: "legend", hidden: true });
+  const aim = drawn("svg", { class: "aim", viewBox: "0 0 1 1", preserveAspectRatio: "none", "aria-hidden": "true" }, ...rings);
+  const stage = make("div", { className: "stage" }, canvas, aim, legend);
   const bar = make("div", { className: "bar" }), tools = make("div", { className: "tools", role: "toolbar", "aria-label": "Tools" });
   const card = make("div", { className: "card" }), parameters = make("div", { className: "card" }), notes = make("div", { className: "notes", role: "status" });
   const more = make("details", {}, make("summary", { textContent: "Parameters and looks" }), parameters);
-  const root = make("div", { className: "wavetank-live", "data-lm-suppress-shortcuts": "true", hidden: true }, canvas, bar, tools, card, more, notes);
+  const root = make("div", { className: "wavetank-live", "data-lm-suppress-shortcuts": "true", hidden: true }, stage, bar, tools, card, more, notes);
   el.append(root);
 
   let about = null, tool = null, now = {}, world = {}, poster = null, sliders = new Map(), chosen = new Map(), parameter = new Map();
@@ -85,10 +89,12 @@ function render({ model, el }) {
   const step = make("button", { title: "One frame (.)", "aria-label": "One frame", onclick: () => send({ do: "step" }) }, icon("M6 5l8 7-8 7zM17 5v14"));
   const back = make("button", { title: "One second back (,)", "aria-label": "One second back", onclick: () => send({ do: "rewind", time: Math.max(0, now.time - 1) }) }, icon("M18 5l-8 7 8 7zM7 5v14"));
   const again = make("button", { title: "Start again (R)", "aria-label": "Start again", onclick: () => send({ do: "reset" }) }, icon("M5 12a7 7 0 1 0 2.500-5.400M5 4v4h4"));
+  const undo = make("button", { title: "Undo the last start (Z)", "aria-label": "Undo", hidden: true, onclick: () => send({ do: "undo" }) }, icon("M8 5L4 9l4 4M4 9h9a6 6 0 0 1 0 12h-3"));
+  const home = make("button", { title: "See all (H)", "aria-label": "See all", onclick: () => send({ do: "home" }) }, icon("M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5M9 12h6M12 9v6"));
   const pace = make("select", { title: "Pace of time", "aria-label": "Pace of time" });
   const said = make("span", { className: "said" });
   pace.onchange = () => send({ do: "speed", factor: Number(pace.value) });
-  bar.append(back, pause, step, again, pace, said);
+  bar.append(back, pause, step, again, undo, home, pace, said);
 
   function showStatus(status) {
     now = status;
@@ -103,7 +109,46 @@ function render({ model, el }) {
     if (status.world) {
       world = { ...world, ...status.world };
       for (const [name, slider] of parameter) slider.show(world.values[name]);
+      showWorld();
+      if (more.open) send({ do: "fit" });
     }
+    // Under a pointer that rests the water moves.
+    if (hovered && !status.paused && performance.now() - answered > SELDOM) ask();
+  }
+
+  /** What there is to undo, and what the colours mean. */
+  function showWorld() {
+    undo.hidden = world.undo === null;
+    const told = world.legend;
+    legend.hidden = !told;
+    if (!told) return;
+    const strip = make("i", { className: "strip" });
+    strip.style.background = `linear-gradient(to right, ${told.colors.join()})`;
+    legend.replaceChildren(...(told.names ? told.names.map(([name, color]) => {
+      const patch = make("i");
+      patch.style.background = color;
+      return make("span", { className: "key" }, patch, name);
+    }) : [make("span", { textContent: told.title }), strip, make("span", { className: "ends" }, ...told.ticks.map((value) => make("b", { textContent: pretty(value) })))]));
+  }
+
+  // --- how fine the water is: what the machine can be expected to make of it ---
+  const fine = make("div", { className: "fine" });
+  more.ontoggle = () => { if (more.open) send({ do: "fit" }); };
+  function showFit({ here }) {
+    fine.replaceChildren();
+    if (here.length < 2) return;
+    const far = ({ particles }) => Math.abs(Math.log(particles / now.count));
+    const first = here.reduce((best, one, k) => (far(one) < far(here[best]) ? k : best), 0);
+    const said = make("output", {}), range = make("input", { type: "range", min: 0, max: here.length - 1, step: 1, value: first, "aria-label": "Detail" });
+    const show = () => {
+      const { particles, pace: speed } = here[range.value];
+      said.textContent = `about ${pretty(particles, 2)} particles: ${speed >= 0.95 ? "real time" : `${pretty(speed, 2)} × real time`} expected`;
+      range.setAttribute("aria-valuetext", said.textContent);
+    };
+    range.oninput = show;
+    range.onchange = () => send({ do: "reset", parameters: { spacing: here[range.value].spacing } });
+    show();
+    fine.append(make("label", { title: "Starts again with as many particles." }, make("span", { textContent: "Detail" }), range, said));
   }
 
   function note(text) {
@@ -119,7 +164,7 @@ function render({ model, el }) {
     chosen.set(name, options);
     for (const button of tools.children) button.setAttribute("aria-pressed", button.dataset.tool === name);
     canvas.classList.toggle("look", name === "look");
-    sliders = tool.options.map((each) => control(each, options[each.name] ?? each.default, (value) => { options[each.name] = value; }).element);
+    sliders = tool.options.map((each) => control(each, options[each.name] ?? each.default, (value) => { options[each.name] = value; }, world.units).element);
     card.replaceChildren(make("p", { textContent: tool.sentence }), ...sliders);
   }
 
@@ -133,11 +178,12 @@ function render({ model, el }) {
     pace.replaceChildren(...hello.speeds.map(([factor, text]) => make("option", { value: String(factor), textContent: text })));
     parameter = new Map();
     const live = hello.parameters.filter((each) => each.live && (each.choices.length || typeof each.default !== "object"));
-    for (const each of live) parameter.set(each.name, control(each, hello.values[each.name], (value) => send({ do: "set", name: each.name, value })));
+    for (const each of live) parameter.set(each.name, control(each, hello.values[each.name], (value) => send({ do: "set", name: each.name, value }), hello.units));
     const looks = [["view", hello.views, hello.view], ["color_by", hello.colorings, hello.color_by]].map(([name, choices, value]) =>
       control({ name, choices, sentence: name === "view" ? "What is drawn." : "What particles are coloured by." }, value, (chosen) => send({ do: "view", [name]: chosen })).element);
-    parameters.replaceChildren(...looks, ...[...parameter.values()].map(({ element }) => element));
+    parameters.replaceChildren(fine, ...looks, ...[...parameter.values()].map(({ element }) => element));
     if (!tool) choose("push"); else choose(tool.name);
+    showWorld();
     root.hidden = false;
     hidePoster();
     tellSize();
@@ -150,6 +196,39 @@ function render({ model, el }) {
   let resizing = 0;
   const watcher = new ResizeObserver(() => { clearTimeout(resizing); resizing = setTimeout(tellSize, 150); });
   watcher.observe(canvas);
+
+  // --- where the hand would act: a ring on the surface that the pointer's ray meets, a line to the floor ---
+  const BETWEEN = 80, SELDOM = 600; // ms between two questions while the pointer moves, and while it rests
+  let hovered = null, asked = 0, answered = 0, told = "";
+  const question = () => (hovered ? `${hovered.x} ${hovered.y} ${tool?.name}` : "");
+  function hover(at) {
+    hovered = at;
+    if (!at || performance.now() - answered > BETWEEN) ask();
+  }
+  /** One question at a time; the answer asks again where the pointer has moved on. */
+  function ask() {
+    if (performance.now() - asked < 1000) return;
+    if (!hovered || !tool || tool.name === "look") {
+      showAim({});
+      if (told) send({ do: "hover" });
+      told = "";
+      return;
+    }
+    told = question();
+    asked = performance.now();
+    const value = (name) => chosen.get(tool.name)?.[name] ?? tool.options.find((each) => each.name === name)?.default;
+    send({ do: "hover", x: hovered.x, y: hovered.y, tool: tool.name, reach: tool.cursor ? value("radius") ?? (value("width") ?? 0.1) / 2 : 0 });
+  }
+  function showAim(places) {
+    for (const line of rings) line.setAttribute("points", (places[line.getAttribute("class").replace("under", "ring")] ?? []).map((p) => p.join()).join(" "));
+  }
+  function answer(message) {
+    asked = 0;
+    answered = performance.now();
+    if (!hovered) { ask(); return; }
+    showAim(message);
+    if (question() !== told) setTimeout(ask, BETWEEN);
+  }
 
   // --- hands ---
   const pointers = new Map();
@@ -182,9 +261,10 @@ function render({ model, el }) {
     }
   };
   canvas.onpointermove = (event) => {
-    const pointer = pointers.get(event.pointerId);
+    const pointer = pointers.get(event.pointerId), at = where(event);
+    if (event.pointerType === "mouse" || pointers.size === 1) hover(pointer && pointer.mode !== "tool" ? null : at);
     if (!pointer) return;
-    const at = where(event), [dx, dy] = [at.x - pointer.x, at.y - pointer.y];
+    const [dx, dy] = [at.x - pointer.x, at.y - pointer.y];
     Object.assign(pointer, at);
     if (event.pointerId === tooling) {
       // At most thirty places a second go over the channel, and the last one always does.
@@ -195,20 +275,24 @@ function render({ model, el }) {
     else if (pointer.mode === "both") {
       turn(dx / 2, dy / 2, at.shape);
       const wide = spread();
-      if (wide > 0 && pinch > 0) send({ do: "zoom", factor: Math.min(2, Math.max(0.5, pinch / wide)) });
+      const [a, b] = [...pointers.values()];
+      if (wide > 0 && pinch > 0) send({ do: "zoom", factor: Math.min(2, Math.max(0.5, pinch / wide)), x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 });
       pinch = wide;
     }
   };
   canvas.onpointerup = canvas.onpointercancel = (event) => {
     if (event.pointerId === tooling) lift();
     pointers.delete(event.pointerId);
+    if (event.pointerType !== "mouse" && !pointers.size) hover(null);
   };
+  canvas.onpointerleave = () => { if (!pointers.size) hover(null); };
   canvas.oncontextmenu = (event) => event.preventDefault();
   // The wheel belongs to the notebook until the water was clicked.
   canvas.addEventListener("wheel", (event) => {
     if (document.activeElement !== canvas && !root.contains(document.activeElement)) return;
     event.preventDefault();
-    send({ do: "zoom", factor: Math.min(1.6, Math.max(0.6, Math.exp(0.0012 * event.deltaY * (event.deltaMode ? 30 : 1)))) });
+    const { x, y } = where(event);
+    send({ do: "zoom", factor: Math.min(1.6, Math.max(0.6, Math.exp(0.0012 * event.deltaY * (event.deltaMode ? 30 : 1)))), x, y });
   }, { passive: false });
 
   const ACTIONS = { pause: () => pause.click(), back: () => back.click(), again: () => again.click() };
@@ -228,6 +312,8 @@ function render({ model, el }) {
     else if (message.type === "hello") build(message);
     else if (message.type === "status") showStatus(message);
     else if (message.type === "note") note(message.text);
+    else if (message.type === "aim") answer(message);
+    else if (message.type === "fit") showFit(message);
     else if (message.type === "end") leave();
   };
   const hide = () => send({ do: "hidden", on: document.hidden });
