@@ -115,3 +115,12 @@ def test_what_a_material_may_not_be():
     for wrong in ({"clarity": "muddy"}, {"glow": -1.0}, {"glow": 1e9}):
         with pytest.raises(WavetankError, match=next(iter(wrong))):
             Material(name="x", **wrong)
+
+
+def test_milk_in_a_plane_is_as_bright_at_its_floor_as_at_its_surface():
+    """Nothing casts a shadow in a plane: no map of what the sun sees is read there."""
+    milk = Material(name="milk", color="#f6f1e4", clarity="opaque")
+    camera = Camera(eye=(0.5, 0.5, 1.0), target=(0.5, 0.5, 0.0), height=1.2)
+    image = picture(filled([milk], dim=2), camera)
+    low, high = (at(image, camera, 0.5, y, 0.0).mean() for y in (0.1, 0.45))
+    assert min(low, high) > 190
