@@ -24,7 +24,7 @@ from wavetank.simulation.added_mass import added_mass
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
 from wavetank.simulation.coupling import Coupling
-from wavetank.simulation.joints import put_joint
+from wavetank.simulation.joints import Joints, put_joints
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.solids.distance import PARTS
 from wavetank.solids.mass import Inertia, Ruler, inertia_of, water_of
@@ -57,6 +57,7 @@ class Bodies(Mapping[str, Body]):
         self.retry = Retry()
         self.gravity = np.zeros(3)  # m/s^2, of the present step
         self.pieces: Pieces | None = None  # of all bodies, on the device
+        self.joints = Joints()
         solids.feeling, solids.passing = {}, {}
         numbers = [number for number, solid in enumerate(solids.members) if solid.is_body]
         if not numbers:
@@ -66,8 +67,7 @@ class Bodies(Mapping[str, Body]):
         self.world = self.engine.PhysicsWorld(gravity=(0.0, 0.0, 0.0))
         self.world.integration_parameters.length_unit = max(10.0 * scene.spacing, 1e-3)
         self.handles = [self._add(number, solid) for number, solid in enumerate(solids.members)]
-        for joint in scene.joints:
-            put_joint(self.engine, self.world, self.handles, solids, joint)
+        self.joints = put_joints(self.engine, lambda: self.world, self.handles, solids, scene.joints)
         self._weigh_all(numbers)
         solids.feel({body.number: (body.dry.center, body.unit) for body in self.members})
         self.numbers = np.array([body.number for body in self.members])
@@ -172,13 +172,18 @@ class Bodies(Mapping[str, Body]):
 
     # --- a step ---
 
-    def advance(self, gravity: tuple[float, ...], dt: float, share: float, fastest: float) -> None:
-        """Move the bodies for a step of `dt` [s], which ends at a `share` of the frame; none is left faster [m/s]."""
+    def advance(self, gravity: tuple[float, ...], dt: float, share: float, fastest: float, clock: float) -> None:
+        """Move the bodies for a step of `dt` [s], which ends at a `share` of the frame; none is left faster [m/s].
+
+        Expressions and keyframes of joints have the time `clock` [s] then.
+        """
         self.fastest, self.gravity = fastest, np.array([*gravity, 0.0][:3])
         self.coupling.held = np.array([self._is_held(body) for body in self.members])
         self.coupling.begin(self._rotations(), self.gravity, dt)
         for body in self.members:
             self._hold(body, body.rigid())
+        for joint in self.joints.values():
+            joint.drive(clock, dt)
         self.begun = [(handle, self.world.rigid_bodies[handle].position) for handle in self.handles]
         self.begins = {body.number: self.solids.poses[body.number] for body in self.members}
         self._move(dt, share)
@@ -291,6 +296,9 @@ class Bodies(Mapping[str, Body]):
         """Return the bodies among these solids; those that there were go on as they did."""
         bodies = Bodies(scene, solids)
         memories: Any = self.coupling.memory() if self.members else []
+        for name, joint in bodies.joints.items():
+            if name in self.joints:
+                joint.take_over(self.joints[name])
         for body in bodies.members:
             for before, memory in zip(self.members, memories, strict=True):
                 if before.name == body.name:
@@ -315,6 +323,9 @@ class Bodies(Mapping[str, Body]):
 
     def check(self, poses: Sequence[Pose]) -> None:
         """Check that the engine, restored from a file, has the bodies where the solids are; raises `WavetankError`."""
+        for name, joint in self.joints.items():
+            if not joint.is_there:
+                raise WavetankError(f"the engine's state lacks the joint {name!r}.")
         for body in self.members:
             (position, rotation), (place, turn) = self._pose(body.rigid()), poses[body.number]
             off = np.concatenate(
