@@ -7,6 +7,7 @@ from worlds import frame_of
 
 from wavetank import Box, Camera, Scene, Simulation, Sphere, Tank
 from wavetank.view.renderer import Renderer
+from wavetank.view.strips import _strips
 
 D = 0.05
 SIZE = (240, 180)
@@ -100,3 +101,15 @@ def test_breaking_water_hardly_flickers():
     jumps = ((np.abs(before) > 40) & (np.abs(after) > 40) & (before * after > 0)).any(axis=-1)
     assert sim.frame().foam_count > 100
     assert jumps.mean() < 0.003
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3, 4])
+def test_strips_cut_no_pixel_on_any_number_of_threads(samples):
+    """What is seen through water is kept for the samples of a pixel: cut in two it came out otherwise."""
+    for width, height in ((400, 225), (641, 97), (7, 5)):
+        for threads in (1, 2, 3, 8):
+            rows, columns = height * samples, width * samples
+            strips = _strips(rows, columns, threads)
+            assert strips.width % samples == 0
+            assert strips.parts * strips.width >= columns > (strips.parts - 1) * strips.width
+            assert strips.count >= rows * strips.parts
