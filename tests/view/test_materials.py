@@ -100,18 +100,31 @@ def test_dye_in_a_plane_reaches_the_walls():
 
 
 def test_ice_is_paler_than_water_and_hides_what_is_behind():
-    scene = Scene(spacing=D, tank=Tank(size=(1, 0.8, 1)), fluids=[wt.Block(lower=(0, 0, 0), upper=(1, 0.5, 1))])
-    sim = wt.Simulation(scene)
-    above = Camera(eye=(0.5, 2.5, 1.6), target=(0.5, 0.4, 0.5))
-    clear = at(picture(sim.frame(), above), above, 0.5, 0.5, 0.5)
-    middle = np.array([0.5, 0.35, 0.5])
-    sim.freeze_inside(middle, middle, 0.2)
-    ice = at(picture(sim.frame(), above), above, 0.5, 0.5, 0.5)
-    assert ice.mean() > clear.mean() + 25
-    assert np.ptp(ice, axis=0).max() <= np.ptp(clear, axis=0).max() + 6, "no tiles are seen through it"
+    """A black plate on the floor below a ball of ice."""
+    plate = Box(center=(0.5, 0.01, 0.5), size=(0.7, 0.02, 0.7), color="#000000")
+    above = Camera(eye=(0.5, 2.5, 1.0), target=(0.5, 0.4, 0.5))
+    middle, seen = np.array([0.5, 0.3, 0.5]), []
+    for solids in ((), (plate,)):
+        fluids = [wt.Block(lower=(0, 0, 0), upper=(1, 0.5, 1))]
+        sim = wt.Simulation(Scene(spacing=D, tank=Tank(size=(1, 0.8, 1)), fluids=fluids, solids=list(solids)))
+        water = at(picture(sim.frame(), above), above, 0.5, 0.5, 0.5)
+        sim.freeze_inside(middle, middle, 0.22)
+        seen.append((water, at(picture(sim.frame(), above), above, 0.5, 0.5, 0.5)))
+    (water, ice), (dark_water, dark_ice) = seen
+    assert ice.mean() > water.mean() + 25
+    assert np.abs(ice - dark_ice).mean() < 0.35 * np.abs(water - dark_water).mean()
 
 
 def test_what_a_material_may_not_be():
     for wrong in ({"clarity": "muddy"}, {"glow": -1.0}, {"glow": 1e9}):
         with pytest.raises(WavetankError, match=next(iter(wrong))):
             Material(name="x", **wrong)
+
+
+def test_milk_in_a_plane_is_as_bright_at_its_floor_as_at_its_surface():
+    """Nothing casts a shadow in a plane: no map of what the sun sees is read there."""
+    milk = Material(name="milk", color="#f6f1e4", clarity="opaque")
+    camera = Camera(eye=(0.5, 0.5, 1.0), target=(0.5, 0.5, 0.0), height=1.2)
+    image = picture(filled([milk], dim=2), camera)
+    low, high = (at(image, camera, 0.5, y, 0.0).mean() for y in (0.1, 0.45))
+    assert min(low, high) > 190

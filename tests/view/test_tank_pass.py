@@ -78,3 +78,12 @@ def test_no_tank_no_lines(make_frame):
     frame = make_frame(Scene(spacing=0.05), [])
     renderer = Renderer(WIDTH, HEIGHT)
     assert len(np.unique(renderer.render(frame, view="particles", legend=False).reshape(-1, 3), axis=0)) < 200
+
+
+def test_a_world_without_a_tank_shows_no_lines_of_the_one_before(make_frame):
+    renderer = Renderer(160, 120)
+    block = np.stack(np.meshgrid(*[np.arange(0.05, 0.6, 0.05)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    open_world = make_frame(Scene(spacing=0.05), block)
+    fresh = renderer.render(open_world, view="water")
+    renderer.render(make_frame(Scene(spacing=0.05, tank=Tank(size=(1.0, 1.0, 1.0))), block), view="water")
+    assert (renderer.render(open_world, view="water") == fresh).all()

@@ -13,6 +13,7 @@ from typing import Any
 from wavetank.device.compiler import qd, threads
 
 LEAST_TASKS = 512  # that the compiler gives to a processor's thread, whatever they cost
+WHOLE = 12  # a strip is as wide as whole pixels of 1 to 4 samples, so that what these share depends on no thread
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -36,7 +37,7 @@ def _strips(rows: int, columns: int, turns: int) -> Strips:
     if turns == 0:
         return Strips(count=rows * columns, parts=columns, width=1, turns=1, run=rows)
     parts = min(columns, math.ceil(LEAST_TASKS * turns / rows)) if turns > 1 else 1
-    width = math.ceil(columns / parts)
+    width = min(WHOLE * math.ceil(columns / parts / WHOLE), columns)
     parts, run = math.ceil(columns / width), math.ceil(rows / turns)
     return Strips(count=run * turns * parts, parts=parts, width=width, turns=turns, run=run)
 

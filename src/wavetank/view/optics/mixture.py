@@ -106,8 +106,10 @@ def mixed(thickness: Thickness, look: Look, optics: Optics, pixel, tau, plane: q
 
 
 @qd.func
-def murky(sunlit: SunlitWater, sun: Lens, look: Look, optics: Optics, color, glow, at, n, seen):
+def murky(sunlit: SunlitWater, sun: Lens, look: Look, optics: Optics, color, glow, at, n, seen, plane: qd.template()):
     """Radiance of a fluid that one does not see into, at the point `at` of its surface, shaded by itself."""
-    under = depth_below(sun, sunlit.depth, at + (0.5 * optics.spacing) * n)
-    share = 1.0 - smoothstep((under - 0.75 * optics.spacing) / (2.5 * optics.spacing))
+    share = 1.0
+    if qd.static(not plane):  # in a plane nothing casts a shadow
+        under = depth_below(sun, sunlit.depth, at + (0.5 * optics.spacing) * n)
+        share = 1.0 - smoothstep((under - 0.75 * optics.spacing) / (2.5 * optics.spacing))
     return surface_radiance(look, color, n, seen, vec2(share, 1.0), 0.45, 0.0) + glow

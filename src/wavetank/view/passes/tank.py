@@ -29,8 +29,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
 
 def draw_lines(shot: Shot, buffers: Buffers) -> None:
     """Mark the edges for those who draw them: the backdrop, and the water those in front of it."""
+    buffers.pixels.lines.fill(0)
     if shot.frame.scene.tank is not None:
-        buffers.pixels.lines.fill(0)
         edges, steps = 12 if shot.frame.dim == 3 else 4, max(buffers.rows, buffers.columns) + 2
         mark(buffers.pixels, shot.lens, shot.box, max(1.0, buffers.rows / 420.0), slack(shot), edges, steps)
 

@@ -311,10 +311,21 @@ def shine(
     result = dimmed(shown, travel, swallow, optics.scattering, tint)
     if qd.static(many):
         if hidden + cover > 0.0:
-            lit = murky(sunlit, sun, look, optics, behind, vec3(0.0, 0.0, 0.0), at, vec3(0.0, 1.0, 0.0), -ahead)
+            lit = murky(
+                sunlit,
+                sun,
+                look,
+                optics,
+                behind,
+                vec3(0.0, 0.0, 0.0),
+                at,
+                vec3(0.0, 1.0, 0.0),
+                -ahead,
+                qd.static(dim == 2),
+            )
             result += hidden * (lit * qd.exp(-0.3 * tau * swallow) - result)
             if cover > 0.0:
-                lit = murky(sunlit, sun, look, optics, color, glow, at, n, -ahead)
+                lit = murky(sunlit, sun, look, optics, color, glow, at, n, -ahead, qd.static(dim == 2))
                 result += cover * (lit - result)
     if qd.static(dim == 2):  # the rim of the sheet catches the light, and on paper there is nothing to mirror
         # Light comes from above left, and less of it reaches the bottom.
