@@ -81,6 +81,46 @@ def test_keys_alone(open_page, browser, tmp_path, monkeypatch):  # noqa: F811
     assert browser.complaints() == []
 
 
+def test_keys_alone_from_the_start_to_a_saved_recording(open_page, browser, tmp_path, monkeypatch):  # noqa: F811
+    """Tab to the scenes, to a level, Enter; aim, tilt, win; Tab to the session, Enter; the file repeats what was done."""
+    monkeypatch.setenv("WAVETANK_DATA", str(tmp_path))
+    browser.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+    world = open_page(wt.Scene.load("drop-2d"))
+    session = world.session
+    tab_to(browser, "tab-water")
+    press(browser, "ArrowRight")
+    browser.wait_for("document.querySelector('#tab-scenes').ariaSelected === 'true'")
+    tab_to(browser, "spill")
+    press(browser, "Enter")
+    until(lambda: session.game is not None and session.waits)
+    browser.wait_for("!document.querySelector('#hud').hidden && document.activeElement.id === 'picture'")
+    browser.wait_for("document.querySelector('[data-tool=tilt]').getAttribute('aria-pressed') === 'true'")
+    press(browser, "Enter")
+    browser.wait_for("!document.querySelector('#cross').hidden")
+    press(browser, "Enter")
+    until(lambda: session.hands and not session.waits)
+    press(browser, "ArrowRight", hold=1.0)
+    until(lambda: session.game.outcome, 150)
+    assert session.game.outcome == "won"
+    press(browser, "Escape")
+    until(lambda: not session.hands)
+    browser.wait_for("!document.querySelector('#banner').hidden")
+    until(lambda: browser.run(FOCUS) in ("next-level", "retry"))
+    tab_to(browser, "tab-scenes")
+    press(browser, "ArrowRight")
+    for _ in range(40):
+        press(browser, "Tab")
+        if browser.run("document.activeElement.download") == "session.toml":
+            break
+    press(browser, "Enter")
+    path = tmp_path / "session.toml"
+    until(path.is_file, 60)
+    until(lambda: path.stat().st_size > 0, 10)
+    recording = Recording.load(path)
+    assert world.front.ask(lambda: list(replay(recording))[-1].sim.digest()).result(240) == recording.digest
+    assert browser.complaints() == []
+
+
 def test_a_reader_is_told_values_with_units(open_page, browser):  # noqa: F811
     """The dial is filled at once, says where down is and turns by arrows; sliders and tools say their units."""
     world = open_page()
