@@ -179,6 +179,12 @@ def test_no_serious_barrier_in_any_state(open_page, browser, tmp_path, monkeypat
     assert world.session.game is not None
 
 
+def look(page, name: str) -> None:
+    """Keep what the page shows, where someone wants to look at it."""
+    if folder := os.environ.get("WAVETANK_PICTURES"):
+        page.picture(Path(folder) / f"{name}.png")
+
+
 class Finger:
     """One finger on a phone."""
 
@@ -212,25 +218,30 @@ def test_a_phone_by_touch_alone(open_page, browser, tmp_path, monkeypatch, sides
         assert browser.run("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") <= [*sides]
         finger.tap("[data-tool=tilt]")
         start, end = browser.center("#picture", 0.3, 0.6), browser.center("#picture", 0.95, 0.6)
+        look(browser, f"level-{sides[0]}")
         finger.put("touchStart", start)
         for k in range(1, 9):
             share = k / 8
             finger.put("touchMove", (start[0] + share * (end[0] - start[0]), start[1]))
             time.sleep(0.05)
+        look(browser, f"tool-{sides[0]}")
         until(lambda: session.game.outcome == "won", 90)
         finger.put("touchEnd")
         browser.wait_for("!document.querySelector('#banner').hidden")
         time.sleep(0.4)
+        look(browser, f"won-{sides[0]}")
         finger.tap("#retry")
         until(lambda: session.waits)
         finger.tap("#panel-toggle")
         finger.tap("#tab-scenes")
         browser.wait_for("document.querySelectorAll('#scenes button[data-scene]').length > 20")
+        look(browser, f"scenes-{sides[0]}")
         finger.tap("[data-scene=drop-2d]")
         until(lambda: session.sim.scene.title != "Small level")
         assert browser.run("document.body.classList.contains('no-panel')"), "the panel gives way to the picture"
         finger.tap("#home")
         browser.wait_for("!document.querySelector('#undo').hidden")
+        look(browser, f"scene-{sides[0]}")
         finger.tap("#undo")
         until(lambda: session.sim.scene.title == "Small level")
         # Half of one more tool is seen, so that one knows of the others.
