@@ -242,6 +242,12 @@ def test_a_phone_by_touch_alone(open_page, browser, tmp_path, monkeypatch, sides
         finger.tap("#home")
         browser.wait_for("!document.querySelector('#undo').hidden")
         look(browser, f"scene-{sides[0]}")
+        covered = browser.run(
+            "[...document.querySelectorAll('#notes div')].flatMap(n => ['#home', '#undo'].filter(id => {"
+            "const a = n.getBoundingClientRect(), b = document.querySelector(id).getBoundingClientRect();"
+            "return a.right > b.left && a.bottom > b.top && a.top < b.bottom }))"
+        )
+        assert covered == [], "a note hides no button"
         finger.tap("#undo")
         until(lambda: session.sim.scene.title == "Small level")
         # Half of one more tool is seen, so that one knows of the others.
