@@ -28,6 +28,7 @@ from wavetank.solids.motion import Keyframe, Motion, sampled
 from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
 
 if TYPE_CHECKING:
+    from wavetank.formats.urdf import load_urdf
     from wavetank.front.notebook.show import show
     from wavetank.session import commands
     from wavetank.session.recording import Recording, replay
@@ -42,8 +43,8 @@ __all__ = [
     "PARAMETERS", "PRESETS", "Ball", "BallJoint", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference",
     "Drain", "Emitter", "Filled", "Gauge", "HalfSpace", "HeightField", "Hinge", "Intersection", "Keyframe", "Mesh",
     "Motion", "Points", "Polygon", "Recording", "Rope", "Scene", "Session", "Simulation", "Slider", "Sphere",
-    "Spring", "Tank", "Union", "WavetankError", "Weld", "__version__", "bundled_scenes", "commands", "render",
-    "replay", "sampled", "show",
+    "Spring", "Tank", "Union", "WavetankError", "Weld", "__version__", "bundled_scenes", "commands", "load_urdf",
+    "render", "replay", "sampled", "show",
 ]  # fmt: skip
 
 #: what needs the kernels' sources is imported when it is first used: data alone should load fast
@@ -53,6 +54,7 @@ LATER = {
     "Session": "wavetank.session.session",
     "Simulation": "wavetank.simulation.simulation",
     "commands": "wavetank.session.commands",
+    "load_urdf": "wavetank.formats.urdf",
     "render": "wavetank.view.renderer",
     "replay": "wavetank.session.recording",
     "show": "wavetank.front.notebook.show",

@@ -188,7 +188,7 @@ def test_every_number_of_a_scene_is_a_length_or_known_not_to_be():
         "velocity", "velocities", "rotation", "friction", "normal", "share", "drag", "strength", "speed", "axis",
         "duration", "acceleration", "frequency", "phase", "tilt", "tilt_axis", "direction", "side", "flow", "spread",
         "Emitter.start", "Drain.start", "suction", "time", "heights", "density", "mass",
-        "angular_velocity", "restitution", "stiffness", "damping", "limits",
+        "angular_velocity", "restitution", "stiffness", "damping", "response", "target", "limits",
     }  # fmt: skip
     models = {Tank, Emitter, Drain, Gauge, Motion, Keyframe, *model._MODEL_OF_TAG.values()}
     assert len(models) > 20

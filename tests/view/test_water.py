@@ -10,7 +10,6 @@ from test_ellipsoids import lattice
 from wavetank import Block, Box, Scene, Simulation, Tank
 from wavetank.device.compiler import qd
 from wavetank.foundation.materials import Material
-from wavetank.view import renderer as renderer_module
 from wavetank.view.camera import Camera
 from wavetank.view.lens import vector
 from wavetank.view.look import pool as pool_look
@@ -18,6 +17,7 @@ from wavetank.view.optics.fluid import coarseness
 from wavetank.view.optics.rays import OPEN, box
 from wavetank.view.passes import ellipsoids, flatten, thickness
 from wavetank.view.renderer import Renderer, affordable
+from wavetank.view.style import Style
 
 D = 0.05
 CAMERA = Camera(eye=(0.7, 1.3, 2.6), target=(0.5, 0.3, 0.5))
@@ -222,7 +222,7 @@ def test_the_sky_is_seen_from_below_through_a_window_of_its_size(make_frame, mon
             pool_look(), zenith=vector(color, color, color), horizon=vector(color, color, color),
             lamp=vector(0.0, 0.0, 0.0), sparkle=0.0, outdoors=0,
         )  # fmt: skip
-        monkeypatch.setattr(renderer_module, "_look", lambda dim, coloured, look=look: look)
+        monkeypatch.setattr(Style, "look", lambda style, frame, look=look: look)
         pictures.append(Renderer(160, 120).render(frame, camera).astype(int))
     change = np.abs(pictures[1] - pictures[0]).max(axis=2)
     rays = np.array([[camera.ray(c + 0.5, r + 0.5, 160, 120)[1] for c in range(160)] for r in range(120)])

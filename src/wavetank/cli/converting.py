@@ -1,12 +1,14 @@
 """Commands between wavetank and other programs: export, import."""
 
 import json
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from wavetank.cli.options import Json, Only, app, console, names_in
+from wavetank.cli.options import Json, Only, app, configured, console, names_in
+from wavetank.foundation.errors import WavetankError
 
 
 @app.command()
@@ -38,19 +40,39 @@ def export(
 
 @app.command("import")
 def import_scene(
-    file: Annotated[Path, typer.Argument(metavar="SCENE.json", help="A scene of SPlisHSPlasH.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="SCENE.json of SPlisHSPlasH, or ROBOT.urdf.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="The scene file to be written, TOML.")],
     spacing: Annotated[float | None, typer.Option(help="Distance of particles [m] in place of its own.")] = None,
+    into: Annotated[str, typer.Option(help="Scene that a robot comes into.")] = "still-tank",
+    at: Annotated[str, typer.Option(help="Where a robot stands [m], as 0.2,0,0.3.")] = "",
     as_json: Json = False,
 ) -> None:
-    """Read a scene of SPlisHSPlasH, write it as one of wavetank, and say what has no counterpart."""
-    from wavetank.formats.splishsplash import read_splishsplash
+    """Read a scene of SPlisHSPlasH or a robot, write a scene of wavetank, and say what has no counterpart."""
+    if file.suffix.lower() == ".urdf":
+        from wavetank.formats.urdf import load_urdf
 
-    imported = read_splishsplash(file, spacing)
-    imported.scene.save(out)
+        robot = load_urdf(file, _place(at))
+        scene, notes = robot.joined(configured(into, [f"spacing={spacing}"] if spacing else [])), robot.notes
+    else:
+        from wavetank.formats.splishsplash import read_splishsplash
+
+        imported = read_splishsplash(file, spacing)
+        scene, notes = imported.scene, imported.notes
+    scene.save(out)
     if as_json:
-        print(json.dumps({"file": str(out), "notes": imported.notes}))
+        print(json.dumps({"file": str(out), "notes": notes}))
         return
     print(out)
-    for note in imported.notes:
+    for note in notes:
         print(f"  {note}")
+
+
+def _place(text: str) -> tuple[float, ...]:
+    parts = text.split(",") if text else ["0", "0", "0"]
+    try:
+        place = tuple(float(part) for part in parts)
+    except ValueError:
+        place = ()
+    if len(place) != 3 or not all(math.isfinite(part) for part in place):
+        raise WavetankError(f"--at = {text!r} is not allowed; write three numbers [m], as 0.2,0,0.3.")
+    return place

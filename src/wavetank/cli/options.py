@@ -21,6 +21,12 @@ Size = Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of a pic
 View = Annotated[str | None, typer.Option(help="water, particles, slice or foam; water unless particles are coloured.")]
 Quality = Annotated[str, typer.Option(help="draft, standard (2 x 2 samples a pixel) or film (64 pictures averaged).")]
 ColorBy = Annotated[str | None, typer.Option(help="speed, density, material, foam, or a colour such as #3f99da.")]
+Environment = Annotated[
+    str | None,
+    typer.Option(help="studio, pool, paper, sky, evening or overcast; the scene's, or the view's, unless told."),
+]
+Sun = Annotated[str | None, typer.Option(help="Where the sun stands [deg]: azimuth,elevation, as 40,25.")]
+Floor = Annotated[str | None, typer.Option(help="plain, tiles, stone, sand or table.")]
 Cut = Annotated[str | None, typer.Option(help="Where a slice lies: z=0.35 for example.")]
 Exports = Annotated[
     list[str],

@@ -14,13 +14,16 @@ from wavetank.cli.options import (
     Arch,
     ColorBy,
     Cut,
+    Environment,
     Exports,
+    Floor,
     Json,
     Only,
     Quality,
     SceneName,
     Settings,
     Size,
+    Sun,
     View,
     app,
     configured,
@@ -92,6 +95,9 @@ def run(
     view: View = None,
     color_by: ColorBy = None,
     cut: Cut = None,
+    environment: Environment = None,
+    sun: Sun = None,
+    floor: Floor = None,
     quality: Quality = "draft",
     name: Annotated[str, typer.Option(help="Front part of the files' names.")] = "",
     checkpoint_every: Annotated[
@@ -112,7 +118,9 @@ def run(
         out, seconds, fps, size_of(size or "1280x720"), name or Path(scene).stem, small_gif=not size,
         video=video, gif=gif, frames=frames,
         exports=names_in(export), only=names_in([only]), every=every, quality=quality,
-        look={"view": view, "color_by": color_by, "cut": cut},
+        look={
+            "view": view, "color_by": color_by, "cut": cut, "environment": environment, "sun": sun, "floor": floor,
+        },
         checkpoint_every=checkpoint_every,
     )  # fmt: skip
     with large_worlds_allowed(allow_large):
@@ -165,6 +173,9 @@ def render(
     view: View = None,
     color_by: ColorBy = None,
     cut: Cut = None,
+    environment: Environment = None,
+    sun: Sun = None,
+    floor: Floor = None,
     quality: Annotated[
         str, typer.Option(help="draft, standard or film, as for run; standard for a picture, draft for a film.")
     ] = "",
@@ -190,11 +201,11 @@ def render(
     across, down = (across if width is None else width), (down if height is None else height)
     if out.suffix.lower() in FILMS:
         _film(world, out, (across, down), at, kept, as_json, arch=arch, quality=quality or "draft",
-              view=view, color_by=color_by, cut=cut)  # fmt: skip
+              view=view, color_by=color_by, cut=cut, environment=environment, sun=sun, floor=floor)  # fmt: skip
         return
     figures = take(
         world, scene, out, across, down, at=at, arch=arch, quality=quality or "standard", eye=eye, target=target,
-        timings=timings, view=view, color_by=color_by, cut=cut,
+        timings=timings, view=view, color_by=color_by, cut=cut, environment=environment, sun=sun, floor=floor,
     )  # fmt: skip
     if as_json:
         print(json.dumps(figures))

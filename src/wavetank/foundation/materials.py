@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from typing import Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
@@ -11,6 +11,9 @@ from wavetank.foundation.params import PARAMETERS, Parameters
 
 #: Colours of fluids that name none, in the order of the materials of a scene.
 COLORS = ("#2f7fd0", "#e0a526", "#c8553d", "#3c9a6b", "#8a63b8", "#6b7885")
+#: How far one sees into a fluid: any way but for its colour, as into honey; some spacings, as into ice; or not at all.
+CLARITIES = ("clear", "cloudy", "opaque")
+BRIGHTEST = 100.0  # of a fluid's own light, in what white paper shows in the sun
 
 
 def _as(name: str) -> Any:
@@ -28,6 +31,8 @@ class Material(Model):
     surface_tension: float | None = _as("surface_tension")  # N/m, towards air
     contact_angle: float | None = _as("contact_angle")  # deg, on solids in air: 0 wets, 180 repels
     color: str | None = None  # '#rrggbb'
+    clarity: Literal["clear", "cloudy", "opaque"] = "clear"  # how far one sees into it
+    glow: Annotated[float, Field(ge=0, le=BRIGHTEST, allow_inf_nan=False)] = 0.0  # own light of its colour
 
     @field_validator("color")
     @classmethod

@@ -318,7 +318,7 @@ def replay_session(
             if film is not None:
                 renderer = renderer or Renderer(*size)
                 look = options(session.view, session.color_by)
-                film.write(renderer.render(session.sim.frame(), session.camera, **look))
+                film.write(renderer.render(session.sim.frame(), session.sight, **look))
             progress.update(task, completed=session.ticks)
             if asked:
                 break

@@ -15,7 +15,7 @@ from wavetank.simulation.frame import Frame
 from wavetank.simulation.simulation import Simulation
 from wavetank.view.camera import Camera
 from wavetank.view.extent import extent_of_water
-from wavetank.view.renderer import Renderer, affordable
+from wavetank.view.renderer import ROOM, Renderer, affordable
 from wavetank.view.style import QUALITIES, Style, quality_named
 
 USUAL_TIME = 0.5  # s: when a scene is shown unless told
@@ -83,7 +83,7 @@ def _camera_of(frame: Frame, eye: str | None, target: str | None, aspect: float)
         eye=_point("eye", eye) if eye else usual.eye,
         target=_point("target", target) if target else usual.target,
         height=usual.height,
-    )
+    ).tilted(frame.scene, frame.time, 1.0 if eye else ROOM)
 
 
 def _point(name: str, text: str) -> tuple[float, float, float]:

@@ -31,6 +31,8 @@ from wavetank.solids.distance import (
     vec4,
 )  # fmt: skip
 
+vec2i = qd.types.vector(2, qd.i32)
+
 
 @qd.func
 def marks():
@@ -127,17 +129,21 @@ def find_walls(sums: qd.template(), team, particles: Particles, solids: SolidSet
 
 
 @qd.func
-def press_back(p, near, free, push, solids: SolidSet, walls: Walls, c: Coefficients):
+def press_back(p, near, found, push, solids: SolidSet, walls: Walls, c: Coefficients):
     """Let bodies feel what their share of the density at `p` moves a particle by: `push` [m^2] times the gradient.
 
-    `free` is the share of the support that all the marked solids leave.
+    `found` is what `wall_density` says of the place; where one solid alone is marked it is the body's.
     """
     k = next_near(near, solids.tank_count - 1, solids)
+    if near & (near - 1) == 0 and solids.count - solids.tank_count <= marks() - solids.tank_count:
+        if solids.unit[k] > 0.0:
+            push_back(solids, k, p, vec3(found.x, found.y, found.z) * push)
+        k = solids.count
     while k < solids.count:
         if solids.unit[k] > 0.0:
             value = signed_distance(solids, k, p)
             share = wall_share(walls, value.w, c.h) * c.wall_density
-            others = free / qd.max(1.0 - share[0], 1e-6)
+            others = (1.0 - found.w) / qd.max(1.0 - share[0], 1e-6)
             push_back(solids, k, p, vec3(value.x, value.y, value.z) * (-push * others * share[1] * c.inverse_h))
         k = next_near(near, k, solids)
 
@@ -269,19 +275,47 @@ def walls_near(
 
 
 @qd.func
-def near_bodies(x, p, solids: SolidSet, h):
-    """Bits of the solids, other than the tank's walls, that a particle on its way from `x` to `p` may touch or feel."""
-    near = 0
-    way = 1.2 * h + (p - x).norm()
+def moves_by(k, length, at, solids: SolidSet):
+    """Bound of how far [m] a way of that length that ends at `at` leads in the frame of solid `k`, which moves."""
+    away = (at - solids.position[k]).norm() + length
+    return length + solids.sweep[k][0] + solids.sweep[k][1] * away
+
+
+@qd.func
+def is_clear(near, share, before, origin, target, solids: SolidSet, walls: Walls, c: Coefficients):
+    """Say whether the way from `origin` to `target` touches none of the marked solids, without their distances.
+
+    At the place `before` they had this `share` of the density together, which tells how far away the nearest is.
+    """
+    length, moved = (target - origin).norm(), (target - before).norm()
+    least = c.wall_gap
+    k = next_near(near, solids.tank_count - 1, solids)
+    while k < solids.count:
+        least = qd.max(least, moves_by(k, length, target, solids))
+        k = next_near(near, k, solids)
+    return share < 0.999 * c.wall_density * wall_share(walls, least + moved, c.h)[0]
+
+
+@qd.func
+def near_bodies(x, p, solids: SolidSet, c: Coefficients):
+    """Bits of the solids, other than the tank's walls, that a particle on its way from `x` to `p` may touch or feel.
+
+    A second number says whether it may touch any.
+    """
+    near, touched, length = 0, 0, (p - x).norm()
+    way = 1.2 * c.h + length
     for k in range(solids.tank_count, solids.count):
         reach = solids.reach[k]
         farthest = reach + way + solids.sweep[k][0] + solids.sweep[k][1] * reach
         away = (p - solids.position[k]).norm_sqr()
         if away < farthest * farthest:
             margin = way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(reach, qd.sqrt(away))
-            if signed_distance(solids, k, p).w < margin:
+            distance = signed_distance(solids, k, p).w
+            if distance < margin:
                 near |= 1 << bit_of(k, solids)
-    return near
+                if distance < qd.max(c.wall_gap, moves_by(k, length, p, solids)):
+                    touched = 1
+    return vec2i(near, touched)
 
 
 @qd.func
@@ -321,8 +355,9 @@ def keep_out_of_solids(particles: Particles, scratch: Scratch, solids: SolidSet,
         near_tank = qd.Matrix.zero(qd.i32, 1, 1)
         nearest = qd.Matrix.zero(qd.f32, 1, 1)
         walls_near(near_tank, nearest, origin, target, solids, c.h)
-        near = near_tank[0, 0] | near_bodies(lift(x), lift(p), solids, c.h)
+        found = near_bodies(lift(x), lift(p), solids, c)
+        near = near_tank[0, 0] | found[0]
         particles.near[i] = near
-        if near >> solids.tank_count != 0:
+        if found[1] == 1:
             weight = scratch.weight[i]
             predict_at(particles, i, flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap, 1.0 / weight), x))

@@ -32,7 +32,7 @@ multiplier: Moreau and Jean's projected iteration, as in Tonge et al. 2012 (10.1
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles, Scratch, Walls
-from wavetank.physics.boundary import find_walls, flattened, kept_in_tank, press_back, stopped
+from wavetank.physics.boundary import find_walls, flattened, is_clear, kept_in_tank, press_back, stopped
 from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.smoothing import kernel
@@ -199,10 +199,12 @@ def correct_positions(
                     if qd.static(searched):
                         if near >> solids.tank_count != 0:
                             mass = 1.0 / scratch.weight[i] if qd.static(searched == 2) else 0.0
-                            p = flattened(stopped(lift(particles.x[i]), lift(p), near, solids, c.wall_gap, mass), p)
+                            x, found = lift(particles.x[i]), scratch.wall[i]
+                            if not is_clear(near, found.w, before, x, lift(p), solids, walls, c):
+                                p = flattened(stopped(x, lift(p), near, solids, c.wall_gap, mass), p)
                             if qd.static(searched == 2):
                                 push = scratch.dlam[i] * short
-                                press_back(before, near, 1.0 - scratch.wall[i].w, push, solids, walls, c)
+                                press_back(before, near, found, push, solids, walls, c)
                 predict_at(corrected, i, p)
 
 

@@ -78,8 +78,9 @@ def predict(
                 if nearest[0, i - first] < 1.1 * c.wall_gap and c.dt > 0.0:
                     p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), x)
                 if qd.static(searched):
-                    near |= near_bodies(lift(x), lift(p), solids, c.h)
-                    if near >> solids.tank_count != 0 and c.dt > 0.0:
+                    found = near_bodies(lift(x), lift(p), solids, c)
+                    near |= found[0]
+                    if found[1] == 1 and c.dt > 0.0:
                         mass = mass_of(particles, i, rows) if qd.static(searched == 2) else 0.0
                         p = flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap, mass), x)
                 particles.near[i] = near

@@ -1,12 +1,16 @@
 """Joints between bodies, or between a body and the world, as plain data: `[[joints]]` in a scene file."""
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import Model, Number, Place, Positive, Vector, register_model
+from wavetank.foundation.tracks import checked_track
 
+#: A number, an expression of t [s], or keyframes.
+Driven = Number | str | list[Any] | dict[str, Any]
 NotNegative = Annotated[Number, Field(ge=0)]
 
 
@@ -24,9 +28,23 @@ class Joint(Model):
 
 
 class _Motor(Joint):
-    speed: Number | None = None  # of a motor, rad/s or m/s; none where None
+    speed: Driven | None = None  # of a motor, rad/s or m/s; none where None
+    target: Driven | None = None  # rad or m from where it begins: where a motor turns or pushes it to
+    response: Positive = 0.03  # s in which it gets 95 % of the way to its target
     strength: Positive = 1e6  # the most that the motor gives, N m or N
     limits: tuple[Number, Number] | None = None  # rad or m: how far it goes from where it begins
+
+    @model_validator(mode="after")
+    def _one_aim(self) -> "_Motor":
+        if self.speed is not None and self.target is not None:
+            raise ValueError("a motor has a speed or a target, not both; leave one of them out.")
+        for name in ("speed", "target"):
+            if getattr(self, name) is not None:
+                try:
+                    checked_track(getattr(self, name), name)
+                except WavetankError as error:
+                    raise ValueError(str(error)) from None
+        return self
 
     @model_validator(mode="after")
     def _limits_in_order(self) -> "_Motor":

@@ -26,6 +26,7 @@ from wavetank.scene.fluids import Points
 from wavetank.scene.forces import AnyForce
 from wavetank.scene.goal import Goal
 from wavetank.scene.joints import AnyJoint, check_joints
+from wavetank.scene.light import Light
 from wavetank.scene.schedule import Timetable
 from wavetank.scene.summary import summary
 from wavetank.scene.tank import Tank
@@ -55,6 +56,7 @@ class Scene(Timetable, Parameters):
     joints: list[AnyJoint] = []
     forces: list[AnyForce] = []
     goal: Goal | None = None
+    light: Light | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -373,11 +375,8 @@ def _read(name: str | Path) -> tuple[str, str, Path]:
     """Return the text of a scene, its name and the folder of its files."""
     for folder in ("scenes", "levels"):
         if str(name) in _names(folder):
-            return (
-                (importlib.resources.files("wavetank.scene") / folder / f"{name}.toml").read_text("utf-8"),
-                str(name),
-                Path(),
-            )
+            file = importlib.resources.files("wavetank.scene") / folder / f"{name}.toml"
+            return file.read_text("utf-8"), str(name), Path()
     path = Path(name)
     if not _is_there(path):
         near = difflib.get_close_matches(str(name)[:100], [*_names("scenes"), *_names("levels")], 1)

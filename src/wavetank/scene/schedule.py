@@ -20,7 +20,7 @@ from wavetank.scene.emitters import Emitter
 
 
 class Tilted(Timed):
-    """What a tank has that leans: gravity is turned the other way, and the picture stays as it is."""
+    """What a tank has that leans: gravity is turned the other way, and pictures show it leaning."""
 
     tilt: Number = 0.0  # rad about the axis
     tilt_axis: tuple[Number, Number, Number] = (0.0, 0.0, 1.0)
@@ -84,11 +84,23 @@ def with_gravity(scene: Any, gravity: tuple[float, ...]) -> Any:
     return scene.model_copy(update={"gravity": gravity, "gravity_track": None, "tank": tank})
 
 
+def tilted_by(scene: Any, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return gravity [m/s^2, 3] in the room at `time` [s] of the water, and as the tank's frame has it."""
+    own = np.zeros(3)
+    own[: scene.dim] = gravity_at(scene, time)
+    return _in_the_room(scene, time + scene.start_time), own
+
+
+def _in_the_room(scene: Any, clock: float) -> np.ndarray:
+    g = np.zeros(3)
+    g[: scene.dim] = scene.gravity if scene.gravity_track is None else track(scene.gravity_track)(clock)
+    return g
+
+
 def gravity_at(scene: Any, time: float) -> tuple[float, ...]:
     """Return gravity [m/s^2] in the frame of the tank at `time` [s] of the water; raises `WavetankError`."""
     clock = time + scene.start_time
-    g = np.zeros(3)
-    g[: scene.dim] = scene.gravity if scene.gravity_track is None else track(scene.gravity_track)(clock)
+    g = _in_the_room(scene, clock)
     if scene.tank is not None and scene.tank.is_tilted:
         tank = scene.tank.at(clock)
         axis = np.array(tank.tilt_axis, float)

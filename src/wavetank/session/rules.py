@@ -33,14 +33,14 @@ def set_parameter(state: SessionState, command: c.SetParameter) -> None:
 
 
 def reset(state: SessionState, command: c.Reset) -> None:
-    """Begin the scene anew, paused if it is."""
+    """Begin the scene anew."""
     unknown = next((name for name in command.parameters if name not in Parameters.model_fields), None)
     if unknown is not None:
         raise WavetankError(f"{unknown!r} is not a parameter.")
     state.lift_all()
-    scene, camera, paused = state.changed_scene(command.parameters), state.chosen_camera, state.paused
+    scene, camera = state.changed_scene(command.parameters), state.chosen_camera
     state.begin(scene)
-    state.camera, state.paused = camera, paused or state.waits
+    state.camera = camera
 
 
 def load(state: SessionState, command: c.LoadScene) -> None:

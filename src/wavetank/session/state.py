@@ -107,7 +107,7 @@ class SessionState:
         self.chosen_camera: Camera | None = None
         self.lit, self.upright = "", None
         self.history.keep(sim.snapshot())
-        if self.patient:  # another scene moves, whatever was before
+        if self.patient:  # what begins moves, whatever was before
             self.paused, self.steps_left = False, 0
         self.wait_for_hand()
 
@@ -170,7 +170,7 @@ class SessionState:
     def sight(self) -> Camera:
         """The camera as pictures show it: a tank that a hand tilts is seen tilted, and gravity points down."""
         if self.upright is None:
-            return self.camera
+            return self.camera.tilted(self.sim.scene, self.sim.time)
         return self.camera.turned_with(self.upright, self.sim.gravity)
 
     def camera_of(self, tool: str) -> Camera:

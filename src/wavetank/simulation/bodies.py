@@ -13,7 +13,6 @@ from typing_extensions import override
 
 from wavetank.device.compiler import download, upload
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.rotations import product, turned, unit_quaternion
 from wavetank.physics.bodies import Pieces, Retry, new_pieces
 from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED, carried
 from wavetank.physics.mixture import blend
@@ -25,7 +24,7 @@ from wavetank.simulation.added_mass import added_mass
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
 from wavetank.simulation.coupling import Coupling
-from wavetank.simulation.joints import put_joint
+from wavetank.simulation.joints import Joints, put_joints
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.solids.distance import PARTS
 from wavetank.solids.mass import Inertia, Ruler, inertia_of, water_of
@@ -58,6 +57,7 @@ class Bodies(Mapping[str, Body]):
         self.retry = Retry()
         self.gravity = np.zeros(3)  # m/s^2, of the present step
         self.pieces: Pieces | None = None  # of all bodies, on the device
+        self.joints = Joints()
         solids.feeling, solids.passing = {}, {}
         numbers = [number for number, solid in enumerate(solids.members) if solid.is_body]
         if not numbers:
@@ -67,8 +67,7 @@ class Bodies(Mapping[str, Body]):
         self.world = self.engine.PhysicsWorld(gravity=(0.0, 0.0, 0.0))
         self.world.integration_parameters.length_unit = max(10.0 * scene.spacing, 1e-3)
         self.handles = [self._add(number, solid) for number, solid in enumerate(solids.members)]
-        for joint in scene.joints:
-            put_joint(self.engine, self.world, self.handles, solids, joint)
+        self.joints = put_joints(self.engine, lambda: self.world, self.handles, solids, scene.joints)
         self._weigh_all(numbers)
         solids.feel({body.number: (body.dry.center, body.unit) for body in self.members})
         self.numbers = np.array([body.number for body in self.members])
@@ -173,14 +172,26 @@ class Bodies(Mapping[str, Body]):
 
     # --- a step ---
 
-    def advance(self, gravity: tuple[float, ...], dt: float, share: float, fastest: float) -> None:
-        """Move the bodies for a step of `dt` [s], which ends at a `share` of the frame; none is left faster [m/s]."""
+    def advance(self, gravity: tuple[float, ...], dt: float, share: float, fastest: float, clock: float) -> None:
+        """Move the bodies for a step of `dt` [s], which ends at a `share` of the frame; none is left faster [m/s].
+
+        Expressions and keyframes of joints have the time `clock` [s] then.
+        """
         self.fastest, self.gravity = fastest, np.array([*gravity, 0.0][:3])
-        rigid, rotations = [body.rigid() for body in self.members], self._rotations()
         self.coupling.held = np.array([self._is_held(body) for body in self.members])
-        wanted = self.coupling.begin(rotations, self.gravity, dt)
-        for body, now, row in zip(self.members, rigid, wanted, strict=True):
-            self._hold(body, now)
+        self.coupling.begin(self._rotations(), self.gravity, dt)
+        for body in self.members:
+            self._hold(body, body.rigid())
+        for joint in self.joints.values():
+            joint.drive(clock, dt)
+        self.begun = [(handle, self.world.rigid_bodies[handle].position) for handle in self.handles]
+        self.begins = {body.number: self.solids.poses[body.number] for body in self.members}
+        self._move(dt, share)
+
+    def _move(self, dt: float, share: float) -> None:
+        """Let the engine take the step, from where it began, with the velocities that are wanted."""
+        rigid = [body.rigid() for body in self.members]
+        for body, now, row in zip(self.members, rigid, self.coupling.wanted, strict=True):
             self._weigh(body, now)
             self._set_velocity(now, row, body.solid.reach())
         begun = self._velocities(rigid)
@@ -189,9 +200,10 @@ class Bodies(Mapping[str, Body]):
             self.world.rigid_bodies[self.handles[number]].set_next_kinematic_position(pose)
         self.world.integration_parameters.dt = dt
         self.world.step()
-        self.coupling.start(rotations, wanted, begun, self._velocities(rigid), dt)
+        rotations = np.array([self.begins[body.number][1] for body in self.members])
+        self.coupling.start(rotations, begun, self._velocities(rigid), dt)
         for body, now in zip(self.members, rigid, strict=True):
-            self._pass(body, now, self.solids.poses[body.number])
+            self._pass(body, now, self.begins[body.number])
 
     def step(self, world: World, scene: Scene, dt: float, fastest: float, part: tuple[float, float]) -> None:
         """Let the water take a step of `dt` [s], which is that `part` of a frame.
@@ -205,7 +217,7 @@ class Bodies(Mapping[str, Body]):
         for turn in range(MOST_TRIES):
             take_step(world, scene, dt, fastest)
             self.feel(world, dt)
-            if turn + 1 == MOST_TRIES or not self.yielded(dt):
+            if turn + 1 == MOST_TRIES or not self.yielded(dt, part[1]):
                 break
             self.retry.restore(world.particles, world.count)
             world.solids_version = self.solids.move_to(*part)
@@ -226,27 +238,21 @@ class Bodies(Mapping[str, Body]):
         cell = world.levels[0].dy if world.levels else 1.0
         coupling.immersed = np.minimum(1.0, rows[:, IMMERSION] * particle / (wet * cell))
 
-    def yielded(self, dt: float) -> bool:
+    def yielded(self, dt: float, share: float) -> bool:
         """Let bodies yield that were pushed by far more than in the step before; say whether any was.
 
         The step of `dt` [s] is then to be taken again: the water pushed as if the body could not give way.
         """
         slow = float(np.linalg.norm(self.gravity) * self.scene.spacing) ** 0.5
-        rotations = self._rotations()
-        steps = self.coupling.yielding(rotations, slow)
-        moved, real = np.flatnonzero(steps.any(axis=1)), np.zeros_like(steps)
-        for row in moved:
-            body, before = self.members[row], self.coupling.velocity[row]
-            rigid = body.rigid()
-            self._set_velocity(rigid, before + steps[row], body.solid.reach())
-            step = real[row] = self._velocities([rigid])[0] - before
-            position, rotation = self._pose(rigid)
-            center = position + turned(rotation, body.dry.center)
-            rotation = unit_quaternion([*(rotation + 0.5 * dt * product(np.array([0.0, *step[3:]]), rotation))])
-            rigid.position = self._isometry(center + dt * step[:3] - turned(rotation, body.dry.center), rotation)
-            self._pass(body, rigid, self.solids.passing[body.number][0])
-        self.coupling.move_on(rotations, steps, real)
-        return len(moved) > 0
+        if not self.coupling.yields(self._rotations(), slow):
+            return False
+        for handle, position in self.begun:
+            self.world.rigid_bodies[handle].position = position
+        for body in self.members:
+            if self._is_held(body):
+                body.rigid().set_next_kinematic_position(self._isometry(*self.begins[body.number]))
+        self._move(dt, share)
+        return True
 
     def _is_held(self, body: Body) -> bool:
         return body.solid.held or body.number in self.solids.targets
@@ -290,6 +296,9 @@ class Bodies(Mapping[str, Body]):
         """Return the bodies among these solids; those that there were go on as they did."""
         bodies = Bodies(scene, solids)
         memories: Any = self.coupling.memory() if self.members else []
+        for name, joint in bodies.joints.items():
+            if name in self.joints:
+                joint.take_over(self.joints[name])
         for body in bodies.members:
             for before, memory in zip(self.members, memories, strict=True):
                 if before.name == body.name:
@@ -314,6 +323,9 @@ class Bodies(Mapping[str, Body]):
 
     def check(self, poses: Sequence[Pose]) -> None:
         """Check that the engine, restored from a file, has the bodies where the solids are; raises `WavetankError`."""
+        for name, joint in self.joints.items():
+            if not joint.is_there:
+                raise WavetankError(f"the engine's state lacks the joint {name!r}.")
         for body in self.members:
             (position, rotation), (place, turn) = self._pose(body.rigid()), poses[body.number]
             off = np.concatenate(

@@ -13,8 +13,9 @@ for one that falls as the body gives way, P = P_before - k (dv - dv_before), whe
 
 What turns out to be wrong of it, O = the right-hand side of the first equation less the left, is made up for in the
 steps that follow; no momentum is lost, whatever k is. Where it is by far wrong, as where a light body hits the water,
-the body yields by O / (m + k) and the step is taken again. Two answers of the water say what k is (their secant), which
-the next steps go by; deep in the water it is that of an ellipsoid (`added_mass.py`).
+the body is to be faster by O / (m + k), and engine and water take the step again from where it began, so that contact
+and joints hold for what bodies yield as well. Two answers of the water say what k is (their secant), which the next
+tries go by; deep in the water it is that of an ellipsoid (`added_mass.py`).
 
 The engine's impulse in contact and joints, (m + k) dv_c, leaves k dv_c to the water, and what the water does not take
 throws the body back: one that is out of the water would bounce with a restitution of k / m, more than one where it is
@@ -26,7 +27,8 @@ light. So no more is taken to go along with a body that is hardly wet than as fa
     along      k            mass and moment of inertia of the water that goes along          kg, kg m^2
     due        m g dt + O   what a body gets by this step but for P,                         kg m/s, kg m^2/s
     given      m dv         and what it has got; of the engine's (m + k) dv_c that is but m dv_c
-    before     v            velocity at the end of the step before                           m/s, rad/s
+    before     v            velocity at the end of the step before
+    wanted                  that with which the engine begins                                m/s, rad/s
     seen_push  P            of the step before, and
     seen_gain  dv           what a body's velocity has changed by in it: from step to step they say what k is by
     sums                    least squares: sums of -dP ddv and of ddv^2, motion and turn, that fade by `STAYS`
@@ -37,9 +39,9 @@ import numpy as np
 from wavetank.foundation.rotations import matrix_of
 
 TOLERANCE = 0.05  # of sqrt(g d), or of its speed: a body's wrong velocity, times k / m, that is worth a second step
+LATER = 1.0  # the same for a third step and more
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
 AT_ONCE = 0.2  # of what is owed: more would ring
-TOUCH = 1e-4  # m/s: change of velocity by the engine that is contact
 STAYS = 0.9  # share that is left after a step of what was seen of how much water goes along
 MOST = 4.0  # of the water that goes along with an immersed body: most that is believed
 BLOCKS = (slice(0, 3), slice(3, 6))  # motion and turn, columns of a row
@@ -68,17 +70,20 @@ class Coupling:
         self._heavy = np.zeros(count)  # N
         self.held = np.zeros(count, bool)  # they have no momentum of their own
         self.lasted = 0.0  # s, of the last step
-        self._asked = np.zeros((count, 6))  # what was owed at the try before,
-        self._moved = np.zeros((count, 6))  # how far bodies yielded then,
-        self._touching = np.zeros(count, bool)  # and which the engine has pushed
+        self.wanted = np.zeros((count, 6))  # m/s, rad/s, but for contact
+        self._inertias = np.stack([masses, np.linalg.norm(tensors, 2, axis=(1, 2))], axis=1)  # kg, kg m^2
+        self._moved = np.zeros((count, 6))  # m/s, rad/s, from the try before to this one
+        self._pushed = np.zeros((count, 6))  # `impulse` of the try before
+        self._given_way = np.zeros((count, 6))  # m/s, rad/s, by how much they have yielded in this step,
+        self._yielded = np.zeros(count, bool)  # and whether they have
 
     @property
     def owed(self) -> np.ndarray:
         """Momentum [n, 6] that bodies are still to get."""
         return np.where(self.held[:, None], 0.0, self.due + self.impulse - self.given)
 
-    def begin(self, rotations: np.ndarray, gravity: np.ndarray, dt: float) -> np.ndarray:
-        """Return the velocities [n, 6] for a step of `dt` [s] of bodies that are turned so [n, 4], but for contact."""
+    def begin(self, rotations: np.ndarray, gravity: np.ndarray, dt: float) -> None:
+        """Find the velocities `wanted` [n, 6] for a step of `dt` [s] of bodies that are turned so [n, 4]."""
         self._heavy = self.masses * np.linalg.norm(gravity)
         self._learn()
         owed = self.owed
@@ -87,21 +92,20 @@ class Coupling:
         ratio = dt / (self.lasted or dt)
         self.due = owed + weight
         wanted = AT_ONCE * owed + weight + ratio * (self.impulse + np.repeat(self.along, 3, axis=1) * self.change)
-        return self.velocity + self.solved(rotations, wanted)
+        self.wanted = self.velocity + self.solved(rotations, wanted)
+        self.carried = self.by_grid
+        self._given_way, self._yielded = np.zeros_like(owed), np.zeros(len(owed), bool)
 
-    def start(
-        self, rotations: np.ndarray, wanted: np.ndarray, begun: np.ndarray, velocity: np.ndarray, dt: float
-    ) -> None:
-        """Begin a step of `dt` [s] with these velocities [n, 6]; `begun` they were before contact and joints.
+    def start(self, rotations: np.ndarray, begun: np.ndarray, velocity: np.ndarray, dt: float) -> None:
+        """Take a step of `dt` [s] with these velocities [n, 6]; `begun` they were before contact and joints.
 
         What makes `begun` less than `wanted`, the speed limit, takes momentum for good.
         """
-        self.given = self.weighed(rotations, wanted - self.velocity)
+        self._moved = velocity - self.velocity
+        self.velocity, self.change = velocity, velocity - self.before - self._given_way
+        self.given = self.weighed(rotations, self.wanted - self.before)
         self.given -= np.repeat(self.along, 3, axis=1) * (velocity - begun)
-        self.change, self.velocity = velocity - self.velocity, velocity
-        self.carried, self.lasted = self.by_grid, dt
-        self._moved = np.zeros_like(velocity)
-        self._touching = (np.abs(velocity - begun)[:, :3] > TOUCH).any(axis=1)
+        self.lasted = dt
 
     def _learn(self) -> None:
         """See how much water goes along by how its push follows the changes of velocity from step to step."""
@@ -121,37 +125,33 @@ class Coupling:
         """
         pushed = np.linalg.norm(self.impulse[:, :3], axis=1)
         carried = np.minimum(1.0, pushed / np.maximum(self._heavy * self.lasted, 1e-30))
-        least = np.maximum(np.cbrt(self.immersed), AFLOAT * carried)
+        least = np.maximum(self.immersed, AFLOAT * carried)
         return np.clip(along, least[:, None] * self.added, MOST * self.added)
 
-    def yielding(self, rotations: np.ndarray, slow: float) -> np.ndarray:
-        """Return by how much bodies are to be faster [n, 6] for the step to be taken again; 0 for those that are not.
+    def yields(self, rotations: np.ndarray, slow: float) -> bool:
+        """Let bodies want other velocities where theirs turned out to be wrong; say whether any does.
 
-        Those yield whose velocity is wrong by more than the water can make up for later: too much of `slow` [m/s], or
-        of their own, the more the heavier the water is that goes along. Bodies that lie against others, and are held
-        by more than water, yield once.
+        Those are wrong that are so by more than the water can make up for later: too much of `slow` [m/s], or of their
+        own, the more the heavier the water is that goes along.
         """
-        asked = self.owed
-        known = np.asarray(self._moved.any(axis=1))
-        less = (self._asked - asked - self.weighed(rotations, self._moved)) * self._moved
+        known = self._yielded & self._moved.any(axis=1)
+        less = (self._pushed - self.impulse) * self._moved
         found = np.stack([less[:, block].sum(axis=1) for block in BLOCKS], axis=1)
         ways = np.stack([(self._moved[:, block] ** 2).sum(axis=1) for block in BLOCKS], axis=1)
+        before = self.along
         self.along = self._bounded(np.where(known[:, None], found / np.maximum(ways, 1e-30), self.along))
-        step, alone = self.solved(rotations, asked), self.solved(rotations, asked, 0.0)
-        heavier = self.along / np.stack([self.masses, np.linalg.norm(self.tensors, 2, axis=(1, 2))], axis=1)
+        asked = self.owed
+        alone = self.solved(rotations, asked, 0.0)
+        heavier = np.minimum(self.along, self.added) / self._inertias
         wrong = np.stack([np.linalg.norm(alone[:, block], axis=1) for block in BLOCKS], axis=1) * heavier
         wrong[:, 1] *= self.reaches
         speeds = np.linalg.norm(self.velocity[:, :3], axis=1)
-        patient = self._touching & known
-        step[(wrong.max(axis=1) <= TOLERANCE * np.maximum(slow, speeds)) | patient] = 0.0
-        self._asked = asked
-        return step
-
-    def move_on(self, rotations: np.ndarray, step: np.ndarray, real: np.ndarray) -> None:
-        """Take note that bodies have yielded by `step` [n, 6], of which the speed limit has left `real`."""
-        self.given = self.given + self.weighed(rotations, step)
-        self.velocity = self.velocity + real
-        self._moved = real
+        yielding = wrong.max(axis=1) > np.where(self._yielded, LATER, TOLERANCE) * np.maximum(slow, speeds)
+        self.along = np.where(yielding[:, None], self.along, before)
+        step = np.where(yielding[:, None], self.solved(rotations, asked), 0.0)
+        self.wanted, self._given_way = self.wanted + step, self._given_way + step
+        self._pushed, self._yielded = self.impulse, self._yielded | yielding
+        return bool(yielding.any())
 
     def solved(self, rotations: np.ndarray, impulse: np.ndarray, share: float = 1.0) -> np.ndarray:
         """Return the change of velocity [n, 6] by an impulse [n, 6] of bodies and a `share` of the water along."""

@@ -39,6 +39,7 @@ class MovingSolids:
         self.courses = Courses(self.members, self.names, start)
         for name in self.courses.names():
             self.poses[self.names.index(name)] = self.courses.pose(name, 0.0)
+        self.starts = list(self.poses)  # where they began
         self.targets: dict[int, Pose] = {}  # at the end of the next frame
         self.growing: dict[int, tuple[float, float]] = {}  # age and time to grow [s]
         self.passing: dict[int, tuple[Pose, Pose]] = {}  # begin and end of a time step, of bodies
@@ -69,6 +70,7 @@ class MovingSolids:
         self.members.append(solid)
         self.names.append(self._free_name(solid.name))
         self.poses.append((solid.origin, solid.quaternion))
+        self.starts.append(self.poses[-1])
         self.courses.add(solid, self.names[-1])
         if grow > 0.0:
             self.growing[len(self.members) - 1] = (0.0, grow)
@@ -82,7 +84,7 @@ class MovingSolids:
             return {k - (k > number): value for k, value in numbered.items() if k != number}
 
         self.courses.forget(self.names[number])
-        for column in (self.members, self.names, self.poses):
+        for column in (self.members, self.names, self.poses, self.starts):
             del column[number]
         self.targets, self.growing, self.feeling = without(self.targets), without(self.growing), {}
         self.rebuild()

@@ -23,6 +23,7 @@ from wavetank.simulation.bodies import Bodies
 from wavetank.simulation.cost import check_cost, check_frames, check_time
 from wavetank.simulation.filling import fill
 from wavetank.simulation.frame import Frame
+from wavetank.simulation.joints import Joints
 from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.simulation.new_world import new_world
@@ -132,14 +133,11 @@ class Simulation(States):
         parts = self.time_steps = whole(self._steps_in(duration))
         self.solids.grow(duration)
         for part in range(parts):
-            start, dt, shares = (
-                self.time + duration * part / parts,
-                duration / parts,
-                (part / parts, (part + 1) / parts),
-            )
+            start, dt = self.time + duration * part / parts, duration / parts
+            shares = part / parts, (part + 1) / parts
             scene = self._scene_at(start + 0.5 * dt)
             if self.bodies:
-                self.bodies.advance(scene.gravity, dt, shares[1], limit)
+                self.bodies.advance(scene.gravity, dt, shares[1], limit, start + dt + self.scene.start_time)
             self.world.solids_version = self.solids.move_to(*shares)
             if self.count:
                 for force in self._acting_at(start + 0.5 * dt):
@@ -206,6 +204,11 @@ class Simulation(States):
         angle about z [rad]; None keeps what is. A solid without a name is called "solid 1" and so on.
         """
         self.solids.aim(name, position, rotation, self.scene.dim)
+
+    @property
+    def joints(self) -> Joints:
+        """Joints by name, with where they are and what their motors do: see `LiveJoint`."""
+        return self.bodies.joints
 
     def hold(self, name: str, held: bool = True) -> None:
         """Let the body `name` stay where it is, or is moved to by `move`; with `held` = False let it go."""

@@ -4,7 +4,7 @@ import dataclasses
 from abc import ABC, abstractmethod
 from copy import deepcopy
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from wavetank.foundation.door import guarded, named
 from wavetank.scene.forces import Force
@@ -19,6 +19,12 @@ from wavetank.simulation.saved import read_snapshot, write_snapshot
 from wavetank.simulation.snapshot import Snapshot
 from wavetank.simulation.sources import Sources
 from wavetank.solids.solid import Solid
+
+#: Of a scene, what the water does not feel, or has left behind it.
+UNFELT: Any = {
+    **dict.fromkeys(("fluids", "title", "goal", "preset", "quality", "light"), True),
+    "materials": {"__all__": {"clarity", "glow"}},
+}
 
 
 class States(Contents, ABC):
@@ -93,7 +99,7 @@ class States(Contents, ABC):
     def _rules(self) -> str:
         """Return the scene as it is now, but for what is of the past, or for people."""
         scene = self.scene if self.gravity_by_hand is None else with_gravity(self.scene, self.gravity_by_hand)
-        return scene.model_dump_json(exclude={"fluids", "title", "goal", "preset", "quality"})
+        return scene.model_dump_json(exclude=UNFELT)
 
     def save(self, path: str | Path, *, lasting: bool = False) -> None:
         """Write the whole state to an .npz file, replaced in one move; `restore` continues from it exactly.

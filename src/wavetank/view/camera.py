@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.foundation.errors import WavetankError
+from wavetank.scene.schedule import tilted_by
 from wavetank.view.extent import Extent, extent_of
 from wavetank.view.lens import Lens, basis, lens_at
 
@@ -145,6 +146,16 @@ class Camera:
         if extent.dim == 2:
             return _front(cls, extent, aspect)
         return _three_quarter(cls, extent, aspect)
+
+    def tilted(self, scene: Any, time: float, room: float = 1.0) -> "Camera":
+        """Turn around the target as the tank of `scene` stands at `time` [s]: it is seen tilted, gravity points down.
+
+        Where a tank ever tilts the camera shows `room` times as much height, so that corners stay in the picture.
+        """
+        if scene.tank is None or not scene.tank.is_tilted:
+            return self
+        upright, own = tilted_by(scene, time)
+        return (self if room == 1.0 else self.zoom(room)).turned_with(tuple(upright), tuple(own))
 
     @property
     def _axes(self) -> np.ndarray:

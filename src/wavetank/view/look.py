@@ -51,6 +51,7 @@ class Look:
     veil: qd.f32  # share of the sun that a surface of water keeps from what is below
     caustic: qd.f32  # strength of the light that bulges of water gather
     tile: qd.f32  # m: edge of the floor's tiles, 0 for none
+    paving: qd.i32  # what the floor is made of: place in `environments.FLOORS`
 
 
 TURBIDITY = 3.5
@@ -58,28 +59,28 @@ SKY = ("sky_even", "sky_low", "sky_haze", "sky_near", "sky_near_haze", "sky_glow
 STUDIO: dict[str, Any] = {"outdoors": 0, "below": vector(0.5, 0.5, 0.5)} | dict.fromkeys(SKY, vector(0.0, 0.0, 0.0))
 
 
-def under_sky(look: Look) -> Look:
+def under_sky(look: Look, turbidity: float = TURBIDITY) -> Look:
     """Return a look in the open, on the ground that its sun and its sky light."""
     parts = (tuple(map(float, part)) for part in (look.to_sun, look.sky, look.horizon))
-    weights = {name: vector(*weight) for name, weight in zip(SKY, fitted(*parts, TURBIDITY), strict=True)}
-    return dataclasses.replace(look, outdoors=1, below=_lit_floor(look), **weights)
+    weights = {name: vector(*weight) for name, weight in zip(SKY, fitted(*parts, turbidity), strict=True)}
+    return dataclasses.replace(look, outdoors=1, below=lit_floor(look), **weights)
 
 
 @functools.cache
 def studio() -> Look:
     """Neutral light studio with a warm sun from behind the left shoulder: worlds in space."""
     return Look(
-        to_sun=_unit(-0.72, 1.0, 0.08),
+        to_sun=unit(-0.72, 1.0, 0.08),
         sun=vector(0.97, 0.935, 0.89),
         sky=vector(0.44, 0.47, 0.51),
         ground=vector(0.30, 0.295, 0.285),
-        horizon=_linear("#dbe1e6"),
-        zenith=_linear("#a3b1bd"),
-        floor=_linear("#dadcdd"),
-        solid=_linear("#d9a982"),
-        line=_linear("#5b6b78"),
+        horizon=linear("#dbe1e6"),
+        zenith=linear("#a3b1bd"),
+        floor=linear("#dadcdd"),
+        solid=linear("#d9a982"),
+        line=linear("#5b6b78"),
         line_strength=0.75,
-        pane=_linear("#f4f8fa"),
+        pane=linear("#f4f8fa"),
         glass=0.0,
         wrap=0.25,
         gloss=0.18,
@@ -92,6 +93,7 @@ def studio() -> Look:
         veil=0.25,
         caustic=0.5,
         tile=0.0,
+        paving=0,
     )
 
 
@@ -103,12 +105,13 @@ def pool() -> Look:
         sun=vector(1.25, 1.16, 1.02),
         sky=vector(0.42, 0.50, 0.60),
         ground=vector(0.30, 0.31, 0.31),
-        horizon=_linear("#d9e4ec"),
-        zenith=_linear("#4f7ba6"),
-        floor=_linear("#b9bcb9"),
-        solid=_linear("#e09a5c"),
-        line=_linear("#eef4f7"),
+        horizon=linear("#d9e4ec"),
+        zenith=linear("#4f7ba6"),
+        floor=linear("#b9bcb9"),
+        solid=linear("#e09a5c"),
+        line=linear("#eef4f7"),
         tile=0.1,
+        paving=1,
         sun_size=0.04,
     ))  # fmt: skip
 
@@ -117,17 +120,17 @@ def pool() -> Look:
 def paper() -> Look:
     """Even light on white paper: worlds in the plane."""
     return Look(
-        to_sun=_unit(-0.35, 0.55, 1.0),
+        to_sun=unit(-0.35, 0.55, 1.0),
         sun=vector(0.36, 0.36, 0.36),
         sky=vector(0.72, 0.72, 0.72),
         ground=vector(0.52, 0.52, 0.54),
         horizon=vector(2.5, 2.5, 2.5),  # the tone mapper makes it white
         zenith=vector(2.5, 2.5, 2.5),
-        floor=_linear("#ffffff"),
-        solid=_linear("#cda587"),
-        line=_linear("#3c444b"),
+        floor=linear("#ffffff"),
+        solid=linear("#cda587"),
+        line=linear("#3c444b"),
         line_strength=1.0,
-        pane=_linear("#edf2f5"),
+        pane=linear("#edf2f5"),
         glass=1.0,
         wrap=0.5,
         gloss=0.0,
@@ -140,6 +143,7 @@ def paper() -> Look:
         veil=0.0,
         caustic=0.0,
         tile=0.0,
+        paving=0,
     )
 
 
@@ -159,14 +163,16 @@ def fluid_optics(color: str | None, extent: Extent) -> tuple[np.ndarray, float, 
     return vector(*(-np.log(seen) / usual)), float(scattering), vector(*seen**0.6)
 
 
-def _lit_floor(look: Look) -> np.ndarray:
+def lit_floor(look: Look) -> np.ndarray:
     """Radiance of a floor that nothing shades."""
     return vector(*(look.floor * (look.to_sun[1] * look.sun + look.sky)))
 
 
-def _linear(color: str) -> np.ndarray:
+def linear(color: str) -> np.ndarray:
+    """Return the linear RGB of a colour `#rrggbb`, as a kernel argument."""
     return vector(*to_linear(np.array(rgb_of(color))))
 
 
-def _unit(x: float, y: float, z: float) -> np.ndarray:
+def unit(x: float, y: float, z: float) -> np.ndarray:
+    """Return the unit vector in a direction, as a kernel argument."""
     return vector(*(vector(x, y, z) / np.linalg.norm([x, y, z]).astype(np.float32)))

@@ -2,7 +2,6 @@
 
 import collections
 import dataclasses
-import functools
 import math
 import time
 from typing import Any
@@ -19,7 +18,7 @@ from wavetank.view.camera import Camera
 from wavetank.view.colormaps import ENTRIES, table
 from wavetank.view.extent import Extent, extent_of
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
-from wavetank.view.look import Look, fluid_optics, paper, pool, studio, usual_depth
+from wavetank.view.look import fluid_optics, usual_depth
 from wavetank.view.optics.dyes import ICE, lay_ice
 from wavetank.view.passes import tonemap
 from wavetank.view.quantities import QUANTITIES, Coloring, usual
@@ -32,6 +31,7 @@ from wavetank.view.water_buffers import sun_texels, water_of
 LARGEST_SIDE, LARGEST_SUPERSAMPLE = 8192, 4
 KEPT_RENDERERS, KEPT_SAMPLES = 4, 2**24
 Timings = dict[str, float] | None  # milliseconds of each pass, added up
+ROOM = 1.25  # more height that a picture of a tilted tank shows
 POINT_SUN = 0.004  # tangent of the sun's radius where many suns are averaged
 
 
@@ -52,7 +52,7 @@ class Renderer:
         self._colors = qd.ndarray(vec3, shape=(ENTRIES,))
         self._colors_name = ""
         self._stages = Stages()
-        self._seen: Any = None  # i32 [capacity]: dyes as they are seen where there is ice
+        self._seen: Any = None  # i32 [capacity]: dyes or materials as they are seen where there is ice
         self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
 
     def render(
@@ -81,8 +81,9 @@ class Renderer:
         style = style or Style()
         frame = self._with_ice(frame, style)
         extent = extent_of(frame.scene)
-        camera = camera or Camera.framing_extent(extent, self.width / self.height)
-        look = _look(extent.dim, style.kind.coloured)
+        if camera is None:
+            camera = Camera.framing_extent(extent, self.width / self.height).tilted(frame.scene, frame.time, ROOM)
+        look = style.look(frame)
         quantity, limits, name, colors = style.coloring(frame)
         if name != self._colors_name:
             upload(self._colors, colors)
@@ -111,11 +112,14 @@ class Renderer:
         )
 
     def _with_ice(self, frame: Frame, style: Style) -> Frame:
-        """Return the frame with the dyes that are seen: its own, and white where there is ice."""
+        """Return the frame with ice as it is seen: dyed white, or in the water as the fluid after the scene's."""
         if not frame.frozen_count:
             return frame
         if self._seen is None or self._seen.shape[0] < frame.dye.shape[0]:
             self._seen = qd.ndarray(qd.i32, shape=(frame.dye.shape[0],))
+        if style.kind.name == "water":
+            lay_ice(frame.material, frame.frozen, self._seen, len(frame.scene.palette()), frame.count)
+            return dataclasses.replace(frame, material=self._seen)
         lay_ice(frame.dye, frame.frozen, self._seen, ICE, frame.count)
         return dataclasses.replace(frame, dye=self._seen)
 
@@ -200,13 +204,6 @@ def _write_legend(picture: np.ndarray, shot: Shot, style: Style, supersample: in
     legends.write_time(picture, shot.frame.time, shot.frame.count, column)
     if shot.lens.perspective == 0.0:
         legends.draw_scale(picture, shot.lens.focal / supersample)
-
-
-@functools.cache
-def _look(dim: int, coloured: bool) -> Look:
-    if dim == 2:
-        return paper()
-    return studio() if coloured else pool()
 
 
 def _sun_axes(to_sun: Any) -> np.ndarray:

@@ -10,7 +10,9 @@ import numpy as np
 from wavetank.foundation.errors import WavetankError
 from wavetank.simulation.frame import Frame
 from wavetank.view.colormaps import ENTRIES, bands, rgb_of, table, to_linear
+from wavetank.view.environments import chosen_light, look_of, usual_environment
 from wavetank.view.extent import Extent
+from wavetank.view.look import Look
 from wavetank.view.quantities import QUANTITIES, key_of, usual
 from wavetank.view.views import VIEWS, View
 
@@ -33,6 +35,9 @@ class Style:
     cut: str | None = None  # where a slice lies: an axis, as "z", or an axis and a place in m, as "z=0.35"
     legend: bool = True
     lit: int | None = None  # number of a solid that shines, as under a pointer
+    environment: str | None = None  # one of ENVIRONMENTS; None is the scene's, or what is usual for the view
+    sun: str | None = None  # azimuth and elevation [deg], as "40,25"
+    floor: str | None = None  # one of FLOORS
     hasty: bool = False  # leave out what movement hides: smooth outlines, every second look of the sun at the water
     samples: int = 1  # pictures, each from a slightly other eye and sun, that are averaged
 
@@ -70,6 +75,7 @@ class Style:
         radius = self.radius
         if radius is not None and not (isinstance(radius, int | float) and 0.0 < radius <= 10.0):
             raise WavetankError(f"render: radius = {radius!r} must be a number of spacings above 0, at most 10.")
+        chosen_light(None, self.environment, self.sun, self.floor)
         samples = self.samples
         if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
             raise WavetankError(f"render: samples = {samples!r} must be a whole number from 1 to {MOST_SAMPLES}.")
@@ -83,6 +89,12 @@ class Style:
                 "slice" if self.cut is not None else "particles" if any(s is not None for s in said) else "water"
             ]
         return VIEWS[self.view]
+
+    def look(self, frame: Frame) -> Look:
+        """Light and colours: what is asked for, else the scene's, else what is usual for the view."""
+        light = chosen_light(frame.scene.light, self.environment, self.sun, self.floor)
+        environment = light.environment or usual_environment(frame.dim, self.kind.coloured)
+        return look_of(environment, light.azimuth, light.elevation, light.floor, frame.dim)
 
     def particle_radius(self, extent: Extent) -> float:
         """Radius of a drawn particle [m]."""

@@ -10,8 +10,8 @@ from wavetank.simulation.frame import Frame
 from wavetank.view.buffers import Buffers, Light, new_light
 from wavetank.view.cells import Cells, new_cells
 from wavetank.view.extent import Extent
-from wavetank.view.lens import vec3
-from wavetank.view.quantities import usual
+from wavetank.view.lens import vec3, vec4
+from wavetank.view.matter import matter_of
 from wavetank.view.shot import Shot
 
 
@@ -37,7 +37,9 @@ class Drops:
     id: qd.types.ndarray()  # i32 [capacity]
     dye: qd.types.ndarray()  # i32 [capacity]
     material: qd.types.ndarray()  # i32 [capacity]
-    stains: qd.types.ndarray()  # i32 [materials]
+    fluids: qd.i32  # as in `Thickness`
+    matter: qd.types.ndarray()
+    shine: qd.types.ndarray()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -66,6 +68,12 @@ class Thickness:
     sums: qd.types.ndarray()  # i32 [parts x texels]: the same, of each part of the particles
     dye: qd.types.ndarray()  # i32 [rows, columns, 4]: the dyed part of it, and that part times linear red, green, blue
     stained: qd.types.ndarray()  # i32 [1]: 1 where any of it is dyed, else `dye` holds nothing of use
+    shares: qd.types.ndarray()  # i32 [rows, columns, fluids]: what of it is of each fluid, where there are several
+    front: qd.types.ndarray()  # i32 [rows, columns, fluids]: the same of what lies in front, on texels of its own
+    edge: qd.types.ndarray()  # f32 [rows, columns], m: depth at which the water begins, on these
+    fluids: qd.i32  # how many there are; 0 where all water is the same
+    matter: qd.types.ndarray()  # vec4 [fluids]: linear colour, negative for that of the picture; murk [1/m]
+    shine: qd.types.ndarray()  # vec3 [fluids]: radiance of its own
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -89,20 +97,29 @@ class WaterBuffers:
     light: Light  # on every second pixel in each direction of what is not water
     sunlit: SunlitWater
     sun_thickness: Thickness
-    stains: Any  # i32 [materials]: colour of each fluid as a dye, 0 where the scene has one fluid only
     key: tuple[Any, ...]  # what the sizes were made for
 
-    known: dict[tuple[int, ...], Drops] = dataclasses.field(default_factory=dict)  # by the arrays they are of
+    known: dict[tuple[int, ...], Any] = dataclasses.field(default_factory=dict)  # by what it is made of
 
-    def drops(self, frame: Frame) -> Drops:
-        """Return what is known of a frame's drops, the same object for the same arrays."""
-        arrays = (self.ellipsoids.lone, frame.v, frame.id, frame.dye, frame.material, self.stains)
-        key = tuple(map(id, arrays))
+    def same(self, kind: Any, *parts: Any) -> Any:
+        """Return a dataclass of these objects, the same one for the same objects."""
+        key = (id(kind), *map(id, parts))
         if key not in self.known:
             if len(self.known) >= MOST_KNOWN:
                 self.known.clear()
-            self.known[key] = Drops(*arrays)
+            self.known[key] = kind(*parts)
         return self.known[key]
+
+    def drops(self, frame: Frame) -> Drops:
+        """Return what is known of a frame's drops, the same object for the same arrays."""
+        arrays, fluids = (self.ellipsoids.lone, frame.v, frame.id, frame.dye, frame.material), self.thickness
+        key = (*map(id, arrays), id(fluids))
+        if key not in self.known:
+            if len(self.known) >= MOST_KNOWN:
+                self.known.clear()
+            self.known[key] = Drops(*arrays, fluids.fluids, fluids.matter, fluids.shine)
+        drops: Drops = self.known[key]
+        return drops
 
 
 REACH = 2.2  # d: radius of the neighbourhood of a particle or a point
@@ -121,33 +138,32 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
     """Return the water buffers of `buffers`, made anew when a frame of another kind comes."""
     frame, extent = shot.frame, shot.extent
     capacity = max(int(frame.x.shape[0]), 1)
-    stains = _stains(frame)
+    fluids = matter_of(frame, extent)
     place = (*extent.lower, *extent.upper, extent.spacing)
-    key = (frame.dim, capacity, frame.scene.tank is None, *stains.tolist(), *place)
+    key = (frame.dim, capacity, frame.scene.tank is None, fluids.tobytes(), *place)
     water = buffers.water
     if water is not None and water.key == key:
         return water
     rows, columns, texels = buffers.rows, buffers.columns, sun_texels(extent)
-    stained = qd.ndarray(qd.i32, shape=(1,))
+    shared = _fluids(fluids)
     if water is not None:  # only the particles or the scene changed
         fields: dict[str, Any] = {name: getattr(water, name) for name in ("surface", "backdrop", "light")}
-        fields["thickness"] = dataclasses.replace(water.thickness, stained=stained)
+        mine = _shares(rows // 2 + 1, columns // 2 + 1, len(fluids), seen=True)
+        fields["thickness"] = dataclasses.replace(water.thickness, **shared, **mine)
     else:
         fields = {
             "surface": WaterSurface(*_maps(3, qd.i32, rows, columns)),
             "backdrop": Backdrop(*_maps(3, vec3, rows, columns)),
             "light": new_light(rows, columns, LIGHT_STEP),
-            "thickness": _thickness(rows // 2 + 1, columns // 2 + 1, stained),
+            "thickness": _thickness(rows // 2 + 1, columns // 2 + 1, shared, seen=True),
         }
     buffers.water = WaterBuffers(
         cells=new_cells(frame, extent, REACH * extent.spacing),
         ellipsoids=_ellipsoids(capacity),
         sunlit=SunlitWater(*_maps(3, qd.i32, texels, texels)),
-        sun_thickness=_thickness(texels, texels, stained),
-        stains=qd.ndarray(qd.i32, shape=stains.shape),
+        sun_thickness=_thickness(texels, texels, shared, seen=False),
         key=key, **fields,
     )  # fmt: skip
-    upload(buffers.water.stains, stains)
     return buffers.water
 
 
@@ -155,23 +171,37 @@ def _maps(number: int, kind: Any, rows: int, columns: int) -> list[Any]:
     return [qd.ndarray(kind, shape=(rows, columns)) for _ in range(number)]
 
 
-def _thickness(rows: int, columns: int, stained: Any) -> Thickness:
-    """Allocate maps of thickness.
+def _thickness(rows: int, columns: int, shared: dict[str, Any], seen: bool) -> Thickness:
+    """Allocate maps of thickness, for the eye that has `seen` it, or for the sun.
 
     There are sums over particles for each thread that adds, as many as may be kept; graphics processors add at once.
     """
     parts = max(1, min(threads(), MOST_PARTS, MOST_SUMS // (rows * columns)))
     sums = qd.ndarray(qd.i32, shape=(parts * rows * columns if threads() else 1,))
     water, dye = (qd.ndarray(qd.i32, shape=(rows, columns, *more)) for more in ((), (4,)))
-    return Thickness(water=water, sums=sums, dye=dye, stained=stained)
+    return Thickness(water=water, sums=sums, dye=dye, **shared, **_shares(rows, columns, shared["fluids"], seen=seen))
 
 
-def _stains(frame: Frame) -> np.ndarray:
-    """Colours of the scene's fluids as dyes of full strength, see `state.py`; zeros where it names no material."""
-    scene = frame.scene
-    if usual(scene) != "material":
-        return np.zeros(len(scene.palette()), np.int32)
-    return np.array([127 << 24 | int(str(fluid.color)[1:], 16) for fluid in scene.palette()], np.int32)
+def _shares(rows: int, columns: int, fluids: int, seen: bool) -> dict[str, Any]:
+    """Allocate what tells several fluids apart; a texel where there is one."""
+    small = (1, 1)
+    shape, front = (rows, columns) if fluids else small, (rows, columns) if fluids and seen else small
+    many = max(fluids, 1)
+    return {
+        "shares": qd.ndarray(qd.i32, shape=(*shape, many)), "front": qd.ndarray(qd.i32, shape=(*front, many)),
+        "edge": qd.ndarray(qd.f32, shape=front),
+    }  # fmt: skip
+
+
+def _fluids(fluids: np.ndarray) -> dict[str, Any]:
+    """Put the table of `matter_of` on the device."""
+    many = max(len(fluids), 1)
+    matter, shine = qd.ndarray(vec4, shape=(many,)), qd.ndarray(vec3, shape=(many,))
+    if len(fluids):
+        upload(matter, np.ascontiguousarray(fluids[:, :4]))
+        upload(shine, np.ascontiguousarray(fluids[:, 4:]))
+    stained = qd.ndarray(qd.i32, shape=(1,))
+    return {"stained": stained, "fluids": len(fluids), "matter": matter, "shine": shine}
 
 
 def _ellipsoids(capacity: int) -> Ellipsoids:

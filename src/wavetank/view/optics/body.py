@@ -11,16 +11,32 @@ where the end of a straight piece does not lie below it, the place where it does
     s                  its length                                                     m
     n                  normal of what it ends at, out of the water                    1
     k         cos^2    of the angle outside; negative: total reflection               1
+
+Solids in the tank are met on the way by their distances, and so are those that the surface mirrors; what the picture
+shows of them is taken from it.
 """
 
+import dataclasses
+
 from wavetank.device.compiler import qd
-from wavetank.view.lens import Lens, to_pixel, to_view, vec3, vec4
+from wavetank.solids.distance import SolidSet, signed_distance
+from wavetank.view.lens import Lens, to_pixel, to_view, vec2, vec3, vec4
 from wavetank.view.look import Look
 from wavetank.view.optics.fluid import Optics
-from wavetank.view.optics.maps import margins_inside, picture_at
+from wavetank.view.optics.maps import margins_inside, picture_at, share_of
 from wavetank.view.optics.normals import normal_of, rise_at
-from wavetank.view.optics.radiance import environment, smoothstep
+from wavetank.view.optics.radiance import environment, smoothstep, surface_radiance
 from wavetank.view.optics.rays import Box
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Inside:
+    """What a ray in a tank may meet, on the device."""
+
+    walls: Box
+    solids: SolidSet
+    paints: qd.types.ndarray()  # vec3 [solids]: their albedo
+    column: qd.types.ndarray()  # i32 [texels, texels]: water along the sun's rays, see `Thickness`
 
 
 @qd.func
@@ -72,17 +88,17 @@ def texel_normal(sun: Lens, first: qd.template(), at, spacing):
 
 
 @qd.func
-def is_wet(sun: Lens, first: qd.template(), walls: Box, at, spacing):
-    """Whether the point `at` lies in the water, judged a spacing off panes and floor, where the map has an edge."""
+def depth_at(sun: Lens, first: qd.template(), walls: Box, at, spacing):
+    """Depth [m] of the point `at` below the surface, judged a spacing off panes and floor, where the map has edges."""
     inset = vec3(spacing, spacing, spacing)
     inner = qd.max(at, walls.lower + inset)
     inner = qd.min(inner, vec3(walls.upper.x - spacing, walls.upper.y, walls.upper.z - spacing))
-    return depth_below(sun, first, inner) > 0.0
+    return depth_below(sun, first, inner)
 
 
 @qd.func
 def about_wet(sun: Lens, first: qd.template(), walls: Box, at, spacing):
-    """The same to the nearest texel, for what is seldom near the surface."""
+    """Whether the point `at` lies in the water, to the nearest texel, for what is seldom near the surface."""
     inset = vec3(spacing, spacing, spacing)
     inner = qd.max(at, walls.lower + inset)
     inner = qd.min(inner, vec3(walls.upper.x - spacing, walls.upper.y, walls.upper.z - spacing))
@@ -94,10 +110,11 @@ def about_wet(sun: Lens, first: qd.template(), walls: Box, at, spacing):
 
 
 @qd.func
-def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usual):
+def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usual, solid: qd.template()):
     """Radiance that the picture shows at the point `at`, and towards its margins and beyond it what is `usual` there.
 
-    What stands before the water, nearer than `z` [m], is not behind it.
+    What stands before the water, nearer than `z` [m], is not behind it; where rays meet each `solid` by themselves,
+    neither is one that hides the point from the eye.
     """
     result = usual
     c = to_view(lens, at)
@@ -106,8 +123,40 @@ def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usu
         inside = margins_inside(depth, there, 0.08)
         if inside > 0.0:
             shown = qd.bit_cast(depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32)
+            if qd.static(solid):
+                if shown < 0.97 * c.z:
+                    shown = 0.0
             if shown > z and shown < 1e30:
                 result += smoothstep(inside) * (picture_at(picture, there) - result)
+    return result
+
+
+@qd.func
+def wholeness(sun: Lens, first: qd.template(), column: qd.template(), walls: Box, at, spacing, unit):
+    """How much of a body the water around the point `at` is, 0 to 1: broken water leaves air in the sun's way.
+
+    It is 0 where there is none.
+    """
+    inset = vec3(1.5 * spacing, 0.0, 1.5 * spacing)  # next to a wall the column's discs are cut
+    inner = qd.min(qd.max(at, walls.lower + inset), walls.upper - inset)
+    c = to_view(sun, inner)
+    # Both maps between the same four texels.
+    place = to_pixel(sun, c) - 0.5
+    left = qd.min(qd.max(qd.cast(place.x, qd.i32), 0), first.shape[1] - 2)
+    top = qd.min(qd.max(qd.cast(place.y, qd.i32), 0), first.shape[0] - 2)
+    u, v = place.x - left, place.y - top
+    begins, water, weight = 0.0, 0.0, 1e-6
+    for k in qd.static(range(4)):
+        z = qd.bit_cast(first[top + k // 2, left + k % 2], qd.f32)
+        share = share_of(k, v, u)
+        water += share * column[top + k // 2, left + k % 2]
+        if z < 1e30:
+            begins += share * z
+            weight += share
+    under, result = c.z - begins / weight, 0.0
+    if under > 0.0 and weight > 0.25:
+        length = qd.min(wall_ahead(walls, inner, sun.forward)[3] + under, 1e3)
+        result = smoothstep((water * unit / length - 0.3) / 0.45)
     return result
 
 
@@ -129,47 +178,143 @@ def wall_ahead(walls: Box, p, ahead):
 
 
 @qd.func
+def solid_ahead(solids: SolidSet, p, ahead, far, coarse):
+    """(normal, way [m], number) of the first solid that a ray meets within `far` [m]; a way of -1 where it meets none.
+
+    Solids are met to within `coarse` [m], and what a ray begins in is left first. All distances are asked for in one
+    place, because every copy of that code takes seconds to compile.
+    """
+    hit, which, last = vec4(0.0, 0.0, 0.0, -1.0), -1, far
+    for k in range(solids.tank_count, solids.count):
+        middle = solids.position[k] - p
+        along = middle.dot(ahead)
+        reach = 1.001 * solids.reach[k] + coarse
+        miss = middle.dot(middle) - along * along
+        t, end = 0.0, last
+        if solids.reach[k] < 1e4:
+            half = qd.sqrt(qd.max(reach * reach - miss, 0.0))
+            t, end = qd.max(along - half, 0.0), qd.min(last, along + half)
+            if miss > reach * reach:
+                end = -1.0
+        steps, outside = 0, 0
+        while steps < 40 and t <= end:
+            value = signed_distance(solids, k, p + t * ahead)
+            if value.w > coarse:
+                outside = 1
+            if outside == 1 and value.w <= coarse:
+                hit, which, last = vec4(value.x, value.y, value.z, t), k, t
+                steps = 40
+            t += qd.max(qd.abs(value.w), 0.5 * coarse)
+            steps += 1
+    return hit, which
+
+
+@qd.func
+def solid_radiance(
+    depth: qd.template(), picture: qd.template(), paints: qd.template(), lens: Lens, look: Look, at, n, seen, k, sunny,
+    spacing,
+):  # fmt: skip
+    """Radiance of solid `k` at its point `at`: as the picture shows it, and where that hides it in plain light."""
+    result = surface_radiance(look, paints[k], n, seen, vec2(sunny, 0.8), 0.4 * look.wrap, 0.0)
+    c = to_view(lens, at)
+    if c.z > lens.near:
+        there = to_pixel(lens, c)
+        inside = margins_inside(depth, there, 0.02)
+        if inside > 0.0:
+            shown = qd.bit_cast(depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32)
+            off = qd.abs(shown - c.z) / (2.0 * spacing)
+            result += smoothstep(inside) * smoothstep(2.0 - off) * (picture_at(picture, there) - result)
+    return result
+
+
+@qd.func
 def through_body(
     depth: qd.template(), picture: qd.template(), first: qd.template(), lens: Lens, sun: Lens, look: Look,
-    optics: Optics, walls: Box, z, at, bent,
+    optics: Optics, inside: Inside, z, at, bent, mirrored, solid: qd.template(),
 ):  # fmt: skip
-    """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`.
+    """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, (radiance,
+    share) of the solid that the ray which is `mirrored` there meets, and how much of a body the water is.
 
-    The way is negative where there is no body of water: less than two spacings of it.
+    The way is negative where there is none: less than two spacings of it, or more air than water; nothing is found
+    then but what is mirrored; nothing is where `mirrored` is nought.
     """
     shown, total, done = vec3(0.0, 0.0, 0.0), 0.0, 0
-    p, ahead = qd.min(qd.max(at, walls.lower), walls.upper), bent
-    if not about_wet(sun, first, walls, p + 2.0 * optics.spacing * ahead, optics.spacing):
+    seen_above = vec4(0.0, 0.0, 0.0, 0.0)
+    p, ahead = qd.min(qd.max(at, inside.walls.lower), inside.walls.upper), bent
+    begun = p + 2.0 * optics.spacing * ahead
+    whole = wholeness(sun, first, inside.column, inside.walls, begun, optics.spacing, optics.unit)
+    if whole <= 0.0:
         total, done = -1.0, 1
-    for bounce in range(3):
-        if done == 0:
-            wall = wall_ahead(walls, p, ahead)
-            n, s = vec3(wall[0], wall[1], wall[2]), wall[3]
-            if not about_wet(sun, first, walls, p + 0.999 * s * ahead, optics.spacing):
-                low = 0.0
-                for _ in range(5):
-                    middle = 0.5 * (low + s)
-                    if is_wet(sun, first, walls, p + middle * ahead, optics.spacing):
-                        low = middle
+    # Within, then where solids stand in the way of what leaves, and of what is mirrored.
+    leaves = 0
+    for bounce in range(qd.static(5 if solid else 3)):
+        above = 0
+        if qd.static(solid):
+            if bounce == 4 and mirrored.y != 0.0:
+                p, ahead, above, leaves = at, mirrored, 1, 0
+        if (done == 0 and (bounce < 3 or leaves == 1)) or above == 1:
+            n, s = vec3(0.0, 1.0, 0.0), 1e3
+            if above + leaves == 0:
+                wall = wall_ahead(inside.walls, p, ahead)
+                n, s = vec3(wall[0], wall[1], wall[2]), wall[3]
+                if not about_wet(sun, first, inside.walls, p + 0.999 * s * ahead, optics.spacing):
+                    # Three halvings, and between their ends as if the surface were straight.
+                    low, over, deep = 0.0, 0.0, 0.0
+                    for _ in range(3):
+                        middle = 0.5 * (low + s)
+                        found = depth_at(sun, first, inside.walls, p + middle * ahead, optics.spacing)
+                        if found > 0.0:
+                            low, deep = middle, found
+                        else:
+                            s, over = middle, found
+                    if deep > 0.0 and over < 0.0:
+                        s = low + (s - low) * deep / (deep - qd.max(over, -deep))
                     else:
-                        s = middle
-                n = texel_normal(sun, first, p + s * ahead, optics.spacing)
-            total += s
-            p += s * ahead
-            cosi = ahead.dot(n)
-            k = 1.0 - 1.7689 * (1.0 - cosi * cosi)
-            if n.y < -0.5:
-                dimly = look.below * qd.exp(-0.6 * optics.usual * optics.absorption)
-                shown, done = seen_at(depth, picture, lens, z, p, dimly), 1
-            elif k > 0.0 or cosi <= 0.0:
-                out = ahead
-                if cosi > 0.0:
-                    out = 1.33 * ahead + (qd.sqrt(k) - 1.33 * cosi) * n
-                shown, done = environment(look, out), 1
-                if out.y < -1e-3:
-                    shown = seen_at(depth, picture, lens, z, p + (qd.max(p.y, 0.0) / -out.y) * out, shown)
-            else:
-                ahead -= 2.0 * cosi * n
+                        s = 0.5 * (low + s)
+                    n = texel_normal(sun, first, p + s * ahead, optics.spacing)
+            met = 0
+            if qd.static(solid):
+                hit, k = solid_ahead(inside.solids, p, ahead, s, 0.1 * optics.spacing)
+                if k >= 0:
+                    met, place = 1, p + hit.w * ahead
+                    normal = vec3(hit.x, hit.y, hit.z)
+                    deep = qd.max(depth_below(sun, first, place), 0.0)
+                    sunny = qd.select(above + leaves > 0, 1.0, qd.exp(-0.6 * deep * optics.absorption.y))
+                    radiance = solid_radiance(
+                        depth, picture, inside.paints, lens, look, place, normal, -ahead, k, sunny, optics.spacing
+                    )
+                    if above == 1:
+                        seen_above = vec4(radiance.x, radiance.y, radiance.z, 1.0)
+                    else:
+                        shown, done = radiance, 1
+                        if leaves == 0:
+                            total += hit.w
+            if met == 0 and leaves == 1:
+                shown, done = environment(look, ahead), 1
+                if ahead.y < -1e-3:
+                    shown = seen_at(depth, picture, lens, z, p + (qd.max(p.y, 0.0) / -ahead.y) * ahead, shown, solid)
+            elif met == 0 and above == 0:
+                total += s
+                p += s * ahead
+                cosi = ahead.dot(n)
+                k = 1.0 - 1.7689 * (1.0 - cosi * cosi)
+                if n.y < -0.5:
+                    dimly = look.below * qd.exp(-0.6 * optics.usual * optics.absorption)
+                    shown, done = seen_at(depth, picture, lens, z, p, dimly, solid), 1
+                elif k > 0.0 or cosi <= 0.0:
+                    out = ahead
+                    if cosi > 0.0:
+                        out = 1.33 * ahead + (qd.sqrt(k) - 1.33 * cosi) * n
+                    if qd.static(solid):
+                        leaves, ahead = 1, out
+                    else:
+                        shown, done = environment(look, out), 1
+                        if out.y < -1e-3:
+                            shown = seen_at(
+                                depth, picture, lens, z, p + (qd.max(p.y, 0.0) / -out.y) * out, shown, solid
+                            )
+                else:
+                    ahead -= 2.0 * cosi * n
     if done == 0:
         shown = optics.glow
-    return vec4(shown.x, shown.y, shown.z, total)
+    return vec4(shown.x, shown.y, shown.z, total), seen_above, whole

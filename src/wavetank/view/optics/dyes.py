@@ -19,10 +19,10 @@ ICE = 127 << 24 | 0xEAF4FB  # what ice is dyed with
 
 
 @qd.kernel(fastcache=True)
-def lay_ice(dye: qd.types.ndarray(), frozen: qd.types.ndarray(), seen: qd.types.ndarray(), ice: qd.i32, count: qd.i32):
-    """Write the dyes that are seen: ice is white, whatever colour its water had."""
+def lay_ice(own: qd.types.ndarray(), frozen: qd.types.ndarray(), seen: qd.types.ndarray(), ice: qd.i32, count: qd.i32):
+    """Write what is seen, dyes or materials: ice is `ice`, whatever its water was."""
     for i in range(count):
-        seen[i] = qd.select(frozen[i] == 1, ice, dye[i])
+        seen[i] = qd.select(frozen[i] == 1, ice, own[i])
 
 
 @qd.func
@@ -52,13 +52,3 @@ def swallowed_by(dye, absorption, usual):
     Strong dye shows in a layer thinner than is `usual` [m].
     """
     return absorption + dye[0] * (-qd.log(vec3(dye[1], dye[2], dye[3])) * (2.5 / usual) - absorption)
-
-
-@qd.func
-def milk_of(dye, usual):
-    """What pale water scatters on top of clear [1/m] where `dye_in` tells its dye: white absorbs nothing.
-
-    What scatters like milk or bubbly ice is white because of it; colours that lack one of the three have none of that.
-    """
-    pale = qd.min(qd.max((qd.min(dye[1], dye[2], dye[3]) - 0.35) / 0.4, 0.0), 1.0)
-    return dye[0] * pale * pale * (3.0 - 2.0 * pale) * 8.0 / usual

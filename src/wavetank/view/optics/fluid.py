@@ -21,6 +21,7 @@ class Optics:
     glow: vec3  # radiance of light that comes back out of deep water
     usual: qd.f32  # m: water that gives its colour to what is behind it
     coarse: qd.f32  # pixels per texel of the thickness
+    fine: qd.f32  # and of what tells fluids apart
     unit: qd.f32  # m per step of it
     spacing: qd.f32  # m
     disc: qd.f32  # m: radius of a particle's disc in a plane
@@ -33,7 +34,7 @@ def optics_of(shot: Shot, under: int = 0, samples: int = 1) -> Optics:
     """Return what the fluid of a picture does to light."""
     return remembered(Optics(
         absorption=shot.absorption, scattering=shot.scattering, glow=vector(*(shot.look.glow * shot.tint)),
-        usual=shot.usual, coarse=float(coarseness(shot)), unit=shot.extent.spacing / UNIT,
+        usual=shot.usual, coarse=float(coarseness(shot)), fine=float(fineness(shot)), unit=shot.extent.spacing / UNIT,
         spacing=shot.extent.spacing, disc=DISC[2] * shot.extent.spacing,
         slack=2.0 * shot.radius, under=under, samples=samples,
     ))  # fmt: skip
@@ -47,6 +48,11 @@ def coarseness(shot: Shot) -> int:
         distance = float((extent.middle - lens.eye) @ lens.forward)
         scale /= max(distance, 0.5 * extent.radius)
     return max(2, min(64, round(scale * extent.spacing * DISC[extent.dim] / (DISC[3] * TEXELS))))
+
+
+def fineness(shot: Shot) -> int:
+    """Pixels per texel of the map that tells fluids apart: half a spacing in a plane, where discs are wide."""
+    return coarseness(shot) if shot.extent.dim == 3 else max(2, coarseness(shot) // 4)
 
 
 @qd.func

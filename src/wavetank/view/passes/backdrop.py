@@ -13,6 +13,7 @@ from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, optics_of
 from wavetank.view.optics.glass import with_tank
 from wavetank.view.optics.maps import share_of, thickness_at
+from wavetank.view.optics.mixture import along_sun
 from wavetank.view.optics.radiance import background, smoothstep, sun_disc, surface_radiance
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
@@ -62,21 +63,36 @@ def sun_through_water(sunlit: SunlitWater, thickness: Thickness, sun: Lens, look
     through = vec3(1.0, 1.0, 1.0)
     texels = sunlit.depth.shape[0]
     if qd.min(place.x, place.y) > 2.0 and qd.max(place.x, place.y) < texels - 2.0:
-        light = 1.0 + look.caustic * qd.min(thickness_at(sunlit.caustic, place, 1.0 / 4096.0), 3.0)
         whole = thickness_at(thickness.water, place, optics.unit)
+        gathered = thickness_at(sunlit.caustic, place, 1.0 / 4096.0)
+        nearest, wide = 1e30, 0.0
+        if whole > 0.0:
+            nearest = qd.bit_cast(sunlit.depth[qd.cast(place.y, qd.i32), qd.cast(place.x, qd.i32)], qd.f32)
+            if nearest < 1e30:  # far behind the water its light is as blurred as the sun is wide
+                wide = 2.0 * look.sun_size * qd.max(c.z - nearest - whole, 0.0) * sun.focal
+        if wide > 0.5:
+            for k in range(4):
+                off = wide * vec2((k % 2) * 1.6 - 0.8, (k // 2) * 1.6 - 0.8)
+                whole += thickness_at(thickness.water, place + off, optics.unit)
+                gathered += thickness_at(sunlit.caustic, place + off, 1.0 / 4096.0)
+            whole *= 0.2
+            gathered *= 0.2
+        light = 1.0 + look.caustic * qd.min(gathered, 3.0)
         tau = whole
         if tau > 0.0:
-            nearest = qd.bit_cast(sunlit.depth[qd.cast(place.y, qd.i32), qd.cast(place.x, qd.i32)], qd.f32)
             if nearest < 1e30:  # what lies above the water is in the full sun
                 within = qd.max(c.z - nearest, 0.0)
                 light = 1.0 + (light - 1.0) * qd.min(within / tau, 1.0)
                 tau = qd.min(tau, within)
         if tau > 0.0 or light != 1.0:
-            swallow = optics.absorption
+            swallow, murk = optics.absorption, 0.0
+            if thickness.fluids > 0 and whole > 0.0:
+                found = along_sun(thickness, optics, place)
+                swallow, murk = vec3(found[0], found[1], found[2]), found[3]
             if thickness.stained[0] == 1 and whole > 0.0:
                 swallow = swallowed_by(dye_in(thickness.dye, place, whole / optics.unit), swallow, optics.usual)
             veil = look.veil * (1.0 - qd.exp(-tau * (optics.absorption.x + optics.absorption.y)))
-            through = light * (1.0 - veil) * qd.exp(-0.6 * tau * swallow)
+            through = light * (1.0 - veil) * qd.exp(-tau * (0.6 * swallow + murk))
     return through
 
 

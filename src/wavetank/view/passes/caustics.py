@@ -17,6 +17,7 @@ from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec
 from wavetank.view.optics.fluid import above_floor, refracted
 from wavetank.view.optics.maps import share_of, thickness_at
 from wavetank.view.optics.normals import normal_of, rise_at
+from wavetank.view.optics.radiance import smoothstep
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import UNIT, SunlitWater, water_of
 
@@ -41,7 +42,10 @@ def gather(sunlit: SunlitWater, thickness: qd.types.ndarray(), sun: Lens, to_sun
             n = normal_of(sun, row, column, z, rise_at(row, column, z, 3.0 * spacing, sunlit.depth))
             bent = refracted(-to_sun, n, qd.max(n.dot(to_sun), 0.05))
             at = sun.eye + from_view(sun, point_at(sun, row, column, z))
-            travel = above_floor(thickness_at(thickness, vec2(column + 0.5, row + 0.5), unit), at, bent)
+            tau = thickness_at(thickness, vec2(column + 0.5, row + 0.5), unit)
+            travel = above_floor(tau, at, bent)
+            # A film is as lumpy as its particles are: what these would gather is no light of the water's.
+            travel *= smoothstep(0.5 * (tau / spacing - 1.0))
             moved = to_pixel(sun, to_view(sun, at + travel * bent)) - to_pixel(sun, to_view(sun, at))
         # Light that the water does not touch adds up to one everywhere and is not sent.
         if moved.x != 0.0 or moved.y != 0.0:

@@ -29,6 +29,7 @@ from wavetank.view.lens import (
     ray_origin,
     to_pixel,
     to_view,
+    vec2,
     vec3,
     vec4,
     view_ray,
@@ -39,7 +40,8 @@ from wavetank.view.optics.dyes import dyed, swallowed_by
 from wavetank.view.optics.fluid import Optics, dimmed, optics_of, refracted
 from wavetank.view.optics.glass import line_cover
 from wavetank.view.optics.maps import margins_inside, picture_at
-from wavetank.view.optics.radiance import environment, glint, smoothstep
+from wavetank.view.optics.mixture import color_of_fluid, swallow_of
+from wavetank.view.optics.radiance import environment, glint, smoothstep, surface_radiance
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import Drops, WaterSurface, water_of
 from wavetank.view.weights import under_water
@@ -177,16 +179,25 @@ def shine(
             i, j = qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)
             if qd.bit_cast(qd.min(surface.depth[i, j], pixels.depth[i, j]), qd.f32) > c.z:
                 shown += smoothstep(inside) * (picture_at(pixels.color, there) - shown)
-    swallow = optics.absorption
+    swallow, murk = optics.absorption, 0.0
     own = drops.dye[cells.order[a]]
-    if own == 0:
-        own = drops.stains[drops.material[cells.order[a]]]
+    body, kind = optics.glow, drops.material[cells.order[a]]
+    if drops.fluids > 0:
+        swallow, murk = swallow_of(drops.matter, optics, kind), drops.matter[kind][3]
+        body = color_of_fluid(drops.matter, look, optics, kind)
     if own != 0:
         color = qd.min(qd.max(dyed(vec3(0.0, 0.0, 0.0), own | (127 << 24)), 0.02), 0.98)
         share = ((own >> 24) & 127) / 127.0
         swallow = swallowed_by(vec4(share, color.x, color.y, color.z), swallow, optics.usual)
+        body += share * (color - body)
     # Light gets into a drop from all sides: it is paler than a layer of water as thick.
     result = dimmed(shown, 0.4 * chord, swallow, optics.scattering, optics.glow)
+    if murk > 0.0:
+        lit = (
+            surface_radiance(look, body / (1.0 + 2.0 * drops.shine[kind].max()), n, -ahead, vec2(1.0, 1.0), 0.45, 0.0)
+            + drops.shine[kind]
+        )
+        result += (1.0 - qd.exp(-murk * chord)) * (lit - result)
     mirror = 0.02 + 0.98 * (1.0 - cosi) ** 5
     result += mirror * (environment(look, ahead + 2.0 * cosi * n) - result)
     return result + glint(look, n.dot((look.to_sun - ahead).normalized(1e-9)))

@@ -20,14 +20,13 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import remembered
 from wavetank.solids.distance import SolidSet, around, grain, signed_distance
 from wavetank.view.buffers import Buffers, Pixels
-from wavetank.view.colormaps import rgb_of, to_linear
 from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, view_ray
 from wavetank.view.optics.rays import Box, box, box_interval
+from wavetank.view.paints import colors_of
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 
 UNBOUNDED = 1e4  # m
-SHINE, LIT = np.array((0.3, 1.0, 1.6), np.float32), 0.6  # linear RGB of what shines, and how much of it is that
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -58,18 +57,6 @@ def lower_depth(shot: Shot, buffers: Buffers, lens: Lens, depth: Any, is_seen: i
         trace(
             depth, buffers.pixels, buffers.solid_box, strips_of(depth), solids, window(shot), lens, paints, is_seen,
         )  # fmt: skip
-
-
-def colors_of(shot: Shot) -> np.ndarray:
-    """Return the albedo of every solid, walls of the tank included, float32 [n, 3], linear RGB."""
-    solids = shot.frame.solids
-    colors = np.tile(np.asarray(shot.look.solid, np.float32), (solids.count, 1))
-    for number, solid in enumerate(shot.frame.scene.solids, solids.tank_count):
-        if solid.color and number < solids.count:
-            colors[number] = to_linear(np.array(rgb_of(solid.color)))
-    if 0 <= shot.lit < solids.count:
-        colors[shot.lit] += LIT * (SHINE - colors[shot.lit])
-    return colors
 
 
 def window(shot: Shot) -> Window:

@@ -17,12 +17,28 @@ from wavetank.device.compiler import qd, threads
 from wavetank.device.state import remembered
 from wavetank.view.buffers import Buffers
 from wavetank.view.cells import Cells
-from wavetank.view.lens import Lens, pixels_between, pixels_per_metre, to_pixel, to_view, vec2, vec3, vec4
+from wavetank.view.lens import (
+    Lens,
+    pixels_between,
+    pixels_per_metre,
+    ray_direction,
+    ray_origin,
+    to_pixel,
+    to_view,
+    vec2,
+    vec3,
+    vec4,
+    view_ray,
+)
 from wavetank.view.optics.dyes import dyed
-from wavetank.view.optics.fluid import DISC, coarseness
+from wavetank.view.optics.fluid import DISC, coarseness, fineness
+from wavetank.view.optics.rays import Box, box_interval
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import UNIT, Thickness, WaterBuffers, water_of
+
+FRONT = 3.0  # d: how deep what counts as being in front may lie
+WIDE = 2.0  # d: radius of the discs that tell what is in front
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -39,6 +55,14 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill the thickness as the eye sees it."""
     water = water_of(buffers, shot)
     add_up(shot, water, water.thickness, shot.lens, float(coarseness(shot)), lone=shot.frame.dim == 2)
+    if water.thickness.fluids:
+        d, dim, lone = shot.extent.spacing, shot.frame.dim, int(shot.frame.dim == 2)
+        disc = remembered(Disc(radius=WIDE * d, peak=peak(3), coarse=float(fineness(shot)), lone=lone))
+        begin(water.thickness.edge, water.surface.depth, shot.lens, shot.walls, fineness(shot))
+        part_front(
+            water.thickness, water.cells, water.ellipsoids.lone, shot.frame.material, shot.lens, disc,
+            (1.0 if dim == 3 else 0.0) / (FRONT * d), shot.frame.count,
+        )  # fmt: skip
 
 
 def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
@@ -60,7 +84,9 @@ def add_up(shot: Shot, water: WaterBuffers, thickness: Thickness, lens: Lens, co
         thickness, cells.x, water.ellipsoids.lone, strips_of(thickness.water), lens, disc, parts, int(threads() > 0),
         frame.count,
     )  # fmt: skip
-    stain(thickness, cells, water.ellipsoids.lone, frame.dye, frame.material, water.stains, lens, disc, frame.count)
+    stain(thickness, cells, water.ellipsoids.lone, frame.dye, lens, disc, frame.count)
+    if thickness.fluids:
+        part(thickness, cells, water.ellipsoids.lone, frame.material, lens, disc, frame.count)
 
 
 def peak(dim: int) -> float:
@@ -148,19 +174,18 @@ def add(
 
 @qd.kernel(fastcache=True)
 def stain(
-    thickness: Thickness, cells: Cells, alone: qd.types.ndarray(), dyes: qd.types.ndarray(),
-    materials: qd.types.ndarray(), stains: qd.types.ndarray(), lens: Lens, disc: Disc, count: qd.i32,
+    thickness: Thickness, cells: Cells, alone: qd.types.ndarray(), dyes: qd.types.ndarray(), lens: Lens, disc: Disc,
+    count: qd.i32,
 ):  # fmt: skip
-    """Add up the discs of coloured particles, as strong as their dye, alone and times its colour.
+    """Add up the discs of dyed particles, as strong as their dye, alone and times its colour.
 
-    A fluid with a colour of its own is dyed with it where nothing else dyes it. `thickness.stained` tells whether any
-    is; where none is, `thickness.dye` holds nothing of use.
+    `thickness.stained` tells whether any is; where none is, `thickness.dye` holds nothing of use.
     """
     rows, columns = thickness.dye.shape[0], thickness.dye.shape[1]
     for k in range(thickness.stained.shape[0]):
         thickness.stained[k] = 0
     for a in range(count):
-        if dyes[a] != 0 or stains[materials[a]] != 0:
+        if dyes[a] != 0:
             thickness.stained[0] = 1
     for row, column in qd.ndrange(rows, columns):
         if thickness.stained[0] == 1:
@@ -170,8 +195,6 @@ def stain(
         own = 0
         if thickness.stained[0] == 1:
             own = dyes[cells.order[a]]
-            if own == 0:
-                own = stains[materials[cells.order[a]]]
         if own != 0 and alone[a] <= disc.lone:
             strength = disc.peak * ((own >> 24) & 127) / 127.0
             at, box = disc_of(lens, disc, cells.x[a], strength, rows, columns)
@@ -182,3 +205,56 @@ def stain(
                     qd.atomic_add(thickness.dye[row, column, 0], qd.cast(share + 0.5, qd.i32))
                     for k in qd.static(range(3)):
                         qd.atomic_add(thickness.dye[row, column, k + 1], qd.cast(share * color[k] + 0.5, qd.i32))
+
+
+@qd.kernel(fastcache=True)
+def part(
+    thickness: Thickness, cells: Cells, alone: qd.types.ndarray(), materials: qd.types.ndarray(), lens: Lens,
+    disc: Disc, count: qd.i32,
+):  # fmt: skip
+    """Add up the discs of each fluid's particles."""
+    rows, columns = thickness.shares.shape[0], thickness.shares.shape[1]
+    for row, column in qd.ndrange(rows, columns):
+        for k in range(thickness.fluids):
+            thickness.shares[row, column, k] = 0
+    for a in range(count):
+        if alone[a] <= disc.lone:
+            kind = materials[cells.order[a]]
+            at, box = disc_of(lens, disc, cells.x[a], disc.peak, rows, columns)
+            for row in range(box[0], box[1] + 1):
+                for column in range(box[2], box[3] + 1):
+                    more = qd.cast(thickness_in(at, row, column) + 0.5, qd.i32)
+                    qd.atomic_add(thickness.shares[row, column, kind], more)
+
+
+@qd.kernel(fastcache=True)
+def begin(edge: qd.types.ndarray(), depth: qd.types.ndarray(), lens: Lens, walls: Box, fine: qd.i32):
+    """Fill the depth [m] at which each texel's water begins: its surface, or the pane before it."""
+    for row, column in qd.ndrange(edge.shape[0], edge.shape[1]):
+        r, c = qd.min(row * fine + fine // 2, depth.shape[0] - 1), qd.min(column * fine + fine // 2, depth.shape[1] - 1)
+        ray = view_ray(lens, r, c)
+        ends = box_interval(ray_origin(lens, ray), ray_direction(lens, ray), walls)
+        z = qd.bit_cast(depth[r, c], qd.f32)
+        edge[row, column] = qd.max(qd.select(z < 1e30, z, 0.0), ends[0])
+
+
+@qd.kernel(fastcache=True)
+def part_front(
+    thickness: Thickness, cells: Cells, alone: qd.types.ndarray(), materials: qd.types.ndarray(), lens: Lens,
+    disc: Disc, per_depth: qd.f32, count: qd.i32,
+):  # fmt: skip
+    """Add up each fluid's discs in what lies next behind the surface."""
+    rows, columns = thickness.front.shape[0], thickness.front.shape[1]
+    for row, column in qd.ndrange(rows, columns):
+        for k in range(thickness.fluids):
+            thickness.front[row, column, k] = 0
+    for a in range(count):
+        if alone[a] <= disc.lone:
+            kind, z = materials[cells.order[a]], to_view(lens, cells.x[a]).z
+            at, box = disc_of(lens, disc, cells.x[a], disc.peak, rows, columns)
+            for row in range(box[0], box[1] + 1):
+                for column in range(box[2], box[3] + 1):
+                    near = 1.0 - qd.max((z - thickness.edge[row, column]) * per_depth, 0.0)
+                    if near > 0.0:
+                        more = qd.cast(near * near * thickness_in(at, row, column) + 0.5, qd.i32)
+                        qd.atomic_add(thickness.front[row, column, kind], more)

@@ -31,16 +31,18 @@ from wavetank.view.lens import (
     view_ray,
 )
 from wavetank.view.look import Look
-from wavetank.view.optics.body import through_body
-from wavetank.view.optics.dyes import dye_in, milk_of, swallowed_by
+from wavetank.view.optics.body import Inside, through_body
+from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, refracted
 from wavetank.view.optics.glass import line_cover
 from wavetank.view.optics.maps import margins_inside, picture_at, thickness_at
 from wavetank.view.optics.marks import rim_cover, rim_key
+from wavetank.view.optics.mixture import mixed, murky
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.panes import share_before_wall, share_behind, tank_interval
 from wavetank.view.optics.radiance import environment, glint, smoothstep
 from wavetank.view.optics.rays import Box, box
+from wavetank.view.paints import colors_of
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import Backdrop, SunlitWater, Thickness, WaterSurface, water_of
@@ -53,10 +55,15 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if shot.frame.dim == 2:  # as deep as the water is drawn
         thick = vector(0.0, 0.0, 10.0 * shot.extent.spacing)
         walls = box(walls.lower - thick, walls.upper + thick)
+    solids = shot.frame.solids
+    # Solids are met by bent rays in a tank only: in the open there is no body of water.
+    world = 4 if shot.frame.dim == 3 and shot.frame.scene.tank and solids.count > solids.tank_count else shot.frame.dim
+    paints = buffers.paints.of(colors_of(shot)) if world == 4 else buffers.paints.device
+    inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water)
     lay(
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit, strips_of(pixels.depth), shot.lens,
-        shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers), buffers.supersample), walls,
-        shot.frame.dim,
+        shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers), buffers.supersample), inside,
+        10 * int(water.thickness.fluids > 0) + world,
     )  # fmt: skip
 
 
@@ -96,15 +103,18 @@ def sheet_normal(thickness: qd.template(), lens: Lens, optics: Optics, walls: Bo
 @qd.kernel(fastcache=True)
 def lay(
     pixels: Pixels, surface: WaterSurface, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater,
-    strips: Strips, lens: Lens, sun: Lens, look: Look, optics: Optics, walls: Box, dim: qd.template(),
+    strips: Strips, lens: Lens, sun: Lens, look: Look, optics: Optics, inside: Inside, world: qd.template(),
 ):  # fmt: skip
     """Shade every pixel that shows water, and copy the backdrop to the others; `surface.nearest` is filled with the
     nearer of its depth and the backdrop's.
+
+    `world` is 2 for a plane, 3 for space, and 4 for space with solids in a tank; ten more with several fluids.
     """
     for task in range(strips.count):
         row, begin, end = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
         # What is seen through a body of water is found once for the samples of a pixel that lie beside each other.
         kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
+        kept_above, kept_whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
         for column in range(begin, end):
             result = backdrop.behind[row, column]
             z, back = qd.bit_cast(surface.depth[row, column], qd.f32), qd.bit_cast(pixels.depth[row, column], qd.f32)
@@ -114,12 +124,12 @@ def lay(
             elif z < 1e30:
                 ray = view_ray(lens, row, column)
                 origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
-                ends, turns, wall = tank_interval(lens, origin, direction, walls)
+                ends, turns, wall = tank_interval(lens, origin, direction, inside.walls)
                 front = qd.max(z, ends[0])
                 if ends[0] <= ends[1] and front < back:
                     # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
                     wet, there, cover, edge, rise = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0)
-                    if qd.static(dim == 3):
+                    if qd.static(world % 10 >= 3):
                         at_pane = ends[0] > lens.near and wall.y == 0.0  # not through the open top
                         if at_pane and z < ends[0] - optics.spacing:
                             wet = 1.0
@@ -145,31 +155,39 @@ def lay(
                         share, n, at = first, wall, front
                         if layer == 1:
                             share = second
-                            if qd.static(dim == 3):
+                            if qd.static(world % 10 >= 3):
                                 n = normal_of(lens, row, column, z, rise)
                         elif layer == 2:
                             share, at = cover, edge
-                            if qd.static(dim == 3):
+                            if qd.static(world % 10 >= 3):
                                 if share > 0.0:
                                     n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
                         if share > 0.0:
                             body = vec4(0.0, 0.0, 0.0, -1.0)
-                            if qd.static(dim == 3):
-                                if walls.upper.x < 1e5 and back > 0.999 * ends[1]:  # a tank, and no solid in it
+                            above, whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
+                            if qd.static(world % 10 >= 3):
+                                # A tank, and without bent rays to meet them no solid in it.
+                                wide = back > 0.999 * ends[1]
+                                if qd.static(world % 10 == 4):
+                                    wide = True
+                                if inside.walls.upper.x < 1e5 and wide:
                                     pixel = column // optics.samples
                                     near = qd.abs(at - kept_z) < 0.3 * optics.spacing
                                     if pixel != kept_pixel or layer != kept_layer or not near:
                                         ahead = direction.normalized()
-                                        bent = refracted(ahead, n, qd.max(-n.dot(ahead), 0.05))
-                                        kept = through_body(
+                                        cosi = qd.max(-n.dot(ahead), 0.05)
+                                        kept, kept_above, kept_whole = through_body(
                                             pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
-                                            walls, at, origin + at * direction, bent,
+                                            inside, at, origin + at * direction, refracted(ahead, n, cosi),
+                                            qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0),
+                                            qd.static(world % 10 == 4),
                                         )  # fmt: skip
                                         kept_z, kept_layer, kept_pixel = at, layer, pixel
-                                    body = kept
+                                    body, above, whole = kept, kept_above, kept_whole
                             result += share * shine(
-                                pixels, thickness, backdrop, lens, look, optics, walls, row, column, at, n, origin,
-                                direction, body, dim,
+                                pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside.walls, row, column,
+                                at, n, origin, direction, body, above, whole, qd.static(min(world % 10, 3)),
+                                qd.static(world >= 10),
                             )  # fmt: skip
                     line = line_cover(pixels.lines[row, column], front, optics.slack)
                     result += look.line_strength * there * line * (look.line - result)
@@ -226,24 +244,28 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
 
 @qd.func
 def shine(
-    pixels: Pixels, thickness: Thickness, backdrop: Backdrop, lens: Lens, look: Look, optics: Optics, walls: Box,
-    row, column, z, normal, origin, direction, body, dim: qd.template(),
+    pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
+    optics: Optics, walls: Box, row, column, z, normal, origin, direction, body, above, whole, dim: qd.template(),
+    many: qd.template(),
 ):  # fmt: skip
     """Radiance of the water that a pixel shows at depth `z` with this normal.
 
-    `body` is what `through_body` found for it; a negative way where it found none.
+    `body`, `above` and `whole` are what `through_body` found for it; a negative way where it found none.
     """
     n, pace = normal, direction.norm()
     ahead, at = direction / pace, origin + z * direction
     place = vec2(column + 0.5, row + 0.5)
-    tau = 0.0
+    tau, raw = 0.0, 0.0
     if qd.static(dim == 2):
         tau = sheet_at(thickness.water, lens, optics, walls, place)
+        raw = thickness_at(thickness.water, place / optics.coarse, optics.unit)
         n = sheet_normal(thickness.water, lens, optics, walls, place)
     else:
         tau = thickness_at(thickness.water, place / optics.coarse, optics.unit)
     cosi = qd.max(-n.dot(ahead), 0.05)
     bent = refracted(ahead, n, cosi)
+    if qd.static(dim == 3):
+        raw = tau
     # The least that a drop is thick; in a plane the rim keeps half of the colour.
     tau = qd.max(tau, qd.static(0.15 if dim == 3 else 0.55) * optics.spacing)
     travel = qd.min(tau, (qd.bit_cast(pixels.depth[row, column], qd.f32) - z) * pace)
@@ -251,7 +273,7 @@ def shine(
         travel = above_floor(travel, at, bent)
     c = to_view(lens, at + travel * bent)
     shown = backdrop.behind[row, column]
-    if c.z > lens.near and body[3] < 0.0:
+    if c.z > lens.near and whole < 1.0:
         there = to_pixel(lens, c)
         r = qd.min(qd.max(qd.cast(there.y, qd.i32), 0), pixels.depth.shape[0] - 1)
         e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), pixels.depth.shape[1] - 1)
@@ -266,19 +288,34 @@ def shine(
         ball = smoothstep((0.75 - layers) / 0.3) * off
         glossy = 1.0 - smoothstep((1.6 - layers) / 0.8) * (1.0 - off)
         if body[3] >= 0.0:
-            shown, travel, ball = vec3(body[0], body[1], body[2]), body[3], 0.0
+            shown += whole * (vec3(body[0], body[1], body[2]) - shown)
+            travel += whole * (body[3] - travel)
+            ball *= 1.0 - whole
         if ball > 0.0:
             out = 2.0 * bent.dot(ahead) * bent - ahead
             far = behind_drop(pixels, backdrop, lens, look, at + travel * bent, out, row, column, z)
             shown += ball * (far - shown)
-    swallow, tint, scattering = optics.absorption, optics.glow, optics.scattering
+    swallow, tint, cover, hidden = optics.absorption, optics.glow, 0.0, 0.0
+    color, glow, behind = optics.glow, vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+    if qd.static(many):
+        swallow, tint, color, cover, glow, hidden, behind = mixed(
+            thickness, look, optics, place, tau, qd.static(dim == 2)
+        )
     if thickness.stained[0] == 1:
-        found = dye_in(thickness.dye, place / optics.coarse, tau / optics.unit)
+        # Of what the map holds: a wall takes as much of the dye's discs as of the water's.
+        found = dye_in(thickness.dye, place / optics.coarse, qd.max(raw, 0.15 * optics.spacing) / optics.unit)
         if found[0] > 0.0:
             swallow = swallowed_by(found, swallow, optics.usual)
             tint += found[0] * (look.glow * vec3(found[1], found[2], found[3]) - tint)
-            scattering += milk_of(found, optics.usual)
-    result = dimmed(shown, travel, swallow, scattering, tint)
+            color += found[0] * (vec3(found[1], found[2], found[3]) - color)
+    result = dimmed(shown, travel, swallow, optics.scattering, tint)
+    if qd.static(many):
+        if hidden + cover > 0.0:
+            lit = murky(sunlit, sun, look, optics, behind, vec3(0.0, 0.0, 0.0), at, vec3(0.0, 1.0, 0.0), -ahead)
+            result += hidden * (lit * qd.exp(-0.3 * tau * swallow) - result)
+            if cover > 0.0:
+                lit = murky(sunlit, sun, look, optics, color, glow, at, n, -ahead)
+                result += cover * (lit - result)
     if qd.static(dim == 2):  # the rim of the sheet catches the light, and on paper there is nothing to mirror
         # Light comes from above left, and less of it reaches the bottom.
         high = (at.y - walls.lower.y) / (walls.upper.y - walls.lower.y)
@@ -286,7 +323,9 @@ def shine(
         result += 0.35 * look.lamp * smoothstep((0.85 - tau / optics.spacing) / 0.3)
     else:
         mirror = glossy * (0.02 + 0.98 * (1.0 - cosi) ** 5)
-        result += mirror * (environment(look, ahead + 2.0 * cosi * n) - result)
+        mirrored = environment(look, ahead + 2.0 * cosi * n)
+        mirrored += above[3] * (vec3(above[0], above[1], above[2]) - mirrored)
+        result += mirror * (mirrored - result)
         half = (look.to_sun - ahead).normalized(1e-9)
         result += glint(look, n.dot(half))
     return result

@@ -1,0 +1,36 @@
+"""What each fluid of a world does to light, as plain numbers: colour, murk, a light of its own.
+
+Murk is how much of what passes a fluid scatters, per metre: what lies behind some lengths of it is not seen, and its
+own colour in the light of the place is. An opaque fluid hides what is behind a spacing of it, at any spacing; into a
+cloudy one one sees as far as its world is wide, about.
+"""
+
+import numpy as np
+
+from wavetank.foundation.materials import Material
+from wavetank.simulation.frame import Frame
+from wavetank.view.colormaps import rgb_of, to_linear
+from wavetank.view.extent import Extent
+from wavetank.view.look import usual_depth
+
+ICE = Material(name="ice", color="#d3e6f0", clarity="cloudy")
+CLOUDY, OPAQUE = 4.0, 3.0  # murk over a usual depth, and over a spacing
+
+
+def matter_of(frame: Frame, extent: Extent) -> np.ndarray:
+    """Return linear colour, murk [1/m] and radiance of each fluid, float32 [fluids, 7].
+
+    Fluids are those of `Scene.palette` and, where there is any, ice as the last of them; none where all is water. A
+    world that names no material has the colour of the picture, which is written as -1.
+    """
+    scene = frame.scene
+    if not (scene.materials or frame.frozen_count):
+        return np.zeros((0, 7), np.float32)
+    table = np.zeros((len(scene.palette()) + 1, 7), np.float32)
+    for number, material in enumerate([*scene.palette(), ICE]):
+        murk = {"clear": 0.0, "cloudy": CLOUDY / usual_depth(extent), "opaque": OPAQUE / extent.spacing}
+        color = np.clip(to_linear(np.array(rgb_of(str(material.color)))), 0.02, 0.98)
+        table[number] = (*color, murk[material.clarity], *(material.glow * color))
+    if not scene.materials:
+        table[0, :3] = -1.0
+    return table if frame.frozen_count else table[:-1]

@@ -1,0 +1,28 @@
+"""Bodies that rain into water, and on each other, come to rest: contact and water together add no energy."""
+
+import numpy as np
+import pytest
+
+import wavetank as wt
+
+pytest.importorskip("rapier3d")
+
+
+def test_light_bodies_that_fall_on_each_other_come_to_rest():
+    """The second law: eighteen boxes and balls, lighter than water, swim at less than 0.3 m/s two seconds later."""
+    rng, bodies = np.random.default_rng(1), []
+    for k in range(18):
+        x, z = 0.12 + 0.19 * (k % 3) + 0.02 * rng.random(), 0.12 + 0.19 * (k // 3 % 3)
+        about = {"name": f"b{k}", "center": (x, 0.5 + 0.2 * (k // 9), z), "density": rng.choice([150.0, 300.0, 600.0])}
+        bodies.append(wt.Sphere(radius=0.08, **about) if k % 2 else wt.Box(size=(0.14, 0.12, 0.14), **about))
+    block = wt.Block(lower=(0, 0, 0), upper=(0.64, 0.32, 0.64))
+    sim = wt.Simulation(wt.Scene(spacing=0.04, tank=wt.Tank(size=(0.64, 1.2, 0.64)), fluids=[block], solids=bodies))
+    speeds = []
+    for frame in range(150):
+        sim.step()
+        if frame >= 120:
+            speeds.append([np.linalg.norm(body.velocity) for body in sim.bodies.values()])
+    assert np.sqrt(np.mean(np.square(speeds))) < 0.15
+    assert np.max(speeds) < 0.6
+    heights = [body.position[1] for body in sim.bodies.values()]
+    assert min(heights) > 0.0 and max(heights) < 0.8, "inside, and none on its way up"

@@ -1,0 +1,117 @@
+"""Materials that look like themselves: clear, cloudy, opaque; with borders between them; in a plane up to its walls."""
+
+import numpy as np
+import pytest
+from test_ellipsoids import lattice
+from worlds import device, frame_of
+
+import wavetank as wt
+from wavetank import Box, Camera, Scene, Tank, WavetankError
+from wavetank.foundation.materials import Material
+from wavetank.view.renderer import Renderer
+
+D = 0.05
+SIZE = (240, 180)
+FRONT = Camera(eye=(0.5, 0.35, 3.2), target=(0.5, 0.3, 0.5))
+BLACK = Box(center=(0.5, 0.3, -0.1), size=(1.0, 0.6, 0.1), color="#000000")
+
+
+def filled(materials, kinds=None, solids=(), dim=3, wide=1.0):
+    x = lattice((0, 0, 0), (1.0, 0.6, wide)) if dim == 3 else lattice((0, 0, 0), (1.0, 0.6, D))[:, :2]
+    size = (1.0, 1.0, wide)[:dim]
+    scene = Scene(spacing=D, tank=Tank(size=size), materials=list(materials), solids=list(solids))
+    numbers = np.ones(len(x), int) if kinds is None else kinds(x)
+    return frame_of(scene, x, kinds=numbers)
+
+
+def picture(frame, camera=FRONT, **style):
+    return Renderer(*SIZE).render(frame, camera, view="water", **style).astype(int)
+
+
+def at(image, camera, *point, half=2):
+    column, row, _ = camera.project(np.array(point), *SIZE)[0]
+    return image[int(row) - half : int(row) + half + 1, int(column) - half : int(column) + half + 1].reshape(-1, 3)
+
+
+@pytest.mark.parametrize(("clarity", "least", "most"), [("clear", 25, 200), ("cloudy", 3, 40), ("opaque", 0, 2)])
+def test_clarity_says_how_much_is_seen_of_what_is_behind(clarity, least, most):
+    """A black wall behind 0.3 m of white fluid."""
+    white = Material(name="fluid", color="#ffffff", clarity=clarity)
+    seen = [at(picture(filled([white], solids=wall, wide=0.3)), FRONT, 0.5, 0.3, 0.3) for wall in ((), (BLACK,))]
+    assert least <= np.abs(seen[0] - seen[1]).mean() <= most
+
+
+def test_milk_is_white_and_casts_a_shadow():
+    milk, glass = (Material(name="milk", color="#f6f1e4", clarity=clarity) for clarity in ("opaque", "clear"))
+    above = Camera(eye=(1.6, 1.6, 2.6), target=(0.9, 0.1, 0.5))
+    shadows = []
+    for material in (milk, glass):
+        image = picture(filled([material]), above)
+        shadows.append(at(image, above, 1.2, 0.0, 0.48).mean())
+        if material is milk:
+            lit = at(image, above, 0.5, 0.6, 0.5)
+            assert lit.min() > 200 and np.ptp(lit.mean(axis=0)) < 30
+    assert shadows[0] < shadows[1] - 25
+
+
+def test_lava_glows_where_no_sun_reaches():
+    """The side that turns away from the sun is as bright as its own light makes it."""
+    rock, lava = (Material(name="rock", color="#ff4a08", clarity="opaque", glow=glow) for glow in (0.0, 0.9))
+    away = Camera(eye=(3.4, 0.3, 0.5), target=(0.5, 0.3, 0.5))
+    dark, bright = (at(picture(filled([m]), away), away, 1.0, 0.3, 0.5)[:, 0].mean() for m in (rock, lava))
+    assert bright > 225 and bright > dark + 25
+
+
+def test_a_border_between_fluids_is_sharp():
+    """From black to white within a spacing, against the glass; it took four."""
+    pair = [
+        Material(name="a", color="#101010", clarity="opaque"),
+        Material(name="b", color="#f0f0f0", clarity="opaque"),
+    ]
+    image = picture(filled(pair, lambda x: np.where(x[:, 0] < 0.5, 1, 2)))
+    row = at(image, FRONT, 0.5, 0.3, 1.0, half=30).reshape(61, 61, 3)[30, :, 0]
+    low, high = row[:10].mean(), row[-10:].mean()
+    between = (row > low + 0.15 * (high - low)) & (row < high - 0.15 * (high - low))
+    pixels = np.subtract(*FRONT.project(np.array([(0.5 + D, 0.3, 1.0), (0.5, 0.3, 1.0)]), *SIZE)[:, 0])
+    assert high > low + 120
+    assert between.sum() <= 1.2 * pixels
+
+
+def test_a_border_in_a_plane_is_sharp():
+    pair = [Material(name="a", color="#0050c8"), Material(name="b", color="#e0a526")]
+    image = picture(filled(pair, lambda x: np.where(x[:, 0] < 0.5, 1, 2), dim=2), None)
+    row = image[110, 50:190, 0]
+    low, high = row[30], row[-30]
+    between = (row > low + 0.15 * (high - low)) & (row < high - 0.15 * (high - low))
+    assert high > low + 100
+    assert between.sum() <= 9, "a spacing is 7 pixels"
+
+
+def test_dye_in_a_plane_reaches_the_walls():
+    """A wall takes as much of the dye's discs as of the water's: the colour is the same in the middle and beside it."""
+    frame = filled([], lambda x: np.zeros(len(x), int), dim=2)
+    dye = np.full(frame.count, (127 << 24) | (220 << 16) | (40 << 8) | 40)
+    frame.dye = device(dye, frame.dye.dtype, frame.count + 3)
+    camera = Camera(eye=(0.5, 0.5, 1.0), target=(0.5, 0.5, 0.0), height=1.2)
+    image = picture(frame, camera)
+    middle, beside = (at(image, camera, x, 0.3, 0.0, half=1).mean(axis=0) for x in (0.5, 0.03))
+    assert middle[0] > middle[2] + 80
+    assert np.abs(middle - beside).max() < 25
+
+
+def test_ice_is_paler_than_water_and_hides_what_is_behind():
+    scene = Scene(spacing=D, tank=Tank(size=(1, 0.8, 1)), fluids=[wt.Block(lower=(0, 0, 0), upper=(1, 0.5, 1))])
+    sim = wt.Simulation(scene)
+    above = Camera(eye=(0.5, 2.5, 1.6), target=(0.5, 0.4, 0.5))
+    clear = at(picture(sim.frame(), above), above, 0.5, 0.5, 0.5)
+    middle = np.array([0.5, 0.35, 0.5])
+    sim.freeze_inside(middle, middle, 0.2)
+    ice = at(picture(sim.frame(), above), above, 0.5, 0.5, 0.5)
+    assert ice.mean() > clear.mean() + 25
+    assert np.ptp(ice, axis=0).max() <= np.ptp(clear, axis=0).max() + 6, "no tiles are seen through it"
+
+
+def test_what_a_material_may_not_be():
+    for wrong in ({"clarity": "muddy"}, {"glow": -1.0}, {"glow": 1e9}):
+        with pytest.raises(WavetankError, match=next(iter(wrong))):
+            Material(name="x", **wrong)
