@@ -81,6 +81,46 @@ def test_keys_alone(open_page, browser, tmp_path, monkeypatch):  # noqa: F811
     assert browser.complaints() == []
 
 
+def test_keys_alone_from_the_start_to_a_saved_recording(open_page, browser, tmp_path, monkeypatch):  # noqa: F811
+    """Tab to the scenes, to a level, Enter; aim, tilt, win; Tab to the session, Enter; the file repeats what was done."""
+    monkeypatch.setenv("WAVETANK_DATA", str(tmp_path))
+    browser.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+    world = open_page(wt.Scene.load("drop-2d"))
+    session = world.session
+    tab_to(browser, "tab-water")
+    press(browser, "ArrowRight")
+    browser.wait_for("document.querySelector('#tab-scenes').ariaSelected === 'true'")
+    tab_to(browser, "spill")
+    press(browser, "Enter")
+    until(lambda: session.game is not None and session.waits)
+    browser.wait_for("!document.querySelector('#hud').hidden && document.activeElement.id === 'picture'")
+    browser.wait_for("document.querySelector('[data-tool=tilt]').getAttribute('aria-pressed') === 'true'")
+    press(browser, "Enter")
+    browser.wait_for("!document.querySelector('#cross').hidden")
+    press(browser, "Enter")
+    until(lambda: session.hands and not session.waits)
+    press(browser, "ArrowRight", hold=1.0)
+    until(lambda: session.game.outcome, 150)
+    assert session.game.outcome == "won"
+    press(browser, "Escape")
+    until(lambda: not session.hands)
+    browser.wait_for("!document.querySelector('#banner').hidden")
+    until(lambda: browser.run(FOCUS) in ("next-level", "retry"))
+    tab_to(browser, "tab-scenes")
+    press(browser, "ArrowRight")
+    for _ in range(40):
+        press(browser, "Tab")
+        if browser.run("document.activeElement.download") == "session.toml":
+            break
+    press(browser, "Enter")
+    path = tmp_path / "session.toml"
+    until(path.is_file, 60)
+    until(lambda: path.stat().st_size > 0, 10)
+    recording = Recording.load(path)
+    assert world.front.ask(lambda: list(replay(recording))[-1].sim.digest()).result(240) == recording.digest
+    assert browser.complaints() == []
+
+
 def test_a_reader_is_told_values_with_units(open_page, browser):  # noqa: F811
     """The dial is filled at once, says where down is and turns by arrows; sliders and tools say their units."""
     world = open_page()
@@ -139,6 +179,12 @@ def test_no_serious_barrier_in_any_state(open_page, browser, tmp_path, monkeypat
     assert world.session.game is not None
 
 
+def look(page, name: str) -> None:
+    """Keep what the page shows, where someone wants to look at it."""
+    if folder := os.environ.get("WAVETANK_PICTURES"):
+        page.picture(Path(folder) / f"{name}.png")
+
+
 class Finger:
     """One finger on a phone."""
 
@@ -172,25 +218,36 @@ def test_a_phone_by_touch_alone(open_page, browser, tmp_path, monkeypatch, sides
         assert browser.run("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") <= [*sides]
         finger.tap("[data-tool=tilt]")
         start, end = browser.center("#picture", 0.3, 0.6), browser.center("#picture", 0.95, 0.6)
+        look(browser, f"level-{sides[0]}")
         finger.put("touchStart", start)
         for k in range(1, 9):
             share = k / 8
             finger.put("touchMove", (start[0] + share * (end[0] - start[0]), start[1]))
             time.sleep(0.05)
+        look(browser, f"tool-{sides[0]}")
         until(lambda: session.game.outcome == "won", 90)
         finger.put("touchEnd")
         browser.wait_for("!document.querySelector('#banner').hidden")
         time.sleep(0.4)
+        look(browser, f"won-{sides[0]}")
         finger.tap("#retry")
         until(lambda: session.waits)
         finger.tap("#panel-toggle")
         finger.tap("#tab-scenes")
         browser.wait_for("document.querySelectorAll('#scenes button[data-scene]').length > 20")
+        look(browser, f"scenes-{sides[0]}")
         finger.tap("[data-scene=drop-2d]")
         until(lambda: session.sim.scene.title != "Small level")
         assert browser.run("document.body.classList.contains('no-panel')"), "the panel gives way to the picture"
         finger.tap("#home")
         browser.wait_for("!document.querySelector('#undo').hidden")
+        look(browser, f"scene-{sides[0]}")
+        covered = browser.run(
+            "[...document.querySelectorAll('#notes div')].flatMap(n => ['#home', '#undo'].filter(id => {"
+            "const a = n.getBoundingClientRect(), b = document.querySelector(id).getBoundingClientRect();"
+            "return a.right > b.left && a.bottom > b.top && a.top < b.bottom }))"
+        )
+        assert covered == [], "a note hides no button"
         finger.tap("#undo")
         until(lambda: session.sim.scene.title == "Small level")
         # Half of one more tool is seen, so that one knows of the others.
