@@ -82,7 +82,7 @@ def test_keys_alone(open_page, browser, tmp_path, monkeypatch):  # noqa: F811
 
 
 def test_keys_alone_from_the_start_to_a_saved_recording(open_page, browser, tmp_path, monkeypatch):  # noqa: F811
-    """Tab to the scenes, to a level, Enter; aim, win; Tab to the session, Enter; the file repeats what was done."""
+    """Tab to the scenes, to a level, Enter; aim, tilt, win; Tab to the session, Enter; the file repeats it."""
     monkeypatch.setenv("WAVETANK_DATA", str(tmp_path))
     browser.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
     world = open_page(wt.Scene.load("drop-2d"))
