@@ -109,7 +109,7 @@ def test_strips_cut_no_pixel_on_any_number_of_threads(samples):
     for width, height in ((400, 225), (641, 97), (7, 5)):
         for threads in (1, 2, 3, 8):
             rows, columns = height * samples, width * samples
-            strips = _strips(rows, columns, threads)
+            strips = _strips(rows, columns, threads, samples)
             assert strips.width % samples == 0
             assert strips.parts * strips.width >= columns > (strips.parts - 1) * strips.width
             assert strips.count >= rows * strips.parts

@@ -2,7 +2,8 @@
 
 A thread that has a strip to itself does once what all pixels of it share. Processors get a contiguous part of a
 kernel's tasks each, one half of the picture where there are two; so rows are dealt out in turns, because the lower
-half, where the water is, takes longer. Graphics processors want many threads: there a strip is one pixel.
+half, where the water is, takes longer. Graphics processors want many threads: there a strip is one pixel, or what
+shares something in it.
 """
 
 import dataclasses
@@ -27,15 +28,16 @@ class Strips:
     run: qd.i32  # rows of each
 
 
-def strips_of(array: Any) -> Strips:
-    """Return the strips of a device array [rows, columns, ...]."""
-    return _strips(int(array.shape[0]), int(array.shape[1]), threads())
+def strips_of(array: Any, together: int = 1) -> Strips:
+    """Return the strips of a device array [rows, columns, ...]; so many columns share something and stay together."""
+    return _strips(int(array.shape[0]), int(array.shape[1]), threads(), together)
 
 
 @functools.lru_cache(maxsize=64)
-def _strips(rows: int, columns: int, turns: int) -> Strips:
+def _strips(rows: int, columns: int, turns: int, together: int) -> Strips:
     if turns == 0:
-        return Strips(count=rows * columns, parts=columns, width=1, turns=1, run=rows)
+        parts = math.ceil(columns / together)
+        return Strips(count=rows * parts, parts=parts, width=together, turns=1, run=rows)
     parts = min(columns, math.ceil(LEAST_TASKS * turns / rows)) if turns > 1 else 1
     width = min(WHOLE * math.ceil(columns / parts / WHOLE), columns)
     parts, run = math.ceil(columns / width), math.ceil(rows / turns)

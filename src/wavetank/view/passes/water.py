@@ -61,8 +61,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     paints = buffers.paints.of(colors_of(shot)) if world == 4 else buffers.paints.device
     inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water)
     lay(
-        pixels, water.surface, water.thickness, water.backdrop, water.sunlit, strips_of(pixels.depth), shot.lens,
-        shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers), buffers.supersample), inside,
+        pixels, water.surface, water.thickness, water.backdrop, water.sunlit,
+        strips_of(pixels.depth, buffers.supersample), shot.lens, shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers), buffers.supersample), inside,
         10 * int(water.thickness.fluids > 0) + world,
     )  # fmt: skip
 
