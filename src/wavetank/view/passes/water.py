@@ -62,7 +62,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water)
     lay(
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit,
-        strips_of(pixels.depth, buffers.supersample), shot.lens, shot.water_sun, shot.look, optics_of(shot, under_water(shot, buffers), buffers.supersample), inside,
+        strips_of(pixels.depth, buffers.supersample), shot.lens, shot.water_sun, shot.look,
+        optics_of(shot, under_water(shot, buffers), buffers.supersample), inside,
         10 * int(water.thickness.fluids > 0) + world,
     )  # fmt: skip
 
