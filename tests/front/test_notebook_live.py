@@ -220,8 +220,8 @@ def test_the_page_is_told_where_a_hand_would_act_and_what_fits(shown):
 
 def test_what_is_wrong_is_said_in_the_page_and_the_water_goes_on(shown):
     shown.say(do="set", name="viscosity", value="much")
-    note, _ = shown.custom("status", lambda status: status["notes"])
-    assert "viscosity" in note["notes"][0]
+    note, _ = shown.custom("note")
+    assert "viscosity" in note["text"]
     shown.say(do="nonsense")
     note, _ = shown.custom("note")
     assert "'nonsense' is not a command" in note["text"]

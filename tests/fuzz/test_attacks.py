@@ -23,7 +23,7 @@ from attacks import (
 )
 
 import wavetank as wt
-from wavetank.front.page.viewers import Viewers
+from wavetank.front.page.viewers import Viewer, Viewers, _table
 from wavetank.session.recording import Recording, replay
 from wavetank.session.session import Session
 from wavetank.simulation.saved import sealed
@@ -90,9 +90,8 @@ def test_bombs_cost_nothing(tmp_path):
 
 def test_messages_do_not_end_the_session():
     session = Session(wt.Scene.from_text(POOL))
-    viewers = Viewers(session.submit, lambda u, v: {}, dict)
-    viewers.driver = viewer = object()
-    from wavetank.front.page.viewers import _table
+    viewers = Viewers(session.submit, lambda u, v, tool: {}, dict)
+    viewers.driver = viewer = Viewer(None)
 
     for name, text in MESSAGES.items():
         taken_or_refused(lambda text=text: viewers.hear(viewer, _table({"text": text})))

@@ -33,14 +33,14 @@ def set_parameter(state: SessionState, command: c.SetParameter) -> None:
 
 
 def reset(state: SessionState, command: c.Reset) -> None:
-    """Begin the scene anew."""
+    """Begin the scene anew, paused if it is."""
     unknown = next((name for name in command.parameters if name not in Parameters.model_fields), None)
     if unknown is not None:
         raise WavetankError(f"{unknown!r} is not a parameter.")
     state.lift_all()
-    scene, camera = state.changed_scene(command.parameters), state.chosen_camera
+    scene, camera, paused = state.changed_scene(command.parameters), state.chosen_camera, state.paused
     state.begin(scene)
-    state.camera = camera
+    state.camera, state.paused = camera, paused or state.waits
 
 
 def load(state: SessionState, command: c.LoadScene) -> None:

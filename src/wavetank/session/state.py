@@ -107,7 +107,7 @@ class SessionState:
         self.chosen_camera: Camera | None = None
         self.lit, self.upright = "", None
         self.history.keep(sim.snapshot())
-        if self.patient:  # what begins moves, whatever was before
+        if self.patient:  # another scene moves, whatever was before
             self.paused, self.steps_left = False, 0
         self.wait_for_hand()
 
