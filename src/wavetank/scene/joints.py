@@ -1,7 +1,7 @@
 """Joints between bodies, or between a body and the world, as plain data: `[[joints]]` in a scene file."""
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -10,7 +10,7 @@ from wavetank.foundation.model import Model, Number, Place, Positive, Vector, re
 from wavetank.foundation.tracks import checked_track
 
 #: A number, an expression of t [s], or keyframes.
-Driven = Number | str | list[Any] | dict[str, Any]
+Driven = Number | str | list[object] | dict[str, object]
 NotNegative = Annotated[Number, Field(ge=0)]
 
 
