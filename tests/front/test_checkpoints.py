@@ -169,13 +169,14 @@ RUN = ("drop-2d", "--fps", "30", "--size", "160x96", "--video")
 
 
 @pytest.mark.parametrize(
-    ("signals", "code"),
+    ("signals", "codes"),
     [
-        ([signal.SIGINT], 130), ([signal.SIGTERM], 143), ([signal.SIGHUP], 129), ([signal.SIGINT] * 2, 130),
-        ([signal.SIGTERM, signal.SIGTERM], 130),
+        ([signal.SIGINT], {130}), ([signal.SIGTERM], {143}), ([signal.SIGHUP], {129}), ([signal.SIGINT] * 2, {130}),
+        # Two that come within one kernel are one signal to Python, and the second may find the run ended.
+        ([signal.SIGTERM, signal.SIGTERM], {130, 143}),
     ],
 )  # fmt: skip
-def test_being_asked_to_end_leaves_a_video_that_plays(signals, code, tmp_path):
+def test_being_asked_to_end_leaves_a_video_that_plays(signals, codes, tmp_path):
     run = process("run", *RUN, "--seconds", "200", "--out", str(tmp_path), "--name", "a")
     end = time.monotonic() + 120
     while time.monotonic() < end and not [*tmp_path.glob(".*.partial")]:
@@ -185,7 +186,7 @@ def test_being_asked_to_end_leaves_a_video_that_plays(signals, code, tmp_path):
         os.kill(run.pid, number)
         time.sleep(0.01)
     _, said = run.communicate(timeout=120)
-    assert run.returncode == code, said
+    assert run.returncode in codes, said
     assert "Traceback" not in said
     assert films(tmp_path / "a.mp4") >= 1
     assert not [*tmp_path.glob(".*")]
