@@ -38,7 +38,7 @@ class Style:
     environment: str | None = None  # one of ENVIRONMENTS; None is the scene's, or what is usual for the view
     sun: str | None = None  # azimuth and elevation [deg], as "40,25"
     floor: str | None = None  # one of FLOORS
-    hasty: bool = False  # leave out what movement hides: smooth outlines, every second look of the sun at the water
+    hasty: bool = False  # leave out what movement hides: smooth outlines, every second look of the sun and ray
     samples: int = 1  # pictures, each from a slightly other eye and sun, that are averaged
 
     @classmethod

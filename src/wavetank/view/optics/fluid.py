@@ -26,7 +26,7 @@ class Optics:
     spacing: qd.f32  # m
     disc: qd.f32  # m: radius of a particle's disc in a plane
     slack: qd.f32  # m: depth by which an edge of the tank wins
-    samples: qd.i32  # computed pixels per pixel of the picture, in each direction
+    samples: qd.i32  # computed pixels beside each other that see the same through a body of water
     under: qd.i32  # 1 where the eye is in the water
 
 

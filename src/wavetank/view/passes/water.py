@@ -56,14 +56,15 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         thick = vector(0.0, 0.0, 10.0 * shot.extent.spacing)
         walls = box(walls.lower - thick, walls.upper + thick)
     solids = shot.frame.solids
+    together = buffers.supersample * (2 if shot.hasty else 1)
     # Solids are met by bent rays in a tank only: in the open there is no body of water.
     world = 4 if shot.frame.dim == 3 and shot.frame.scene.tank and solids.count > solids.tank_count else shot.frame.dim
     paints = buffers.paints.of(colors_of(shot)) if world == 4 else buffers.paints.device
     inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water)
     lay(
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit,
-        strips_of(pixels.depth, buffers.supersample), shot.lens, shot.water_sun, shot.look,
-        optics_of(shot, under_water(shot, buffers), buffers.supersample), inside,
+        strips_of(pixels.depth, together), shot.lens, shot.water_sun, shot.look,
+        optics_of(shot, under_water(shot, buffers), together), inside,
         10 * int(water.thickness.fluids > 0) + world,
     )  # fmt: skip
 
@@ -113,7 +114,7 @@ def lay(
     """
     for task in range(strips.count):
         row, begin, end = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
-        # What is seen through a body of water is found once for the samples of a pixel that lie beside each other.
+        # What is seen through a body of water is found once for what lies beside each other in a pixel, or in two.
         kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
         kept_above, kept_whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
         for column in range(begin, end):
