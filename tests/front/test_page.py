@@ -2,6 +2,8 @@
 
 import asyncio
 import os
+import subprocess
+import sys
 import time
 
 import pytest
@@ -217,3 +219,18 @@ def test_a_level_is_played_and_won(open_page, browser, tmp_path, monkeypatch):
         "document.querySelector('#hud').hidden && document.querySelectorAll('#tools button:not([hidden])').length > 9"
     )
     assert browser.complaints() == []
+
+
+def test_a_first_start_says_that_it_compiles_and_then_shows_water(browser, tmp_path):
+    command = [sys.executable, "-m", "wavetank", "play", "drop-2d", "--web", "--no-browser", "--port", "0"]
+    env = os.environ | {"QD_OFFLINE_CACHE_FILE_PATH": str(tmp_path), "PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=env) as server:
+        try:
+            line = next(line for line in server.stdout if "http://" in line)
+            browser.open(next(word for word in line.split() if word.startswith("http://")).rstrip(";"))
+            browser.wait_for("document.querySelector('#veil-text')?.textContent.startsWith('Compiling, once')", 120)
+            assert browser.run("document.querySelector('#veil.gone') === null"), "it is read over an empty picture"
+            browser.wait_for("document.querySelector('#veil.gone') !== null", 240)
+        finally:
+            server.terminate()
+            browser.open("about:blank")

@@ -236,6 +236,8 @@ def _film(
 
 
 def _report(figures: dict[str, Any]) -> None:
+    from wavetank.formats.outputs import bytes_of
+
     last, worst = figures["last"], figures["worst"]
     print(f"{figures['seconds_of_water']:.2f} s of water, {last['count']:,} particles on {figures['arch']}")
     print(
@@ -244,4 +246,5 @@ def _report(figures: dict[str, Any]) -> None:
         f"{100 * worst['density_error_p99']:.2f} %"
     )
     for path in figures["files"]:
-        print(f"  {path}")
+        size = bytes_of([path])
+        print(f"  {path}{f'  {size / 1e6:,.0f} MB' if size > 1_000_000 else ''}")

@@ -1,5 +1,6 @@
 """All files of a run's frames: which formats, which parts, and a thread that writes them."""
 
+import glob
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from types import ModuleType
@@ -14,6 +15,7 @@ from wavetank.foundation.patience import Patience
 from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import PARTS, Instant
 
+TRIED, WORTH_A_WORD = 10, 1_000_000_000  # frames by which the size of all is judged; bytes of all
 USUAL = ("particles", "foam", "solids")
 
 
@@ -39,12 +41,23 @@ def check_exports(names: Sequence[str], only: Collection[str], scene: Scene) -> 
     return modules
 
 
+def bytes_of(files: Sequence[str]) -> int:
+    """Return the size of files, ##### for the number of a frame; of a folder that of all in it."""
+    found = [
+        path
+        for name in map(Path, files)
+        for path in name.parent.glob(glob.escape(name.name).replace("#####", "[0-9]*"))
+    ]
+    inside = [below for path in found if path.is_dir() for below in path.rglob("*")]
+    return sum(path.stat().st_size for path in (*found, *inside) if path.is_file())
+
+
 class Outputs:
     """Writes frames into files beside the simulation."""
 
     def __init__(
         self, base: Path, scene: Scene, names: Sequence[str], *, fps: float, only: Collection[str] = (),
-        view: Viewpoint | None = None, kept: int = 0, tell: Callable[[str], None] = lambda text: None,
+        view: Viewpoint | None = None, kept: int = 0, frames: int = 0, tell: Callable[[str], None] = lambda text: None,
     ) -> None:  # fmt: skip
         modules = check_exports(names, only, scene)
         self.parts, self.shapes, self.patience = parts_named(only), Shapes(scene), Patience(tell)
@@ -55,6 +68,7 @@ class Outputs:
             module.write(plan) if module.KIND == "series" else _EachFrame(module, plan) for module in modules
         ]
         self._background = Background() if modules else None
+        self._frames, self._tell = frames, tell
 
     @property
     def files(self) -> list[str]:
@@ -76,6 +90,11 @@ class Outputs:
         instant = Instant.of(frame)
         self.shapes.learn(instant.standing)
         self._background.put(lambda: self._write(number, instant), instant.size)
+        if number + 1 == TRIED < self._frames:
+            self.drain()
+            expected = bytes_of(self.files) / TRIED * self._frames
+            if expected > WORTH_A_WORD:
+                self._tell(f"all frames will take about {expected / 1e9:.1f} GB; --every 2 writes half of them.")
 
     def _write(self, number: int, instant: Instant) -> None:
         if self._needs_surface:

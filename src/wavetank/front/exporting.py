@@ -54,7 +54,7 @@ def export(
     folder, written = make_folder(out or found.folder), 0
     outputs = Outputs(
         folder / found.name, found.scene, names, fps=found.fps / every, only=only, view=view_of(found.scene),
-        tell=console.print,
+        frames=(found.count or 0) // every, tell=console.print,
     )  # fmt: skip
     with outputs, Progress(console=console, transient=True) as progress:
         task = progress.add_task("export", total=found.count)

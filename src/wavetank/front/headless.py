@@ -223,6 +223,7 @@ class _Work:
         self.outputs = Outputs(
             self.folder.base, self.folder.scene, order.exports, fps=order.fps / order.every, only=order.only,
             view=view_of(self.folder.scene), kept=self.done // order.every + 1, tell=tell,
+            frames=int(order.seconds * order.fps / order.every) + 1,
         )  # fmt: skip
         stack.enter_context(self.outputs)
 

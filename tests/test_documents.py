@@ -1,0 +1,48 @@
+"""What the documents tell people to type is understood as it stands."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import typer
+
+from wavetank.cli import app
+from wavetank.lab.cases import CASES
+from wavetank.scene.summary import bundled_counts
+
+ROOT = Path(__file__).parent.parent
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+COMMANDS = typer.main.get_command(app)
+PLACE = re.compile(r"[A-Z]{3,}(=[A-Z]+)?")
+#: Words in a document that stand for a person's own.
+OWN = re.compile(r"[A-Z]{3,}|[\w-]+\.(toml|json|urdf|npz|h5)|night|out")
+
+
+def lines_of(path: Path) -> list[str]:
+    """Return the command lines of a document, in the text and in its blocks."""
+    text = path.read_text("utf-8")
+    blocks = "\n".join(re.findall(r"```.*?\n(.*?)```", text, re.DOTALL)).replace("\\\n", " ")
+    typed = [line.split("#")[0].strip() for line in blocks.splitlines() if line.strip().startswith("wavetank ")]
+    return typed + re.findall(r"`(wavetank [a-z][^`\n]*)`", text)
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.stem)
+def test_command_lines_are_understood(path):
+    for line in lines_of(path):
+        name, *words = (word.strip("[]") for word in shlex.split(line)[1:])
+        assert name in COMMANDS.commands, line
+        command = COMMANDS.commands[name]
+        if all(word.startswith("-") or PLACE.fullmatch(word) for word in words):  # the command or an option as such
+            options = {option for parameter in command.params for option in parameter.opts}
+            assert {word for word in words if word.startswith("-")} <= options, line
+            continue
+        given = command.make_context(name, words).params  # raises for what it does not know
+        for word in (given[key] for key in ("scene", "world") if given.get(key)):
+            assert word in bundled_counts() or OWN.fullmatch(word) or "/" in word, line
+        if name == "validate":
+            assert {str(case) for case in given.get("cases") or ()} <= {case.name for case in CASES}, line
+
+
+def test_there_are_command_lines():
+    assert sum(map(len, map(lines_of, DOCUMENTS))) > 100
