@@ -1,3 +1,4 @@
+import re
 import subprocess
 import sys
 
@@ -377,3 +378,19 @@ def test_water_survives_a_slider_at_either_end(name):
             sim.step()
         assert np.isfinite(sim.velocities).all()
         assert (np.abs(sim.positions / sim.scene.tank.size - 0.5) <= 0.5).all()
+
+
+def test_places_in_a_plane_are_two_numbers_and_what_is_no_place_is_one_sentence():
+    sim = wt.Simulation(wt.Scene.load("drop-2d"))
+    middle = sim.frame().positions.mean(axis=0)
+    sim.freeze_inside(middle, middle, 0.06)
+    frozen = sim.frame().frozen_count
+    sim.freeze_inside([*middle, 0.0], (*middle, 0.0), 0.06)
+    assert 0 < frozen == sim.frame().frozen_count < sim.count
+    for start, radius, words in (
+        ("here", 0.1, "start = 'here'"), ([0.1, np.nan], 0.1, "nan"), ([0.1], 0.1, "two or three"),
+        (middle, -1.0, "radius = -1.0"), (middle, "wide", "radius = 'wide'"),
+    ):  # fmt: skip
+        for act in (sim.remove_inside, lambda *where: sim.paint_inside(*where, 1), sim.freeze_inside):
+            with pytest.raises(wt.WavetankError, match=re.escape(words)):
+                act(start, middle, radius)

@@ -17,6 +17,7 @@ import numpy as np
 
 from wavetank.device.compiler import download, qd, upload
 from wavetank.device.state import LASTING, Grid, Particles, integers, new_particles, vectors, with_viscosity
+from wavetank.foundation.errors import WavetankError
 from wavetank.physics.neighbors import copy_particle
 from wavetank.physics.predicted_positions import predict_at
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3
@@ -29,6 +30,22 @@ class Capsule:
     start: vec3  # m
     end: vec3  # m
     radius: qd.f32  # m
+
+
+def capsule_of(start: Any, end: Any, radius: Any) -> Capsule:
+    """Return the capsule around the segment between two points, [3] or in a plane [2]; raises `WavetankError`."""
+    points = []
+    for name, point in (("start", start), ("end", end)):
+        try:
+            place = np.asarray(point, np.float32)
+        except (TypeError, ValueError):
+            place = np.zeros(0, np.float32)
+        if place.shape not in ((2,), (3,)) or not np.isfinite(place).all():
+            raise WavetankError(f"{name} = {point!r} is not a point; give two or three finite numbers [m].")
+        points.append(np.append(place, np.float32(0.0))[:3])
+    if not (isinstance(radius, int | float | np.number) and 0.0 <= radius < np.inf):
+        raise WavetankError(f"radius = {radius!r} is not allowed; it must be a finite number from 0 on [m].")
+    return Capsule(start=points[0], end=points[1], radius=float(radius))
 
 
 @qd.func
@@ -168,7 +185,7 @@ def inside_capsule(particles: Particles, count: int, start: np.ndarray, end: np.
     if not count:
         return np.zeros(0, bool)
     marks = integers(count)
-    mark_particles(marks, particles, Capsule(start, end, radius), count)
+    mark_particles(marks, particles, capsule_of(start, end, radius), count)
     result: np.ndarray = download(marks)[:count] == 1
     return result
 
@@ -188,14 +205,14 @@ def paint_capsule(
     particles: Particles, count: int, start: np.ndarray, end: np.ndarray, radius: float, dye: int
 ) -> None:
     """Dye the particles inside."""
-    dye_particles(particles, Capsule(start, end, radius), dye, count)
+    dye_particles(particles, capsule_of(start, end, radius), dye, count)
 
 
 def freeze_capsule(
     particles: Particles, count: int, start: np.ndarray, end: np.ndarray, radius: float, frozen: int
 ) -> int:
     """Turn the particles inside to ice (1) or water (0); return how many are ice in all."""
-    return int(freeze_particles(particles, Capsule(start, end, radius), frozen, count))
+    return int(freeze_particles(particles, capsule_of(start, end, radius), frozen, count))
 
 
 def free_places(

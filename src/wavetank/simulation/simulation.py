@@ -283,20 +283,23 @@ class Simulation(States):
         gone = np.isin(compiler.download(self.world.particles.id)[: self.count], np.asarray(ids))
         return self._keep(~gone)
 
-    def remove_inside(self, start: np.ndarray, end: np.ndarray, radius: float) -> int:
-        """Remove the particles within `radius` [m] of the segment between two points [3]; return how many."""
+    def remove_inside(self, start: Any, end: Any, radius: float) -> int:
+        """Remove the particles within `radius` [m] of the segment between two points [dim]; return how many.
+
+        Raises `WavetankError` for what is none.
+        """
         return self._keep(~population.inside_capsule(self.world.particles, self.count, start, end, radius))
 
     def free_places(self, places: np.ndarray, gap: float, wall: float) -> np.ndarray:
         """Say which `places` [n, dim] keep the distances `gap` [m] to all particles and `wall` to all solids."""
         return population.free_places(places, self.world.particles, self.world.solids, self.count, gap, wall)
 
-    def paint_inside(self, start: np.ndarray, end: np.ndarray, radius: float, dye: int) -> None:
+    def paint_inside(self, start: Any, end: Any, radius: float, dye: int) -> None:
         """Dye the particles in that capsule; 0 washes them."""
         if self.count:
             population.paint_capsule(self.world.particles, self.count, start, end, radius, dye)
 
-    def freeze_inside(self, start: np.ndarray, end: np.ndarray, radius: float, frozen: bool = True) -> None:
+    def freeze_inside(self, start: Any, end: Any, radius: float, frozen: bool = True) -> None:
         """Turn the particles in that capsule to ice that keeps its place, or back to water."""
         if self.count:
             self.world.frozen = population.freeze_capsule(

@@ -13,7 +13,8 @@ from wavetank.view.colormaps import rgb_of, to_linear
 from wavetank.view.extent import Extent
 from wavetank.view.look import usual_depth
 
-ICE = Material(name="ice", color="#d3e6f0", clarity="cloudy")
+#: In a plane there is no depth that would tint it, and paper behind it.
+ICE = {dim: Material(name="ice", color=color, clarity="cloudy") for dim, color in ((2, "#b6e0f8"), (3, "#d3e6f0"))}
 CLOUDY, OPAQUE = 4.0, 3.0  # murk over a usual depth, and over a spacing
 
 
@@ -27,7 +28,7 @@ def matter_of(frame: Frame, extent: Extent) -> np.ndarray:
     if not (scene.materials or frame.frozen_count):
         return np.zeros((0, 7), np.float32)
     table = np.zeros((len(scene.palette()) + 1, 7), np.float32)
-    for number, material in enumerate([*scene.palette(), ICE]):
+    for number, material in enumerate([*scene.palette(), ICE[extent.dim]]):
         murk = {"clear": 0.0, "cloudy": CLOUDY / usual_depth(extent), "opaque": OPAQUE / extent.spacing}
         color = np.clip(to_linear(np.array(rgb_of(str(material.color)))), 0.02, 0.98)
         table[number] = (*color, murk[material.clarity], *(material.glow * color))
