@@ -24,8 +24,7 @@ from pathlib import Path
 
 import wavetank as wt
 from wavetank.front.checkpoints import begun
-from wavetank.front.play import with_particles
-from wavetank.scene.scene import bundled_levels, bundled_scenes
+from wavetank.scene.scene import bundled_levels, bundled_scenes, with_particles
 
 Digests = dict[int, str]  # by the number of the frame
 

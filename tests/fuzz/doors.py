@@ -187,7 +187,7 @@ def _session() -> Session:
 def try_message(text: str) -> None:
     session = _session()
     ray = {"origin": (0.5, 0.3, 5.0), "direction": (0.0, 0.0, -1.0)}
-    viewers = Viewers(session.submit, lambda u, v: ray, dict)
+    viewers = Viewers(session.submit, lambda u, v, tool: ray, dict)
     from wavetank.front.page.viewers import Viewer
 
     viewers.driver = viewer = Viewer(None)

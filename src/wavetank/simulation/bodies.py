@@ -317,7 +317,10 @@ class Bodies(Mapping[str, Body]):
         """Go on from what `arrays` returned, with the same solids."""
         if not self.members:
             return
-        self.world = self.engine.PhysicsWorld.restore(arrays["bodies_engine"].tobytes())
+        try:
+            self.world = self.engine.PhysicsWorld.restore(arrays["bodies_engine"].tobytes())
+        except self.engine.SerializationError as error:
+            raise WavetankError(f"the engine's state of the bodies cannot be read: {error}.") from None
         for row, memory in enumerate(arrays["bodies_memory"]):
             self.coupling.recall(row, memory)
 
