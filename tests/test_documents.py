@@ -2,6 +2,8 @@
 
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -46,3 +48,11 @@ def test_command_lines_are_understood(path):
 
 def test_there_are_command_lines():
     assert sum(map(len, map(lines_of, DOCUMENTS))) > 100
+
+
+@pytest.mark.parametrize("script", ["promises.py", "fuzz/long.py", "fuzz/soak.py"])
+def test_studies_that_take_hours_still_begin(script):
+    asked = subprocess.run(
+        [sys.executable, ROOT / "tests" / script, "--help"], capture_output=True, text=True, check=False
+    )
+    assert asked.returncode == 0, asked.stderr[-500:]

@@ -240,10 +240,11 @@ class Scene(Timetable, Parameters):
         """Positions and velocities of each fluid."""
         parts = []
         for number, fluid in enumerate(self.fluids):
-            x = fluid.particles(self.spacing).reshape(-1, self.dim)  # no particles have no width of their own
+            x = fluid.particles(self.spacing)
+            x = x.reshape(len(x), self.dim)  # none at all have no width of their own
             v = np.zeros_like(x) if fluid.velocity is None else np.tile(np.array(fluid.velocity, float), (len(x), 1))
             if isinstance(fluid, Points):
-                v = v if fluid.velocities is None else fluid.velocities.reshape(-1, self.dim)
+                v = v if fluid.velocities is None else fluid.velocities.reshape(x.shape)
             else:
                 taken = np.zeros(len(x), bool)
                 for other in self.fluids[:number]:
