@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from attacks import POOL, taken_or_refused
+from files import FILES
 from hypothesis import strategies as st
 from strategies import WEIRD, mutated, of_type, tables, toml_of, torn
 
@@ -261,5 +262,5 @@ def try_mesh(given: tuple[str, bytes]) -> None:
 
 DOORS: dict[str, tuple[st.SearchStrategy[Any], Any]] = {
     "scene": (scenes, try_scene), "state": (states(), try_state), "message": (messages, try_message),
-    "recording": (recordings, try_recording), "mesh": (meshes(), try_mesh),
+    "recording": (recordings, try_recording), "mesh": (meshes(), try_mesh), **FILES,
 }  # fmt: skip

@@ -1,56 +1,74 @@
 """Particles in Houdini's classic geometry files (.bgeo, version 5), as Partio and SPlisHSPlasH write them."""
 
 import gzip
+import os
 import struct
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from wavetank.foundation.door import TIMES, UNPACKED, guarded, named, one_line, opened
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.memory import free_memory, in_words
 
-LARGEST = 2_000_000_000  # bytes of a file that is unpacked
+LARGEST = 2_000_000_000  # bytes of points
+MOST_ATTRIBUTES, MOST_NAMES = 1000, 100_000
 VERSION = 5
 INDEXED = 4  # type of an attribute whose default is a list of names
 
 
 def read_bgeo(path: str | Path) -> np.ndarray:
-    """Return the positions [m], float64 [n, 3], of the points of a file; raises `WavetankError` for another one."""
-    try:
-        with Path(path).open("rb") as file:
-            packed = file.read(2) == b"\x1f\x8b"
-        with gzip.open(path) if packed else Path(path).open("rb") as file:
-            data = file.read(LARGEST)
-    except (OSError, EOFError, zlib.error) as error:
-        raise WavetankError(f"{path}: these particles cannot be read: {error}.") from None
-    try:
-        return _points(data)
-    except (struct.error, ValueError, IndexError) as error:
-        raise WavetankError(f"{path}: this is no .bgeo file of version {VERSION}: {error}.") from None
+    """Return the positions [m], float64 [n, 3], of the points of a file; raises `WavetankError` for another one.
+
+    What it says of itself is compared with its size and with free memory before the points are unpacked.
+    """
+    origin = named(path)
+    with guarded(origin, "particle file"), opened(path, LARGEST, "particle file") as file:
+        size = os.fstat(file.fileno()).st_size
+        packed = file.read(2) == b"\x1f\x8b"
+        file.seek(0)
+        try:
+            return _points(gzip.GzipFile(fileobj=file) if packed else file, size)
+        except (OSError, EOFError, zlib.error) as error:
+            raise WavetankError(f"{origin}: these particles cannot be read: {one_line(error)}.") from None
+        except (struct.error, ValueError) as error:
+            raise WavetankError(f"{origin}: this is no .bgeo file of version {VERSION}: {error}.") from None
 
 
-def _points(data: bytes) -> np.ndarray:
-    magic, letter, version, points, _, _, _, attributes = struct.unpack_from(">4scIIIIII", data)
+def _points(file: Any, size: int) -> np.ndarray:
+    """Return the points of an open file that takes so many bytes on the disk; raises `ValueError`."""
+
+    def unpacked(form: str) -> tuple[Any, ...]:
+        return struct.unpack(form, file.read(struct.calcsize(form)))
+
+    magic, letter, version, points, _, _, _, attributes, *_ = unpacked(">4sc9I")
     if magic != b"Bgeo" or letter != b"V" or version != VERSION:
         raise ValueError("it begins otherwise")
-    place = 5 + 4 * 9
+    if attributes > MOST_ATTRIBUTES:
+        raise ValueError(f"it has {attributes:,} attributes")
     width = 4
     for _ in range(attributes):
-        (length,) = struct.unpack_from(">H", data, place)
-        size, kind = struct.unpack_from(">HI", data, place + 2 + length)
-        place += 2 + length + 6
+        file.read(unpacked(">H")[0])
+        count, kind = unpacked(">HI")
         if kind == INDEXED:
-            (names,) = struct.unpack_from(">I", data, place)
-            place += 4
+            (names,) = unpacked(">I")
+            if names > MOST_NAMES:
+                raise ValueError(f"an attribute has {names:,} names")
             for _ in range(names):
-                place += 2 + struct.unpack_from(">H", data, place)[0]
-            size = 1
+                file.read(unpacked(">H")[0])
+            count = 1
         else:
-            place += 4 * size
-        width += size
-    if len(data) < place + 4 * width * points:
+            file.read(4 * count)
+        width += count
+    needed, free = 4 * width * points, free_memory()
+    if needed > max(UNPACKED, TIMES * size) or needed > LARGEST or (free is not None and 4 * needed > free):
+        raise ValueError(f"its points take {in_words(needed)}, too much for a file of this size, or for this machine")
+    data = file.read(needed)
+    if len(data) < needed:
         raise ValueError("it ends too early")
-    rows = np.frombuffer(data, ">f4", width * points, place).reshape(points, width)[:, :4].astype(np.float64)
+    rows = np.frombuffer(data, ">f4").reshape(points, width)[:, :4].astype(np.float64)
     if not np.isfinite(rows).all():
         raise ValueError("a position is not finite")
     return rows[:, :3] / np.where(rows[:, 3:] == 0.0, 1.0, rows[:, 3:])

@@ -1,5 +1,7 @@
 """HDF5 files that grow by a frame at a time, and can be opened at any of them: rows of columns, one after the other."""
 
+import contextlib
+import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -7,10 +9,13 @@ from typing import Any
 import numpy as np
 
 from wavetank.formats.committed import CommittedFile
+from wavetank.foundation import door
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.memory import in_words
 from wavetank.foundation.patience import Patience
 
 CHUNK = 1 << 17  # bytes of a column that lie together, about
+LARGEST = 2**48  # bytes
 FEW = 128  # rows that lie together of what has one for each frame: as many are written for each
 
 
@@ -83,11 +88,22 @@ class GrowingFile:
 def opened(path: str | Path) -> Any:
     """Open such a file for reading; raises `WavetankError` for what is none."""
     h5py = import_h5py()
-    try:
+    door.opened(path, LARGEST, "HDF5 file").close()  # a file, and none that waits
+    with damaged(path):
         return h5py.File(path, "r")
-    except OSError as error:
-        reason = str(error).splitlines()[0]
-        raise WavetankError(f"{path}: this HDF5 file cannot be read: {reason}.") from None
+
+
+@contextlib.contextmanager
+def damaged(path: str | Path) -> Iterator[None]:
+    """Make one sentence of what a damaged file ends in."""
+    origin = door.named(path)
+    with door.guarded(origin, "HDF5 file"):
+        try:
+            yield
+        except (OSError, KeyError, IndexError, ValueError, TypeError, RuntimeError, AttributeError) as error:
+            if isinstance(error, WavetankError):
+                raise
+            raise WavetankError(f"{origin}: this HDF5 file cannot be read: {door.one_line(error)}.") from None
 
 
 Rows = Mapping[str, np.ndarray]
@@ -113,13 +129,24 @@ class Table:
 
 
 def table_rows(group: Any, frame: int) -> dict[str, np.ndarray]:
-    """Return the columns of a table in a frame."""
+    """Return the columns of a table in a frame; raises `ValueError` where they cannot be."""
     first, count = int(group["first"][frame]), int(group["count"][frame])
-    return {name: group[name][first : first + count] for name in group if name not in ("first", "count")}
+    columns = {name: group[name] for name in group if name not in ("first", "count")}
+    for name, column in columns.items():
+        if not 0 <= first <= first + count <= len(column):
+            raise ValueError(f"frame {frame} has rows {first} to {first + count} of {name}, which has {len(column)}")
+    needed = sum(count * column.dtype.itemsize * math.prod(column.shape[1:]) for column in columns.values())
+    if needed > max(door.UNPACKED, door.TIMES * Path(group.file.filename).stat().st_size):
+        raise ValueError(f"frame {frame} takes {in_words(needed)}, too much for a file of this size")
+    return {name: column[first : first + count] for name, column in columns.items()}
 
 
 def frames_of(path: str | Path, read: Callable[[Any, int], Any], counter: str, first: int = 0) -> Iterator[Any]:
     """Yield what `read` makes of each frame of a file, from the one with the number `first` on."""
     with opened(path) as file:
-        for frame in range(first, int(file.attrs[counter])):
-            yield read(file, frame)
+        with damaged(path):
+            frames = int(file.attrs[counter])
+        for frame in range(first, frames):
+            with damaged(path):
+                one = read(file, frame)
+            yield one

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.formats.growing import GrowingFile, Table, frames_of, import_h5py, opened, table_rows
+from wavetank.formats.growing import GrowingFile, Table, damaged, frames_of, import_h5py, opened, table_rows
 from wavetank.formats.plan import Plan
 from wavetank.formats.surface import WaterSurface
 from wavetank.foundation.errors import WavetankError
@@ -133,6 +133,8 @@ def _surfaces(file: Any, frame: int, scene: Scene) -> tuple[WaterSurface, ...]:
         own = np.flatnonzero(rows["materials"] == number)  # those of a fluid are together
         triangles = corners[np.isin(corners[:, 0], own)] - own[0]
         points, normals, velocities = (rows[name][own] for name in ("positions", "normals", "velocities"))
+        if not 0 <= number < len(palette):
+            raise ValueError(f"a surface is of material {number}; it has {len(palette)}")
         fluid = palette[number]
         found.append(WaterSurface(fluid.name, number, str(fluid.color), points, normals, velocities, triangles))
     return tuple(found)
@@ -143,7 +145,7 @@ def read(path: str | Path, first: int = 0) -> Iterator[Instant]:
 
     Raises `WavetankError` for another file.
     """
-    with opened(path) as file:
+    with opened(path) as file, damaged(path):
         if file.attrs.get("format") != "wavetank" or COUNTER not in file.attrs:
             raise WavetankError(f"{path}: this HDF5 file was not written by wavetank; it has no format and {COUNTER}.")
         if file.attrs["layout"] != VERSION_OF_LAYOUT:
@@ -172,14 +174,17 @@ def read(path: str | Path, first: int = 0) -> Iterator[Instant]:
 
 def times(path: str | Path) -> list[float]:
     """Return the time of the water [s] at each frame of such a file."""
-    with opened(path) as file:
+    with opened(path) as file, damaged(path):
         return [float(time) for time in file["frames/time"][: int(file.attrs.get(COUNTER, 0))]]
 
 
 def rate(path: str | Path) -> float:
     """Return the frames per second of water of such a file."""
-    with opened(path) as file:
-        return float(file.attrs.get("fps", 30.0))
+    with opened(path) as file, damaged(path):
+        fps = float(file.attrs.get("fps", 30.0))
+    if not 0.0 < fps <= 1000.0:
+        raise WavetankError(f"{path}: {fps} frames per second are not allowed; a rate lies between 0 and 1000.")
+    return fps
 
 
 write = Hdf5Series

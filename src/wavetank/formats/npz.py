@@ -1,11 +1,11 @@
 """Particles as NumPy archives: everything, exactly."""
 
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from wavetank.foundation.door import guarded, named, one_line, read_arrays
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.replacing import replacing
 from wavetank.scene.scene import Scene
@@ -35,26 +35,27 @@ def write_npz(path: str | Path, frame: Any) -> None:
 
 
 def read_npz(path: str | Path) -> dict[str, np.ndarray]:
-    """Return the arrays of a file by name."""
-    with np.load(path) as file:
-        return {name: file[name] for name in file.files}
+    """Return the arrays of a file by name; raises `WavetankError` for what is none, or costs too much."""
+    return read_arrays(path, "frame of particles")
 
 
 def read(path: str | Path, scene: Scene) -> Instant:
     """Return the instant of `scene` that a file holds; raises `WavetankError` for a file that holds none."""
-    try:
+    origin = named(path)
+    with guarded(origin, "frame of particles"):
         arrays = read_npz(path)
-        known, ends = solids_by_name(scene), np.cumsum([width for _, width in POSES])[:-1]
-        standing = tuple(
-            Standing(str(name), known[str(name)], *np.split(row, ends))
-            for name, row in zip(arrays.get("solid_names", ()), arrays.get("solid_poses", ()), strict=True)
-            if str(name) in known
-        )
-        return Instant.read(scene, int(arrays["number"]), float(arrays["time"]), arrays, standing)
-    except OSError as error:
-        raise WavetankError(f"{path}: these particles cannot be read: {error.strerror or error}.") from None
-    except (KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise WavetankError(f"{path}: these are no particles that wavetank wrote: {str(error).rstrip('.')}.") from None
+        try:
+            known, ends = solids_by_name(scene), np.cumsum([width for _, width in POSES])[:-1]
+            standing = tuple(
+                Standing(str(name), known[str(name)], *np.split(row, ends))
+                for name, row in zip(arrays.get("solid_names", ()), arrays.get("solid_poses", ()), strict=True)
+                if str(name) in known
+            )
+            return Instant.read(scene, int(arrays["number"]), float(arrays["time"]), arrays, standing)
+        except (KeyError, ValueError, TypeError, OverflowError) as error:
+            if isinstance(error, WavetankError):
+                raise
+            raise WavetankError(f"{origin}: these are no particles that wavetank wrote: {one_line(error)}.") from None
 
 
 write = write_npz

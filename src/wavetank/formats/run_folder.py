@@ -9,7 +9,7 @@ NAME*          pictures, films and files of frames
 """
 
 import json
-import tomllib
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Literal
@@ -18,6 +18,7 @@ import tomli_w
 from pydantic import Field
 
 from wavetank.formats import hdf5, npz
+from wavetank.foundation.door import guarded, named, parse_toml, read_text
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import Model
 from wavetank.foundation.replacing import make_folder, replacing
@@ -26,7 +27,8 @@ from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import Instant
 
 FILE, SCENE, STATS, SUMMARY, STATES = "run.toml", "scene.toml", "stats.jsonl", "stats.json", "states"
-Count = Annotated[int, Field(ge=0, le=100_000_000)]
+LARGEST_STATS = 4_000_000_000  # bytes: a day of water at 60 frames per second
+LONGEST_ROW = 20_000  # characters
 
 
 class Run(Model):
@@ -43,9 +45,9 @@ class Run(Model):
     video: bool = False
     gif: bool = False
     frames: bool = False
-    exports: list[str] = []
-    only: list[str] = []
-    every: Annotated[int, Field(ge=1)] = 1
+    exports: Annotated[list[str], Field(max_length=100)] = []
+    only: Annotated[list[str], Field(max_length=100)] = []
+    every: Annotated[int, Field(ge=1, le=100_000_000)] = 1
     quality: str = "draft"
     look: dict[str, str] = {}
 
@@ -76,18 +78,16 @@ class RunFolder:
     def open(cls, path: str | Path) -> "RunFolder":
         """Open the folder of a run; raises `WavetankError` for what is none."""
         place = Path(path) / FILE
-        try:
-            table = tomllib.loads(place.read_text("utf-8"))
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            reason = (isinstance(error, OSError) and error.strerror) or error
-            raise WavetankError(f"{place}: the run cannot be read: {reason}; it is written by wavetank run.") from None
-        if table.get("format", 1) != 1:
-            made = table.get("wavetank", "a later one")
-            raise WavetankError(
-                f"{place}: format = {table['format']!r} is not known to this version of wavetank, which reads 1; use "
-                f"the one that wrote it, {made}."
-            )
-        return cls(Path(path), Run.parse(table, str(place)), Scene.load(Path(path) / SCENE))
+        origin = named(place)
+        with guarded(origin, "run"):
+            table = parse_toml(read_text(place, "run"), origin, "this run")
+            if table.get("format", 1) != 1:
+                made = table.get("wavetank", "a later one")
+                raise WavetankError(
+                    f"{origin}: format = {str(table['format'])[:20]} is not known to this version of wavetank, which "
+                    f"reads 1; use the one that wrote it, {str(made)[:20]}."
+                )
+            return cls(Path(path), Run.parse(table, origin), Scene.load(Path(path) / SCENE))
 
     @property
     def states(self) -> Path:
@@ -104,19 +104,21 @@ class RunFolder:
     def add_stats(self, row: Mapping[str, float]) -> None:
         """Append the figures of a frame."""
         with (self.path / STATS).open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+            file.write(_line(row))
 
     def stats(self) -> list[dict[str, float]]:
-        """Return the figures of all frames that were finished."""
+        """Return the figures of all frames that were finished; raises `WavetankError` for lines that are none."""
         path = self.path / STATS
-        lines = path.read_text("utf-8").splitlines(keepends=True) if path.is_file() else []
-        return [json.loads(line) for line in lines if line.endswith("\n")]
+        if not path.exists():
+            return []
+        *lines, _ = read_text(path, "figures", LARGEST_STATS).split("\n")  # the last one was not finished, or is empty
+        return [_row(line, f"{named(path)}, line {number}") for number, line in enumerate(lines, 1)]
 
     def keep_stats(self, count: int) -> None:
         """Drop the figures of all but the first `count` frames, before a run goes on from there."""
         rows = self.stats()[:count]
         with replacing(self.path / STATS) as partial:
-            partial.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+            partial.write_text("".join(map(_line, rows)), encoding="utf-8")
 
     # --- frames ---
 
@@ -155,6 +157,23 @@ class RunFolder:
             return []
         number = "[0-9]" * 5
         return sorted(self.path.glob(f"{_escaped(self.run.name)}-{number}{npz.SUFFIXES[0]}"))
+
+
+def _line(row: Mapping[str, float]) -> str:
+    """Return a line of JSON, which knows no NaN: null is, say, the time that the frame before the first one took."""
+    return json.dumps({name: value if math.isfinite(value) else None for name, value in row.items()}) + "\n"
+
+
+def _row(line: str, origin: str) -> dict[str, float]:
+    try:
+        row = json.loads(line) if len(line) <= LONGEST_ROW else None
+    except (ValueError, RecursionError):
+        row = None
+    if not isinstance(row, dict) or any(not isinstance(value, int | float | None) for value in row.values()):
+        raise WavetankError(
+            f"{origin} is no table of numbers, as the figures of a frame are; restore or remove the file."
+        )
+    return {name: math.nan if value is None else value for name, value in row.items()}
 
 
 def _escaped(name: str) -> str:

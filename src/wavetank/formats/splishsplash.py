@@ -6,7 +6,6 @@ is an inverted box around its own centre, anywhere; sizes of emitters count part
 """
 
 import dataclasses
-import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 
 from wavetank.formats.bgeo import read_bgeo
 from wavetank.formats.splishsplash_solids import Solids, arrays_of, turn_of
+from wavetank.foundation.door import guarded, named, one_line, parse_json, read_text
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.materials import Material
 from wavetank.foundation.params import PARAMETERS
@@ -27,6 +27,8 @@ from wavetank.scene.scene import Scene
 from wavetank.solids.meshes.files import SUFFIXES
 
 LARGEST_FILE = 50_000_000  # bytes
+#: what a file with values of other types than theirs ends in
+UNREADABLE = (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError, OSError)
 ZORILLA = 5  # surfaceTensionMethod in N/m
 #: viscosityMethod -> name of its table, and how its number is meant
 VISCOSITIES = {
@@ -50,22 +52,19 @@ class Imported:
 
 def read_splishsplash(path: str | Path, spacing: float | None = None) -> Imported:
     """Read a scene file; `spacing` [m] in place of its own. Raises `WavetankError` for one that has no counterpart."""
-    place = Path(path)
-    try:
-        if place.stat().st_size > LARGEST_FILE:
-            raise WavetankError(f"{path} is larger than {LARGEST_FILE // 1_000_000} MB; a scene file is text.")
-        data = json.loads(place.read_text("utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        reason = (isinstance(error, OSError) and error.strerror) or error
-        raise WavetankError(f"{path}: this scene file cannot be read: {reason}.") from None
-    if not isinstance(data, dict) or not isinstance(data.get("Configuration"), dict):
-        raise WavetankError(f"{path}: a scene file of SPlisHSPlasH has a table Configuration; this one has none.")
-    try:
-        return _Reader(data, place, spacing).read()
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        if isinstance(error, WavetankError):
-            raise
-        raise WavetankError(f"{path}: the scene cannot be read: {type(error).__name__} {error}.") from None
+    origin = named(path)
+    with guarded(origin, "scene"):
+        data = parse_json(read_text(path, "scene file", LARGEST_FILE), origin)
+        if not isinstance(data, dict) or not isinstance(data.get("Configuration"), dict):
+            raise WavetankError(f"{origin}: a scene file of SPlisHSPlasH has a table Configuration; this one has none.")
+        try:
+            return _Reader(data, Path(path), spacing).read()
+        except UNREADABLE as error:
+            if isinstance(error, WavetankError):
+                raise
+            raise WavetankError(
+                f"{origin}: the scene cannot be read: {one_line(f'{type(error).__name__} {error}')}."
+            ) from None
 
 
 class _Reader:

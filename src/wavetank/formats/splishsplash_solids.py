@@ -13,6 +13,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import turned
 from wavetank.scene.tank import Tank
 from wavetank.solids.ground.polygon import Polygon
+from wavetank.solids.meshes.counted import check_file
 from wavetank.solids.meshes.files import SUFFIXES
 from wavetank.solids.meshes.mesh import Mesh
 from wavetank.solids.shapes import Box, Sphere
@@ -48,6 +49,7 @@ def arrays_of(path: Path) -> tuple[np.ndarray, np.ndarray]:
     if path.suffix.lower() not in SUFFIXES:
         raise WavetankError(f"{path}: meshes are read from {', '.join(SUFFIXES)} files; convert this one.")
     try:
+        check_file(path)
         loaded = trimesh.load(path, process=False, skip_materials=True, force="mesh")
         vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64)
     except Exception as error:  # a damaged file fails in as many ways as there are formats

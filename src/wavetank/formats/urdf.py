@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from wavetank.foundation.door import read_text
+from wavetank.foundation.door import guarded, named, one_line, read_text
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import product, turned, unit_quaternion
 from wavetank.scene.joints import Hinge, Joint, Slider
@@ -24,7 +24,8 @@ from wavetank.solids.shapes import Box, Cylinder, Sphere, Union, moved
 from wavetank.solids.solid import Solid
 
 LARGEST = 20_000_000  # characters
-MOST_LINKS = 300
+MOST_LINKS = 300  # and joints
+MOST_SHAPES = 1000  # of a link
 STANDING = unit_quaternion([math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0])  # z to y
 TINY = 0.01  # m, radius of a link that has a mass and no shape
 MOVING = {"revolute": Hinge, "continuous": Hinge, "prismatic": Slider}
@@ -55,21 +56,24 @@ def load_urdf(
     Its root stands at `position` [m], shape [3], turned by `angle` [rad] about the upright axis; `held` is false for a
     robot that is not fixed to the ground. `prefix` comes before all names. Raises `WavetankError`.
     """
-    text = read_text(path, "URDF file", LARGEST)
-    if "<!" in text.replace("<!--", ""):
-        raise WavetankError(f"{path}: a document type is not read; a URDF file has none.")
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise WavetankError(f"{path}: this is no XML: {error}.") from None
-    if root.tag != "robot":
-        raise WavetankError(f"{path}: a URDF file has a robot at its top; this one has <{root.tag}>.")
+    origin = named(path)
     upright = unit_quaternion([math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0])
-    try:
-        return _Reader(root, Path(path), prefix, held).read((np.array(position, float), product(upright, STANDING)))
-    except (WavetankError, KeyError, ValueError, TypeError, AttributeError) as error:
-        reason = f"{type(error).__name__} {error}" if not isinstance(error, WavetankError) else str(error)
-        raise WavetankError(f"{path}: the robot cannot be read: {reason}") from None
+    place = np.array(position, float), product(upright, STANDING)
+    with guarded(origin, "robot"):
+        text = read_text(path, "URDF file", LARGEST)
+        if "<!" in text.replace("<!--", ""):
+            raise WavetankError(f"{origin}: a document type is not read; a URDF file has none.")
+        try:
+            root = ElementTree.fromstring(text)
+        except ElementTree.ParseError as error:
+            raise WavetankError(f"{origin}: this is no XML: {error}.") from None
+        if root.tag != "robot":
+            raise WavetankError(f"{origin}: a URDF file has a robot at its top; this one has <{root.tag[:60]}>.")
+        try:
+            return _Reader(root, Path(path), prefix, held).read(place)
+        except (WavetankError, LookupError, ValueError, TypeError, AttributeError, OverflowError, OSError) as error:
+            reason = f"{type(error).__name__} {error}" if not isinstance(error, WavetankError) else str(error)
+            raise WavetankError(f"{origin}: the robot cannot be read: {one_line(reason)}.") from None
 
 
 class _Reader:
@@ -93,8 +97,9 @@ class _Reader:
         missing = sorted((children | {_end(joint, "parent") for joint in self.joints}) - set(self.links))
         if missing:
             raise WavetankError(f"its joints name links that it does not have: {', '.join(missing)}.")
-        if len(self.links) > MOST_LINKS:
-            raise WavetankError(f"it has {len(self.links):,} links; at most {MOST_LINKS} are allowed.")
+        for what, rows in (("links", self.links), ("joints", self.joints)):
+            if len(rows) > MOST_LINKS:
+                raise WavetankError(f"it has {len(rows):,} {what}; at most {MOST_LINKS} are allowed.")
         roots = [name for name in self.links if name not in children]
         if len(roots) != 1:
             raise WavetankError(f"it has {len(roots)} roots; a robot is a tree with one link that no joint leads to.")
@@ -185,6 +190,8 @@ class _Reader:
         link = self.links[name]
         mass = link.find("inertial/mass")
         rows = link.findall("collision") or link.findall("visual")
+        if len(rows) > MOST_SHAPES:
+            raise WavetankError(f"link {name} has {len(rows):,} shapes; at most {MOST_SHAPES:,} are allowed.")
         shapes = [self._shape(name, row) for row in rows]
         paint = link.find("visual/material")
         color = "" if paint is None else _color(paint) or self.colors.get(str(paint.get("name")), "")
@@ -242,9 +249,13 @@ def _end(joint: ElementTree.Element, which: str) -> str:
 
 
 def _numbers(row: ElementTree.Element | None, key: str, otherwise: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the numbers of an attribute: as many as `otherwise` has, three where that is empty."""
     if row is None or row.get(key) is None:
         return otherwise
-    return tuple(float(word) for word in str(row.get(key)).split())
+    numbers = tuple(float(word) for word in str(row.get(key)).split())
+    if len(numbers) < (len(otherwise) or 3) or not all(map(math.isfinite, numbers)):
+        raise WavetankError(f"<{row.tag[:60]} {key}={str(row.get(key))[:60]!r}> is not {len(otherwise) or 3} numbers.")
+    return numbers
 
 
 def _origin(row: ElementTree.Element) -> Pose:

@@ -1,5 +1,6 @@
 """Pictures and films of what was kept: a run's folder, frames in HDF5, a recording."""
 
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -44,8 +45,8 @@ def frame_at(world: str, at: float | None, arch: str = "") -> Frame:
     """
     if not Path(world).is_dir():
         source = source_of(Path(world), arch)
-        instants = list(source.frames) if at is None else source.frames
-        found = instants[-1] if isinstance(instants, list) else min(instants, key=lambda one: abs(one.time - at))
+        last = at is None
+        found = deque(source.frames, 1)[-1] if last else min(source.frames, key=lambda one: abs(one.time - at))
         return Shown(source.scene, arch or "cpu").frame(found)
     folder = RunFolder.open(world)
     run = folder.run

@@ -68,16 +68,28 @@ class Instant:
     def read(
         cls, scene: Scene, number: int, time: float, arrays: Mapping[str, np.ndarray], standing: tuple[Standing, ...]
     ) -> "Instant":
-        """Return an instant from what a file holds; what the file does not hold is empty or 0."""
+        """Return an instant from what a file holds; what the file does not hold is empty or 0.
+
+        Raises `ValueError` for arrays that are none of particles of this scene.
+        """
         count, foam = len(arrays.get("positions", ())), len(arrays.get("foam_positions", ()))
         whole: dict[str, Any] = {}
         for names, rows in ((WATER, count), (FOAM, foam)):
             for name, (kind, width) in names.items():
                 shape = (rows, scene.dim) if width else (rows,)
-                value: np.ndarray = np.asarray(arrays.get(name, np.zeros(shape, kind)), kind)
-                whole[name] = value if len(value) or not rows else np.zeros(shape, kind)
+                value: np.ndarray = np.asarray(arrays.get(name, np.zeros(shape, kind)))
+                value = value.astype(kind) if value.shape == shape or value.size else np.zeros(shape, kind)
+                if value.shape != shape or not np.isfinite(value).all():
+                    raise ValueError(f"{name} are {list(value.shape)}, or not finite; {list(shape)} are needed")
+                whole[name] = value
         if count and "ids" not in arrays:
             whole["ids"] = np.arange(count, dtype=np.int32)
+        materials = whole["materials"]
+        if count and not 0 <= materials.min() <= materials.max() < len(scene.palette()):
+            raise ValueError(f"materials go from {materials.min()} to {materials.max()}; it has {len(scene.palette())}")
+        poses = [getattr(one, name) for one in standing for name in ("position", "rotation")]
+        if not (np.isfinite(time) and all(np.isfinite(pose).all() for pose in poses)):
+            raise ValueError("a time or a pose is not finite")
         return cls(scene=scene, number=number, time=time, standing=standing, **whole)
 
     @property
