@@ -1,6 +1,7 @@
 """How much memory there is, and numbers of bytes and seconds in words."""
 
 import contextlib
+import ctypes
 import os
 from pathlib import Path
 
@@ -14,6 +15,12 @@ def free_memory() -> int | None:
     """Return the bytes that this process may still take, about; None where the system does not tell."""
     found = [free for free in (_of_machine(), *map(_of_group, *zip(*_LIMITS, strict=True)), _of_process()) if free]
     return min(found) if found else None
+
+
+def give_back() -> None:
+    """Give back to the system what was freed, where the C library keeps it (glibc; malloc_trim(3)); else do nothing."""
+    with contextlib.suppress(OSError, AttributeError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _of_machine() -> int | None:

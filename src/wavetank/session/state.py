@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.memory import in_words
+from wavetank.foundation.memory import give_back, in_words
 from wavetank.foundation.params import LIVE
 from wavetank.scene.fluids import Points
 from wavetank.scene.forces import Force
@@ -95,6 +95,7 @@ class SessionState:
             sim.scene.assign("most_particles", min(scene.most_particles or self.most_particles, self.most_particles))
         sim.load_kernels()
         self._leave(cost.bytes)
+        give_back()
         if self.own is not None:
             sim.forces += [force for force in self.own.forces if force not in self.own.scene.forces]
         self._enter(scene, self._own(sim))
