@@ -48,6 +48,7 @@ def batch(name: str, count: int, seed: int) -> int:
     """Try so many inputs in this process; return how many failed."""
     os.environ["WAVETANK_STRICT_DOOR"] = "1"
     import hypothesis
+    from attacks import TooSlowError
     from doors import DOORS, FOLDER, try_scene
     from files import good_scenes
     from hypothesis import HealthCheck, Phase, given, settings
@@ -67,14 +68,20 @@ def batch(name: str, count: int, seed: int) -> int:
     @given(inputs)
     def attack(given_input: object) -> None:
         last.write_bytes(pickle.dumps((name, given_input)))
-        Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
-        before, began = resident(), time.process_time()
         faulthandler.dump_traceback_later(HANGS, exit=True)
         why = ""
-        try:
-            attempt(given_input)
-        except BaseException:
-            why = traceback.format_exc()
+        for trial in range(2):  # the first that needs a kernel compiles it, which costs seconds once
+            Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
+            before, began = resident(), time.process_time()
+            try:
+                attempt(given_input)
+            except TooSlowError:
+                if trial == 0:
+                    continue
+                why = traceback.format_exc()
+            except BaseException:
+                why = traceback.format_exc()
+            break
         faulthandler.cancel_dump_traceback_later()
         if time.process_time() - began > LONGEST:
             why += f"\n{time.process_time() - began:.1f} s"
