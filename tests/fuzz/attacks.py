@@ -118,6 +118,8 @@ MESSAGES: dict[str, str] = {
     "lone surrogate": '{"do": "load", "text": "title = \\"\\ud800\\""}',
     "lone surrogate in a name": '{"do": "bookmark", "name": "\\ud800"}',
     "zero": '{"do": "load", "name": "\\u0000"}',
+    "a solid of 10^9 m": '{"do": "add-solid", "solid": {"shape": "polygon", "points": [[1e9, -1], [1e9, 0], [0, 0]]}}',
+    "a pointer of two lines": '{"do": "point-end", "pointer": "a\\nb"}',
 }  # fmt: skip
 
 

@@ -78,7 +78,8 @@ def test_frames_that_unpack_to_terabytes():
     [lambda file: file["water/count"].__setitem__(1, 2**62), lambda file: file["water/first"].__setitem__(1, -5),
      lambda file: file["water/positions"].resize(2**40, axis=0) or file["water/count"].__setitem__(1, 2**40),
      lambda file: file.attrs.__setitem__("NFrames", "many"), lambda file: file.__delitem__("solids"),
-     lambda file: file["water/positions"].__setitem__(30, np.nan), lambda file: file.attrs.__setitem__("NFrames", 9)],
+     lambda file: file["water/positions"].__setitem__(30, np.nan),
+     lambda file: (file.__delitem__("foam/count"), file.__setitem__("foam/count", np.full(3, np.inf))), lambda file: file.attrs.__setitem__("NFrames", 9)],
 )  # fmt: skip
 def test_tables_that_say_something_else(change):
     h5py = pytest.importorskip("h5py")

@@ -394,3 +394,17 @@ def test_places_in_a_plane_are_two_numbers_and_what_is_no_place_is_one_sentence(
         for act in (sim.remove_inside, lambda *where: sim.paint_inside(*where, 1), sim.freeze_inside):
             with pytest.raises(wt.WavetankError, match=re.escape(words)):
                 act(start, middle, radius)
+
+
+@pytest.mark.parametrize("body", [False, True])
+def test_a_solid_that_cannot_be_built_changes_nothing(body):
+    """What the grid of a shape refuses was half in the world, which ended a frame later."""
+    sim = wt.Simulation(wt.Scene.load("drop-2d").model_copy(update={"spacing": 0.05}))
+    sim.step()
+    before, names = sim.digest(), [*sim.solids.names]
+    wide = wt.Polygon(points=[(1e9, -1.0), (1e9, 0.0), (0.0, 0.0)], density=500.0 if body else None)
+    for grow in (0.0, 0.35):
+        with pytest.raises(wt.WavetankError, match="nodes"):
+            sim.add_solid(wide, grow)
+    assert (sim.digest(), sim.solids.names, len(sim.solids.reaches)) == (before, names, len(names))
+    sim.step()

@@ -21,6 +21,7 @@ import types
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from wavetank.device.freed_arrays import FreedArrays
 from wavetank.device.launches import NEEDED, keep_prepared_launches
 
 VERSIONS = ("1.3.3", "1.4.0")  # of Quadrants
@@ -291,3 +292,24 @@ def keep_launches(kernel: Any) -> Any:
     """Keeps prepared launches by their arguments, and launches them at once."""
     keep_prepared_launches(_part("kernel"), _part("impl").get_runtime)
     return kernel
+
+
+# --- arrays ---
+
+
+@patch(
+    "freed arrays", "impl:_qd_core.Program", needs=("impl:_qd_core.Program.get_ndarray_data_ptr_as_int",)
+)  # fmt: skip
+def keep_freed_arrays(program: Any) -> Any:
+    """Gives arrays of the CPU that nobody uses any more away again: of each one made it keeps some bytes for ever."""
+    on_host = {_part("impl")._qd_core.Arch.x64, _part("impl")._qd_core.Arch.arm64}
+    freed = FreedArrays(program.create_ndarray, program.delete_ndarray)
+
+    def create(self: Any, *args: Any, **kwargs: Any) -> Any:
+        return (freed.create if self.config().arch in on_host else freed.really_create)(self, *args, **kwargs)
+
+    def delete(self: Any, array: Any) -> None:
+        return (freed.delete if self.config().arch in on_host else freed.really_delete)(self, array)
+
+    program.create_ndarray, program.delete_ndarray = create, delete
+    return program

@@ -68,7 +68,8 @@ def _points(file: Any, size: int) -> np.ndarray:
     data = file.read(needed)
     if len(data) < needed:
         raise ValueError("it ends too early")
-    rows = np.frombuffer(data, ">f4").reshape(points, width)[:, :4].astype(np.float64)
+    with np.errstate(invalid="ignore"):  # a NaN that signals: refused below
+        rows = np.frombuffer(data, ">f4").reshape(points, width)[:, :4].astype(np.float64)
     if not np.isfinite(rows).all():
         raise ValueError("a position is not finite")
     return rows[:, :3] / np.where(rows[:, 3:] == 0.0, 1.0, rows[:, 3:])

@@ -17,6 +17,8 @@ from wavetank.foundation.patience import Patience
 CHUNK = 1 << 17  # bytes of a column that lie together, about
 LARGEST = 2**48  # bytes
 FEW = 128  # rows that lie together of what has one for each frame: as many are written for each
+#: what h5py and what it read end in where a file is damaged
+UNREADABLE = (OSError, KeyError, IndexError, ValueError, TypeError, RuntimeError, AttributeError, ArithmeticError)
 
 
 def import_h5py() -> Any:
@@ -100,7 +102,7 @@ def damaged(path: str | Path) -> Iterator[None]:
     with door.guarded(origin, "HDF5 file"):
         try:
             yield
-        except (OSError, KeyError, IndexError, ValueError, TypeError, RuntimeError, AttributeError) as error:
+        except UNREADABLE as error:
             if isinstance(error, WavetankError):
                 raise
             raise WavetankError(f"{origin}: this HDF5 file cannot be read: {door.one_line(error)}.") from None

@@ -9,6 +9,7 @@ _LIMITS = (  # of the group of processes that this one is in, and what they take
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
 )
+_ARENA_MAX = -8  # M_ARENA_MAX of malloc.h
 
 
 def free_memory() -> int | None:
@@ -21,6 +22,12 @@ def give_back() -> None:
     """Give back to the system what was freed, where the C library keeps it (glibc; malloc_trim(3)); else do nothing."""
     with contextlib.suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
+
+
+def share_arenas() -> None:
+    """Let threads allocate from two arenas (glibc; mallopt(3)): one uses what another has freed. Else do nothing."""
+    with contextlib.suppress(OSError, AttributeError, TypeError):
+        ctypes.CDLL(None).mallopt(_ARENA_MAX, 2)
 
 
 def _of_machine() -> int | None:

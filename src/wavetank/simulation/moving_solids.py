@@ -47,12 +47,17 @@ class MovingSolids:
         self.version = 0  # of what is on the device
         self.rebuild()
 
-    def rebuild(self) -> None:
-        """Put all on the device anew, at rest where they are."""
-        self.device = shapes.build(self.members, self.tank_count, self.friction, self.spacing)
-        self.has_friction = self.friction > 0.0 or any(solid.friction for solid in self.members)
-        self.reaches = [solid.span() for solid in self.members]
-        self.walls = [solid.program()[0] for solid in self.members[: self.tank_count]]
+    def rebuild(self, members: list[Solid] | None = None) -> None:
+        """Put all on the device anew, at rest where they are; with `members`, these from now on.
+
+        Raises `WavetankError` and changes nothing where one of them cannot be built.
+        """
+        chosen = self.members if members is None else members
+        reaches = [solid.span() for solid in chosen]
+        self.device = shapes.build(chosen, self.tank_count, self.friction, self.spacing)
+        self.members, self.reaches = chosen, reaches
+        self.has_friction = self.friction > 0.0 or any(solid.friction for solid in chosen)
+        self.walls = [solid.program()[0] for solid in chosen[: self.tank_count]]
         self._resize()
         self._upload(0.0, 0.0)
 
@@ -66,16 +71,29 @@ class MovingSolids:
         self._upload(0.0, 0.0)
 
     def add(self, solid: Solid, grow: float) -> str:
-        """Add a solid that swells to its size within `grow` [s]; return its name."""
-        self.members.append(solid)
-        self.names.append(self._free_name(solid.name))
-        self.poses.append((solid.origin, solid.quaternion))
-        self.starts.append(self.poses[-1])
-        self.courses.add(solid, self.names[-1])
+        """Add a solid that swells to its size within `grow` [s]; return its name.
+
+        Raises `WavetankError` and changes nothing where it cannot be built.
+        """
+        name, number = self._free_name(solid.name), len(self.members)
+        self.courses.add(solid, name)
+        columns: tuple[tuple[list[Any], Any], ...] = (
+            (self.names, name), (self.poses, (solid.origin, solid.quaternion)),
+            (self.starts, (solid.origin, solid.quaternion)),
+        )  # fmt: skip
+        for column, value in columns:
+            column.append(value)
         if grow > 0.0:
-            self.growing[len(self.members) - 1] = (0.0, grow)
-        self.rebuild()
-        return self.names[-1]
+            self.growing[number] = (0.0, grow)
+        try:
+            self.rebuild([*self.members, solid])
+        except BaseException:
+            self.courses.forget(name)
+            self.growing.pop(number, None)
+            for column, _ in columns:
+                del column[number:]
+            raise
+        return name
 
     def remove(self, number: int) -> None:
         """Take a solid away."""

@@ -232,9 +232,16 @@ class Simulation(States):
 
         With `grow` [s] it swells to its size within that time and pushes the water where it appears aside.
         """
-        self.scene.assign("solids", [*self.scene.solids, solid])
-        name = self.solids.add(solid, grow)
-        self._renew_solids()
+        before = self.scene.solids
+        self.scene.assign("solids", [*before, solid])
+        try:
+            name = self.solids.add(solid, grow)
+            self._renew_solids()
+        except BaseException:
+            self.scene.assign("solids", before)
+            for number in range(self.solids.tank_count + len(before), len(self.solids.members)):
+                self.solids.remove(number)
+            raise
         return name
 
     def remove_solid(self, name: str) -> None:

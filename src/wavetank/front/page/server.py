@@ -27,6 +27,7 @@ from typing_extensions import override
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.memory import share_arenas
 from wavetank.front.about import everything
 from wavetank.front.aim import aim
 from wavetank.front.dropped import command_for
@@ -104,6 +105,7 @@ class WebFront:
     def start(self) -> None:
         """Open the doors."""
         share_interpreter()
+        share_arenas()
         self._thread.start()
 
     def run(self) -> None:

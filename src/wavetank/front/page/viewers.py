@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from wavetank.foundation.door import guarded, parse_json
+from wavetank.foundation.door import guarded, one_line, parse_json
 from wavetank.foundation.errors import WavetankError
 from wavetank.session.commands import Command, ToolBegin, ToolEnd, ToolMove, command_of
 
@@ -263,5 +263,5 @@ def _hovered(table: dict[str, Any]) -> tuple[str, float, float, float]:
 def _whole(table: dict[str, Any], key: str, most: int, least: int = 1) -> int:
     value = table.get(key, 0)
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise WavetankError(f"{key} = {str(value)[:20]} must be a whole number from {least} to {most}.")
+        raise WavetankError(f"{key} = {one_line(value, 20)} must be a whole number from {least} to {most}.")
     return value
