@@ -28,6 +28,7 @@ from wavetank.solids.motion import Keyframe, Motion, sampled
 from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
 
 if TYPE_CHECKING:
+    from wavetank.formats.splishsplash import load_splishsplash
     from wavetank.formats.urdf import load_urdf
     from wavetank.front.notebook.show import show
     from wavetank.session import commands
@@ -43,8 +44,8 @@ __all__ = [
     "PARAMETERS", "PRESETS", "Ball", "BallJoint", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference",
     "Drain", "Emitter", "Filled", "Gauge", "HalfSpace", "HeightField", "Hinge", "Intersection", "Keyframe", "Mesh",
     "Motion", "Points", "Polygon", "Recording", "Rope", "Scene", "Session", "Simulation", "Slider", "Sphere",
-    "Spring", "Tank", "Union", "WavetankError", "Weld", "__version__", "bundled_scenes", "commands", "load_urdf",
-    "render", "replay", "sampled", "show",
+    "Spring", "Tank", "Union", "WavetankError", "Weld", "__version__", "bundled_scenes", "commands",
+    "load_splishsplash", "load_urdf", "render", "replay", "sampled", "show",
 ]  # fmt: skip
 
 #: what needs the kernels' sources is imported when it is first used: data alone should load fast
@@ -54,6 +55,7 @@ LATER = {
     "Session": "wavetank.session.session",
     "Simulation": "wavetank.simulation.simulation",
     "commands": "wavetank.session.commands",
+    "load_splishsplash": "wavetank.formats.splishsplash",
     "load_urdf": "wavetank.formats.urdf",
     "render": "wavetank.view.renderer",
     "replay": "wavetank.session.recording",

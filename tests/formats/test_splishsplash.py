@@ -11,7 +11,7 @@ import pytest
 import wavetank as wt
 from wavetank.cli import main
 from wavetank.formats.bgeo import read_bgeo
-from wavetank.formats.splishsplash import read_splishsplash
+from wavetank.formats.splishsplash import load_splishsplash
 
 CUBE = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -66,7 +66,7 @@ def test_spacing_tank_blocks_and_gravity(scene):
             {"start": [-2, 0, -0.5], "end": [-0.8, 0.3, 0.5]},
         ],
     )  # fmt: skip
-    read = read_splishsplash(path)
+    read = load_splishsplash(path)
     assert read.scene.spacing == pytest.approx(0.05)
     assert read.scene.gravity == (0.0, -5.0, 1.0)
     assert np.ravel(read.scene.tank.box()).tolist() == [-1.0, 0.0, -0.5, 1.0, 2.0, 0.5]
@@ -83,7 +83,7 @@ def test_viscosity_is_kinematic_and_tension_in_newtons_per_metre(scene):
         {"id": "Fluid", "density0": 800, "viscosityMethod": 6, "Weiler et al. 2018": {"viscosity": 0.5},
          "surfaceTensionMethod": 5, "Zorilla, Ritter, et al. 2020": {"surfaceTension": 0.1}},
     ])  # fmt: skip
-    material = read_splishsplash(path).scene.materials[0]
+    material = load_splishsplash(path).scene.materials[0]
     assert material.viscosity == pytest.approx(400.0)
     assert material.density == 800.0
     assert material.surface_tension == pytest.approx(0.1)
@@ -91,7 +91,7 @@ def test_viscosity_is_kinematic_and_tension_in_newtons_per_metre(scene):
         {"id": "Fluid", "density0": 1000, "viscosityMethod": 3, "Peer et al. 2015": {"viscosity": 0.5},
          "surfaceTensionMethod": 2, "vorticityMethod": 1},
     ])  # fmt: skip
-    read = read_splishsplash(path)
+    read = load_splishsplash(path)
     # 1 / (1 + nu dt / h^2) = 0.5 with h = 0.1 m and dt = 1 ms: nu = 10 m^2/s
     assert read.scene.materials[0].viscosity == pytest.approx(1e4, rel=1e-6)
     told = " ".join(read.notes)
@@ -105,7 +105,7 @@ def test_boxes_meshes_and_bodies_stand_where_theirs_do(scene):
         body(id=2, geometryFile="../models/wedge.obj", isDynamic=True, density=300, friction=0.4, velocity=[0, 0, 1],
              rotationAxis=[0, 0, 1], rotationAngle=math.pi / 2, scale=[0.5, 0.5, 0.5]),
     ])  # fmt: skip
-    box, wedge = read_splishsplash(path).scene.solids
+    box, wedge = load_splishsplash(path).scene.solids
     assert (box.shape, box.center, box.size) == ("box", (0.0, 1.0, 0.0), (1.0, 0.2, 0.4))
     np.testing.assert_allclose(box.quaternion, [math.sqrt(0.5), 0, math.sqrt(0.5), 0], atol=1e-7)
     # The wedge's own origin is 2 * 0.5 m to its left; turned by a quarter, that is below.
@@ -124,7 +124,7 @@ def test_emitters_count_particles(scene):
             {"width": 6, "translation": [0.9, 0.7, 0], "velocity": 3, "type": 1, "emitStartTime": 1, "emitEndTime": 5},
         ],
     )  # fmt: skip
-    scene_ = read_splishsplash(path).scene
+    scene_ = load_splishsplash(path).scene
     first, second = scene_.emitters
     np.testing.assert_allclose(first.direction, (0, -1, 0), atol=1e-7)
     np.testing.assert_allclose(first.size, (0.4, 0.15))
@@ -147,7 +147,7 @@ def test_motors_join_a_body_and_the_world(scene):
         ],
         FluidBlocks=[{"start": [-0.5, 0, -0.5], "end": [0.5, 0.3, 0.5]}],
     )
-    scene_ = read_splishsplash(path).scene
+    scene_ = load_splishsplash(path).scene
     (hinge,) = scene_.joints
     assert (hinge.kind, hinge.first, hinge.second, hinge.axis, hinge.speed) == ("hinge", "body 1", "", (0, 1, 0), -6.0)
     sim = wt.Simulation(scene_)
@@ -165,7 +165,7 @@ def test_two_dimensions(scene):
         Emitters=[{"width": 8, "height": 5, "translation": [-0.8, 1.2, 0], "velocity": 2, "type": 0, "emitEndTime": 4}],
         FluidBlocks=[{"start": [-1, 0, -0.5], "end": [-0.2, 0.4, 0.5]}],
     )
-    scene_ = read_splishsplash(path).scene
+    scene_ = load_splishsplash(path).scene
     assert scene_.dim == 2
     assert scene_.tank.size == (2.0, 2.0)
     (wedge,) = scene_.solids
@@ -182,11 +182,11 @@ def test_particles_of_houdini(scene, tmp_path):
     np.testing.assert_allclose(read_bgeo(tmp_path / "models" / "some.bgeo"), points, atol=1e-7)
     model = {"particleFile": "../models/some.bgeo", "translation": [0, 1, 0], "rotationAxis": [0, 1, 0],
              "rotationAngle": math.pi / 2, "scale": [2, 2, 2]}  # fmt: skip
-    (fluid,) = read_splishsplash(scene(FluidModels=[model], FluidBlocks=[])).scene.fluids
+    (fluid,) = load_splishsplash(scene(FluidModels=[model], FluidBlocks=[])).scene.fluids
     expected = [(2 * z, 2 * y + 1, -2 * x) for x, y, z in points]  # a quarter about y takes z to x and x to -z
     np.testing.assert_allclose(fluid.positions, expected, atol=1e-6)
     with pytest.raises(wt.WavetankError, match="another spacing is for fluid blocks only"):
-        read_splishsplash(scene(FluidModels=[model]), spacing=0.1)
+        load_splishsplash(scene(FluidModels=[model]), spacing=0.1)
     for broken in (b"", b"BgeoV", bgeo_of(points)[:-40], b"Bgeo" * 30, gzip.compress(b"BgeoV" + b"\xff" * 90)):
         (tmp_path / "models" / "some.bgeo").write_bytes(broken)
         with pytest.raises(wt.WavetankError, match=r"some\.bgeo"):
@@ -196,9 +196,9 @@ def test_particles_of_houdini(scene, tmp_path):
 def test_what_has_no_counterpart_is_told(scene):
     elastic = [{"id": "Fluid", "elasticityMethod": 3}, {"id": "water"}]
     with pytest.raises(wt.WavetankError, match="no fluid in it that wavetank could simulate; Fluid is an elastic"):
-        read_splishsplash(scene(Materials=elastic))
+        load_splishsplash(scene(Materials=elastic))
     blocks = [{"start": [0, 0, 0], "end": [1, 1, 1]}, {"id": "water", "start": [1, 0, 0], "end": [2, 1, 1]}]
-    read = read_splishsplash(
+    read = load_splishsplash(
         scene(Materials=elastic, FluidBlocks=blocks, AnimationFields=[{"particleField": "velocity"}], Robots=[1])
     )
     assert [fluid.material for fluid in read.scene.fluids] == ["water"]
@@ -237,5 +237,5 @@ def test_damaged_files_are_one_sentence(tmp_path, text):
     path = tmp_path / "a.json"
     path.write_text(text)
     with pytest.raises(wt.WavetankError, match=r"a\.json") as error:
-        read_splishsplash(path)
+        load_splishsplash(path)
     assert "\n" not in str(error.value)

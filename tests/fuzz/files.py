@@ -18,7 +18,7 @@ from strategies import mutated, toml_of, torn
 import wavetank as wt
 from wavetank.formats.bgeo import read_bgeo
 from wavetank.formats.run_folder import Run, RunFolder
-from wavetank.formats.splishsplash import read_splishsplash
+from wavetank.formats.splishsplash import load_splishsplash
 from wavetank.foundation.door import parse_toml
 from wavetank.front.checkpoints import Checkpoints, begun
 
@@ -269,7 +269,7 @@ def others(draw: Any) -> Files:
 
 def try_other(files: Files) -> None:
     path = fresh("other", files) / "scene.json"
-    found = taken_or_refused(lambda: read_splishsplash(path))
+    found = taken_or_refused(lambda: load_splishsplash(path))
     if found is not None:
         assert all("\n" not in note for note in found.notes)
         count = sum(fluid.estimate(found.scene.spacing) for fluid in found.scene.fluids)

@@ -12,7 +12,7 @@ from files import ROBOT, fresh, good_run, good_scenes, particle_file
 import wavetank as wt
 from wavetank.formats.bgeo import read_bgeo
 from wavetank.formats.run_folder import RunFolder
-from wavetank.formats.splishsplash import read_splishsplash
+from wavetank.formats.splishsplash import load_splishsplash
 from wavetank.front.checkpoints import begun
 
 
@@ -133,7 +133,7 @@ def test_a_robot_of_very_many_joints_costs_little():
 )  # fmt: skip
 def test_scenes_of_another_program(content, words):
     path = fresh("other", {"scene.json": content.encode()}) / "scene.json"
-    refused(lambda: read_splishsplash(path), words)
+    refused(lambda: load_splishsplash(path), words)
 
 
 def test_meshes_beside_such_a_scene_are_counted_first():
@@ -141,7 +141,7 @@ def test_meshes_beside_such_a_scene_are_counted_first():
     many = b"\0" * 80 + struct.pack("<I", 60_000_000) + bytes(5000)
     plain = json.loads(json.dumps(plain).replace("UnitBox.obj", "many.stl"))
     path = fresh("other", {**files, "many.stl": many, "scene.json": json.dumps(plain).encode()}) / "scene.json"
-    refused(lambda: read_splishsplash(path), "triangles")
+    refused(lambda: load_splishsplash(path), "triangles")
 
 
 @pytest.mark.parametrize(

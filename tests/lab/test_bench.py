@@ -222,6 +222,8 @@ def test_the_command_prints_json_last(tmp_path, monkeypatch, capsys):
         (("--peers", "--roofline"), "give one of them"),
         (("--peers", "drop"), "--peers compares one dam break"),
         (("--peers", "--sizes", "10"), "from 1,000"),
+        (("--scenes",), "goes with --peers"),
+        (("--peers", "--scenes", "--sizes", "1000"), "give no --sizes"),
         (("--roofline", "drop-2d", "300"), "2-D world"),
     ],
 )

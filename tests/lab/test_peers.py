@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wavetank import WavetankError
-from wavetank.lab.bench.peers import compare, environment, runs, splishsplash
+from wavetank.lab.bench.peers import compare, environment, runs, scenes, splishsplash
 from wavetank.lab.bench.peers.runs import Dam, ours, pace, rate
 
 #: Stands in for the peer: answers like its script, and says what it was told.
@@ -154,3 +154,74 @@ def test_the_script_needs_nothing_of_ours():
     path = runs.Path(splishsplash.__file__)
     code = "import runpy, sys; sys.modules['wavetank'] = None; sys.modules['numpy'] = None; runpy.run_path(sys.argv[1])"
     subprocess.run([sys.executable, "-c", code, str(path)], check=True)
+
+
+#: Answers for a scene of its own: the same block, which falls freely beside a ball that turns about y.
+FAKE_SCENE = """
+import json, pathlib, sys
+import numpy as np
+order, folder = json.loads(sys.argv[2]), pathlib.Path(sys.argv[1])
+file = pathlib.Path(__file__).with_name(order["scene"] + ".json")
+if not file.is_file():
+    raise SystemExit("there is no scene " + order["scene"])
+if "seconds" in order:
+    times = np.arange(0.0, order["seconds"] + 1e-9, order["every"])
+    grid = np.stack(np.meshgrid(*[np.arange(0.05, 0.4, 0.1)] * 3, indexing="ij"), -1).reshape(-1, 3) + [0, 1.5, 0]
+    fall = np.array([0, -4.905, 0]) * times[:, None, None] ** 2
+    half = 0.5 * np.pi * times / times[-1]  # half a turn in all
+    poses = [[[0, 0, 0, 0, 0, 0, 1], [1, 0.3, 1, 0, np.sin(a), 0, np.cos(a)]] for a in half]
+    np.savez(folder / "watched.npz", times=times, counts=np.full((len(times), 1), len(grid)), bodies=poses,
+             names=["Fluid"], positions=(grid + fall).reshape(-1, 3), velocities=np.zeros((len(times) * len(grid), 3)))
+print(json.dumps({"file": str(file), "wall": 1.0}))
+"""
+
+
+@pytest.fixture
+def their_scene(tmp_path, monkeypatch):
+    script = tmp_path / "fake.py"
+    script.write_text(FAKE_SCENE)
+    monkeypatch.setattr(runs, "SCRIPT", script)
+    monkeypatch.setenv(environment.VARIABLE, sys.executable)
+    (tmp_path / "box.obj").write_text(splishsplash.box())
+    wall = {"geometryFile": "box.obj", "translation": [1, 2, 1], "scale": [4, 4, 4], "isWall": True, "mapInvert": True}
+    block = {"geometryFile": "box.obj", "translation": [1, 0.3, 1], "scale": [0.4, 0.2, 0.2], "isDynamic": False}
+    water = {"start": [-0.05, 1.45, -0.05], "end": [0.45, 1.95, 0.45]}
+    scene = {"Configuration": {"particleRadius": 0.05}, "RigidBodies": [wall, block], "FluidBlocks": [water]}
+    (tmp_path / "Falls.json").write_text(json.dumps(scene))
+    return tmp_path
+
+
+def test_a_scene_of_theirs_is_run_by_both_and_shown(their_scene):
+    """Both fall freely, so their heights are the same, y0 - g t^2 / 2; pictures show both."""
+    from PIL import Image
+
+    result = scenes.compare_scenes(["Falls"], their_scene / "pictures", seconds=0.3, threads=1)
+    (found,) = result["scenes"]
+    for side in ("ours", "theirs"):
+        times, means = (np.array(found[side][what]) for what in ("times", "mean"))
+        assert means == pytest.approx(means[0] - 0.5 * 9.81 * times**2, abs=0.03)  # g t dt / 2 of Euler's steps
+    assert found["apart_largest"] < 0.05
+    assert Image.open(their_scene / "pictures" / "Falls.png").width > 1000
+    assert "Falls" in str(scenes.scenes_table(result).columns[0]._cells)
+
+
+def test_their_bodies_turn_ours(their_scene):
+    """A box of 0.4 x 0.2 m that turned by 90 degrees about y is 0.4 m long along z (their quaternions: x, y, z, w)."""
+    from wavetank.formats.splishsplash import load_splishsplash
+    from wavetank.foundation.rotations import turned
+
+    scene = load_splishsplash(their_scene / "Falls.json").scene
+    standing = scenes.watch(scene, 0.05).instants[0].standing[0]
+    start, end = np.array([1, 0.3, 1, 0, 0, 0, 1.0]), np.array([1, 0.8, 1, 0, 0.5**0.5, 0, 0.5**0.5])
+    moved = scenes._moved(standing, start, end)
+    assert moved.position - standing.position == pytest.approx([0, 0.5, 0])
+    assert np.abs(turned(moved.rotation, np.array([1.0, 0, 0]))) == pytest.approx([0, 0, 1])
+    assert scenes._numbers(their_scene / "Falls.json") == {"body 1": 0, "body 2": 1}
+    assert standing.name == "body 2"
+
+
+def test_what_is_no_scene_of_theirs_is_said(their_scene):
+    with pytest.raises(WavetankError, match="there is no scene Nothing"):
+        scenes.compare_scenes(["Nothing"], their_scene, seconds=0.1)
+    with pytest.raises(WavetankError, match="--seconds"):
+        scenes.compare_scenes(["Falls"], their_scene, seconds=1e9)

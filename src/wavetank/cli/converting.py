@@ -54,9 +54,9 @@ def import_scene(
         robot = load_urdf(file, _place(at))
         scene, notes = robot.joined(configured(into, [f"spacing={spacing}"] if spacing else [])), robot.notes
     else:
-        from wavetank.formats.splishsplash import read_splishsplash
+        from wavetank.formats.splishsplash import load_splishsplash
 
-        imported = read_splishsplash(file, spacing)
+        imported = load_splishsplash(file, spacing)
         scene, notes = imported.scene, imported.notes
     scene.save(out)
     if as_json:

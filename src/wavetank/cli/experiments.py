@@ -74,6 +74,10 @@ def bench(
     repeats: Annotated[int, typer.Option(help="Passes that the medians are taken over, 2 or more.")] = 3,
     threads: Annotated[int | None, typer.Option(min=1, max=1024, help="Threads on the CPU; all without it.")] = None,
     peers: Annotated[bool, typer.Option("--peers", help="Compare with SPlisHSPlasH on the same dam break.")] = False,
+    their_scenes: Annotated[
+        bool, typer.Option("--scenes", help="With --peers: scenes of theirs side by side, in pictures and heights.")
+    ] = False,
+    pictures: Annotated[Path, typer.Option(help="Folder for the pictures of --scenes.")] = Path("out/peers"),
     roofline: Annotated[
         bool, typer.Option("--roofline", help="Compare each kernel with what this machine can do.")
     ] = False,
@@ -89,8 +93,9 @@ def bench(
     from wavetank.lab.bench import run as bench_run
 
     order = bench_run.Order(
-        scenes=scenes, sizes=sizes, seconds=seconds, repeats=repeats, threads=threads, peers=peers, roofline=roofline,
-        search=search, page=page, start_up=start_up, compare=compare, arch=arch,
+        scenes=scenes, sizes=sizes, seconds=seconds, repeats=repeats, threads=threads, peers=peers,
+        their_scenes=their_scenes, pictures=pictures, roofline=roofline, search=search, page=page, start_up=start_up,
+        compare=compare, arch=arch,
     )  # fmt: skip
     result, tables = bench_run.perform(order, console.print)
     if out is not None:

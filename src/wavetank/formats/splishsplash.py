@@ -50,7 +50,7 @@ class Imported:
     notes: tuple[str, ...]
 
 
-def read_splishsplash(path: str | Path, spacing: float | None = None) -> Imported:
+def load_splishsplash(path: str | Path, spacing: float | None = None) -> Imported:
     """Read a scene file; `spacing` [m] in place of its own. Raises `WavetankError` for one that has no counterpart."""
     origin = named(path)
     with guarded(origin, "scene"):

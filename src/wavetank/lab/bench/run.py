@@ -27,6 +27,8 @@ class Order:
     repeats: int
     threads: int | None
     peers: bool
+    their_scenes: bool
+    pictures: Path
     roofline: bool
     search: bool
     page: bool
@@ -43,6 +45,8 @@ def perform(order: Order, say: Callable[[str], None]) -> tuple[dict[str, Any], l
     if order.peers + order.roofline + order.search + order.page + (order.compare is not None) > 1:
         raise WavetankError("--peers, --roofline, --search, --page and --compare are five things; give one of them.")
     names, sizes = split(order.scenes, order.sizes)
+    if order.their_scenes:
+        return _their_scenes(order, names, sizes, say)
     if order.peers:
         return _peers(order, names, sizes, say)
     if order.page:
@@ -135,3 +139,19 @@ def _peers(
             "; ".join(f"{100 * one[side]['density_error_mean']:.3f} %" for side in ("ours", "theirs")),
         )  # fmt: skip
     return result, [table]
+
+
+def _their_scenes(
+    order: Order, names: list[str], sizes: list[int], say: Callable[[str], None]
+) -> tuple[dict[str, Any], list[Table]]:
+    from wavetank.lab.bench.peers import scenes
+
+    if not order.peers or sizes or order.arch != "cpu":
+        raise WavetankError(
+            "--scenes goes with --peers: scenes of theirs on the CPU, each at its own spacing; give no --sizes."
+        )
+    result = scenes.compare_scenes(
+        names or scenes.SCENES, order.pictures, seconds=scenes.SECONDS if order.seconds is None else order.seconds,
+        threads=order.threads, say=say,
+    )  # fmt: skip
+    return result, [scenes.scenes_table(result)]

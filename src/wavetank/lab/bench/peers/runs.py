@@ -80,10 +80,14 @@ def ours(scene: Scene, seconds: float, *, measure: bool = True) -> Run:
 
 
 def theirs(python: Path, folder: Path, dam: Dam, threads: int, **order: Any) -> Run:
-    """Run SPlisHSPlasH with this order (see `splishsplash.py`); raise `WavetankError` where it fails."""
-    full = {"spacing": dam.spacing, "cells": dam.cells, "tank": dam.tank, **order}
+    """Run SPlisHSPlasH on the dam with this order (see `splishsplash.py`); raise `WavetankError` where it fails."""
+    return ask(python, folder, {"spacing": dam.spacing, "cells": dam.cells, "tank": dam.tank, **order}, threads)
+
+
+def ask(python: Path, folder: Path, order: dict[str, Any], threads: int) -> Run:
+    """Let SPlisHSPlasH carry out an order; raise `WavetankError` where it fails."""
     result = subprocess.run(
-        [str(python), str(SCRIPT), str(folder), json.dumps(full)],
+        [str(python), str(SCRIPT), str(folder), json.dumps(order)],
         capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": str(threads)},
     )  # fmt: skip
     lines = result.stdout.strip().splitlines()

@@ -1,11 +1,13 @@
-"""One run of SPlisHSPlasH on a dam break; executed by the Python of an environment that has pysplishsplash.
+"""One run of SPlisHSPlasH, on a dam break or on a scene of its own; its Python is one that has pysplishsplash.
 
     python splishsplash.py FOLDER '{"method": "dfsph", ...}'
+    python splishsplash.py FOLDER '{"scene": "DamBreakModel", "seconds": 2.0, "every": 0.05}'
 
 It needs nothing of wavetank. The last line that it prints is a JSON object with what the run took and reached. Keys of
 the order: method (pbf, dfsph), spacing [m], cells (three numbers of particles), tank [m], seconds, and the solver's
 own iterations, dt, cfl_factor, largest_dt, max_error and max_error_v [%]. A run that has taken `patience` [s] is given
-up: what it prints is then of the water until there.
+up: what it prints is then of the water until there. Of a scene of its own, which is run as it is, particles and rigid
+bodies are kept `every` so long [s] in FOLDER/watched.npz.
 """
 
 import contextlib
@@ -79,25 +81,38 @@ def configure(solver: Any, order: dict[str, Any]) -> None:
     solver.setValueFloat(solver.MAX_ERROR_V, order["max_error_v"])
 
 
-def run(folder: Path, order: dict[str, Any]) -> dict[str, Any]:
-    """Simulate and return steps, seconds, iterations and density error; reading the densities is not timed."""
+def load() -> Any:
+    """Return its module."""
     for name in LIBRARIES if sys.platform == "linux" else ():
         try:
             ctypes.CDLL(name, mode=ctypes.RTLD_GLOBAL)
         except OSError:
             continue
+    import pysplishsplash
+
+    return pysplishsplash
+
+
+def begin(sph: Any, file: Path, folder: Path, seconds: float) -> Any:
+    """Return its simulator with a scene file in it."""
+    solver = sph.Exec.SimulatorBase()
+    solver.init(
+        sceneFile=str(file), outputDir=str(folder / "out"), useGui=False, initialPause=False, useCache=True,
+        stopAt=seconds,
+    )  # fmt: skip
+    solver.initSimulation()
+    return solver
+
+
+def run(folder: Path, order: dict[str, Any]) -> dict[str, Any]:
+    """Simulate and return steps, seconds, iterations and density error; reading the densities is not timed."""
+    sph = load()
     import numpy as np
-    import pysplishsplash as sph
 
     (folder / "box.obj").write_text(box())
     file = folder / "scene.json"
     file.write_text(json.dumps(scene(order)))
-    solver = sph.Exec.SimulatorBase()
-    solver.init(
-        sceneFile=str(file), outputDir=str(folder / "out"), useGui=False, initialPause=False, useCache=True,
-        stopAt=order["seconds"],
-    )  # fmt: skip
-    solver.initSimulation()
+    solver = begin(sph, file, folder, order["seconds"])
     water, clock = sph.Simulation.getCurrent(), sph.TimeManager.getCurrent()
     configure(water.getTimeStep(), order)
     steps: list[tuple[float, float, int, float, float]] = []
@@ -136,5 +151,67 @@ def run(folder: Path, order: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def scenes() -> Path:
+    """Return the folder of the scenes that its package has."""
+    for place in (Path(sys.prefix) / "bin" / "data" / "Scenes", Path(sys.prefix) / "data" / "Scenes"):
+        if place.is_dir():
+            return place
+    raise SystemExit("this pysplishsplash has no folder of scenes")
+
+
+def watch(folder: Path, order: dict[str, Any]) -> dict[str, Any]:
+    """Run a scene of its own and keep what moves; return how long it took and where the scene file is.
+
+    FOLDER/watched.npz has, for n instants: times [s], counts [n, fluids], positions [m] and velocities [m/s] one
+    instant after the other, [sum, 3], names of fluids, and bodies [n, bodies, 7]: place [m], quaternion (x, y, z, w).
+    """
+    file = scenes() / f"{order['scene']}.json"
+    if not file.is_file():
+        raise SystemExit(f"there is no scene {order['scene']!r} in pysplishsplash")
+    if not order.get("seconds"):
+        return {"file": str(file)}
+    sph = load()
+    import numpy as np
+
+    solver = begin(sph, file, folder, order["seconds"])
+    water, clock = sph.Simulation.getCurrent(), sph.TimeManager.getCurrent()
+    kept: dict[str, list[Any]] = {key: [] for key in ("times", "counts", "positions", "velocities", "bodies")}
+    left, wall, steps = [time.perf_counter()], [0.0], [0]
+
+    def keep() -> None:
+        fluids = [water.getFluidModel(k) for k in range(water.numberOfFluidModels())]
+        solids = [water.getBoundaryModel(k).getRigidBodyObject() for k in range(water.numberOfBoundaryModels())]
+        kept["times"].append(clock.getTime())
+        kept["counts"].append([fluid.numActiveParticles() for fluid in fluids])
+        for name, column in (("position", "positions"), ("velocity", "velocities")):
+            rows = [np.array(fluid.getFieldBuffer(name))[: fluid.numActiveParticles()] for fluid in fluids]
+            kept[column].append(np.concatenate(rows).astype(np.float32))
+        poses = [[*np.ravel(solid.getPosition()), *np.ravel(solid.getRotation())] for solid in solids]
+        kept["bodies"].append(np.array(poses, np.float64).reshape(len(solids), 7))
+
+    def after_step() -> None:
+        if steps[0]:  # the first one pays for the maps of the walls
+            wall[0] += time.perf_counter() - left[0]
+        steps[0] += 1
+        if clock.getTime() >= len(kept["times"]) * order["every"] - 1e-9:
+            keep()
+        if clock.getTime() >= order["seconds"]:
+            raise Done
+        left[0] = time.perf_counter()
+
+    solver.setTimeStepCB(after_step)
+    solver.setValueFloat(solver.STOP_AT, order["seconds"])
+    with contextlib.suppress(Done):
+        solver.runSimulation()
+    names = [water.getFluidModel(k).getId() for k in range(water.numberOfFluidModels())]
+    np.savez(
+        folder / "watched.npz", times=kept["times"], counts=kept["counts"], bodies=kept["bodies"], names=names,
+        positions=np.concatenate(kept["positions"]), velocities=np.concatenate(kept["velocities"]),
+    )  # fmt: skip
+    return {"file": str(file), "wall": wall[0], "steps": steps[0], "seconds_of_water": clock.getTime()}
+
+
 if __name__ == "__main__":
-    print(json.dumps(run(Path(sys.argv[1]).resolve(), json.loads(sys.argv[2]))), flush=True)
+    ordered = json.loads(sys.argv[2])
+    done = (watch if "scene" in ordered else run)(Path(sys.argv[1]).resolve(), ordered)
+    print(json.dumps(done), flush=True)
