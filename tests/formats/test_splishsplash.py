@@ -78,6 +78,17 @@ def test_spacing_tank_blocks_and_gravity(scene):
     assert any("FluidBlocks[1] reaches out of the tank" in note for note in read.notes)
 
 
+@pytest.mark.parametrize(
+    ("walls", "share"), [({}, 0.0), ({"viscosityBoundary": 0.1}, 0.2), ({"viscosityBoundary": 9}, 1.0)]
+)
+def test_fluids_slide_along_walls_that_do_not_hold_them(scene, walls, share):
+    """Their walls have a viscosity of their own, which is nothing where it is not named."""
+    weiler = {"id": "Fluid", "viscosityMethod": 6, "Weiler et al. 2018": {"viscosity": 0.5, **walls}}
+    assert load_splishsplash(scene(Materials=[weiler])).scene.no_slip == pytest.approx(share)
+    other = {"id": "Other", "viscosityMethod": 1, "viscosity": 1.0, "viscosityBoundary": 1.0}
+    assert load_splishsplash(scene(Materials=[weiler, other])).scene.no_slip == pytest.approx(share), "nobody uses it"
+
+
 def test_viscosity_is_kinematic_and_tension_in_newtons_per_metre(scene):
     path = scene(Materials=[
         {"id": "Fluid", "density0": 800, "viscosityMethod": 6, "Weiler et al. 2018": {"viscosity": 0.5},

@@ -59,6 +59,7 @@ fluids = [{ lower = [0, 0], upper = [0.5, 0.4] }]
 UNION = 'solids = [{ shape = "union", parts = ['
 #: scene files, each with a word that its refusal has
 SCENES: dict[str, tuple[str, str]] = {
+    "a body of 10^9 m": (POOL + '[[solids]]\nshape = "cylinder"\nstart = [0.5, 0.3]\nend = [0.6, 0.3]\nradius = 1e9\ndensity = 500', "pieces"),
     "deep arrays": ("x = " + "[" * 100_000, "nested"),
     "deep closed arrays": ("x = " + nested("[", "]", 500), "nested"),
     "deep inline tables": ("x = " + "{a=" * 50_000, "nested"),

@@ -101,7 +101,7 @@ class _Reader:
             "materials": [material for name, material in materials.items() if name in used], "solids": solids.found,
             "joints": [*self._joints(solids)], "emitters": emitters,
             "gravity": tuple(map(float, self.settings.get("gravitation", (0.0, -9.81, 0.0))))[: self.dim],
-            **self._most(fluids),
+            "no_slip": self._hold_of_walls(used), **self._most(fluids),
         }  # fmt: skip
         self._tell_the_rest()
         return Imported(Scene.parse(table, str(self.path)), tuple(dict.fromkeys(self.notes)))
@@ -151,6 +151,18 @@ class _Reader:
             "Pa s, which leaves as much of the strain rate in a time step."
         )
         return self._allowed("dynamic_viscosity", viscosity, f"{name}: viscosity")
+
+    def _hold_of_walls(self, used: set[str]) -> float:
+        """Share of the viscosity that solids hold fluids back with: none where it is not named, and fluids slide."""
+        shares = {}
+        for row in self._list("Materials"):
+            own = {**row, **row.get(VISCOSITIES.get(int(row.get("viscosityMethod", 0)), ("", ""))[0], {})}
+            fluid, solid = (float(own.get(key, 0.0)) for key in ("viscosity", "viscosityBoundary"))
+            if fluid > 0.0 and str(row.get("id", "Fluid")) in used:
+                shares[str(row.get("id", "Fluid"))] = min(max(solid / fluid, 0.0), 1.0)
+        if len(set(shares.values())) > 1:
+            self.notes.append("viscosityBoundary differs between the fluids; the largest share of viscosity is taken.")
+        return max(shares.values(), default=0.0)
 
     def _tension(self, name: str, row: dict[str, Any]) -> float | None:
         method = int(row.get("surfaceTensionMethod", 0))

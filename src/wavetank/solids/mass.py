@@ -5,6 +5,7 @@ plane at that distance leaves. A box is exact, a ball right to a thousandth.
 """
 
 import dataclasses
+import math
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from wavetank.solids.solid import Solid
 SEARCH = 48  # boxes along an axis in which the extent is looked for
 PIECES = 200_000  # about, of a quadrature
 LEAST = 4  # boxes along an axis
+MOST_PIECES = 4_000_000  # of a solid: half a gigabyte while they are measured
 
 
 @qd.kernel(fastcache=True)
@@ -83,6 +85,13 @@ class Ruler:
         used = size[: self.dim]
         edge = edge or float((np.prod(used) / PIECES) ** (1.0 / self.dim))
         numbers = np.ones(3, int)
+        wanted = math.prod(max(float(length / edge), 1.0) for length in used)
+        if not wanted <= MOST_PIECES:
+            sizes = " x ".join(f"{length:.3g}" for length in used)
+            raise WavetankError(
+                f"the body {self.solid.name or type(self.solid).__name__!r} of {sizes} m is {wanted:.2g} pieces of "
+                f"{edge:.3g} m; at most {MOST_PIECES:,} are allowed: make it smaller or use a larger spacing."
+            )
         numbers[: self.dim] = np.maximum(np.ceil(used / edge - 1e-6), LEAST)
         edges = np.where(np.arange(3) < self.dim, size / numbers, 0.0)
         places = _centers(lower, upper, numbers)
