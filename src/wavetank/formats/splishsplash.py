@@ -7,7 +7,7 @@ is an inverted box around its own centre, anywhere; sizes of emitters count part
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -152,7 +152,7 @@ class _Reader:
         )
         return self._allowed("dynamic_viscosity", viscosity, f"{name}: viscosity")
 
-    def _hold_of_walls(self, used: set[str]) -> float:
+    def _hold_of_walls(self, used: Collection[str | None]) -> float:
         """Share of the viscosity that solids hold fluids back with: none where it is not named, and fluids slide."""
         shares = {}
         for row in self._list("Materials"):
