@@ -145,8 +145,8 @@ class Simulation(States):
                 self.bodies.step(self.world, scene, dt, limit, shares)
         self.solids.passing.clear()
         self.solids.move_to(0.0, 1.0)
-        self._let_out()
         update_foam(self.world, self._scene_at(self.time + 0.5 * duration), duration, self.frame_number)
+        self._let_out()  # after the foam, which looks for water in the cells of the last step
         self.pushed = []
         self.solids.arrive()
         if self.sources:

@@ -42,6 +42,8 @@ def update_foam(world: World, params: Parameters, dt: float, frame: int) -> None
     c, method = coefficients(params, dt), method_number(params)
     shared = int(current_backend() != "cpu")
 
+    if not count:
+        grid.start.fill(0)  # without water no step has found cells: those of the last one would still hold it
     if pool.count:
         kept = move(pool.spare, pool.now, pool.births, water, grid, solids, c, a, frame, pool.count, shared)
         pool.now, pool.spare, pool.count = pool.spare, pool.now, int(kept)
