@@ -16,7 +16,7 @@ export function choose(name) {
   hand.options = chosen.get(tool.name) ?? {};
   chosen.set(tool.name, hand.options);
   for (const [other, button] of buttons) button.setAttribute("aria-pressed", other === tool.name);
-  buttons.get(tool.name)?.scrollIntoView({ block: "nearest", inline: "nearest" });
+  buttons.get(tool.name)?.scrollIntoView({ block: "nearest", inline: "center" }); // with its neighbours on both sides
   find("picture").classList.toggle("look", tool === look);
   card(tool);
 }
