@@ -28,6 +28,7 @@ from wavetank.solids.motion import Keyframe, Motion, sampled
 from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
 
 if TYPE_CHECKING:
+    from wavetank.formats.dualsphysics import load_dualsphysics
     from wavetank.formats.splishsplash import load_splishsplash
     from wavetank.formats.urdf import load_urdf
     from wavetank.front.notebook.show import show
@@ -45,7 +46,7 @@ __all__ = [
     "Drain", "Emitter", "Filled", "Gauge", "HalfSpace", "HeightField", "Hinge", "Intersection", "Keyframe", "Mesh",
     "Motion", "Points", "Polygon", "Recording", "Rope", "Scene", "Session", "Simulation", "Slider", "Sphere",
     "Spring", "Tank", "Union", "WavetankError", "Weld", "__version__", "bundled_scenes", "commands",
-    "load_splishsplash", "load_urdf", "render", "replay", "sampled", "show",
+    "load_dualsphysics", "load_splishsplash", "load_urdf", "render", "replay", "sampled", "show",
 ]  # fmt: skip
 
 #: what needs the kernels' sources is imported when it is first used: data alone should load fast
@@ -55,6 +56,7 @@ LATER = {
     "Session": "wavetank.session.session",
     "Simulation": "wavetank.simulation.simulation",
     "commands": "wavetank.session.commands",
+    "load_dualsphysics": "wavetank.formats.dualsphysics",
     "load_splishsplash": "wavetank.formats.splishsplash",
     "load_urdf": "wavetank.formats.urdf",
     "render": "wavetank.view.renderer",

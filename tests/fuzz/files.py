@@ -171,22 +171,38 @@ NUMBERS = (
 )
 
 
-@st.composite
-def robots(draw: Any) -> bytes:
-    """A robot with other attributes, elements that are gone, twice, or in the wrong place; or torn."""
+CASE = """<case><casedef><constantsdef><gravity x="0" y="0" z="-9.81"/><rhop0 value="1000"/></constantsdef>
+<geometry><predefinition><newvarcte wide="0.5"/></predefinition>
+<definition dp="0.05"><pointmin x="0" y="0" z="0"/><pointmax x="2" y="1" z="1"/></definition><commands>
+<list name="more"><drawsphere radius="0.06"><point x="0.7" y="0.2" z="0.5"/></drawsphere></list><mainlist>
+<setmkfluid mk="0"/><drawbox><boxfill>solid</boxfill><point x="0" y="0" z="0"/><size x="#wide" y="0.4" z="0.3"/></drawbox>
+<setmkbound mk="0"/><drawbox><boxfill>bottom|left|right|front|back</boxfill><point x="0" y="0" z="0"/>
+<endpoint x="1" y="0.4" z="0.5"/></drawbox><setmkvoid/><drawbox><boxfill>solid</boxfill><point x="0.1" y="0" z="0.1"/>
+<size x="0.1" y="0.1" z="0.1"/></drawbox><setmkbound mk="1"/><runlist name="more" times="1"/><move x="0.1" y="0" z="0"/>
+<setmkbound mk="2"/><rotate ang="20" x="0" y="0" z="1"/><drawbox><boxfill>all</boxfill><point x="0.75" y="0" z="0.1"/>
+<size x="0.1" y="0.1" z="0.1"/></drawbox><drawprism><point x="0.6" y="0" z="0"/><point x="0.7" y="0" z="0"/>
+<point x="0.6" y="0.1" z="0"/><point x="0.6" y="0" z="0.2"/><point x="0.7" y="0" z="0.2"/><point x="0.6" y="0.1" z="0.2"/>
+</drawprism><drawcylinder radius="0.05"><point x="0.9" y="0" z="0"/><point x="0.9" y="0" z="0.1"/></drawcylinder>
+<fillbox x="0" y="0" z="0"><modefill>void</modefill><point x="0" y="0" z="0"/><size x="0.9" y="0.4" z="0.1"/></fillbox>
+</mainlist></commands></geometry><initials><velocity mkfluid="0" x="0.1" y="0" z="0"/></initials>
+<floatings><floating mkbound="1" rhopbody="500"><linearvelini x="0" y="0" z="0.1"/></floating></floatings>
+<motion><objreal ref="2"><begin mov="1" start="0.1"/><mvrot id="1" duration="0.5" next="2"><vel ang="30"/>
+<axisp1 x="0" y="0" z="0"/><axisp2 x="0" y="0" z="1"/></mvrot><wait id="2" duration="0.1"/></objreal></motion></casedef>
+<execution><special><wavepaddles><piston><mkbound value="2"/><depth value="0.3"/><waveheight value="0.05"/>
+<waveperiod value="1"/></piston></wavepaddles></special><parameters><parameter key="TimeMax" value="1"/></parameters>
+</execution></case>"""
+
+
+def spoiled(draw: Any, root: Any, names: list[str]) -> bytes:
+    """Return XML with other attributes, elements that are gone, twice, or in the wrong place; or torn."""
     from xml.etree import ElementTree
 
-    root = ElementTree.fromstring(ROBOT.replace("package://a/", "").replace("<mesh filename=\"b.stl\" scale=\"1 1 1\"/>",
-                                                "<sphere radius=\"0.1\"/>" if draw(st.booleans()) else
-                                                "<mesh filename=\"b.stl\" scale=\"1 1 1\"/>"))  # fmt: skip
     for _ in range(draw(st.integers(1, 4))):
         rows = [row for row in root.iter() if row is not root]
         row, other = draw(st.sampled_from(rows)), draw(st.sampled_from(rows))
         what = draw(st.sampled_from(["value", "value", "value", "drop", "twice", "into", "tag"]))
         if what == "value" and row.attrib:
-            row.set(
-                draw(st.sampled_from(sorted(row.attrib))), draw(st.sampled_from([*NUMBERS, "post", "upper", "cup"]))
-            )
+            row.set(draw(st.sampled_from(sorted(row.attrib))), draw(st.sampled_from([*NUMBERS, *names])))
         elif what == "drop":
             for parent in root.iter():
                 if row in [*parent]:
@@ -200,6 +216,25 @@ def robots(draw: Any) -> bytes:
             row.tag = other.tag
     content = ElementTree.tostring(root)
     return draw(torn(st.just(content))) if not draw(st.integers(0, 3)) else content
+
+
+@st.composite
+def robots(draw: Any) -> bytes:
+    """A robot with damages."""
+    from xml.etree import ElementTree
+
+    root = ElementTree.fromstring(ROBOT.replace("package://a/", "").replace("<mesh filename=\"b.stl\" scale=\"1 1 1\"/>",
+                                                "<sphere radius=\"0.1\"/>" if draw(st.booleans()) else
+                                                "<mesh filename=\"b.stl\" scale=\"1 1 1\"/>"))  # fmt: skip
+    return spoiled(draw, root, ["post", "upper", "cup"])
+
+
+@st.composite
+def cases(draw: Any) -> bytes:
+    """A case of DualSPHysics with damages."""
+    from xml.etree import ElementTree
+
+    return spoiled(draw, ElementTree.fromstring(CASE), ["bound", "#Dp*2", "#wide", "#1/0", "left|top", "1-9999999"])
 
 
 def try_robot(content: bytes) -> None:
@@ -269,7 +304,16 @@ def others(draw: Any) -> Files:
 
 def try_other(files: Files) -> None:
     path = fresh("other", files) / "scene.json"
-    found = taken_or_refused(lambda: load_splishsplash(path))
+    begin(taken_or_refused(lambda: load_splishsplash(path)))
+
+
+def try_case(content: bytes) -> None:
+    path = fresh("case", {"a_Def.xml": content}) / "a_Def.xml"
+    begin(taken_or_refused(lambda: wt.load_dualsphysics(path)))
+
+
+def begin(found: Any) -> None:
+    """Compute a frame of an imported scene that is small."""
     if found is not None:
         assert all("\n" not in note for note in found.notes)
         count = sum(fluid.estimate(found.scene.spacing) for fluid in found.scene.fluids)
@@ -290,5 +334,5 @@ def try_particles(content: bytes) -> None:
 
 FILES: dict[str, tuple[st.SearchStrategy[Any], Any]] = {
     "checkpoint": (runs(), try_checkpoint), "run": (runs(), try_run), "robot": (robots(), try_robot),
-    "other": (others(), try_other), "particles": (particles, try_particles),
+    "other": (others(), try_other), "case": (cases(), try_case), "particles": (particles, try_particles),
 }  # fmt: skip

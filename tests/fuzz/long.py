@@ -25,7 +25,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 FOUND = HERE / "found"
 SHARES = {"scene": 0.25, "state": 0.15, "message": 0.25, "recording": 0.08, "mesh": 0.07,
-          "checkpoint": 0.04, "run": 0.06, "robot": 0.03, "other": 0.04, "particles": 0.03}  # fmt: skip
+          "checkpoint": 0.04, "run": 0.06, "robot": 0.03, "other": 0.04, "case": 0.03, "particles": 0.03}  # fmt: skip
 LONGEST, MORE_MEMORY, BATCH = 5.0, 1_000_000_000, 250
 HANGS = 60.0  # s of a clock, after which the process is ended
 

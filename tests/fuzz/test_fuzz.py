@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis.errors import FlakyStrategyDefinition
 
 SHARES = {"scene": 40, "state": 25, "message": 80, "recording": 25, "mesh": 25, "checkpoint": 20, "run": 30, "robot": 30,
-          "other": 30, "particles": 30}  # fmt: skip
+          "other": 30, "case": 30, "particles": 30}  # fmt: skip
 TIMES = int(os.environ.get("WAVETANK_FUZZ_TIMES", "1"))
 
 

@@ -40,23 +40,27 @@ def export(
 
 @app.command("import")
 def import_scene(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="SCENE.json of SPlisHSPlasH, or ROBOT.urdf.")],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="SCENE.json of SPlisHSPlasH, CASE_Def.xml of DualSPHysics, or ROBOT.urdf."),
+    ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The scene file to be written, TOML.")],
     spacing: Annotated[float | None, typer.Option(help="Distance of particles [m] in place of its own.")] = None,
     into: Annotated[str, typer.Option(help="Scene that a robot comes into.")] = "still-tank",
     at: Annotated[str, typer.Option(help="Where a robot stands [m], as 0.2,0,0.3.")] = "",
     as_json: Json = False,
 ) -> None:
-    """Read a scene of SPlisHSPlasH or a robot, write a scene of wavetank, and say what has no counterpart."""
+    """Read a scene of SPlisHSPlasH or DualSPHysics, or a robot; write a scene, and say what has no counterpart."""
     if file.suffix.lower() == ".urdf":
         from wavetank.formats.urdf import load_urdf
 
         robot = load_urdf(file, _place(at))
         scene, notes = robot.joined(configured(into, [f"spacing={spacing}"] if spacing else [])), robot.notes
     else:
-        from wavetank.formats.splishsplash import load_splishsplash
+        from wavetank import load_dualsphysics, load_splishsplash
 
-        imported = load_splishsplash(file, spacing)
+        load = load_dualsphysics if file.suffix.lower() == ".xml" else load_splishsplash
+        imported = load(file, spacing)
         scene, notes = imported.scene, imported.notes
     scene.save(out)
     if as_json:

@@ -5,7 +5,6 @@ is an inverted box around its own centre, anywhere; sizes of emitters count part
 [m^2/s]; rotations are an axis and an angle. What has no counterpart is told, one sentence each: see docs/formats.md.
 """
 
-import dataclasses
 import math
 from collections.abc import Collection, Iterator
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.formats.bgeo import read_bgeo
+from wavetank.formats.imported import Imported
 from wavetank.formats.splishsplash_solids import Solids, arrays_of, turn_of
 from wavetank.foundation.door import guarded, named, one_line, parse_json, read_text
 from wavetank.foundation.errors import WavetankError
@@ -40,14 +40,6 @@ STEP = 0.001  # s: time step for which their shares of the strain rate that stay
 #: keys of `Configuration` that are read here; the others are about how it is solved, shown and written
 READ = {"particleRadius", "sim2D", "gravitation", "scriptFile"}
 JOINTS = ("TargetVelocityMotorHingeJoints", "HingeJoints", "BallJoints")
-
-
-@dataclasses.dataclass(frozen=True)
-class Imported:
-    """A scene, and what of the file it does not have."""
-
-    scene: Scene
-    notes: tuple[str, ...]
 
 
 def load_splishsplash(path: str | Path, spacing: float | None = None) -> Imported:

@@ -150,13 +150,13 @@ class Solids:
         elif _is_ball(vertices - middle) and not is_inverted(row):
             yield Sphere(center=center, radius=float(0.5 * (upper - lower)[0]), **rotation, **place)
         elif self.dim == 2:
-            for loop in _section(turned(turn, vertices) + shift, faces):
+            for loop in section(turned(turn, vertices) + shift, faces):
                 yield Polygon(points=[(float(x), float(y)) for x, y in loop], invert=is_inverted(row), **place)
         else:
             thickness: dict[str, Any] = {}
             if is_inverted(row):
                 thickness = {"invert": True}
-            elif not _is_closed(faces):
+            elif not is_closed(faces):
                 thickness = {"thickness": 2.0 * self.spacing}
                 self.notes.append(f"{place['name']}: its surface is not closed; it becomes walls two particles thick.")
             edge = float((upper - lower).max())
@@ -189,12 +189,13 @@ def _is_ball(offsets: np.ndarray) -> bool:
     return len(offsets) > 50 and bool(np.ptp(distances) < ROUND * distances.max())
 
 
-def _is_closed(faces: np.ndarray) -> bool:
+def is_closed(faces: np.ndarray) -> bool:
+    """Say whether each edge of the triangles [m, 3] has two of them."""
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
-def _section(vertices: np.ndarray, faces: np.ndarray) -> Iterator[np.ndarray]:
+def section(vertices: np.ndarray, faces: np.ndarray) -> Iterator[np.ndarray]:
     """Yield the closed lines [n, 2] in which a surface meets the plane z = 0, the longest ones first."""
     height = vertices[:, 2] + 1e-9 * max(float(np.abs(vertices[:, 2]).max()), 1e-9)  # no corner lies in the plane
     nexts: dict[tuple[int, int], tuple[int, int]] = {}

@@ -1,0 +1,241 @@
+"""What the commands of a DualSPHysics case draw: boxes, balls, cylinders and meshes, in their order.
+
+GenCase, their tool that reads a case, keeps a state while it draws: what is drawn (fluid, bound or void) with which
+number (mk), and a matrix that moves it. Numbers may be expressions of `Dp` and of variables (`#Dp*2`).
+"""
+
+import dataclasses
+import math
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from wavetank.formats.splishsplash_solids import Solids, arrays_of
+from wavetank.foundation.door import one_line
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.expressions import Expression
+from wavetank.foundation.rotations import unit_quaternion
+
+MOST_ITEMS, DEEPEST, MOST_COMMANDS = 2000, 8, 20_000  # shapes; lists that run lists; commands
+FACES = ("bottom", "top", "left", "right", "front", "back")  # -z, +z, -x, +x, -y, +y of theirs
+_NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]*")
+#: commands that say how something is drawn, shown or kept, which a shape of ours does not need to be told
+_SILENT = {
+    "setshapemode", "setdrawmode", "shapeout", "resetdraw", "setdpctes", "dpctessave", "dpctesload", "dpctesreset",
+    "setactive", "setboxlimitmode", "setnormalinvert", "debugout", "cellsout", "pointsmkout", "printf", "exportvar",
+    "setfrdrawmode", "delvar", "newvarstr", "newvarstrcte", "setvarstr", "varssave", "varsload", "list",
+}  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
+class Item:
+    """A shape that was drawn, in their axes."""
+
+    what: str  # fluid, bound or void
+    mk: int
+    shape: str  # box, sphere, cylinder or mesh
+    points: np.ndarray  # [m], [n, 3]: lower and upper corner, center, ends of the axis, or vertices; before the matrix
+    matrix: np.ndarray  # [4, 4]
+    radius: float = 0.0  # m
+    faces: Any = None  # names of the faces of a box that is none but its faces; triangles [m, 3] of a mesh
+    is_filling: bool = False  # whether it fills what is free in a box
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the matrix does not turn it."""
+        return bool(np.allclose(self.matrix[:3, :3], np.diag(np.diag(self.matrix[:3, :3])), atol=1e-9))
+
+    def corners(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corners of the box along the axes that holds it [m], each [3]."""
+        points = self.points
+        if self.shape == "box":
+            points = np.array([[self.points[k >> axis & 1, axis] for axis in range(3)] for k in range(8)])
+        placed = points @ self.matrix[:3, :3].T + self.matrix[:3, 3]
+        way = self.radius * self.scale
+        return placed.min(axis=0) - way, placed.max(axis=0) + way
+
+    @property
+    def scale(self) -> float:
+        """How much larger the matrix makes it."""
+        return float(abs(np.linalg.det(self.matrix[:3, :3])) ** (1.0 / 3.0))
+
+    def turn(self) -> np.ndarray:
+        """Return the unit quaternion (w, x, y, z) of the matrix: Bar-Itzhack 2000, 10.2514/2.4654."""
+        rows = self.matrix[:3, :3] / max(self.scale, 1e-12)
+        skew = np.array([rows[2, 1] - rows[1, 2], rows[0, 2] - rows[2, 0], rows[1, 0] - rows[0, 1]])
+        table = np.zeros((4, 4))
+        table[0, 0], table[0, 1:], table[1:, 0] = np.trace(rows), skew, skew
+        table[1:, 1:] = rows + rows.T - np.trace(rows) * np.eye(3)
+        return unit_quaternion(np.linalg.eigh(table)[1][:, -1].tolist())
+
+
+class Drawing:
+    """Runs the commands of a case; raises `WavetankError` for numbers that it cannot read."""
+
+    def __init__(self, path: Path, geometry: Element, dp: float, notes: list[str]) -> None:
+        self.path, self.notes = path, notes
+        self.items: list[Item] = []
+        self.variables = {"Dp": dp}
+        self.what, self.mk, self.matrix = "void", 0, np.eye(4)
+        self._kept: list[Any] = []
+        self._left = MOST_COMMANDS
+        for row in geometry.findall("predefinition/*"):
+            self._run(row, 0)
+        commands = geometry.find("commands")
+        self.lists = {row.get("name", ""): row for row in commands.findall("list")} if commands is not None else {}
+        for row in commands.findall("mainlist/*") if commands is not None else ():
+            self._run(row, 0)
+
+    def number(self, text: str) -> float:
+        """Return the number that a text means."""
+        try:
+            value = float(text)
+        except ValueError:
+            plain = text.strip().lstrip("#").replace("pi()", "pi")
+            known = _NAME.sub(lambda m: repr(self.variables[m[0]]) if m[0] in self.variables else m[0], plain)
+            value = Expression(known)(0.0)
+        if not math.isfinite(value):
+            raise WavetankError(f"{one_line(text, 60)} is no finite number.")
+        return value
+
+    def vector(self, row: Element | None, usual: float = 0.0) -> np.ndarray:
+        """Return x, y, z of a tag, float [3]."""
+        return np.array([usual if row is None else self.number(row.get(axis, str(usual))) for axis in "xyz"])
+
+    def _run(self, row: Element, depth: int) -> None:
+        self._left -= 1
+        if self._left < 0 or depth > DEEPEST or len(self.items) > MOST_ITEMS:
+            raise WavetankError(
+                f"it draws too much; at most {MOST_COMMANDS:,} commands, {MOST_ITEMS:,} shapes and lists in lists "
+                f"{DEEPEST} deep are allowed."
+            )
+        tag = str(row.tag)
+        if tag in ("newvar", "newvarcte", "setvar"):
+            for name, text in row.attrib.items():
+                if not name.startswith("_"):
+                    self.variables[name] = self.number(text)
+        elif tag == "setmkvoid":
+            self.what, self.mk = "void", 0
+        elif tag in ("setmkfluid", "setmkbound"):
+            self.what, self.mk = tag.removeprefix("setmk"), int(self.number(row.get("mk", "0")))
+        elif tag in ("mksave", "matrixsave"):
+            self._kept.append((self.what, self.mk) if tag == "mksave" else self.matrix)
+        elif tag in ("mkload", "matrixload"):
+            self._load(is_matrix=tag == "matrixload")
+        elif tag in ("move", "scale", "rotate", "rotateline", "matrixreset"):
+            self.matrix = np.eye(4) if tag == "matrixreset" else self.matrix @ self._moved(row)
+        elif tag == "runlist":
+            for _ in range(int(self.number(row.get("times", "1")))):
+                for part in self.lists.get(row.get("name", ""), ()):
+                    self._run(part, depth + 1)
+        elif tag in _SILENT or row.get("active", "true") in ("false", "0"):
+            pass
+        else:
+            self._draw(tag, row)
+
+    def _load(self, is_matrix: bool) -> None:
+        for k in range(len(self._kept) - 1, -1, -1):
+            if isinstance(self._kept[k], np.ndarray) == is_matrix:
+                kept = self._kept.pop(k)
+                if is_matrix:
+                    self.matrix = kept
+                else:
+                    self.what, self.mk = kept
+                return
+
+    def _moved(self, row: Element) -> np.ndarray:
+        matrix = np.eye(4)
+        if row.tag == "move":
+            matrix[:3, 3] = self.vector(row)
+        elif row.tag == "scale":
+            matrix[:3, :3] = np.diag(self.vector(row, 1.0))
+        else:
+            start, end = np.zeros(3), self.vector(row)
+            if row.tag == "rotateline":
+                start, end = (self.vector(point) for point in row.findall("point")[:2])
+            matrix[:3, :3] = turning(end - start, math.radians(self.number(row.get("ang", "0"))))
+            matrix[:3, 3] = start - matrix[:3, :3] @ start
+        return matrix
+
+    def _draw(self, tag: str, row: Element) -> None:
+        points = [self.vector(point) for point in row.findall("point")]
+        if tag in ("drawbox", "fillbox"):
+            size, end = row.find("size"), row.find("endpoint")
+            other = points[0] + self.vector(size) if size is not None else self.vector(end)
+            corners = np.sort([points[0], other], axis=0)
+            mode = (row.findtext("boxfill") or "solid").replace(" ", "").lower()
+            faces = None if mode == "solid" or tag == "fillbox" else _faces_of(mode)
+            self._add("box", corners, faces=faces, is_filling=tag == "fillbox")
+        elif tag == "drawsphere":
+            self._add("sphere", np.array(points[:1]), radius=self.number(row.get("radius", "")))
+        elif tag == "drawcylinder":
+            self._add("cylinder", np.array(points[:2]), radius=self.number(row.get("radius", "")))
+        elif tag in ("drawfilestl", "drawfileply"):
+            self._add_file(row)
+        elif tag in ("drawprism", "drawpyramid", "drawfigure"):
+            self._add_figure(tag, row)
+        else:
+            self.notes.append(f"<{one_line(tag, 40)}> has no counterpart; it is left out.")
+
+    def _add(self, shape: str, points: np.ndarray, **rest: Any) -> None:
+        self.items.append(Item(self.what, self.mk, shape, points, self.matrix.copy(), **rest))
+
+    def _add_file(self, row: Element) -> None:
+        vertices, faces = arrays_of(Solids.find_file(self.path, row.get("file", "")))
+        vertices = vertices * self.vector(row.find("drawscale"), 1.0)
+        turns = row.find("drawrotate")
+        angles = {} if turns is None else turns.attrib
+        for axis, name in enumerate("xyz"):
+            angle = math.radians(self.number(angles.get(f"ang{name}", "0")))
+            vertices = vertices @ turning(np.eye(3)[axis], angle).T
+        self._add("mesh", vertices + self.vector(row.find("drawmove")), faces=faces)
+
+    def _add_figure(self, tag: str, row: Element) -> None:
+        """A prism has two ends of as many points, a pyramid a top and a base; a figure has triangles."""
+        points = np.array([self.vector(point) for point in row.iter("point")])
+        if tag == "drawfigure":
+            triangles = [[int(self.number(t.get(axis, "0"))) for axis in "xyz"] for t in row.iter("triangle")]
+            faces = np.array(triangles, np.int64).reshape(-1, 3)
+            if len(faces) and (faces.min() < 0 or faces.max() >= len(points)):
+                raise WavetankError("a triangle of <drawfigure> names a point that it does not have.")
+        elif tag == "drawprism":
+            n = len(points) // 2
+            sides = [(k, (k + 1) % n, n + (k + 1) % n, n + k) for k in range(n)]
+            faces = _triangles([tuple(range(n))[::-1], tuple(range(n, 2 * n)), *sides])
+        else:
+            n = len(points)
+            faces = _triangles([tuple(range(1, n))[::-1], *((0, k, k % (n - 1) + 1) for k in range(1, n))])
+        self._add("mesh", points, faces=faces)
+
+
+def _faces_of(mode: str) -> tuple[str, ...]:
+    names = mode.split("|")
+    return FACES if "all" in names else tuple(name for name in FACES if name in names)
+
+
+def _triangles(polygons: Sequence[tuple[int, ...]]) -> np.ndarray:
+    """Return fans over convex polygons, int64 [m, 3]."""
+    fans = [(face[0], face[k], face[k + 1]) for face in polygons for k in range(1, len(face) - 1)]
+    return np.array(fans, np.int64).reshape(-1, 3)
+
+
+def turning(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Return the matrix [3, 3] that turns by `angle` [rad] about an axis (Rodrigues); no axis turns nothing."""
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
+        return np.eye(3)
+    x, y, z = axis / length
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
+
+
+def numbers_of(text: str) -> Iterator[int]:
+    """Yield the numbers of a list as theirs, "1,4-6"."""
+    for part in text.split(","):
+        first, _, last = part.strip().partition("-")
+        if first.isdigit():
+            yield from range(int(first), min(int(last) if last.isdigit() else int(first), int(first) + 1000) + 1)
