@@ -121,6 +121,19 @@ def test_what_a_material_may_not_be():
             Material(name="x", **wrong)
 
 
+def test_water_in_a_plane_is_as_blue_beside_solids_as_elsewhere():
+    """A box and a ball in the water have no pale rim around them, and no dark one."""
+    solids = [Box(center=(0.4, 0.22), size=(0.12, 0.2)), wt.Sphere(center=(0.8, 0.2), radius=0.1)]
+    fluids = [wt.Block(lower=(0, 0), upper=(1.2, 0.48))]
+    sim = wt.Simulation(Scene(spacing=0.02, tank=Tank(size=(1.2, 0.6)), fluids=fluids, solids=solids))
+    sim.advance(0.5)
+    camera = Camera(eye=(0.6, 0.3, 1.0), target=(0.6, 0.3, 0.0), height=0.7)
+    image = picture(sim.frame(), camera)
+    for x, y in ((0.328, 0.22), (0.472, 0.2), (0.912, 0.2), (0.8, 0.312)):
+        beside, far = (at(image, camera, column, y, 0.0, half=1).mean(axis=0) for column in (x, 0.1))
+        assert np.abs(beside - far).max() < 12, (x, y)
+
+
 def test_milk_in_a_plane_is_as_bright_at_its_floor_as_at_its_surface():
     """Nothing casts a shadow in a plane: no map of what the sun sees is read there."""
     milk = Material(name="milk", color="#f6f1e4", clarity="opaque")

@@ -15,6 +15,7 @@ takes the finished backdrop where that point is seen.
 """
 
 from wavetank.device.compiler import qd
+from wavetank.solids.distance import SolidSet, signed_distance
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import (
     Lens,
@@ -58,7 +59,9 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     solids = shot.frame.solids
     together = buffers.supersample * (2 if shot.hasty else 1)
     # Solids are met by bent rays in a tank only: in the open there is no body of water.
-    world = 4 if shot.frame.dim == 3 and shot.frame.scene.tank and solids.count > solids.tank_count else shot.frame.dim
+    world, among = shot.frame.dim, solids.count > solids.tank_count
+    if among and (world == 2 or shot.frame.scene.tank):
+        world = {2: 1, 3: 4}[world]
     paints = buffers.paints.of(colors_of(shot)) if world == 4 else buffers.paints.device
     inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water)
     lay(
@@ -83,21 +86,34 @@ def wall_share(at, walls: Box, disc):
 
 
 @qd.func
-def sheet_at(thickness: qd.template(), lens: Lens, optics: Optics, walls: Box, place):
-    """Thickness of the sheet that a 2-D world is, at a place in the picture [m]."""
-    c = point_at(lens, place.y - 0.5, place.x - 0.5, 1.0)
-    share = wall_share(lens.eye + from_view(lens, c), walls, optics.disc)
-    return thickness_at(thickness, place / optics.coarse, optics.unit) / share
+def solid_share(at, solids: SolidSet, disc):
+    """Share of a disc around `at` that the solids of a plane leave, each taken for a straight wall."""
+    share = 1.0
+    for k in range(solids.tank_count, solids.count):
+        if (solids.position[k] - at).norm() < solids.reach[k] + disc or solids.reach[k] > 1e4:
+            share *= share_before_wall(qd.max(signed_distance(solids, k, at).w / disc, 0.0))
+    return share
 
 
 @qd.func
-def sheet_normal(thickness: qd.template(), lens: Lens, optics: Optics, walls: Box, place):
+def sheet_at(thickness: qd.template(), lens: Lens, optics: Optics, inside: Inside, place, among: qd.template()):
+    """Thickness of the sheet that a 2-D world is, at a place in the picture [m]; `among` solids or not."""
+    at = lens.eye + from_view(lens, point_at(lens, place.y - 0.5, place.x - 0.5, 1.0))
+    thick = thickness_at(thickness, place / optics.coarse, optics.unit) / wall_share(at, inside.walls, optics.disc)
+    if qd.static(among):  # beside corners less is missing than beside a wall: no more than a whole sheet
+        left = solid_share(vec3(at.x, at.y, 0.0), inside.solids, optics.disc)
+        thick = qd.max(thick, qd.min(thick / qd.max(left, 0.2), optics.spacing))
+    return thick
+
+
+@qd.func
+def sheet_normal(thickness: qd.template(), lens: Lens, optics: Optics, inside: Inside, place, among: qd.template()):
     """Normal of the sheet: a plane has no shape in depth and gets that of a drop between two panes."""
     dx, dy = vec2(optics.coarse, 0.0), vec2(0.0, optics.coarse)
-    right = sheet_at(thickness, lens, optics, walls, place + dx)
-    right -= sheet_at(thickness, lens, optics, walls, place - dx)
-    below = sheet_at(thickness, lens, optics, walls, place + dy)
-    below -= sheet_at(thickness, lens, optics, walls, place - dy)
+    right = sheet_at(thickness, lens, optics, inside, place + dx, among)
+    right -= sheet_at(thickness, lens, optics, inside, place - dx, among)
+    below = sheet_at(thickness, lens, optics, inside, place + dy, among)
+    below -= sheet_at(thickness, lens, optics, inside, place - dy, among)
     bulge = optics.disc / (2.0 * optics.coarse * lens.pixel * optics.spacing)
     return from_view(lens, vec3(-bulge * right, bulge * below, -1.0).normalized())
 
@@ -110,7 +126,8 @@ def lay(
     """Shade every pixel that shows water, and copy the backdrop to the others; `surface.nearest` is filled with the
     nearer of its depth and the backdrop's.
 
-    `world` is 2 for a plane, 3 for space, and 4 for space with solids in a tank; ten more with several fluids.
+    `world` is 1 for a plane with solids, 2 for one without, 3 for space, 4 for space with solids in a tank; ten more
+    with several fluids.
     """
     for task in range(strips.count):
         row, begin, end = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
@@ -187,8 +204,8 @@ def lay(
                                         kept_z, kept_layer, kept_pixel = at, layer, pixel
                                     body, above, whole = kept, kept_above, kept_whole
                             result += share * shine(
-                                pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside.walls, row, column,
-                                at, n, origin, direction, body, above, whole, qd.static(min(world % 10, 3)),
+                                pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside, row, column,
+                                at, n, origin, direction, body, above, whole, qd.static(world % 10),
                                 qd.static(world >= 10),
                             )  # fmt: skip
                     line = line_cover(pixels.lines[row, column], front, optics.slack)
@@ -247,7 +264,7 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
 @qd.func
 def shine(
     pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
-    optics: Optics, walls: Box, row, column, z, normal, origin, direction, body, above, whole, dim: qd.template(),
+    optics: Optics, inside: Inside, row, column, z, normal, origin, direction, body, above, whole, world: qd.template(),
     many: qd.template(),
 ):  # fmt: skip
     """Radiance of the water that a pixel shows at depth `z` with this normal.
@@ -258,20 +275,20 @@ def shine(
     ahead, at = direction / pace, origin + z * direction
     place = vec2(column + 0.5, row + 0.5)
     tau, raw = 0.0, 0.0
-    if qd.static(dim == 2):
-        tau = sheet_at(thickness.water, lens, optics, walls, place)
+    if qd.static(world <= 2):
+        tau = sheet_at(thickness.water, lens, optics, inside, place, qd.static(world == 1))
         raw = thickness_at(thickness.water, place / optics.coarse, optics.unit)
-        n = sheet_normal(thickness.water, lens, optics, walls, place)
+        n = sheet_normal(thickness.water, lens, optics, inside, place, qd.static(world == 1))
     else:
         tau = thickness_at(thickness.water, place / optics.coarse, optics.unit)
     cosi = qd.max(-n.dot(ahead), 0.05)
     bent = refracted(ahead, n, cosi)
-    if qd.static(dim == 3):
+    if qd.static(world >= 3):
         raw = tau
     # The least that a drop is thick; in a plane the rim keeps half of the colour.
-    tau = qd.max(tau, qd.static(0.15 if dim == 3 else 0.55) * optics.spacing)
+    tau = qd.max(tau, qd.static(0.15 if world >= 3 else 0.55) * optics.spacing)
     travel = qd.min(tau, (qd.bit_cast(pixels.depth[row, column], qd.f32) - z) * pace)
-    if qd.static(dim == 3):
+    if qd.static(world >= 3):
         travel = above_floor(travel, at, bent)
     c = to_view(lens, at + travel * bent)
     shown = backdrop.behind[row, column]
@@ -282,10 +299,13 @@ def shine(
         if qd.bit_cast(pixels.depth[r, e], qd.f32) > z:  # not what stands in front of the water
             shown = picture_at(backdrop.behind, there)
     glossy = 1.0
-    if qd.static(dim == 3):
+    if qd.static(world >= 3):
         # Less water than in a sheet of single particles is a drop: a ball turns a ray twice by the same angle. Against
         # the glass drops and films are flat, and mirror no more than the glass around them.
-        layers, gap = tau / optics.spacing, qd.min((at - walls.lower).min(), (walls.upper - at).min()) / optics.spacing
+        layers, gap = (
+            tau / optics.spacing,
+            qd.min((at - inside.walls.lower).min(), (inside.walls.upper - at).min()) / optics.spacing,
+        )
         off = smoothstep((gap - 0.05) / 0.2)
         ball = smoothstep((0.75 - layers) / 0.3) * off
         glossy = 1.0 - smoothstep((1.6 - layers) / 0.8) * (1.0 - off)
@@ -301,7 +321,7 @@ def shine(
     color, glow, behind = optics.glow, vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
     if qd.static(many):
         swallow, tint, color, cover, glow, hidden, behind = mixed(
-            thickness, look, optics, place, tau, qd.static(dim == 2)
+            thickness, look, optics, place, tau, qd.static(world <= 2)
         )
     if thickness.stained[0] == 1:
         # Of what the map holds: a wall takes as much of the dye's discs as of the water's.
@@ -323,15 +343,15 @@ def shine(
                 at,
                 vec3(0.0, 1.0, 0.0),
                 -ahead,
-                qd.static(dim == 2),
+                qd.static(world <= 2),
             )
             result += hidden * (lit * qd.exp(-0.3 * tau * swallow) - result)
             if cover > 0.0:
-                lit = murky(sunlit, sun, look, optics, color, glow, at, n, -ahead, qd.static(dim == 2))
+                lit = murky(sunlit, sun, look, optics, color, glow, at, n, -ahead, qd.static(world <= 2))
                 result += cover * (lit - result)
-    if qd.static(dim == 2):  # the rim of the sheet catches the light, and on paper there is nothing to mirror
+    if qd.static(world <= 2):  # the rim of the sheet catches the light, and on paper there is nothing to mirror
         # Light comes from above left, and less of it reaches the bottom.
-        high = (at.y - walls.lower.y) / (walls.upper.y - walls.lower.y)
+        high = (at.y - inside.walls.lower.y) / (inside.walls.upper.y - inside.walls.lower.y)
         result *= (0.75 + 0.3 * qd.max(n.dot(look.to_sun), 0.0)) * (0.78 + 0.4 * qd.min(high, 1.0))
         result += 0.35 * look.lamp * smoothstep((0.85 - tau / optics.spacing) / 0.3)
     else:
