@@ -1,3 +1,7 @@
+import os
+import signal
+import time
+
 import av
 import numpy as np
 import pytest
@@ -52,6 +56,34 @@ def test_an_interrupt_leaves_a_complete_file(tmp_path):
         raise KeyboardInterrupt
     assert len(decoded(tmp_path / "a.mp4")[1]) == len(COLORS)
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.mp4"]
+
+
+def test_a_second_interrupt_keeps_what_the_encoder_holds_back(tmp_path):
+    """Five pictures lie in the encoder and there is no file yet: an interrupt while they are encoded loses none."""
+    path = tmp_path / "a.mp4"
+    with pytest.raises(KeyboardInterrupt), VideoWriter(path, 64, 48, 30.0) as video:
+        drain = video._drain
+
+        def interrupted():
+            video._drain = drain
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.3)
+            drain()
+
+        video._drain = interrupted
+        for k in range(5):
+            video.write(picture(COLORS[k], 64, 48))
+    assert len(decoded(path)[1]) == 5
+    assert [*tmp_path.iterdir()] == [path]
+
+
+def test_stopping_at_once_keeps_all_pictures(tmp_path):
+    video = VideoWriter(tmp_path / "a.mp4", 64, 48, 30.0)
+    for k in range(5):
+        video.write(picture(COLORS[k], 64, 48))
+    video.keep()
+    video.close()
+    assert len(decoded(tmp_path / "a.mp4")[1]) == 5
 
 
 def test_an_error_leaves_the_old_file_and_nothing_else(tmp_path):

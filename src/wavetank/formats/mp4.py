@@ -1,5 +1,6 @@
 """H.264 video in MP4, for every browser and player."""
 
+import threading
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -38,6 +39,9 @@ class VideoWriter:
             raise WavetankError(f"{str(path)!r}: a video is an MP4; give the file a name that ends with .mp4.")
         self.path, self.width, self.height = Path(path), int(width), int(height)
         self.count = 0
+        self._is_closed = False
+        self._has_ended, self._lock = False, threading.Lock()
+        self._problem: Exception | None = None
         self._rate = Fraction(fps).limit_denominator(1001)
         self._partial = partial_path(path)
         self._container = _open(self._partial)
@@ -65,14 +69,10 @@ class VideoWriter:
 
     def close(self) -> None:
         """Complete the file, its index first, and give it its name; without a single picture no file is left."""
-        if self._container is None:
+        if self._is_closed:
             return
         try:
-            if self.count:
-                for packet in self._stream.encode(None):
-                    self._container.mux(packet)
-            self._container.close()
-            self._container = None
+            self._end()
             if self.count:
                 join([self._partial], self.path)
         except KeyboardInterrupt:
@@ -85,18 +85,44 @@ class VideoWriter:
 
     def keep(self) -> None:
         """Stop at once and leave what there is under the file's name; it plays as far as it goes."""
-        container, self._container = self._container, None
-        if container is not None:
-            container.close()
+        if self._is_closed:
+            return
+        self._end()
+        self._is_closed = True
         if self.count and self._partial.exists():
             self._partial.replace(self.path)
 
     def discard(self) -> None:
         """Stop and leave nothing."""
-        container, self._container = self._container, None
-        if container is not None:
-            container.close()
+        self._is_closed = True
+        with self._lock:
+            if not self._has_ended:
+                self._container.close()
+                self._has_ended = True
         self._partial.unlink(missing_ok=True)
+
+    def _end(self) -> None:
+        """Encode what the encoder holds back, up to some forty pictures, and end the file that grows; once.
+
+        In a thread of its own, where no interrupt comes between: whoever was interrupted here comes again and waits.
+        """
+        thread = threading.Thread(target=self._drain)
+        thread.start()
+        thread.join()
+        if self._problem is not None:
+            raise self._problem
+
+    def _drain(self) -> None:
+        with self._lock:
+            if self._has_ended:
+                return
+            try:
+                for packet in self._stream.encode(None) if self.count else ():
+                    self._container.mux(packet)
+                self._container.close()
+            except Exception as error:
+                self._problem = error
+            self._has_ended = True
 
     def __enter__(self) -> "VideoWriter":
         return self
