@@ -94,6 +94,12 @@ def relaxations(params: Parameters, density_ratio: float = 1.0) -> list[tuple[fl
     return schedule(params.iterations, 4.0 * params.slowest_mode / params.iterations, stiffest)
 
 
+@functools.lru_cache(maxsize=256)
+def before_fall(c: Coefficients) -> Coefficients:
+    """Return `c` for densities of places before gravity, less what is carried on, moved all by the same way."""
+    return dataclasses.replace(c, fallen=(1.0 - c.carried) * c.dt**2)
+
+
 def correction_number(params: Parameters) -> int:
     """Return the place of the correction in `density_constraint.CORRECTIONS`."""
     return 0 if params.tensile_strength == 0.0 else 2 if params.tensile_exponent == 4.0 else 1

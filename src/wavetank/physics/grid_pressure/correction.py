@@ -42,7 +42,7 @@ import math
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls, remembered
 from wavetank.foundation.params import Parameters
-from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
+from wavetank.physics.boundary import fall, flattened, kept_in_tank, next_near, wall_share
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, open_area, solve_levels
@@ -56,7 +56,7 @@ from wavetank.physics.grid_pressure.room import (
     open_tents,
     whole,
 )  # fmt: skip
-from wavetank.physics.grid_pressure.surface import carried_share, depth_at
+from wavetank.physics.grid_pressure.surface import along, carried_share, depth_at
 from wavetank.physics.mixture import Blend
 from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predict_at, predicted
@@ -96,6 +96,7 @@ class Errors:
     unit: qd.f32  # what a whole number in the sums is the inverse of
     volume: qd.f32  # of a particle, over that of a cell and the unit
     scale: qd.f32  # 1/m^2, the same over the stiffness M
+    per_way: qd.f32  # the share of errors that is removed, over the stiffness M
     inner_from: qd.f32  # the fill from which a particle counts
     inner_to: qd.f32  # and with which it counts in full
     missing: qd.f32  # share by which the answer of solids is increased
@@ -214,7 +215,7 @@ def add_errors(
         if near != 0:
             x = lift(particles.x[i])
             added[0, i - first] = e.missing * approached(
-                x, lift(predicted(particles, i)), near, solids, walls, c, searched
+                x, lift(predicted(particles, i)) - fall(c), near, solids, walls, c, searched
             )
     for lane in range(lanes):
         s = in_cells(grid, predicted(particles, first + lane))
@@ -242,6 +243,28 @@ def taken(sums: qd.template(), n, nodes, parts):
     for part in range(parts):
         total += sums[part * nodes + n]
         sums[part * nodes + n] = 0
+    return total
+
+
+@qd.func
+def borne(fill):
+    """Share of the weight that the grid bears where water is so thin that it hardly fills a cell."""
+    return qd.min(qd.max((fill - 0.5) / 0.25, 0.0), 1.0)
+
+
+@qd.func
+def flow_out(grid: CoarseGrid, n, way):
+    """Share of a cell that flows out of that of node `n`, where all water moves by the same `way` [m]."""
+    edges = vec3(grid.dx, grid.dy, grid.dz)
+    total = 0.0
+    for axis in qd.static(range(3)):
+        if grid.nz > 1 or axis < 2:
+            for side in qd.static((-1, 1)):
+                nodes = along(grid, n, axis, side)
+                if nodes[0] > 0:
+                    m = n + nodes[1]
+                    if qd.min(grid.room[n], grid.room[m]) > 0.0:
+                        total += side * open_area(grid, n, m) * way[axis] / edges[axis]
     return total
 
 
@@ -293,7 +316,7 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.rhs[n] = e.scale * total
+        grid.rhs[n] = e.scale * total - e.per_way * flow_out(grid, n, fall(c)) * borne(grid.fill[n])
         if qd.static(searched):
             grid.rhs[n] -= grid.slope_x[n] * e.closing * grid.room[n]
     qd.loop_config(serialize=bool(few))
@@ -394,7 +417,8 @@ def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
     """Return the numbers of `gather`."""
     volume = params.spacing**params.dim / (grid.dx * grid.dy * grid.dz) / UNIT
     return remembered(Errors(
-        unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness, inner_from=INNER[0],
+        unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness,
+        per_way=params.grid_pressure / stiffness, inner_from=INNER[0],
         inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT,
         closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA,
     ))  # fmt: skip
