@@ -332,10 +332,13 @@ def slope_across(grid: CoarseGrid, coupled, edge, n, m):
 
 
 @qd.func
-def slope_along(grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), dim: qd.template()):
+def slope_along(
+    grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), at_rest, dim: qd.template(),
+    searched: qd.template(),
+):  # fmt: skip
     """Derivative of lambda [m] along `axis` at the place `s` [cells], from the faces around that lead into water.
 
-    The `slope` of the others is 0.
+    The `slope` of the others is 0. In a gap so narrow that there is none it is what holds water `at_rest`.
     """
     place = s
     place[axis] -= 0.5
@@ -346,13 +349,17 @@ def slope_along(grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), 
         own = slope[at[k]]
         total += weights[k] * own
         weight += weights[k] if own != 0.0 else 0.0
-    return total / qd.max(weight, 1e-9)
+    found = total / qd.max(weight, 1e-9)
+    if qd.static(searched):
+        enclosed = at_rest * borne(grid.fill[nearest(grid, qd.floor(s + 0.5, qd.i32))])
+        found = qd.select(weight == 0.0, enclosed, found)
+    return found
 
 
 @qd.kernel(fastcache=True)
 def move_particles(
     grid: CoarseGrid, particles: Particles, cells: Grid, solids: SolidSet, c: Coefficients, push: Push, count: qd.i32,
-    few: qd.template(),
+    few: qd.template(), searched: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by M grad lambda, inside the tank, and carry it on; what sticks out has less.
 
@@ -364,6 +371,7 @@ def move_particles(
         grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, n + grid.nx)
         grid.slope_z[n] = slope_across(grid, grid.wz[n], grid.dz, n, n + grid.nx * grid.ny)
     for turn in range(turns(cells, count)):
+        at_rest = -fall(c) / push.stiffness
         for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
             first = team * cells.lanes
             dim = qd.static(particles.x[first].n)
@@ -372,10 +380,10 @@ def move_particles(
             for lane in range(cells.lanes):
                 s = in_cells(grid, predicted(particles, first + lane))
                 shares[0, lane] = carried_share(grid, s, push.supported, push.fade, dim)
-                slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, dim)
-                slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, dim)
+                slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, at_rest.x, dim, searched)
+                slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, at_rest.y, dim, searched)
                 if qd.static(dim == 3):
-                    slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, dim)
+                    slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, at_rest.z, dim, searched)
             for i in range(first, end_of(team, cells, count)):
                 p = predicted(particles, i)
                 dp = column(slopes, i - first) * (push.stiffness * shares[0, i - first])
@@ -407,7 +415,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     )  # fmt: skip
     solve_levels(world.levels)
     push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing)
-    move_particles(finest, world.particles, cells, world.solids, c, remembered(push), count, few)
+    move_particles(finest, world.particles, cells, world.solids, c, remembered(push), count, few, searched)
     if world.pieces:
         acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2
         push_on_grid(world, stiffness, stiffness / acting if acting else 0.0)  # nothing is deep without gravity
