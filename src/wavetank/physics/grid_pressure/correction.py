@@ -77,13 +77,14 @@ from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, sig
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
+BORNE = (0.6, 0.9)  # fill of a cell from where to where the grid bears its weight
 REACH = 0.2  # of the support: the longest correction
 DAMPING = 0.1  # of a frame: the length of a step that damps as much, docs/notebook/calm.md
 LARGEST_CARRIED = 1.2  # of gravity
 SUPPORTED = 0.5  # d: depth from which on the grid carries a particle in full, that of the top layer at rest
 FADE = 1.0  # d: by how much higher it carries nothing
 MISSING = 1.0 / 3.0  # of a wall's answer, over what it gives: all of what lacks, docs/notebook/grid-pressure.md
-FULL = 0.97  # fill that cells without gaps have at least, also where few rows of particles do not match them
+FULL = 0.98  # fill that cells without gaps have at least, also where few rows of particles do not match them
 SLIT = 0.7  # fill of a cell that touches a solid, as far as its tents can tell
 CLOSING = 0.5  # of what lacks, in a step
 GAP_SHARE = 6.0  # by which errors are less, of what lacks there
@@ -97,6 +98,8 @@ class Errors:
     volume: qd.f32  # of a particle, over that of a cell and the unit
     scale: qd.f32  # 1/m^2, the same over the stiffness M
     per_way: qd.f32  # the share of errors that is removed, over the stiffness M
+    borne_from: qd.f32  # the fill from which weight is borne
+    borne_to: qd.f32  # and from which all of it is
     inner_from: qd.f32  # the fill from which a particle counts
     inner_to: qd.f32  # and with which it counts in full
     missing: qd.f32  # share by which the answer of solids is increased
@@ -116,6 +119,8 @@ class Push:
     reach: qd.f32  # m: the longest correction
     supported: qd.f32  # m: depth from which on particles have all of it
     fade: qd.f32  # m: by how much higher they have none
+    borne_from: qd.f32  # the fill from which weight is borne in gaps
+    borne_to: qd.f32  # and from which all of it is
 
 
 def carried(dt: float, frame_time: float) -> float:
@@ -247,9 +252,9 @@ def taken(sums: qd.template(), n, nodes, parts):
 
 
 @qd.func
-def borne(fill):
+def borne(fill, first, last):
     """Share of the weight that the grid bears where water is so thin that it hardly fills a cell."""
-    return qd.min(qd.max((fill - 0.5) / 0.25, 0.0), 1.0)
+    return qd.min(qd.max((fill - first) / (last - first), 0.0), 1.0)
 
 
 @qd.func
@@ -316,7 +321,7 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.rhs[n] = e.scale * total - e.per_way * flow_out(grid, n, fall(c)) * borne(grid.fill[n])
+        grid.rhs[n] = e.scale * total - e.per_way * flow_out(grid, n, fall(c)) * borne(grid.fill[n], e.borne_from, e.borne_to)
         if qd.static(searched):
             grid.rhs[n] -= grid.slope_x[n] * e.closing * grid.room[n]
     qd.loop_config(serialize=bool(few))
@@ -333,7 +338,7 @@ def slope_across(grid: CoarseGrid, coupled, edge, n, m):
 
 @qd.func
 def slope_along(
-    grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), at_rest, dim: qd.template(),
+    grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), at_rest, push: Push, dim: qd.template(),
     searched: qd.template(),
 ):  # fmt: skip
     """Derivative of lambda [m] along `axis` at the place `s` [cells], from the faces around that lead into water.
@@ -351,7 +356,7 @@ def slope_along(
         weight += weights[k] if own != 0.0 else 0.0
     found = total / qd.max(weight, 1e-9)
     if qd.static(searched):
-        enclosed = at_rest * borne(grid.fill[nearest(grid, qd.floor(s + 0.5, qd.i32))])
+        enclosed = at_rest * borne(grid.fill[nearest(grid, qd.floor(s + 0.5, qd.i32))], push.borne_from, push.borne_to)
         found = qd.select(weight == 0.0, enclosed, found)
     return found
 
@@ -371,7 +376,7 @@ def move_particles(
         grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, n + grid.nx)
         grid.slope_z[n] = slope_across(grid, grid.wz[n], grid.dz, n, n + grid.nx * grid.ny)
     for turn in range(turns(cells, count)):
-        at_rest = -fall(c) / push.stiffness
+        at_rest = vec3(c.gravity_x, c.gravity_y, c.gravity_z) * ((c.carried - 1.0) * c.dt * c.dt / push.stiffness)
         for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
             first = team * cells.lanes
             dim = qd.static(particles.x[first].n)
@@ -380,10 +385,10 @@ def move_particles(
             for lane in range(cells.lanes):
                 s = in_cells(grid, predicted(particles, first + lane))
                 shares[0, lane] = carried_share(grid, s, push.supported, push.fade, dim)
-                slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, at_rest.x, dim, searched)
-                slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, at_rest.y, dim, searched)
+                slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, at_rest.x, push, dim, searched)
+                slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, at_rest.y, push, dim, searched)
                 if qd.static(dim == 3):
-                    slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, at_rest.z, dim, searched)
+                    slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, at_rest.z, push, dim, searched)
             for i in range(first, end_of(team, cells, count)):
                 p = predicted(particles, i)
                 dp = column(slopes, i - first) * (push.stiffness * shares[0, i - first])
@@ -414,7 +419,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         count, searched, kinds.mixed, few,
     )  # fmt: skip
     solve_levels(world.levels)
-    push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing)
+    push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing, *BORNE)
     move_particles(finest, world.particles, cells, world.solids, c, remembered(push), count, few, searched)
     if world.pieces:
         acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2
@@ -426,7 +431,7 @@ def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
     volume = params.spacing**params.dim / (grid.dx * grid.dy * grid.dz) / UNIT
     return remembered(Errors(
         unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness,
-        per_way=params.grid_pressure / stiffness, inner_from=INNER[0],
+        per_way=params.grid_pressure / stiffness, borne_from=BORNE[0], borne_to=BORNE[1], inner_from=INNER[0],
         inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT,
         closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA,
     ))  # fmt: skip
