@@ -96,7 +96,7 @@ def relaxations(params: Parameters, density_ratio: float = 1.0) -> list[tuple[fl
 
 @functools.lru_cache(maxsize=256)
 def before_fall(c: Coefficients) -> Coefficients:
-    """Return `c` for densities of places before gravity, less what is carried on, moved all by the same way."""
+    """Return `c` for densities of places before gravity, less what is carried on, moved all of them alike."""
     return dataclasses.replace(c, fallen=(1.0 - c.carried) * c.dt**2)
 
 

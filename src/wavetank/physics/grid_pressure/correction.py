@@ -321,7 +321,9 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.rhs[n] = e.scale * total - e.per_way * flow_out(grid, n, fall(c)) * borne(grid.fill[n], e.borne_from, e.borne_to)
+        grid.rhs[n] = e.scale * total - e.per_way * flow_out(grid, n, fall(c)) * borne(
+            grid.fill[n], e.borne_from, e.borne_to
+        )
         if qd.static(searched):
             grid.rhs[n] -= grid.slope_x[n] * e.closing * grid.room[n]
     qd.loop_config(serialize=bool(few))
@@ -376,7 +378,7 @@ def move_particles(
         grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, n + grid.nx)
         grid.slope_z[n] = slope_across(grid, grid.wz[n], grid.dz, n, n + grid.nx * grid.ny)
     for turn in range(turns(cells, count)):
-        at_rest = vec3(c.gravity_x, c.gravity_y, c.gravity_z) * ((c.carried - 1.0) * c.dt * c.dt / push.stiffness)
+        at_rest = -fall(c) / push.stiffness
         for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
             first = team * cells.lanes
             dim = qd.static(particles.x[first].n)
@@ -415,8 +417,8 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     few = int(not is_shared(finest))
     gather(
-        finest, world.particles, world.scratch, cells, world.solids, world.walls, c, errors(finest, params, stiffness),
-        count, searched, kinds.mixed, few,
+        finest, world.particles, world.scratch, cells, world.solids, world.walls, c,
+        errors(finest, params, stiffness), count, searched, kinds.mixed, few,
     )  # fmt: skip
     solve_levels(world.levels)
     push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing, *BORNE)

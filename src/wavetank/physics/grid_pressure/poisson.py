@@ -22,7 +22,7 @@ from wavetank.physics.grid_pressure.coarse_grid import coordinates
 
 SWEEPS, MOST_SWEEPS = 8, 200  # of a level, and of the coarsest
 OVER_RELAXATION = 1.5
-LEAST_THETA = 0.1
+LEAST_THETA = 0.01  # what is less slants the pressure along a surface that lies at nodes: docs/notebook/calm.md
 BLOCK_NODES = 8192  # at most, of a level that one block of a graphics processor sees to
 
 
