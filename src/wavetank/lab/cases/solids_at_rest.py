@@ -2,7 +2,8 @@
 
 Reference: hydrostatics; nothing acts on water at rest. Each world is small, and its solids lie anywhere to the cells of
 the pressure and to the rows of the water: by a share of a cell that is drawn for each start. What counts is the fastest
-particle of two seconds, by its velocity and by its way from frame to frame, whichever is more.
+particle of two seconds, by its velocity and by its way from frame to frame, whichever is more. What is slower than
+0.2 sqrt(g d) past a solid is slow (`coefficients.SLOW_AT_SOLIDS`); a particle that is thrown is faster.
 """
 
 import dataclasses
@@ -24,6 +25,7 @@ SIZE = {2: (1.0, 0.6), 3: (0.6, 0.45, 0.42)}  # m, of the tank
 SPACING = {2: 0.02, 3: 0.03}  # m
 DEPTH = {2: 0.4, 3: 0.3}  # m, before solids take their room
 SECONDS, WATCHED = 10.0, 2.0
+SLOW = 0.2  # of sqrt(g d)
 
 
 def worlds(dim: int, start: int) -> dict[str, list[AnySolid]]:
@@ -114,7 +116,10 @@ def run(quick: bool, arch: str) -> Outcome:
                 seen.setdefault(f"{dim}-D, {name}", []).append(watch(solids, dim, arch))
     worst = {name: max(w.worst for w in starts) for name, starts in seen.items()}
     median = {name: max(float(np.median(w.velocity)) for w in starts) for name, starts in seen.items()}
-    figures = [Figure(f"{name}: fastest", value, "m/s", None, None, "0", "rest") for name, value in worst.items()]
+    bounds = {f"{dim}-D": SLOW * math.sqrt(9.81 * d) for dim, d in SPACING.items()}
+    figures = [
+        Figure(f"{name}: fastest", value, "m/s", None, bounds[name[:3]], "0", "rest") for name, value in worst.items()
+    ]
 
     def draw(plot: Any) -> None:
         axis = plot.subplots()
