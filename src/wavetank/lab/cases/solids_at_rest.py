@@ -40,7 +40,8 @@ def worlds(dim: int, start: int) -> dict[str, list[AnySolid]]:
         angle += chance.uniform(-0.05, 0.05)
         return (math.cos(angle / 2.0), 0.0, 0.0, math.sin(angle / 2.0))
 
-    surface, result = DEPTH[dim], {}
+    surface = DEPTH[dim]
+    result: dict[str, list[AnySolid]] = {}
     if dim == 2:
         for layers in (1, 2, 3):
             x, top = at(0.5)[0], surface + 1.2 * d - layers * d

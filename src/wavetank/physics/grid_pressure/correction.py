@@ -24,11 +24,6 @@ the share `DAMPING` of a frame would, and steps shorter than that carry nothing.
 modes that are much stiffer than a step are stopped at once, as without it. No more than `LARGEST_CARRIED` times gravity
 is carried, so that water that hits a wall does not bounce.
 
-At walls. Layers of a wall that move with a particle by half of its way (`smoothing.WALL_STIFFENING`) answer it with 3/4
-of the density that water would, so that the grid removed only 3/4 of what runs into a wall in a step, and water at rest
-made up for it by standing too close. The grid is told most of the rest: `MISSING` times what the way of this step has
-added. As it is the way that counts and not the place, it does not shift where water rests.
-
 Gaps. Particles in rows, near in one direction and far in the other, read the density of water at rest where there is
 less: the kernel is pointed and counts near ones most. The grid counts the room, so it knows. Where even the fullest
 cells around are less than `FULL`, the rows have gaps that the water around may close, and an error is less by
@@ -42,7 +37,7 @@ import math
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls, remembered
 from wavetank.foundation.params import Parameters
-from wavetank.physics.boundary import fall, flattened, kept_in_tank, next_near, wall_share
+from wavetank.physics.boundary import fall, flattened, kept_in_tank
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, open_area, solve_levels
@@ -56,7 +51,9 @@ from wavetank.physics.grid_pressure.room import (
     open_tents,
     whole,
 )  # fmt: skip
-from wavetank.physics.grid_pressure.surface import along, carried_share, depth_at
+from wavetank.physics.grid_pressure.surface import carried_share, depth_at
+from wavetank.physics.grid_pressure.walls import approached
+from wavetank.physics.grid_pressure.weight import borne, flow_out
 from wavetank.physics.mixture import Blend
 from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predict_at, predicted
@@ -73,7 +70,7 @@ from wavetank.physics.teams import (
     turns_over,
 )  # fmt: skip
 from wavetank.physics.world import World
-from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, signed_distance, to_local, vec3, vec4
+from wavetank.solids.distance import SolidSet, lift
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
@@ -180,30 +177,6 @@ def add_fill(
 
 
 @qd.func
-def approached(x, p, near, solids: SolidSet, walls: Walls, c: Coefficients, searched: qd.template()):
-    """Relative density that the marked solids have added on the way from `x` to `p`, in their motion."""
-    added, free = 0.0, 1.0
-    k = next_near(near, -1, solids)
-    while k < (solids.count if qd.static(searched) else solids.tank_count):
-        value = vec4(0.0, 0.0, 0.0, 0.0)
-        way = p - x
-        if qd.static(searched):
-            value = signed_distance(solids, k, p)
-            if k >= solids.tank_count:
-                own = to_local(solids.old_position[k], solids.old_rotation[k], x)
-                way = p - solids.position[k] - rotate(solids.rotation[k], own)
-        else:
-            value = plane_distance(solids, k, p)
-        if value.w < c.h:
-            share = wall_share(walls, value.w, c.h) * c.wall_density
-            inward = -way.dot(vec3(value.x, value.y, value.z))
-            added = added * (1.0 - share[0]) + inward * free * share[1] / c.h
-            free *= 1.0 - share[0]
-        k = next_near(near, k, solids)
-    return added
-
-
-@qd.func
 def add_errors(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     e: Errors, cells: Grid, team, part, count, searched: qd.template(),
@@ -248,28 +221,6 @@ def taken(sums: qd.template(), n, nodes, parts):
     for part in range(parts):
         total += sums[part * nodes + n]
         sums[part * nodes + n] = 0
-    return total
-
-
-@qd.func
-def borne(fill, first, last):
-    """Share of the weight that the grid bears where water is so thin that it hardly fills a cell."""
-    return qd.min(qd.max((fill - first) / (last - first), 0.0), 1.0)
-
-
-@qd.func
-def flow_out(grid: CoarseGrid, n, way):
-    """Share of a cell that flows out of that of node `n`, where all water moves by the same `way` [m]."""
-    edges = vec3(grid.dx, grid.dy, grid.dz)
-    total = 0.0
-    for axis in qd.static(range(3)):
-        if grid.nz > 1 or axis < 2:
-            for side in qd.static((-1, 1)):
-                nodes = along(grid, n, axis, side)
-                if nodes[0] > 0:
-                    m = n + nodes[1]
-                    if qd.min(grid.room[n], grid.room[m]) > 0.0:
-                        total += side * open_area(grid, n, m) * way[axis] / edges[axis]
     return total
 
 
