@@ -25,8 +25,9 @@ from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 
 QUICK = ["still-tank", "column", "martin-moyce", "lobovsky", "standing-wave", "elliptical-drop", "drop", "energy",
-         "momentum", "rest", "creep", "seeds", "layers", "lock-exchange", "shear-wave", "gravity-current",
-         "buckling", "tension-drop", "calm-vorticity", "emitter", "buoyancy", "heave", "water-entry"]  # fmt: skip
+         "momentum", "rest", "solids-at-rest", "creep", "seeds", "layers", "lock-exchange", "shear-wave",
+         "gravity-current", "buckling", "tension-drop", "calm-vorticity", "emitter", "buoyancy", "heave",
+         "water-entry"]  # fmt: skip
 
 
 def test_the_help_names_all_cases():

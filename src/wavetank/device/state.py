@@ -241,6 +241,7 @@ class Coefficients:
     wall_gap: qd.f32  # m
     skin: qd.f32 = 0.0  # m^(dim - 2), see physics/tension.py
     cohesion: qd.f32 = 0.0  # m^(dim - 2), likewise
+    fallen: qd.f32 = 0.0  # s^2: by this times gravity places are told from where all fell alike, see grid_pressure
 
 
 MOST_REMEMBERED = 512

@@ -105,6 +105,12 @@ def add_solids(
 
 
 @qd.func
+def fall(c: Coefficients):
+    """Way [m] that all particles have fallen alike, which does not count."""
+    return vec3(c.gravity_x, c.gravity_y, c.gravity_z) * c.fallen
+
+
+@qd.func
 def find_walls(sums: qd.template(), team, particles: Particles, solids: SolidSet, walls: Walls, c: Coefficients):
     """Find, in a column for each particle of a team, (gradient [1/m], free share) by the marked solids.
 
@@ -116,14 +122,15 @@ def find_walls(sums: qd.template(), team, particles: Particles, solids: SolidSet
         near |= particles.near[first + lane]
     for lane in range(sums.m):
         sums[3, lane] = 1.0
+    way = fall(c)
     k = next_near(near, -1, solids)
     while k < solids.tank_count:
         for lane in range(sums.m):
-            add_wall(sums, lane, plane_distance(solids, k, lift(predicted(particles, first + lane))), walls, c)
+            add_wall(sums, lane, plane_distance(solids, k, lift(predicted(particles, first + lane)) - way), walls, c)
         k = next_near(near, k, solids)
     if near >> solids.tank_count != 0:
         for lane in range(sums.m):
-            p = predicted(particles, first + lane)
+            p = lift(predicted(particles, first + lane)) - way
             add_solids(sums, lane, p, particles.near[first + lane], solids.tank_count - 1, solids, walls, c)
     return near
 

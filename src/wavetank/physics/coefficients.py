@@ -36,8 +36,9 @@ def coefficients(
     s_0 = rest.squared_gradients / h**2
     w_dq = float(kernel_shape(NAMES[params.kernel][0], np.array(params.tensile_distance))[0])
     tensile = params.tensile_strength / s_0 / (parts or params.iterations) / w_dq**params.tensile_exponent
-    # Packings need it that gravity presses; without gravity it would blow them up (docs/notebook/calm.md).
-    tensile *= dt / params.frame_time * min(1.0, math.hypot(*params.gravity) / EARTH)
+    # Packings need it that gravity presses; without gravity it would blow them up (docs/notebook/calm.md). It is the
+    # same force in steps of any length.
+    tensile *= (dt / params.frame_time) ** 2 * min(1.0, math.hypot(*params.gravity) / EARTH)
     viscosity = min(1.0, params.viscosity * REFERENCE_RATE * dt)
     calming = 1.0 - (1.0 - params.calming) ** (dt / params.frame_time)
     # Of what an iteration may move a particle by: as fast as it goes, and as it falls past a neighbour.
@@ -92,6 +93,12 @@ def relaxations(params: Parameters, density_ratio: float = 1.0) -> list[tuple[fl
     rest = rest_lattice(params.kernel, params.dim, params.support)
     stiffest = (rest.stiffest_mode + DISORDER[params.dim] + stiffening(density_ratio)) / params.relaxation
     return schedule(params.iterations, 4.0 * params.slowest_mode / params.iterations, stiffest)
+
+
+@functools.lru_cache(maxsize=256)
+def before_fall(c: Coefficients) -> Coefficients:
+    """Return `c` for densities of places before gravity, less what is carried on, moved all of them alike."""
+    return dataclasses.replace(c, fallen=(1.0 - c.carried) * c.dt**2)
 
 
 def correction_number(params: Parameters) -> int:

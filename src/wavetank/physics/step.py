@@ -11,7 +11,7 @@ from wavetank.device.state import Coefficients
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids
 from wavetank.physics.central_xsph import apply_central_xsph
-from wavetank.physics.coefficients import coefficients, in_iteration, relaxations
+from wavetank.physics.coefficients import before_fall, coefficients, in_iteration, relaxations
 from wavetank.physics.density_constraint import (
     correct_positions,
     measure_density,
@@ -77,6 +77,8 @@ def act_on_fluids(world: World, plan: Plan, params: Parameters, c: Coefficients)
 def correct_on_grid(world: World, plan: Plan, params: Parameters, c: Coefficients) -> None:
     """Remove what the densities of the whole tank are off, before the iterations between particles."""
     grid, of_heaviest = world.grid, 1.0
+    if plan.balanced:
+        c = before_fall(c)
     measure_density(
         world.scratch, world.particles, grid, world.solids, world.walls, c, of_heaviest, world.count, plan.method,
     )  # fmt: skip

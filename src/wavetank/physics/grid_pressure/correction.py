@@ -24,11 +24,6 @@ the share `DAMPING` of a frame would, and steps shorter than that carry nothing.
 modes that are much stiffer than a step are stopped at once, as without it. No more than `LARGEST_CARRIED` times gravity
 is carried, so that water that hits a wall does not bounce.
 
-At walls. Layers of a wall that move with a particle by half of its way (`smoothing.WALL_STIFFENING`) answer it with 3/4
-of the density that water would, so that the grid removed only 3/4 of what runs into a wall in a step, and water at rest
-made up for it by standing too close. The grid is told most of the rest: `MISSING` times what the way of this step has
-added. As it is the way that counts and not the place, it does not shift where water rests.
-
 Gaps. Particles in rows, near in one direction and far in the other, read the density of water at rest where there is
 less: the kernel is pointed and counts near ones most. The grid counts the room, so it knows. Where even the fullest
 cells around are less than `FULL`, the rows have gaps that the water around may close, and an error is less by
@@ -42,7 +37,7 @@ import math
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls, remembered
 from wavetank.foundation.params import Parameters
-from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
+from wavetank.physics.boundary import fall, flattened, kept_in_tank
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, open_area, solve_levels
@@ -57,6 +52,8 @@ from wavetank.physics.grid_pressure.room import (
     whole,
 )  # fmt: skip
 from wavetank.physics.grid_pressure.surface import carried_share, depth_at
+from wavetank.physics.grid_pressure.walls import approached
+from wavetank.physics.grid_pressure.weight import borne, flow_out
 from wavetank.physics.mixture import Blend
 from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predict_at, predicted
@@ -73,17 +70,18 @@ from wavetank.physics.teams import (
     turns_over,
 )  # fmt: skip
 from wavetank.physics.world import World
-from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, signed_distance, to_local, vec3, vec4
+from wavetank.solids.distance import SolidSet, lift
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
+BORNE = (0.6, 0.9)  # fill of a cell from where to where the grid bears its weight
 REACH = 0.2  # of the support: the longest correction
 DAMPING = 0.1  # of a frame: the length of a step that damps as much, docs/notebook/calm.md
 LARGEST_CARRIED = 1.2  # of gravity
 SUPPORTED = 0.5  # d: depth from which on the grid carries a particle in full, that of the top layer at rest
 FADE = 1.0  # d: by how much higher it carries nothing
 MISSING = 1.0 / 3.0  # of a wall's answer, over what it gives: all of what lacks, docs/notebook/grid-pressure.md
-FULL = 0.97  # fill that cells without gaps have at least, also where few rows of particles do not match them
+FULL = 0.98  # fill that cells without gaps have at least, also where few rows of particles do not match them
 SLIT = 0.7  # fill of a cell that touches a solid, as far as its tents can tell
 CLOSING = 0.5  # of what lacks, in a step
 GAP_SHARE = 6.0  # by which errors are less, of what lacks there
@@ -96,6 +94,9 @@ class Errors:
     unit: qd.f32  # what a whole number in the sums is the inverse of
     volume: qd.f32  # of a particle, over that of a cell and the unit
     scale: qd.f32  # 1/m^2, the same over the stiffness M
+    per_way: qd.f32  # the share of errors that is removed, over the stiffness M
+    borne_from: qd.f32  # the fill from which weight is borne
+    borne_to: qd.f32  # and from which all of it is
     inner_from: qd.f32  # the fill from which a particle counts
     inner_to: qd.f32  # and with which it counts in full
     missing: qd.f32  # share by which the answer of solids is increased
@@ -115,6 +116,8 @@ class Push:
     reach: qd.f32  # m: the longest correction
     supported: qd.f32  # m: depth from which on particles have all of it
     fade: qd.f32  # m: by how much higher they have none
+    borne_from: qd.f32  # the fill from which weight is borne in gaps
+    borne_to: qd.f32  # and from which all of it is
 
 
 def carried(dt: float, frame_time: float) -> float:
@@ -174,30 +177,6 @@ def add_fill(
 
 
 @qd.func
-def approached(x, p, near, solids: SolidSet, walls: Walls, c: Coefficients, searched: qd.template()):
-    """Relative density that the marked solids have added on the way from `x` to `p`, in their motion."""
-    added, free = 0.0, 1.0
-    k = next_near(near, -1, solids)
-    while k < (solids.count if qd.static(searched) else solids.tank_count):
-        value = vec4(0.0, 0.0, 0.0, 0.0)
-        way = p - x
-        if qd.static(searched):
-            value = signed_distance(solids, k, p)
-            if k >= solids.tank_count:
-                own = to_local(solids.old_position[k], solids.old_rotation[k], x)
-                way = p - solids.position[k] - rotate(solids.rotation[k], own)
-        else:
-            value = plane_distance(solids, k, p)
-        if value.w < c.h:
-            share = wall_share(walls, value.w, c.h) * c.wall_density
-            inward = -way.dot(vec3(value.x, value.y, value.z))
-            added = added * (1.0 - share[0]) + inward * free * share[1] / c.h
-            free *= 1.0 - share[0]
-        k = next_near(near, k, solids)
-    return added
-
-
-@qd.func
 def add_errors(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     e: Errors, cells: Grid, team, part, count, searched: qd.template(),
@@ -214,7 +193,7 @@ def add_errors(
         if near != 0:
             x = lift(particles.x[i])
             added[0, i - first] = e.missing * approached(
-                x, lift(predicted(particles, i)), near, solids, walls, c, searched
+                x, lift(predicted(particles, i)) - fall(c), near, solids, walls, c, searched
             )
     for lane in range(lanes):
         s = in_cells(grid, predicted(particles, first + lane))
@@ -293,7 +272,9 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.rhs[n] = e.scale * total
+        grid.rhs[n] = e.scale * total - e.per_way * flow_out(grid, n, fall(c)) * borne(
+            grid.fill[n], e.borne_from, e.borne_to
+        )
         if qd.static(searched):
             grid.rhs[n] -= grid.slope_x[n] * e.closing * grid.room[n]
     qd.loop_config(serialize=bool(few))
@@ -309,10 +290,13 @@ def slope_across(grid: CoarseGrid, coupled, edge, n, m):
 
 
 @qd.func
-def slope_along(grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), dim: qd.template()):
+def slope_along(
+    grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), at_rest, push: Push, dim: qd.template(),
+    searched: qd.template(),
+):  # fmt: skip
     """Derivative of lambda [m] along `axis` at the place `s` [cells], from the faces around that lead into water.
 
-    The `slope` of the others is 0.
+    The `slope` of the others is 0. In a gap so narrow that there is none it is what holds water `at_rest`.
     """
     place = s
     place[axis] -= 0.5
@@ -323,13 +307,17 @@ def slope_along(grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), 
         own = slope[at[k]]
         total += weights[k] * own
         weight += weights[k] if own != 0.0 else 0.0
-    return total / qd.max(weight, 1e-9)
+    found = total / qd.max(weight, 1e-9)
+    if qd.static(searched):
+        enclosed = at_rest * borne(grid.fill[nearest(grid, qd.floor(s + 0.5, qd.i32))], push.borne_from, push.borne_to)
+        found = qd.select(weight == 0.0, enclosed, found)
+    return found
 
 
 @qd.kernel(fastcache=True)
 def move_particles(
     grid: CoarseGrid, particles: Particles, cells: Grid, solids: SolidSet, c: Coefficients, push: Push, count: qd.i32,
-    few: qd.template(),
+    few: qd.template(), searched: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by M grad lambda, inside the tank, and carry it on; what sticks out has less.
 
@@ -341,6 +329,7 @@ def move_particles(
         grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, n + grid.nx)
         grid.slope_z[n] = slope_across(grid, grid.wz[n], grid.dz, n, n + grid.nx * grid.ny)
     for turn in range(turns(cells, count)):
+        at_rest = -fall(c) / push.stiffness
         for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
             first = team * cells.lanes
             dim = qd.static(particles.x[first].n)
@@ -349,10 +338,10 @@ def move_particles(
             for lane in range(cells.lanes):
                 s = in_cells(grid, predicted(particles, first + lane))
                 shares[0, lane] = carried_share(grid, s, push.supported, push.fade, dim)
-                slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, dim)
-                slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, dim)
+                slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, at_rest.x, push, dim, searched)
+                slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, at_rest.y, push, dim, searched)
                 if qd.static(dim == 3):
-                    slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, dim)
+                    slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, at_rest.z, push, dim, searched)
             for i in range(first, end_of(team, cells, count)):
                 p = predicted(particles, i)
                 dp = column(slopes, i - first) * (push.stiffness * shares[0, i - first])
@@ -379,12 +368,12 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     few = int(not is_shared(finest))
     gather(
-        finest, world.particles, world.scratch, cells, world.solids, world.walls, c, errors(finest, params, stiffness),
-        count, searched, kinds.mixed, few,
+        finest, world.particles, world.scratch, cells, world.solids, world.walls, c,
+        errors(finest, params, stiffness), count, searched, kinds.mixed, few,
     )  # fmt: skip
     solve_levels(world.levels)
-    push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing)
-    move_particles(finest, world.particles, cells, world.solids, c, remembered(push), count, few)
+    push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing, *BORNE)
+    move_particles(finest, world.particles, cells, world.solids, c, remembered(push), count, few, searched)
     if world.pieces:
         acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2
         push_on_grid(world, stiffness, stiffness / acting if acting else 0.0)  # nothing is deep without gravity
@@ -394,7 +383,8 @@ def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
     """Return the numbers of `gather`."""
     volume = params.spacing**params.dim / (grid.dx * grid.dy * grid.dz) / UNIT
     return remembered(Errors(
-        unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness, inner_from=INNER[0],
+        unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness,
+        per_way=params.grid_pressure / stiffness, borne_from=BORNE[0], borne_to=BORNE[1], inner_from=INNER[0],
         inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT,
         closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA,
     ))  # fmt: skip

@@ -20,9 +20,10 @@ from wavetank.device.compiler import current_backend, qd, worth_sharing
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import coordinates
 
-SWEEPS, MOST_SWEEPS = 8, 200  # of a level, and of the coarsest
-OVER_RELAXATION = 1.5
-LEAST_THETA = 0.1
+SWEEPS, MOST_SWEEPS = 8, 200  # at once, and of the coarsest level
+ON_EACH = 2 * SWEEPS  # of a level: half as many leave pressures that drive calm water round for ever
+OVER_RELAXATION = 1.7
+LEAST_THETA = 0.01  # what is less slants the pressure along a surface that lies at nodes: docs/notebook/calm.md
 BLOCK_NODES = 8192  # at most, of a level that one block of a graphics processor sees to
 
 
@@ -325,7 +326,7 @@ def solve_levels(levels: list[CoarseGrid]) -> None:
             restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)))
     coarsest = coarser = levels[-1]
     for level in reversed(levels):
-        start, sweeps, over_relaxation = FROM_COARSER, SWEEPS, OVER_RELAXATION
+        start, sweeps, over_relaxation = FROM_COARSER, ON_EACH, OVER_RELAXATION
         if level is coarsest:
             start = ZERO
             sweeps, over_relaxation = coarsest_relaxation(level)

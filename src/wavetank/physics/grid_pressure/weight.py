@@ -1,0 +1,41 @@
+"""The weight of the water, as the faces of the cells let it through.
+
+What gravity moves particles by in a step, less what is carried on, is the same for all. Densities need not tell it, and
+beside solids that cut cells they tell it wrong, by a part of the whole weight, which drove water round for ever. So it
+goes to the right side of the equation as the faces of the cells count it, and densities are read where particles were
+before (`boundary.fall`). The slope of water at rest then fulfils the equation whatever the solids are: a well-balanced
+scheme, as Greenberg and Leroux 1996 (10.1137/0733001) have it for shallow water. Worlds with bodies, and mixtures,
+leave it to the densities (docs/notebook/calm.md).
+
+    code     meaning                                                                      unit
+    way      by which all particles have fallen alike                                     m
+    fill     water in the tent of a node, over the room that it has                       1
+"""
+
+from wavetank.device.compiler import qd
+from wavetank.device.state import CoarseGrid
+from wavetank.physics.grid_pressure.poisson import open_area
+from wavetank.physics.grid_pressure.surface import along
+from wavetank.solids.distance import vec3
+
+
+@qd.func
+def borne(fill, first, last):
+    """Share of the weight that the grid bears where water is so thin that it hardly fills a cell."""
+    return qd.min(qd.max((fill - first) / (last - first), 0.0), 1.0)
+
+
+@qd.func
+def flow_out(grid: CoarseGrid, n, way):
+    """Share of a cell that flows out of that of node `n`, where all water moves by the same `way` [m]."""
+    edges = vec3(grid.dx, grid.dy, grid.dz)
+    total = 0.0
+    for axis in qd.static(range(3)):
+        if grid.nz > 1 or axis < 2:
+            for side in qd.static((-1, 1)):
+                nodes = along(grid, n, axis, side)
+                if nodes[0] > 0:
+                    m = n + nodes[1]
+                    if qd.min(grid.room[n], grid.room[m]) > 0.0:
+                        total += side * open_area(grid, n, m) * way[axis] / edges[axis]
+    return total
