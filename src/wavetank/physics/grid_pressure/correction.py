@@ -371,7 +371,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         finest, world.particles, world.scratch, cells, world.solids, world.walls, c,
         errors(finest, params, stiffness), count, searched, kinds.mixed, few,
     )  # fmt: skip
-    solve_levels(world.levels)
+    solve_levels(world.levels, balanced=c.fallen > 0.0)
     push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing, *BORNE)
     move_particles(finest, world.particles, cells, world.solids, c, remembered(push), count, few, searched)
     if world.pieces:

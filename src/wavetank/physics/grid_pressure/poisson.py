@@ -21,8 +21,8 @@ from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import coordinates
 
 SWEEPS, MOST_SWEEPS = 8, 200  # at once, and of the coarsest level
-ON_EACH = 2 * SWEEPS  # of a level: half as many leave pressures that drive calm water round for ever
-OVER_RELAXATION = 1.7
+#: Sweeps of a level and their relaxation, where weight is balanced or not: eight leave what drives calm water round.
+ON_EACH = {True: (2 * SWEEPS, 1.7), False: (SWEEPS, 1.5)}
 LEAST_THETA = 0.01  # what is less slants the pressure along a surface that lies at nodes: docs/notebook/calm.md
 BLOCK_NODES = 8192  # at most, of a level that one block of a graphics processor sees to
 
@@ -316,8 +316,11 @@ def coarsest_relaxation(level: CoarseGrid) -> tuple[int, float]:
     return min(sweeps, MOST_SWEEPS), over_relaxation
 
 
-def solve_levels(levels: list[CoarseGrid]) -> None:
-    """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set."""
+def solve_levels(levels: list[CoarseGrid], *, balanced: bool = True) -> None:
+    """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set.
+
+    Where faces count the weight, `balanced`, what is left of it must be small.
+    """
     fenced = int(current_backend() != "cuda")
     for fine, coarse in itertools.pairwise(levels):
         if in_block(coarse):
@@ -326,7 +329,8 @@ def solve_levels(levels: list[CoarseGrid]) -> None:
             restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)))
     coarsest = coarser = levels[-1]
     for level in reversed(levels):
-        start, sweeps, over_relaxation = FROM_COARSER, ON_EACH, OVER_RELAXATION
+        start = FROM_COARSER
+        sweeps, over_relaxation = ON_EACH[balanced]
         if level is coarsest:
             start = ZERO
             sweeps, over_relaxation = coarsest_relaxation(level)
