@@ -79,7 +79,7 @@ def test_correction_eq_8(dim, kernel):
     name = NAMES[kernel][0]
     ratio = kernel_shape(name, cloud.distance / cloud.h)[0] / kernel_shape(name, np.array(0.3))[0]
     s_0 = rest_lattice(kernel, dim, cloud.scene.support).squared_gradients / cloud.h**2
-    s_corr = -0.2 * (cloud.c.dt / cloud.scene.frame_time) / s_0 * ratio**4.0
+    s_corr = -0.2 * (cloud.c.dt / cloud.scene.frame_time) ** 2 / s_0 * ratio**4.0
     expected = volume * np.sum((lam[:, None] + lam[None, :] + s_corr)[..., None] * cloud.grad_w(), axis=1)
     moved = cloud.predictions(cloud.world.spare) - cloud.x
     np.testing.assert_allclose(moved, expected, atol=2e-4 * np.abs(expected).max())

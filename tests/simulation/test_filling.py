@@ -127,7 +127,7 @@ def test_water_on_a_slope_rests():
     slope = wt.HalfSpace(point=(0.5, 0.2), normal=(-np.sin(0.3), np.cos(0.3)))
     scene = wt.Scene(spacing=0.02, tank=wt.Tank(size=(1, 1)), solids=[slope],
                      fluids=[wt.Block(lower=(0, 0), upper=(1, 0.5))])  # fmt: skip
-    assert fastest(Simulation(scene), 4.0)[120:].max() < 0.02
+    assert fastest(Simulation(scene), 6.0)[240:].max() < 0.02  # the waves of what fell at first are gone by then
 
 
 def test_heights_are_ground(tmp_path):
