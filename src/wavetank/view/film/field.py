@@ -1,0 +1,314 @@
+"""Particles to the field of the water: smooth where there is much of it, ellipsoids where it is thin.
+
+Two fields are made and joined. The first is the share of full water around a node, a sum of (1 - q^2)^3 over the
+particles, blurred until the lattice is gone; half of it is the surface (J. Monaghan, "Smoothed particle hydrodynamics",
+2005, Eq. 2.7 for the sum). It is still where water is deep, and loses what is thin. The second is the union of the
+ellipsoids that all pictures show (`passes/ellipsoids.py`), which keeps sheets and threads. Where there is much water
+the second is drawn in, so that its bumps stay below the first; their smooth maximum is the water.
+
+Sums and maxima are those of whole numbers, so that threads do not matter. Behind panes lies the mirror image; in solids
+the water goes on as it is before them, so that it meets them at a right angle and without a gap.
+
+    code      symbol   meaning                                                        unit
+    share     s        share of full water                                            1
+    reach     R        radius of the sum, 1.75 d                                      m
+    bulk               the share in a wider neighbourhood                             1
+    drawn              by how much ellipsoids are drawn in                            m
+"""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from wavetank.device.compiler import download, qd
+from wavetank.device.state import remembered
+from wavetank.solids.distance import SolidSet, around, signed_distance
+from wavetank.view.film.grid import Field, Grid, node_at, value_at
+from wavetank.view.lens import vec3, vector
+from wavetank.view.optics.rays import box
+from wavetank.view.shot import Shot
+from wavetank.view.water_buffers import Ellipsoids, WaterBuffers
+
+NODES_A_SPACING, MOST_NODES = 2.0, 48_000_000
+REACH = 1.75  # d
+UNIT = 65536.0  # steps of a share, and of a level in units of a node
+SMOOTH, WIDE = 3, 5  # binomial blurs of the surface, and further ones of what tells how much water there is
+DRAWN = 0.16  # d
+MARGIN = 4  # nodes of air in the open and above
+
+
+@dataclasses.dataclass(eq=False)
+class FieldRoom:
+    """What building a field needs, for one grid; on the device."""
+
+    grid: Grid
+    sums: Any  # i32 [nodes]: shares while they are added up, then the union of ellipsoids
+    one: Any  # f32 [nodes]
+    two: Any  # f32 [nodes]
+    level: Any  # f32 [nodes], m
+    skip: Any  # i32 [cells]
+    near: Any  # i32 [cells]: 1 where there are motes
+
+
+def grid_around(shot: Shot, reach: float) -> Grid:
+    """Return the grid for the water of a picture, with room for what moves by `reach` [m]."""
+    d, frame, tank = shot.extent.spacing, shot.frame, shot.frame.scene.tank
+    x = frame.positions if frame.count else np.array([shot.extent.middle])
+    low, high = x.min(axis=0) - reach, x.max(axis=0) + reach
+    lower, upper = np.array(shot.extent.lower, float), np.array(shot.extent.upper, float)
+    step = d / NODES_A_SPACING
+    margin = (MARGIN + NODES_A_SPACING * 1.5) * step
+    if tank is None:
+        lower, upper = low - margin, high + margin
+    upper[1] = max(high[1] + margin, lower[1] + 4.0 * step)
+    upper[1] = min(upper[1], lower[1] + 4.0 * max(float(shot.extent.upper[1] - lower[1]), 8.0 * d))
+    size = upper - lower
+    step *= max(1.0, (float(np.prod(size / step)) / MOST_NODES) ** (1.0 / 3.0))
+    count = [max(4, 2 * round(float(length) / (2.0 * step))) for length in size]
+    return remembered(Grid(
+        lower=vector(*lower), upper=vector(*upper), box=box(lower, upper), step=vector(*(size / count)), nx=count[0], ny=count[1],
+        nz=count[2], spacing=d, walled=int(tank is not None),
+    ))  # fmt: skip
+
+
+def room_for(grid: Grid) -> FieldRoom:
+    """Allocate what a field on that grid needs."""
+    nodes = grid.nx * grid.ny * grid.nz
+    real = [qd.ndarray(qd.f32, shape=(nodes,)) for _ in range(3)]
+    cells = [qd.ndarray(qd.i32, shape=(nodes // 8,)) for _ in range(2)]
+    return FieldRoom(grid, qd.ndarray(qd.i32, shape=(nodes,)), *real, *cells)
+
+
+def rest_sum() -> float:
+    """Return the sum of the weights over the lattice of full water, mean over places in it."""
+    return REACH**3 * 4.0 * math.pi * 16.0 / 315.0
+
+
+def build(room: FieldRoom, water: WaterBuffers, shot: Shot) -> Field:
+    """Fill the field of the particles that `water` has sorted and fitted ellipsoids to."""
+    grid, count, d = room.grid, shot.frame.count, shot.extent.spacing
+    room.sums.fill(0)
+    add_shares(room.sums, water.cells.x, grid, REACH * d, UNIT / rest_sum(), count)
+    solids = shot.frame.solids
+    to_shares(room.one, room.sums, solids, grid, REACH * d, 1.0 / UNIT)
+    given, taken = room.one, room.two
+    if solids.count > solids.tank_count:
+        go_on_in_solids(taken, given, solids, grid, 0.6 * d)
+        given, taken = taken, given
+    for _ in range(SMOOTH):
+        for axis in range(3):
+            blur(taken, given, grid, axis)
+            given, taken = taken, given
+    room.level.copy_from(given)
+    for _ in range(WIDE):
+        for axis in range(3):
+            blur(taken, given, grid, axis)
+            given, taken = taken, given
+    room.sums.fill(-(1 << 30))
+    add_ellipsoids(room.sums, water.ellipsoids, grid, UNIT / float(grid.step[0]), count)
+    # Standard deviation of the whole blur along an axis: the slope of what a plane becomes.
+    wide = math.sqrt((REACH * d) ** 2 / 11.0 + SMOOTH * float(np.max(grid.step)) ** 2)
+    join(
+        room.level, room.sums, given, grid, math.sqrt(2.0 * math.pi) * wide, DRAWN * d,
+        float(grid.step[0]) / UNIT,
+    )  # fmt: skip
+    mark(room.skip, room.level, room.near, grid)
+    for axis in range(3):
+        spread(room.near, room.skip, grid, axis)
+        room.skip, room.near = room.near, room.skip
+    return Field(grid=grid, level=room.level, skip=room.skip)
+
+
+@qd.func
+def folded(i, count, walled):
+    """Index of what lies behind a pane: its mirror image; -1 in the open."""
+    result = i
+    if i < 0:
+        result = qd.select(walled == 1, -1 - i, -1)
+    elif i >= count:
+        result = qd.select(walled == 1, 2 * count - 1 - i, -1)
+    return qd.select(result < count, result, -1)
+
+
+@qd.kernel(fastcache=True)
+def add_shares(
+    sums: qd.types.ndarray(), x: qd.types.ndarray(), grid: Grid, reach: qd.f32, unit: qd.f32, count: qd.i32
+):  # fmt: skip
+    """Add what every particle has to the nodes around it."""
+    for a in range(count):
+        p = x[a]
+        first = qd.cast(qd.floor((p - reach - grid.lower) / grid.step - 0.5), qd.i32)
+        last = qd.cast(qd.ceil((p + reach - grid.lower) / grid.step - 0.5), qd.i32)
+        for k in range(first.z, last.z + 1):
+            kk = folded(k, grid.nz, grid.walled)
+            for j in range(first.y, last.y + 1):
+                jj = qd.select(j >= grid.ny, -1, folded(j, grid.ny, grid.walled))
+                if kk >= 0 and jj >= 0:
+                    for i in range(first.x, last.x + 1):
+                        ii = folded(i, grid.nx, grid.walled)
+                        if ii >= 0:
+                            r = grid.lower + (vec3(i, j, k) + 0.5) * grid.step - p
+                            q = 1.0 - r.dot(r) / (reach * reach)
+                            if q > 0.0:
+                                qd.atomic_add(sums[node_at(grid, ii, jj, kk)], qd.cast(unit * q * q * q + 0.5, qd.i32))
+
+
+@qd.func
+def nearest_wall(solids: SolidSet, x, far):
+    """(gradient, distance) of the nearest solid but the tank; a distance of `far` where none is nearer."""
+    best = qd.Vector([0.0, 1.0, 0.0, far])
+    for k in range(solids.tank_count, solids.count):
+        off = x - solids.position[k]
+        reach = solids.reach[k] + far
+        if solids.reach[k] < around() and (solids.reach[k] > 1e4 or off.dot(off) < reach * reach):
+            value = signed_distance(solids, k, x)
+            if value.w < best[3]:
+                best = qd.Vector([value.x, value.y, value.z, value.w])
+    return best
+
+
+@qd.func
+def share_before(q):
+    """Share of the weights on the free side of a plane `q` reaches away: the integral of (1 - z^2)^4."""
+    z = qd.min(qd.max(q, -1.0), 1.0)
+    s = z * z
+    return 0.5 + 1.23046875 * z * (1.0 + s * (-1.3333333 + s * (1.2 + s * (-0.5714286 + s * 0.1111111))))
+
+
+@qd.kernel(fastcache=True)
+def to_shares(
+    share: qd.types.ndarray(), sums: qd.types.ndarray(), solids: SolidSet, grid: Grid, reach: qd.f32, per: qd.f32
+):  # fmt: skip
+    """Turn sums into shares of full water; what a solid takes away is no air."""
+    for n in range(grid.nx * grid.ny * grid.nz):
+        s = sums[n] * per
+        if s > 0.0 and solids.count > solids.tank_count:
+            x = grid.lower + (vec3(n % grid.nx, n // grid.nx % grid.ny, n // (grid.nx * grid.ny)) + 0.5) * grid.step
+            q = nearest_wall(solids, x, reach)[3] / reach
+            s /= qd.max(share_before(q), 0.4)
+        share[n] = qd.min(s, 1.0)
+
+
+@qd.kernel(fastcache=True)
+def go_on_in_solids(
+    share: qd.types.ndarray(), before: qd.types.ndarray(), solids: SolidSet, grid: Grid, keep: qd.f32
+):  # fmt: skip
+    """Let the water go on in solids, and as near to them as `keep`, as it is at that distance."""
+    for n in range(grid.nx * grid.ny * grid.nz):
+        x = grid.lower + (vec3(n % grid.nx, n // grid.nx % grid.ny, n // (grid.nx * grid.ny)) + 0.5) * grid.step
+        wall = nearest_wall(solids, x, keep)
+        s = before[n]
+        if wall[3] < keep and wall[3] > -8.0 * keep:
+            s = value_at(before, grid, x + (keep - wall[3]) * vec3(wall[0], wall[1], wall[2]))
+        share[n] = s
+
+
+@qd.kernel(fastcache=True)
+def blur(share: qd.types.ndarray(), before: qd.types.ndarray(), grid: Grid, axis: qd.i32):
+    """Blur along an axis by 1 4 6 4 1, a standard deviation of one node."""
+    for n in range(grid.nx * grid.ny * grid.nz):
+        i, j, k = n % grid.nx, n // grid.nx % grid.ny, n // (grid.nx * grid.ny)
+        at, count, by = i, grid.nx, 1
+        if axis == 1:
+            at, count, by = j, grid.ny, grid.nx
+        elif axis == 2:
+            at, count, by = k, grid.nz, grid.nx * grid.ny
+        total = 0.375 * before[n]
+        for m in qd.static(range(4)):
+            off = qd.static((-2, -1, 1, 2)[m])
+            there = at + off
+            if there < 0:
+                there = -1 - there
+            if there >= count:
+                there = 2 * count - 1 - there
+            total += qd.static((0.0625, 0.25, 0.25, 0.0625)[m]) * before[n + (there - at) * by]
+        share[n] = total
+
+
+@qd.kernel(fastcache=True)
+def add_ellipsoids(
+    sums: qd.types.ndarray(), ellipsoids: Ellipsoids, grid: Grid, unit: qd.f32, count: qd.i32
+):  # fmt: skip
+    """Raise every node to its depth in the ellipsoids around it; lone particles are balls of their own."""
+    for a in range(count):
+        size = ellipsoids.size[a]
+        if size > 0.0 and ellipsoids.lone[a] == 0:
+            c = ellipsoids.center[a]
+            m, o = ellipsoids.axes[a], ellipsoids.mixed[a]
+            # The inverse of B^2 by its cofactors.
+            p, q, s = m.y * m.z - o.z * o.z, o.y * o.z - o.x * m.z, o.x * o.z - o.y * m.y
+            whole = m.x * p + o.x * q + o.y * s
+            if whole > 0.0:
+                per = 1.0 / whole
+                one = per * vec3(p, m.x * m.z - o.y * o.y, m.x * m.y - o.x * o.x)
+                two = per * vec3(q, s, o.x * o.y - m.x * o.z)
+                reach = size + 2.0 * grid.step.max()
+                first = qd.cast(qd.ceil((c - reach - grid.lower) / grid.step - 0.5), qd.i32)
+                last = qd.cast(qd.floor((c + reach - grid.lower) / grid.step - 0.5), qd.i32)
+                for k in range(qd.max(first.z, 0), qd.min(last.z, grid.nz - 1) + 1):
+                    for j in range(qd.max(first.y, 0), qd.min(last.y, grid.ny - 1) + 1):
+                        for i in range(qd.max(first.x, 0), qd.min(last.x, grid.nx - 1) + 1):
+                            r = grid.lower + (vec3(i, j, k) + 0.5) * grid.step - c
+                            g = one * r + vec3(
+                                two.x * r.y + two.y * r.z, two.x * r.x + two.z * r.z, two.y * r.x + two.z * r.y
+                            )
+                            far = qd.sqrt(qd.max(r.dot(g), 0.0))
+                            depth = (1.0 - far) * far / qd.max(g.norm(), 1e-12)
+                            if far < 0.05:
+                                depth = 0.5 * size
+                            if depth > -2.5 * grid.step.max():
+                                qd.atomic_max(sums[node_at(grid, i, j, k)], qd.cast(depth * unit, qd.i32))
+
+
+@qd.kernel(fastcache=True)
+def join(
+    level: qd.types.ndarray(), union: qd.types.ndarray(), bulk: qd.types.ndarray(), grid: Grid, slope: qd.f32,
+    drawn: qd.f32, unit: qd.f32,
+):  # fmt: skip
+    """Join the two fields; `level` holds the shares of the surface before."""
+    for n in range(grid.nx * grid.ny * grid.nz):
+        smooth = (level[n] - 0.5) * slope
+        much = qd.min(qd.max((bulk[n] - 0.26) / 0.14, 0.0), 1.0)
+        thin = qd.max(union[n] * unit - drawn * much * much * (3.0 - 2.0 * much), -2.0 * slope)
+        blend = qd.max(drawn - qd.abs(smooth - thin), 0.0)
+        level[n] = qd.max(smooth, thin) + 0.25 * blend * blend / drawn
+
+
+@qd.kernel(fastcache=True)
+def mark(skip: qd.types.ndarray(), level: qd.types.ndarray(), near: qd.types.ndarray(), grid: Grid):
+    """Write 0 for cells that hold a surface, by the nodes that count in them, or motes; 99 for others."""
+    for c in range(grid.nx // 2 * (grid.ny // 2) * (grid.nz // 2)):
+        x, y, z = c % (grid.nx // 2), c // (grid.nx // 2) % (grid.ny // 2), c // (grid.nx // 2 * (grid.ny // 2))
+        low, high = 1e9, -1e9
+        for m in range(64):
+            i = qd.min(qd.max(2 * x - 1 + m % 4, 0), grid.nx - 1)
+            j = qd.min(qd.max(2 * y - 1 + m // 4 % 4, 0), grid.ny - 1)
+            k = qd.min(qd.max(2 * z - 1 + m // 16, 0), grid.nz - 1)
+            here = level[node_at(grid, i, j, k)]
+            low, high = qd.min(low, here), qd.max(high, here)
+        skip[c] = qd.select((low < 0.0 and high > 0.0) or near[c] == 1, 0, 99)
+
+
+@qd.kernel(fastcache=True)
+def spread(skip: qd.types.ndarray(), before: qd.types.ndarray(), grid: Grid, axis: qd.i32):
+    """Let cells know the distance to the nearest marked one along one more axis, up to 12."""
+    for c in range(grid.nx // 2 * (grid.ny // 2) * (grid.nz // 2)):
+        mx, my, mz = grid.nx // 2, grid.ny // 2, grid.nz // 2
+        at, count, by = c % mx, mx, 1
+        if axis == 1:
+            at, count, by = c // mx % my, my, mx
+        elif axis == 2:
+            at, count, by = c // (mx * my), mz, mx * my
+        best = 12
+        for off in range(-11, 12):
+            there = at + off
+            if there >= 0 and there < count:
+                best = qd.min(best, qd.max(qd.abs(off), before[c + off * by]))
+        skip[c] = best
+
+
+def host_level(field: Field) -> np.ndarray:
+    """Return the field on the host [m], float32 [nz, ny, nx]."""
+    return download(field.level).reshape(field.grid.nz, field.grid.ny, field.grid.nx)

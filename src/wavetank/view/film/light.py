@@ -1,0 +1,200 @@
+"""The sun's light that has passed or left the surface of the water: photons, gathered where they arrive.
+
+H. W. Jensen, "Global illumination using photon maps" (1996), with two maps in place of a tree: the floor has texels, and
+solids read the flow of light in the cells of the water's grid (vector irradiance, A. Gershun 1936), which is found from
+the ways of the photons through the cells. Light that meets nothing on its way from the sun is not in the maps: shadow
+rays see to it. All sums are whole numbers.
+
+    code      symbol   meaning                                                        unit
+    floor              light on a texel over that of the bare sun on a plane to it    1
+    flow      J        light through a cell: its vector, and its colours              1
+    power              part of the sun's cross section that a photon stands for       m^2
+"""
+
+import dataclasses
+
+from wavetank.device.compiler import qd
+from wavetank.view.film.grid import Grid
+from wavetank.view.film.interface import bent, index_of_water, mirrored
+from wavetank.view.film.march import World, first_hit
+from wavetank.view.film.sampling import pair, towards
+from wavetank.view.lens import vec3
+from wavetank.view.look import Look
+from wavetank.view.optics.chance import scrambled
+
+UNIT = 4096.0  # steps of a map in the light of the bare sun
+MOST_BOUNCES = 12
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Photons:
+    """The maps of the sun's light, on the device."""
+
+    floor: qd.types.ndarray()  # i32 [rows, columns, 3]: along z and x
+    flow: qd.types.ndarray()  # i32 [cells, 6]
+    corner: vec3  # m: of the floor's map; y is the edge of a texel
+    begin: vec3  # m: corner of the rectangle that photons start from
+    right: vec3  # m: its sides
+    up: vec3
+    across: qd.i32  # photons along each side
+    rows: qd.i32
+    power: qd.f32  # m^2
+    has_flow: qd.i32  # 1 where the flow is gathered
+
+
+@qd.kernel(fastcache=True)
+def shine(photons: Photons, world: World, look: Look, absorption: vec3, round: qd.i32):
+    """Send one round of photons from the sun, each from its own place of the rectangle, and add what arrives."""
+    for number in range(photons.across * photons.rows):
+        column, row = number % photons.across, number // photons.across
+        seed = scrambled(qd.cast(number, qd.u32) ^ qd.u32(0x51ED270B))
+        u, lamp = pair(seed, round, 0), pair(seed, round, 1)
+        p = photons.begin + ((column + u.x) / photons.across) * photons.right + ((row + u.y) / photons.rows) * photons.up
+        ahead = -towards(look.to_sun, look.sun_size, lamp)
+        weight, wet, crossed, going, bounce = vec3(1.0, 1.0, 1.0), 0, 0, 1, 0
+        while going == 1:
+            hit, what, which, was_wet = first_hit(world, p, ahead, wet, 1)
+            n = vec3(hit.x, hit.y, hit.z)
+            at = p + hit.w * ahead
+            if crossed > 0 and photons.has_flow == 1:
+                leave_in_cells(photons, world.field.grid, p, ahead, qd.min(hit.w, 1e3), weight, absorption, was_wet)
+            if was_wet == 1:
+                weight *= qd.exp(-qd.min(hit.w, 1e3) * absorption)
+            chance = pair(seed, round, 2 + bounce)
+            if what == 3:
+                inward = qd.select(n.dot(ahead) > 0.0, -n, n)
+                eta = index_of_water()
+                if was_wet == 0:
+                    eta = 1.0 / eta
+                through = bent(ahead, inward, eta)
+                crossed = 1
+                if chance.x < through.w:
+                    ahead = mirrored(ahead, inward)
+                    p = at + 1e-3 * world.field.grid.step.x * inward
+                    wet = was_wet
+                else:
+                    ahead = vec3(through.x, through.y, through.z)
+                    p = at - 1e-3 * world.field.grid.step.x * inward
+                    wet = 1 - was_wet
+            elif what == 4:
+                ball = world.motes.ball[which]
+                through = bent(ahead, n, 1.0 / index_of_water())
+                crossed = 1
+                if chance.x < through.w:
+                    ahead = mirrored(ahead, n)
+                    p = at + 1e-4 * ball.w * n
+                else:
+                    inner = vec3(through.x, through.y, through.z)
+                    chord = -2.0 * ball.w * inner.dot(n)
+                    p = at + chord * inner
+                    ahead = (2.0 * inner.dot(ahead) * inner - ahead).normalized(1e-12)
+                    p += 1e-4 * ball.w * ahead
+                    weight *= qd.exp(-chord * absorption)
+            else:
+                if what == 1 and crossed > 0:
+                    arrive(photons, at, weight)
+                going = 0
+            bounce += 1
+            if bounce >= 12:
+                going = 0
+
+
+@qd.func
+def arrive(photons: Photons, at, weight):
+    """Add a photon to the four texels around its place."""
+    texel = photons.corner.y
+    x, z = (at.x - photons.corner.x) / texel - 0.5, (at.z - photons.corner.z) / texel - 0.5
+    c, r = qd.cast(qd.floor(x), qd.i32), qd.cast(qd.floor(z), qd.i32)
+    if r >= 0 and c >= 0 and r < photons.floor.shape[0] - 1 and c < photons.floor.shape[1] - 1:
+        u, v = x - c, z - r
+        for k in range(4):
+            share = qd.select(k % 2 == 1, u, 1.0 - u) * qd.select(k // 2 == 1, v, 1.0 - v)
+            amount = 4096.0 * share * photons.power / (texel * texel)
+            for color in qd.static(range(3)):
+                qd.atomic_add(
+                    photons.floor[r + k // 2, c + k % 2, color], qd.cast(amount * weight[color] + 0.5, qd.i32)
+                )
+
+
+@qd.func
+def cell_of(grid: Grid, x):
+    """Number of the cell at a point, -1 outside of the grid."""
+    c = qd.cast(qd.floor((x - grid.lower) / (2.0 * grid.step)), qd.i32)
+    mx, my, mz = grid.nx // 2, grid.ny // 2, grid.nz // 2
+    result = -1
+    if qd.min(c.x, c.y, c.z) >= 0 and c.x < mx and c.y < my and c.z < mz:
+        result = c.x + mx * (c.y + my * c.z)
+    return result
+
+
+@qd.func
+def leave_in_cells(photons: Photons, grid: Grid, p, ahead, far, weight, absorption, wet):
+    """Add a straight way of a photon to the cells that it passes, in steps of half a cell."""
+    step = grid.step
+    cell = 8.0 * step.x * step.y * step.z
+    pace = step.x
+    amount = 4096.0 * photons.power * pace / cell
+    count = qd.min(qd.cast(far / pace + 0.5, qd.i32), 2000)
+    left, per, gone = weight, qd.exp(-pace * absorption), 0
+    for part in range(count):
+        if gone == 0:
+            number = cell_of(grid, p + (part + 0.5) * pace * ahead)
+            if number >= 0:
+                for k in qd.static(range(3)):
+                    bright = amount * (left.x + left.y + left.z) / 3.0
+                    qd.atomic_add(photons.flow[number, k], qd.cast(qd.floor(bright * ahead[k] + 0.5), qd.i32))
+                    qd.atomic_add(photons.flow[number, 3 + k], qd.cast(amount * left[k] + 0.5, qd.i32))
+            elif part > 2:
+                gone = 1
+            if wet == 1:
+                left *= per
+
+
+@qd.func
+def floor_light(photons: Photons, at):
+    """Light on the floor that came by the water, per colour, over that of the bare sun."""
+    texel = photons.corner.y
+    x, z = (at.x - photons.corner.x) / texel - 0.5, (at.z - photons.corner.z) / texel - 0.5
+    c, r = qd.cast(qd.floor(x), qd.i32), qd.cast(qd.floor(z), qd.i32)
+    total = vec3(0.0, 0.0, 0.0)
+    if r >= 0 and c >= 0 and r < photons.floor.shape[0] - 1 and c < photons.floor.shape[1] - 1:
+        u, v = x - c, z - r
+        for k in range(4):
+            share = qd.select(k % 2 == 1, u, 1.0 - u) * qd.select(k // 2 == 1, v, 1.0 - v) / 4096.0
+            for color in qd.static(range(3)):
+                total[color] += share * photons.floor[r + k // 2, c + k % 2, color]
+    return total
+
+
+@qd.func
+def flow_at(photons: Photons, grid: Grid, x):
+    """(vector of the light that came by the water, its colours), each a vec3, between the cells around a point."""
+    mx, my, mz = grid.nx // 2, grid.ny // 2, grid.nz // 2
+    q = (x - grid.lower) / (2.0 * grid.step) - 0.5
+    q = qd.max(qd.min(q, vec3(mx - 1.001, my - 1.001, mz - 1.001)), 0.0)
+    i, j, k = qd.cast(q.x, qd.i32), qd.cast(q.y, qd.i32), qd.cast(q.z, qd.i32)
+    vector, colors = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+    for m in range(8):
+        u, v, w = q.x - i, q.y - j, q.z - k
+        share = qd.select(m % 2 == 1, u, 1.0 - u) * qd.select(m // 2 % 2 == 1, v, 1.0 - v)
+        share *= qd.select(m // 4 == 1, w, 1.0 - w) / 4096.0
+        at = (
+            qd.min(i + m % 2, mx - 1) + mx * (qd.min(j + m // 2 % 2, my - 1) + my * qd.min(k + m // 4, mz - 1))
+        )
+        for c in qd.static(range(3)):
+            vector[c] += share * photons.flow[at, c]
+            colors[c] += share * photons.flow[at, 3 + c]
+    return vector, colors
+
+
+@qd.func
+def solid_light(photons: Photons, grid: Grid, at, n):
+    """Light on a surface with the normal `n` that came by the water, per colour, over that of the bare sun."""
+    result = vec3(0.0, 0.0, 0.0)
+    if photons.has_flow == 1:
+        # A cell and a bit before the surface: nearer ones reach into the solid, where no light flows.
+        vector, colors = flow_at(photons, grid, at + 2.2 * grid.step.x * n)
+        mean = (colors.x + colors.y + colors.z) / 3.0
+        if mean > 1e-6:
+            result = (qd.max(-n.dot(vector), 0.0) / mean) * colors
+    return result

@@ -1,0 +1,274 @@
+"""The paths of light, followed from the eye: J. T. Kajiya, "The rendering equation" (1986).
+
+A path ends at the sky or after three matte surfaces. At smooth surfaces of water it goes one way, by chance as Fresnel
+has it; within the water it is dimmed (Beer-Lambert). At a matte surface the sun is looked for by one shadow ray, and
+what light the water brings there is taken from the photons; the path goes on in a direction by its cosine. One loop
+follows both paths and shadow rays, so that what meets rays is compiled once.
+
+    code      symbol   meaning                                                        unit
+    value     T        share of the light at the end of the path that the eye gets    1
+    radiance  L        light found so far                                             1
+    matte              matte surfaces on the path so far                              1
+    smooth             whether the eye sees this place by smooth surfaces alone       1
+    waits              light that a shadow ray decides on                             1
+"""
+
+import dataclasses
+
+from wavetank.device.compiler import qd
+from wavetank.view.film.interface import bent, index_of_water, mirrored
+from wavetank.view.film.light import Photons, floor_light, flow_at, solid_light
+from wavetank.view.film.march import World, first_hit
+from wavetank.view.film.sampling import around, disc, pair, towards
+from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, view_ray
+from wavetank.view.look import Look
+from wavetank.view.optics.chance import scrambled
+from wavetank.view.optics.radiance import background, smoothstep, sun_disc
+from wavetank.view.optics.rays import Box
+from wavetank.view.passes.floor import joint_cover, sand, stone
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Film:
+    """What the samples of every pixel have come to, [rows, columns], on the device."""
+
+    mean: qd.types.ndarray()  # vec3: radiance
+    square: qd.types.ndarray()  # f32: mean square of its brightness
+    albedo: qd.types.ndarray()  # vec3: of the first matte surface, however it is seen
+    shape: qd.types.ndarray()  # vec4: normal of the first surface, and the inverse of its distance
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Medium:
+    """What water does to light on its way, on the device."""
+
+    absorption: vec3  # 1/m
+    scattering: qd.f32  # 1/m
+    glow: vec3  # radiance of light that comes back out of deep water
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Setting:
+    """What surrounds the water, and how it is looked at, on the device."""
+
+    fill: vec3  # what matte surfaces get of the sky, over what the sky looks like
+    middle: vec3  # m: middle of the world, on the floor
+    size: qd.f32  # m: radius of the world
+    tank: Box  # m: its edges; empty where there is none
+    edge: qd.f32  # m: half the width of a line along the tank's edges
+    aperture: qd.f32  # m: radius of the lens
+    focus: qd.f32  # m: depth that is sharp
+    under: qd.i32  # 1 where the eye is in the water
+    brightest: qd.f32  # radiance that a sample is bent to, so that none stands out
+
+
+@qd.kernel(fastcache=True)
+def trace(
+    film: Film, world: World, photons: Photons, lens: Lens, look: Look, medium: Medium, setting: Setting,
+    first: qd.i32, samples: qd.i32,
+):  # fmt: skip
+    """Add `samples` samples to every pixel, which has had `first` of them."""
+    for row, column in qd.ndrange(film.mean.shape[0], film.mean.shape[1]):
+        for sample in range(first, first + samples):
+            seed = scrambled(qd.cast(row * 16384 + column, qd.u32) ^ qd.u32(0x2545F491))
+            place = pair(seed, sample, 0)
+            ray = view_ray(lens, row + place.y - 0.5, column + place.x - 0.5)
+            p, ahead = ray_origin(lens, ray), ray_direction(lens, ray)
+            at_focus = p + setting.focus * ahead
+            if setting.aperture > 0.0:
+                off = setting.aperture * disc(pair(seed, sample, 1))
+                p += off.x * lens.right + off.y * lens.up
+            ahead = (at_focus - p).normalized(1e-12)
+            light, albedo, shape = follow(world, photons, lens, look, medium, setting, seed, sample, p, ahead)
+            bright = light.max()
+            if bright > 1.0:
+                # What is much brighter than white counts as a little less, or single samples would stand out.
+                light *= (1.0 + (bright - 1.0) / (1.0 + (bright - 1.0) / setting.brightest)) / bright
+            share = 1.0 / (sample + 1)
+            gray = 0.3 * light.x + 0.6 * light.y + 0.1 * light.z
+            before, square = film.mean[row, column], film.square[row, column]
+            guide, form = film.albedo[row, column], film.shape[row, column]
+            if sample == 0:
+                before, square, guide, form = light, gray * gray, albedo, shape
+            film.mean[row, column] = before + share * (light - before)
+            film.square[row, column] = square + share * (gray * gray - square)
+            film.albedo[row, column] = guide + share * (albedo - guide)
+            film.shape[row, column] = form + share * (shape - form)
+
+
+@qd.func
+def follow(
+    world: World, photons: Photons, lens: Lens, look: Look, medium: Medium, setting: Setting, seed, sample, begin,
+    direction,
+):  # fmt: skip
+    """Radiance along a ray; the albedo at its first matte surface, and what its first surface is."""
+    light, value, waits = vec3(0.0, 0.0, 0.0), vec3(1.0, 1.0, 1.0), vec3(0.0, 0.0, 0.0)
+    albedo, shape = vec3(0.0, 0.0, 0.0), qd.Vector([0.0, 0.0, 0.0, 0.0])
+    p, ahead, wet = begin, direction, setting.under
+    after, after_wet = direction, 0  # how the path goes on behind a shadow ray
+    bounce, matte, glossy, shadow, going, way = 0, 0, 0, 0, 1, 0.0
+    guided = 0
+    while going == 1:
+        hit, what, which, was_wet = first_hit(world, p, ahead, wet, 1)
+        n = vec3(hit.x, hit.y, hit.z)
+        if shadow == 1:
+            if what == 0 or (what == 1 and hit.w > 1e6):
+                light += waits
+            ahead, wet, shadow = after, after_wet, 0
+        else:
+            at = p + hit.w * ahead
+            chance = pair(seed, sample, 2 + 3 * bounce)
+            if matte == 0:
+                cover = line_on_way(setting, p, ahead, hit.w)
+                if cover > 0.0:
+                    light += value * look.line_strength * cover * look.line
+                    value *= 1.0 - look.line_strength * cover
+            if was_wet == 1:
+                far = qd.min(hit.w, 1e3)
+                left = qd.exp(-medium.scattering * far)
+                light += value * (1.0 - left) * medium.glow
+                value *= qd.exp(-far * medium.absorption)
+            way += qd.min(hit.w, 1e6)
+            if guided == 0:
+                guided = 1
+                shape = qd.Vector([n.x, n.y, n.z, setting.size / (setting.size + qd.min(hit.w, 1e6))])
+            far = 0.0
+            if what == 1:
+                far = smoothstep(((at - setting.middle).norm() * (1.0 / setting.size) - 1.5) * 0.2)
+            if what == 0 or far > 0.0:
+                sky = background(look, ahead)
+                if ahead.y < 0.0 and what == 0:
+                    sky = look.below
+                if matte > 0:
+                    sky *= setting.fill
+                else:
+                    if what == 0 and glossy == 0:
+                        sky += sun_disc(look, ahead)
+                    if what == 0 and glossy > 0:
+                        sky += lamp(look, ahead)
+                share = qd.select(what == 0, 1.0, far)
+                light += value * share * sky
+                if matte == 0:
+                    albedo = share * vec3(1.0, 1.0, 1.0)
+                value *= 1.0 - share
+                if what == 0 or far > 0.999:
+                    going = 0
+            if going == 1 and what == 3:
+                inward = qd.select(n.dot(ahead) > 0.0, -n, n)
+                eta = index_of_water()
+                if was_wet == 0:
+                    eta = 1.0 / eta
+                through = bent(ahead, inward, eta)
+                glossy += 1
+                if chance.x < through.w:
+                    ahead = mirrored(ahead, inward)
+                    p = at + 1e-3 * world.field.grid.step.x * inward
+                    wet = was_wet
+                else:
+                    ahead = vec3(through.x, through.y, through.z)
+                    p = at - 1e-3 * world.field.grid.step.x * inward
+                    wet = 1 - was_wet
+            elif going == 1 and what == 4:
+                ball = world.motes.ball[which]
+                through = bent(ahead, n, 1.0 / index_of_water())
+                glossy += 1
+                if chance.x < through.w:
+                    ahead = mirrored(ahead, n)
+                    p = at + 1e-4 * ball.w * n
+                else:
+                    inner = vec3(through.x, through.y, through.z)
+                    chord = -2.0 * ball.w * inner.dot(n)
+                    p = at + chord * inner
+                    ahead = (2.0 * inner.dot(ahead) * inner - ahead).normalized(1e-12)
+                    p += 1e-4 * ball.w * ahead
+                    value *= qd.exp(-chord * medium.absorption)
+                wet = 0
+            elif going == 1:
+                color = vec3(0.92, 0.93, 0.94)  # froth
+                brought = vec3(0.0, 0.0, 0.0)
+                if n.dot(ahead) > 0.0:
+                    n = -n
+                if what == 1:
+                    color = floor_albedo(look, at, way * lens.pixel, -ahead.y, matte)
+                    brought = floor_light(photons, at)
+                else:
+                    if what == 2:
+                        color = world.paints[which]
+                    brought = solid_light(photons, world.field.grid, at, n)
+                if matte == 0:
+                    albedo += value.max() * color
+                light += value * color * look.sun * brought
+                value *= color
+                matte += 1
+                p = at + 2e-4 * setting.size * n
+                spread = pair(seed, sample, 3 + 3 * bounce)
+                after, after_wet, wet = around(n, spread), was_wet, was_wet
+                facing = n.dot(look.to_sun)
+                if was_wet == 0 and facing > -look.sun_size:
+                    to_lamp = towards(look.to_sun, look.sun_size, pair(seed, sample, 4 + 3 * bounce))
+                    waits = value * look.sun * qd.max(n.dot(to_lamp), 0.0)
+                    if n.dot(to_lamp) > 0.0:
+                        shadow = 1
+                        ahead = to_lamp
+                if shadow == 0:
+                    ahead = after
+                if matte > 2:
+                    # What further surfaces would bring is taken as even light.
+                    light += 0.5 * value * look.sky
+                    if shadow == 0:
+                        going = 0
+                    value = vec3(0.0, 0.0, 0.0)
+            bounce += 1
+        if bounce >= 24 or (shadow == 0 and value.max() < 1e-3):
+            going = 0
+    return light, albedo, shape
+
+
+@qd.func
+def lamp(look: Look, ahead):
+    """Radiance of the sun as smooth surfaces show it: as wide as it is when it casts shadows, in a studio too."""
+    wide = qd.max(look.sun_size, 0.02)
+    away = (ahead - look.to_sun).norm() / wide
+    bright = qd.min(1.0 / (wide * wide), 60.0) * look.sparkle / 3.0
+    return bright * smoothstep(4.0 * (1.1 - away)) * look.sun
+
+
+@qd.func
+def floor_albedo(look: Look, at, wide, steep, matte):
+    """Albedo of the floor at a point seen by a ray that is `wide` there; plain where the eye does not see it."""
+    share = 1.0
+    if matte == 0 and look.tile > 0.0:
+        per = 1.0 / look.tile
+        grain = 0.5 * per * wide / qd.sqrt(qd.max(steep, 1e-3))
+        place = vec2(at.x, at.z) * per
+        if look.paving == 1:
+            joint = joint_cover(place.x, grain) + joint_cover(place.y, grain)
+            share = 1.0 - 0.45 * qd.min(joint, 1.0)
+        elif look.paving == 2:
+            share = stone(place, grain)
+        elif look.paving == 3:
+            share = sand(place, grain)
+    return qd.min(share * look.floor, 0.97)
+
+
+@qd.func
+def line_on_way(setting: Setting, p, ahead, far):
+    """1 where a ray meets an edge of the tank nearer than `far`: twelve round bars, by the nearest way to each."""
+    met = 0.0
+    if setting.edge > 0.0:
+        for axis in qd.static(range(3)):
+            b, c = qd.static((axis + 1) % 3), qd.static((axis + 2) % 3)
+            square = qd.max(ahead[b] * ahead[b] + ahead[c] * ahead[c], 1e-12)
+            for corner in range(4):
+                y, z = setting.tank.lower[b], setting.tank.lower[c]
+                if corner % 2 == 1:
+                    y = setting.tank.upper[b]
+                if corner // 2 == 1:
+                    z = setting.tank.upper[c]
+                t = ((y - p[b]) * ahead[b] + (z - p[c]) * ahead[c]) / square
+                off_y, off_z = p[b] + t * ahead[b] - y, p[c] + t * ahead[c] - z
+                along = p[axis] + t * ahead[axis]
+                if t > 0.0 and t < far + setting.edge and off_y * off_y + off_z * off_z < setting.edge * setting.edge:
+                    if along > setting.tank.lower[axis] and along < setting.tank.upper[axis]:
+                        met = 1.0
+    return met

@@ -1,0 +1,188 @@
+"""A path-traced picture: instants of the open shutter, photons and samples for each, until all samples are there."""
+
+import dataclasses
+import hashlib
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wavetank.device.compiler import download, qd, synchronize, upload
+from wavetank.device.state import remembered
+from wavetank.view.buffers import Buffers
+from wavetank.view.film import balls, field, light, paths
+from wavetank.view.film.march import World
+from wavetank.view.lens import vec3, vec4, vector
+from wavetank.view.look import Look
+from wavetank.view.optics.rays import box
+from wavetank.view.optics.radiance import background
+from wavetank.view.paints import colors_of
+from wavetank.view.passes import ellipsoids, solids
+from wavetank.view.shot import Shot
+from wavetank.view.water_buffers import water_of
+from wavetank.view.weights import under_water
+
+PHOTONS_A_ROUND, ROUNDS = 250_000, 16
+TEXELS_A_SPACING, MOST_TEXELS = 4.0, 1400  # of the floor's map
+BRIGHTEST = 4.0
+SLICES = 8  # instants of an open shutter
+
+
+def glow_of(shot: Shot) -> Any:
+    """Return the radiance of light that comes back out of deep water."""
+    return vector(*(shot.look.glow * shot.tint))
+
+
+class Tracer:
+    """Traces the pictures of one size."""
+
+    def __init__(self, buffers: Buffers) -> None:
+        self.buffers = buffers
+        shape = (buffers.rows, buffers.columns)
+        self.film = paths.Film(
+            mean=qd.ndarray(vec3, shape=shape), square=qd.ndarray(qd.f32, shape=shape),
+            albedo=qd.ndarray(vec3, shape=shape), shape=qd.ndarray(vec4, shape=shape),
+        )  # fmt: skip
+        self._room: field.FieldRoom | None = None
+        self._photons: light.Photons | None = None
+
+    def trace(
+        self, shot: Shot, samples: int, *, aperture: float = 0.0, focus: float | None = None, shutter: float = 0.0,
+        first: int = 0, tell: Callable[[int], bool] | None = None,
+    ) -> int:  # fmt: skip
+        """Take the samples from `first` on and return how many there are: fewer where `tell` says to stop.
+
+        `aperture` is the radius of the lens [m], `focus` the depth that is sharp [m], `shutter` for how long it is open
+        [s]. `tell` is called with the number of samples after each few, and ends the work by returning False.
+        """
+        slices = [0.0] if shutter == 0.0 else [shutter * ((k + 0.5) / SLICES - 0.5) for k in range(SLICES)]
+        setting, medium = self.setting(shot, aperture, focus), self.medium(shot)
+        done = first
+        for number, moved in enumerate(slices):
+            end = samples * (number + 1) // len(slices)
+            if done >= end:
+                continue
+            now = self._moved(shot, moved)
+            world = self._world(now, shutter, moved)
+            photons = self._lit(now, world, medium, number)
+            if number == 0 or done == first:
+                setting = dataclasses.replace(setting, under=under_water(now, self.buffers))
+            while done < end:
+                count = min(self._at_once(), end - done)
+                paths.trace(
+                    self.film, world, photons, shot.lens, shot.look, medium, remembered(setting), done, count
+                )
+                synchronize()
+                done += count
+                if tell is not None and not tell(done):
+                    return done
+        return done
+
+    def _at_once(self) -> int:
+        return max(1, min(16, 4_000_000 // (self.buffers.rows * self.buffers.columns)))
+
+    def setting(self, shot: Shot, aperture: float, focus: float | None) -> paths.Setting:
+        """Return what surrounds the water, and how it is looked at."""
+        extent, lens = shot.extent, shot.lens
+        depth = float((extent.middle - lens.eye) @ lens.forward) if focus is None else focus
+        distance = max(float(np.linalg.norm(extent.middle - lens.eye)), 0.2 * extent.radius)
+        pixels = self.buffers.rows / self.buffers.supersample
+        edge = 0.5 * max(1.0, pixels / 420.0) * distance / float(lens.focal) if shot.frame.scene.tank else 0.0
+        return paths.Setting(
+            fill=filled(shot.look), middle=vector(extent.middle[0], 0.0, extent.middle[2]), size=extent.radius,
+            tank=shot.walls, edge=float(edge), aperture=float(aperture), focus=max(float(depth), 1e-3), under=0,
+            brightest=BRIGHTEST,
+        )  # fmt: skip
+
+    def medium(self, shot: Shot) -> paths.Medium:
+        """Return what the water does to light."""
+        return remembered(
+            paths.Medium(absorption=shot.absorption, scattering=shot.scattering, glow=glow_of(shot))
+        )
+
+    def _moved(self, shot: Shot, moved: float) -> Shot:
+        """Return the shot of an instant, with the particles where they have gone to."""
+        if moved == 0.0 or not shot.frame.count:
+            return shot
+        frame = shot.frame
+        x = qd.ndarray(vec3, shape=frame.x.shape)
+        upload(x, download(frame.x) + np.float32(moved) * download(frame.v))
+        return dataclasses.replace(shot, frame=dataclasses.replace(frame, x=x))
+
+    def _world(self, shot: Shot, shutter: float, moved: float) -> World:
+        """Return all that rays may meet at an instant."""
+        speed = float(np.abs(shot.frame.velocities).max()) if shutter and shot.frame.count else 0.0
+        ellipsoids.draw(shot, self.buffers)
+        water = water_of(self.buffers, shot)
+        grid = field.grid_around(shot, 0.0 if not shutter else speed * shutter)
+        if self._room is None or self._room.grid is not grid:
+            self._room = None
+            self._room = field.room_for(grid)
+        motes, touched = balls.motes_of(shot, water, grid, moved)
+        upload(self._room.near, touched)
+        paints = self.buffers.paints.of(colors_of(shot))
+        return World(
+            field=field.build(self._room, water, shot), motes=motes, solids=shot.frame.solids,
+            window=solids.window(shot), paints=paints,
+        )  # fmt: skip
+
+    def _lit(self, shot: Shot, world: World, medium: paths.Medium, slice: int) -> light.Photons:
+        """Return the light that the water of an instant brings."""
+        grid, look, d = world.field.grid, shot.look, shot.extent.spacing
+        lower, upper = np.asarray(grid.lower, float), np.asarray(grid.upper, float)
+        corners = np.array([[(lower, upper)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
+        to_sun = np.asarray(look.to_sun, float)
+        side = np.cross([0.0, 1.0, 0.0] if abs(to_sun[1]) < 0.99 else [1.0, 0.0, 0.0], to_sun)
+        side /= np.linalg.norm(side)
+        top = np.cross(to_sun, side)
+        a, b, c = corners @ side, corners @ top, corners @ to_sun
+        begin = side * a.min() + top * b.min() + to_sun * (c.max() + 0.05 * shot.extent.radius)
+        wide, tall = float(np.ptp(a)), float(np.ptp(b))
+        across = max(8, round(math.sqrt(PHOTONS_A_ROUND * wide / tall)))
+        rows = max(8, round(PHOTONS_A_ROUND / across))
+        margin = 1.2 * (upper[1] - lower[1]) + 4.0 * d
+        size = upper[[0, 2]] - lower[[0, 2]] + 2.0 * margin
+        texel = max(d / TEXELS_A_SPACING, float(size.max()) / MOST_TEXELS)
+        texels = [int(math.ceil(length / texel)) for length in size]
+        has_solids = shot.frame.solids.count > shot.frame.solids.tank_count or len(world.motes.kind.to_numpy()) > 1
+        cells = grid.nx * grid.ny * grid.nz // 8 if has_solids else 1
+        shapes = ((texels[1], texels[0], 3), (cells, 6))
+        kept = self._photons
+        if kept is None or (tuple(kept.floor.shape), tuple(kept.flow.shape)) != shapes:
+            floor, flow = (qd.ndarray(qd.i32, shape=shape) for shape in shapes)
+        else:
+            floor, flow = kept.floor, kept.flow
+            floor.fill(0)
+            flow.fill(0)
+        photons = light.Photons(
+            floor=floor, flow=flow, corner=vector(lower[0] - margin, texel, lower[2] - margin),
+            begin=vector(*begin), right=vector(*(side * wide)), up=vector(*(top * tall)), across=across, rows=rows,
+            power=wide * tall / (across * rows * ROUNDS), has_flow=int(has_solids),
+        )  # fmt: skip
+        self._photons = photons
+        if float(np.max(look.sun)) > 0.0:
+            for number in range(ROUNDS):
+                light.shine(photons, world, look, medium.absorption, slice * ROUNDS + number)
+        return photons
+
+
+@qd.kernel(fastcache=True)
+def look_around(found: qd.types.ndarray(), directions: qd.types.ndarray(), look: Look, count: qd.i32):
+    """Write the radiance of the sky in every direction."""
+    for k in range(count):
+        found[k] = background(look, directions[k])
+
+
+def filled(look: Look) -> Any:
+    """Return what a matte surface gets of the sky over what the sky looks like, so that white shows `Look.sky`."""
+    count = 2048
+    up = np.sqrt((np.arange(count) + 0.5) / count)  # by the cosine
+    turn, flat = 2.3999632297 * np.arange(count), np.sqrt(1.0 - up * up)
+    directions, found = qd.ndarray(vec3, shape=(count,)), qd.ndarray(vec3, shape=(count,))
+    upload(directions, np.stack([flat * np.cos(turn), up, flat * np.sin(turn)], axis=1).astype(np.float32))
+    look_around(found, directions, look, count)
+    mean = download(found).mean(axis=0)
+    return vector(*(np.asarray(look.sky) / np.maximum(mean, 1e-6)))
