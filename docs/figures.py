@@ -78,7 +78,7 @@ def foam_figures() -> None:
     Image.fromarray(image).save(DOCS / "foam.jpg", quality=88, optimize=True)
 
 
-def picture(sim: wt.Simulation, path: Path, width: int, height: int, quality: str = "film", **options: Any) -> None:
+def picture(sim: wt.Simulation, path: Path, width: int, height: int, quality: str = "high", **options: Any) -> None:
     """Write a JPG of a world."""
     supersample, samples = QUALITIES[quality]
     renderer = Renderer(width, height, supersample)
@@ -94,7 +94,7 @@ def figures(names: list[str]) -> None:
         scene, moment, options = SHOTS[name]
         sim = wt.Simulation(scene)
         sim.advance(moment)
-        picture(sim, DOCS / f"{name}.jpg", 1280, 720, "standard" if options else "film", **options)
+        picture(sim, DOCS / f"{name}.jpg", 1280, 720, "standard" if options else "high", **options)
         if name == "drop":
             picture(sim, DOCS / "drop-draft.jpg", 1280, 720, "draft")
     if names:

@@ -177,8 +177,9 @@ def render(
     sun: Sun = None,
     floor: Floor = None,
     quality: Annotated[
-        str, typer.Option(help="draft, standard or film, as for run; standard for a picture, draft for a film.")
+        str, typer.Option(help="draft, standard, high or film, as for run; standard for a picture, draft for a film.")
     ] = "",
+    samples: Annotated[int | None, typer.Option(help="Samples a pixel, of high and film; 64 unless told.")] = None,
     eye: Annotated[
         str | None, typer.Option(help="Where the camera is [m], as 2,1,3; what it looks at is --target.")
     ] = None,
@@ -204,11 +205,16 @@ def render(
               view=view, color_by=color_by, cut=cut, environment=environment, sun=sun, floor=floor)  # fmt: skip
         return
     figures = take(
-        world, scene, out, across, down, at=at, arch=arch, quality=quality or "standard", eye=eye, target=target,
+        world, scene, out, across, down, at=at, arch=arch, quality=quality or "standard", samples=samples, eye=eye, target=target,
         timings=timings, view=view, color_by=color_by, cut=cut, environment=environment, sun=sun, floor=floor,
     )  # fmt: skip
     if as_json:
         print(json.dumps(figures))
+    if figures.get("interrupted"):
+        if not as_json:
+            print(f"{figures['samples']} of {figures['of']} samples are kept in {figures['file']}; the same command goes on.")
+        raise typer.Exit(figures["exit_code"])
+    if as_json:
         return
     for name, milliseconds in figures.get("milliseconds", {}).items():
         print(f"{name:12s} {milliseconds:8.1f} ms")

@@ -30,7 +30,7 @@ from wavetank.simulation.simulation import Simulation
 from wavetank.view.camera import Camera
 from wavetank.view.extent import extent_of
 from wavetank.view.renderer import Renderer
-from wavetank.view.style import QUALITIES, quality_named
+from wavetank.view.style import quality_named, quality_options
 
 GIF_WIDTH = 640  # px
 WORST = ("density_error_mean", "density_error_p99", "speed_max")
@@ -100,7 +100,7 @@ class Order:
     @property
     def style(self) -> dict[str, Any]:
         """Options of every picture."""
-        return {**self.look, "samples": QUALITIES[self.quality][1]}
+        return {**quality_options(self.quality)[1], **self.look}
 
     def run(self, sim: Simulation, start: float) -> Run:
         """Return this as the file of a run's folder has it, which began at the time `start` [s] of the water."""
@@ -133,7 +133,7 @@ def record(
     check_exports(order.exports, order.only, sim.scene)
     check_time(sim.count, sim.scene, order.seconds, "this run")
     with asked_to_end(say="asked to end; the files are being completed (once more stops at once)") as asked:
-        supersample = QUALITIES[order.quality][0]
+        supersample, _ = quality_options(order.quality)
         renderer = Renderer(*order.size, supersample)
         renderer.render(sim.frame(), **order.style)  # what is wrong with the look shows before anything is written
         work = _Work(sim, order, asked, begun)

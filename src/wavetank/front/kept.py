@@ -20,7 +20,7 @@ from wavetank.simulation.instant import Instant
 from wavetank.simulation.shown import Shown
 from wavetank.simulation.simulation import Simulation
 from wavetank.view.renderer import Renderer, affordable
-from wavetank.view.style import QUALITIES, quality_named
+from wavetank.view.style import quality_options
 
 FILMS = (".mp4", ".gif")
 
@@ -89,12 +89,12 @@ def film(
     Nothing is computed again where frames were written. Raises `WavetankError`.
     """
     console = console or Console(stderr=True)
-    supersample, samples = QUALITIES[quality_named(quality)]
+    supersample, chosen = quality_options(quality)
     writer = exporter_for(path, "video")
     source = source_of(Path(world), arch)
     if source.note:
         console.print(source.note, markup=False)
-    style, count, time = {**options, "samples": samples}, 0, 0.0
+    style, count, time = {**chosen, **options}, 0, 0.0
     frames = _shown(source.scene, source.frames, arch)
     first = next(frames, None)
     if first is None:

@@ -1,8 +1,12 @@
 """One picture of a scene, of a saved state or of a run."""
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
 from wavetank.device.compiler import current_backend
 from wavetank.formats import exporter_for
@@ -10,14 +14,19 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.replacing import partial_path
 from wavetank.foundation.version import VERSION
 from wavetank.front.kept import frame_at, is_kept
+from wavetank.front.signals import Asked, asked_to_end
 from wavetank.scene.scene import Scene
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.simulation import Simulation
 from wavetank.view.camera import Camera
 from wavetank.view.extent import extent_of_water
+from wavetank.view.film.samples import Watch
 from wavetank.view.renderer import ROOM, Renderer, affordable
-from wavetank.view.style import QUALITIES, Style, quality_named
+from wavetank.view.style import Style, quality_options
 
+SAMPLES = ".samples.npz"  # what the file of a picture that was stopped ends in
+STOPS = "asked to end; the samples are being kept (once more stops at once)"
+PARTS = ("{task.description}", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
 USUAL_TIME = 0.5  # s: when a scene is shown unless told
 #: the same for bundled scenes whose best moment is another one
 SHOWN_AT = {
@@ -30,7 +39,7 @@ SHOWN_AT = {
 def take(
     world: str, scene: Scene | None, path: Path, width: int, height: int, *, at: float | None = None,
     arch: str = "", quality: str = "standard", eye: str | None = None, target: str | None = None,
-    timings: bool = False, **options: Any,
+    timings: bool = False, samples: int | None = None, console: Console | None = None, **options: Any,
 ) -> dict[str, Any]:  # fmt: skip
     """Write a picture with its scene, time and view as metadata, and return what it cost.
 
@@ -39,8 +48,8 @@ def take(
     """
     writer = exporter_for(path, "picture")
     partial_path(path)  # what is wrong shows before the work
-    supersample, samples = QUALITIES[quality_named(quality)]
-    style = {**options, "samples": samples}
+    supersample, chosen = quality_options(quality, samples)
+    style = {**chosen, **options}
     view = Style(**style).kind
     if scene is None and is_kept(world):
         frame = frame_at(world, at, arch)
@@ -49,7 +58,17 @@ def take(
     renderer = Renderer(width, height, affordable(width, height, supersample))
     camera = _camera_of(frame, eye, target, width / max(height, 1))
     began = time.perf_counter()
-    image = renderer.render(frame, camera, **style)
+    with asked_to_end(say=STOPS if style["traced"] else "") as asked, Progress(
+        *PARTS, console=console or Console(stderr=True), transient=True, disable=not style["traced"]
+    ) as bar:
+        watch = Watch(path=path.with_name(path.name + SAMPLES) if style["traced"] else None)
+        watch.tell = telling(bar, asked)
+        image = renderer.render(frame, camera, watch=watch, **style)
+    if not watch.whole:
+        return {
+            "file": str(watch.path), "samples": watch.done, "of": style["samples"], "interrupted": True,
+            "exit_code": asked.code,
+        }  # fmt: skip
     figures: dict[str, Any] = {
         "file": str(path), "scene": frame.scene.title, "time": frame.time, "view": view.name, "particles": frame.count,
         "seconds_to_draw": time.perf_counter() - began, "arch": current_backend(),
@@ -59,8 +78,21 @@ def take(
         figures["milliseconds"] = measured
         renderer.render(frame, camera, timings=measured, **style)
     about = {"scene": frame.scene.title, "time": f"{frame.time:.4f} s", "view": view.name, "particles": frame.count}
+    if watch.done:
+        figures |= {"samples": watch.done, "samples_kept": watch.begun}
     writer.write(path, image, about | {"Software": f"wavetank {VERSION}"})
     return figures
+
+
+def telling(bar: Progress, asked: Asked, name: str = "samples") -> Callable[[int, int], bool]:
+    """Return what shows the samples of a picture in a bar, with the time that is left, and stops where `asked` to."""
+    task = bar.add_task(name, total=None)
+
+    def tell(done: int, of: int) -> bool:
+        bar.update(task, completed=done, total=of)
+        return not asked
+
+    return tell
 
 
 def _open(world: str, scene: Scene | None, at: float | None, arch: str) -> Simulation:

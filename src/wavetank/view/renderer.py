@@ -17,6 +17,8 @@ from wavetank.view.buffers import allocate
 from wavetank.view.camera import Camera
 from wavetank.view.colormaps import ENTRIES, table
 from wavetank.view.extent import Extent, extent_of
+from wavetank.view.film.samples import Watch
+from wavetank.view.film.tracer import Tracer
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
 from wavetank.view.look import fluid_optics, usual_depth
 from wavetank.view.optics.dyes import ICE, lay_ice
@@ -24,7 +26,7 @@ from wavetank.view.passes import tonemap
 from wavetank.view.quantities import QUANTITIES, Coloring, usual
 from wavetank.view.shot import Shot
 from wavetank.view.stages import Stages, Sunlight, eye_and_style, sun_and_solids
-from wavetank.view.style import QUALITIES, Style, quality_named
+from wavetank.view.style import Style, quality_options
 from wavetank.view.views import Pass, View
 from wavetank.view.water_buffers import sun_texels, water_of
 
@@ -54,17 +56,27 @@ class Renderer:
         self._stages = Stages()
         self._seen: Any = None  # i32 [capacity]: dyes or materials as they are seen where there is ice
         self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
+        self._tracer: Tracer | None = None
 
     def render(
-        self, frame: Frame, camera: Camera | None = None, *, timings: Timings = None, **options: Any
-    ) -> np.ndarray:
+        self, frame: Frame, camera: Camera | None = None, *, timings: Timings = None, watch: Watch | None = None,
+        **options: Any,
+    ) -> np.ndarray:  # fmt: skip
         """Return a picture of `frame`, uint8 [height, width, 3].
 
-        `options` are the fields of `Style`; `timings`, a dict, receives the milliseconds of each pass. Raises
-        `WavetankError` for what is not allowed.
+        `options` are the fields of `Style`; `timings`, a dict, receives the milliseconds of each pass. `watch` is told
+        how far a traced picture is, and can stop it. Raises `WavetankError` for what is not allowed.
         """
         style = Style.of(options)
         shot = self.shot(frame, camera, style)
+        if style.traced and style.kind.name == "water" and frame.dim == 3:
+            began = time.perf_counter()
+            self._tracer = self._tracer or Tracer(self.buffers)
+            self._tracer.draw(shot, style, watch or Watch())
+            tonemap.draw(shot, self.buffers)
+            if timings is not None:
+                timings["film"] = 1e3 * (time.perf_counter() - began)
+            return self.buffers.host_picture()
         lit = self._begin(style, shot, timings)
         if style.samples == 1:
             self._take(style.kind, shot, lit, timings)
@@ -228,12 +240,12 @@ def render(
     """Return a picture of a `Frame` or a `Simulation`, uint8 [height, width, 3].
 
     `options` are those of `Renderer.render`: a view by name, a camera and the fields of `Style`. `quality` is draft,
-    standard or film. Without either `supersample` is 2, or 1 for pictures of more than 16 million pixels. Renderers of
+    standard, high or film. Without either `supersample` is 2, or 1 for pictures of more than 16 million pixels. Renderers of
     the last few sizes are kept.
     """
     if quality is not None:
-        samples = QUALITIES[quality_named(quality)]
-        supersample, options = supersample or samples[0], {"samples": samples[1], **options}
+        usual_samples, chosen = quality_options(quality)
+        supersample, options = supersample or usual_samples, {**chosen, **options}
     # Neighbours are searched for only where densities are seen.
     frame = world.frame(measured=options.get("color_by") == "density") if hasattr(world, "frame") else world
     if not (hasattr(frame, "scene") and hasattr(frame, "x")):

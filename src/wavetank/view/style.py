@@ -19,8 +19,8 @@ from wavetank.view.views import VIEWS, View
 #: Of a drawn particle [d] in 2-D and 3-D worlds: what has no depth should close its gaps.
 RADIUS = {2: 0.62, 3: 0.55}
 MOST_SAMPLES = 4096
-#: name -> samples a pixel has in each direction, and pictures that are averaged
-QUALITIES: dict[str, tuple[int, int]] = {"draft": (1, 1), "standard": (2, 1), "film": (1, 64)}
+#: name -> samples a pixel has in each direction, and pictures that are averaged; of a film, samples of a path tracer
+QUALITIES: dict[str, tuple[int, int]] = {"draft": (1, 1), "standard": (2, 1), "high": (1, 64), "film": (1, 64)}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,7 +39,11 @@ class Style:
     sun: str | None = None  # azimuth and elevation [deg], as "40,25"
     floor: str | None = None  # one of FLOORS
     hasty: bool = False  # leave out what movement hides: smooth outlines, every second look of the sun and ray
-    samples: int = 1  # pictures, each from a slightly other eye and sun, that are averaged
+    samples: int = 1  # pictures, each from a slightly other eye and sun, that are averaged; or samples that are traced
+    traced: bool = False  # follow paths of light through the water of a world in space; other pictures are averaged
+    aperture: float = 0.0  # m: radius of the lens of a traced picture
+    focus: float | None = None  # m: distance that is sharp in it, that of the world's middle unless told
+    shutter: float = 0.0  # s: for which it sees the water move
 
     @classmethod
     def of(cls, options: dict[str, Any]) -> "Style":
@@ -79,6 +83,10 @@ class Style:
         samples = self.samples
         if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
             raise WavetankError(f"render: samples = {samples!r} must be a whole number from 1 to {MOST_SAMPLES}.")
+        lengths = ("aperture", self.aperture, 0.0), ("focus", self.focus, 1e-3), ("shutter", self.shutter, 0.0)
+        for name, value, least in lengths:
+            if value is not None and not (isinstance(value, int | float) and least <= value <= 1e4):
+                raise WavetankError(f"render: {name} = {value!r} must be a number from {least:g} to 10000.")
 
     @property
     def kind(self) -> View:
@@ -146,3 +154,9 @@ def quality_named(name: str) -> str:
     if name not in QUALITIES:
         raise WavetankError(f"quality = {name!r} is not known; use one of {', '.join(QUALITIES)}.")
     return name
+
+
+def quality_options(name: str, samples: int | None = None) -> tuple[int, dict[str, Any]]:
+    """Return the samples a pixel has in each direction, and the options of a quality, with other `samples` if told."""
+    supersample, usual = QUALITIES[quality_named(name)]
+    return supersample, {"samples": usual if samples is None else samples, "traced": name == "film"}

@@ -34,7 +34,7 @@ from wavetank.view.water_buffers import Ellipsoids, WaterBuffers
 NODES_A_SPACING, MOST_NODES = 2.0, 48_000_000
 REACH = 1.75  # d
 UNIT = 65536.0  # steps of a share, and of a level in units of a node
-SMOOTH, WIDE = 3, 5  # binomial blurs of the surface, and further ones of what tells how much water there is
+SMOOTH, WIDE = 6, 5  # binomial blurs of the surface, and further ones of what tells how much water there is
 DRAWN = 0.16  # d
 MARGIN = 4  # nodes of air in the open and above
 

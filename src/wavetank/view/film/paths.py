@@ -33,7 +33,7 @@ class Film:
     """What the samples of every pixel have come to, [rows, columns], on the device."""
 
     mean: qd.types.ndarray()  # vec3: radiance
-    square: qd.types.ndarray()  # f32: mean square of its brightness
+    half: qd.types.ndarray()  # vec3: what it was when half of the samples were there
     albedo: qd.types.ndarray()  # vec3: of the first matte surface, however it is seen
     shape: qd.types.ndarray()  # vec4: normal of the first surface, and the inverse of its distance
 
@@ -65,9 +65,9 @@ class Setting:
 @qd.kernel(fastcache=True)
 def trace(
     film: Film, world: World, photons: Photons, lens: Lens, look: Look, medium: Medium, setting: Setting,
-    first: qd.i32, samples: qd.i32,
+    first: qd.i32, samples: qd.i32, half: qd.i32,
 ):  # fmt: skip
-    """Add `samples` samples to every pixel, which has had `first` of them."""
+    """Add `samples` samples to every pixel, which has had `first` of them; `half` is half of all that will be."""
     for row, column in qd.ndrange(film.mean.shape[0], film.mean.shape[1]):
         for sample in range(first, first + samples):
             seed = scrambled(qd.cast(row * 16384 + column, qd.u32) ^ qd.u32(0x2545F491))
@@ -85,13 +85,13 @@ def trace(
                 # What is much brighter than white counts as a little less, or single samples would stand out.
                 light *= (1.0 + (bright - 1.0) / (1.0 + (bright - 1.0) / setting.brightest)) / bright
             share = 1.0 / (sample + 1)
-            gray = 0.3 * light.x + 0.6 * light.y + 0.1 * light.z
-            before, square = film.mean[row, column], film.square[row, column]
+            before = film.mean[row, column]
             guide, form = film.albedo[row, column], film.shape[row, column]
             if sample == 0:
-                before, square, guide, form = light, gray * gray, albedo, shape
+                before, guide, form = light, albedo, shape
             film.mean[row, column] = before + share * (light - before)
-            film.square[row, column] = square + share * (gray * gray - square)
+            if sample < half:
+                film.half[row, column] = film.mean[row, column]
             film.albedo[row, column] = guide + share * (albedo - guide)
             film.shape[row, column] = form + share * (shape - form)
 

@@ -1,11 +1,8 @@
 """A path-traced picture: instants of the open shutter, photons and samples for each, until all samples are there."""
 
 import dataclasses
-import hashlib
 import math
-import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,22 +10,24 @@ import numpy as np
 from wavetank.device.compiler import download, qd, synchronize, upload
 from wavetank.device.state import remembered
 from wavetank.view.buffers import Buffers
-from wavetank.view.film import balls, field, light, paths
+from wavetank.view.film import balls, denoise, field, light, paths
 from wavetank.view.film.march import World
-from wavetank.view.lens import vec3, vec4, vector
+from wavetank.view.film.samples import Watch, digest_of, load, store
+from wavetank.view.lens import vec2, vec3, vec4, vector
 from wavetank.view.look import Look
 from wavetank.view.optics.rays import box
 from wavetank.view.optics.radiance import background
 from wavetank.view.paints import colors_of
 from wavetank.view.passes import ellipsoids, solids
 from wavetank.view.shot import Shot
+from wavetank.view.style import Style
 from wavetank.view.water_buffers import water_of
 from wavetank.view.weights import under_water
 
 PHOTONS_A_ROUND, ROUNDS = 250_000, 16
 TEXELS_A_SPACING, MOST_TEXELS = 4.0, 1400  # of the floor's map
 BRIGHTEST = 4.0
-SLICES = 8  # instants of an open shutter
+SLICES, TURNS = 8, (0, 2, 4, 6, 1, 3, 5, 7)  # instants of an open shutter: both halves of the samples see all of it
 
 
 def glow_of(shot: Shot) -> Any:
@@ -43,11 +42,36 @@ class Tracer:
         self.buffers = buffers
         shape = (buffers.rows, buffers.columns)
         self.film = paths.Film(
-            mean=qd.ndarray(vec3, shape=shape), square=qd.ndarray(qd.f32, shape=shape),
+            mean=qd.ndarray(vec3, shape=shape), half=qd.ndarray(vec3, shape=shape),
             albedo=qd.ndarray(vec3, shape=shape), shape=qd.ndarray(vec4, shape=shape),
         )  # fmt: skip
         self._room: field.FieldRoom | None = None
         self._photons: light.Photons | None = None
+        self._spare: tuple[Any, Any, Any] | None = None
+
+    def draw(self, shot: Shot, style: Style, watch: Watch) -> None:
+        """Fill `color` with the picture of a style; stopped, with what there is of it."""
+        options = (style.samples, style.aperture, style.focus, style.shutter)
+        digest = digest_of(shot, (*options, self.buffers.rows, self.buffers.columns)) if watch.path else ""
+        watch.begun = watch.done = load(watch.path, self.film, digest) if watch.path else 0
+
+        def tell(done: int) -> bool:
+            watch.done = done
+            return watch.tell is None or watch.tell(done, style.samples)
+
+        watch.done = self.trace(
+            shot, style.samples, aperture=style.aperture, focus=style.focus, shutter=style.shutter,
+            first=watch.begun, tell=tell,
+        )  # fmt: skip
+        watch.whole = watch.done >= style.samples
+        if watch.path and not watch.whole:
+            store(watch.path, self.film, digest, watch.done)
+        elif watch.path:
+            watch.path.unlink(missing_ok=True)
+        if self._spare is None:
+            shape = (self.buffers.rows, self.buffers.columns)
+            self._spare = (qd.ndarray(vec3, shape=shape), qd.ndarray(vec3, shape=shape), qd.ndarray(vec2, shape=shape))
+        self.buffers.pixels.color.copy_from(denoise.clean(self.film, self._spare))
 
     def trace(
         self, shot: Shot, samples: int, *, aperture: float = 0.0, focus: float | None = None, shutter: float = 0.0,
@@ -58,7 +82,7 @@ class Tracer:
         `aperture` is the radius of the lens [m], `focus` the depth that is sharp [m], `shutter` for how long it is open
         [s]. `tell` is called with the number of samples after each few, and ends the work by returning False.
         """
-        slices = [0.0] if shutter == 0.0 else [shutter * ((k + 0.5) / SLICES - 0.5) for k in range(SLICES)]
+        slices = [0.0] if shutter == 0.0 else [shutter * ((k + 0.5) / SLICES - 0.5) for k in TURNS]
         setting, medium = self.setting(shot, aperture, focus), self.medium(shot)
         done = first
         for number, moved in enumerate(slices):
@@ -68,12 +92,12 @@ class Tracer:
             now = self._moved(shot, moved)
             world = self._world(now, shutter, moved)
             photons = self._lit(now, world, medium, number)
-            if number == 0 or done == first:
-                setting = dataclasses.replace(setting, under=under_water(now, self.buffers))
+            around = remembered(dataclasses.replace(setting, under=under_water(now, self.buffers)))
             while done < end:
                 count = min(self._at_once(), end - done)
                 paths.trace(
-                    self.film, world, photons, shot.lens, shot.look, medium, remembered(setting), done, count
+                    self.film, world, photons, shot.lens, shot.look, medium, around, done, count,
+                    max(1, samples // 2),
                 )
                 synchronize()
                 done += count

@@ -1,0 +1,69 @@
+"""The samples of a picture under way: who is told of them, and the file that keeps them."""
+
+import dataclasses
+import hashlib
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wavetank.device.compiler import download, upload
+from wavetank.foundation.replacing import replacing
+from wavetank.foundation.version import VERSION
+from wavetank.view.film.paths import Film
+
+NAMES = ("mean", "half", "albedo", "shape")
+FORMAT = 1  # of what the samples mean; another one is begun anew
+
+
+@dataclasses.dataclass
+class Watch:
+    """How a picture that takes minutes is watched: whom it tells, where it keeps its samples, whether it is whole."""
+
+    tell: Callable[[int, int], bool] | None = None  # samples there are, and of how many; False stops
+    path: Path | None = None  # of the samples when it is stopped
+    begun: int = 0  # samples that were there
+    done: int = 0  # samples there are
+    whole: bool = True  # whether they are all
+
+
+def digest_of(shot: Any, options: tuple[Any, ...]) -> str:
+    """Return what tells one picture from another: water, solids, eye, light, and how it is taken."""
+    frame, found = shot.frame, hashlib.sha256(repr((VERSION, FORMAT, options, frame.time, frame.count)).encode())
+    count, foam = frame.count, frame.foam_count
+    arrays = [download(array)[:count] for array in (frame.x, frame.v, frame.id, frame.dye, frame.material)]
+    if frame.diffuse is not None and foam:
+        arrays += [download(getattr(frame.diffuse, name))[:foam] for name in ("x", "v", "kind", "id")]
+    solids = frame.solids
+    arrays += [download(getattr(solids, name)) for name in ("op", "size", "offset", "turn", "position", "rotation")]
+    for of in (shot.lens, shot.look):
+        arrays += [np.asarray(getattr(of, field.name)) for field in dataclasses.fields(of)]
+    arrays += [np.asarray(shot.absorption), np.asarray(shot.tint), np.asarray(shot.scattering)]
+    for array in arrays:
+        found.update(np.ascontiguousarray(array).tobytes())
+    found.update("".join(solid.color or "-" for solid in frame.scene.solids).encode())
+    return found.hexdigest()
+
+
+def store(path: Path, film: Film, digest: str, done: int) -> None:
+    """Write the samples to a file, which is complete or not there."""
+    with replacing(path) as partial, open(partial, "wb") as out:
+        np.savez(out, digest=digest, done=done, **{name: download(getattr(film, name)) for name in NAMES})
+
+
+def load(path: Path, film: Film, digest: str) -> int:
+    """Fill `film` from a file and return how many samples it holds: 0 where there is none of this picture."""
+    try:
+        with np.load(path, allow_pickle=False) as kept:
+            if str(kept["digest"]) != digest:
+                return 0
+            arrays = {name: kept[name] for name in NAMES}
+            if any(value.shape[:2] != tuple(film.mean.shape) for value in arrays.values()):
+                return 0
+            for name, value in arrays.items():
+                upload(getattr(film, name), value)
+            return int(kept["done"])
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return 0
