@@ -6,7 +6,7 @@ from wavetank import WavetankError
 from wavetank.cli.options import app
 
 # isort: off
-from wavetank.cli import running, playing, converting, experiments  # noqa: F401  (the order of --help)
+from wavetank.cli import running, filming, playing, converting, experiments  # noqa: F401  (the order of --help)
 
 
 def main() -> None:

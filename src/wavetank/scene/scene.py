@@ -22,6 +22,7 @@ from wavetank.foundation.replacing import replacing
 from wavetank.foundation.tracks import scaled
 from wavetank.scene.bounds import check_numbers, check_scales
 from wavetank.scene.filled import AnyFluid, Filled
+from wavetank.scene.film import Film
 from wavetank.scene.fluids import Points
 from wavetank.scene.forces import AnyForce
 from wavetank.scene.goal import Goal
@@ -57,6 +58,7 @@ class Scene(Timetable, Parameters):
     forces: list[AnyForce] = []
     goal: Goal | None = None
     light: Light | None = None
+    film: Film | None = None
 
     @model_validator(mode="before")
     @classmethod

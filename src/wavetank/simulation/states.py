@@ -22,7 +22,7 @@ from wavetank.solids.solid import Solid
 
 #: Of a scene, what the water does not feel, or has left behind it.
 UNFELT: Any = {
-    **dict.fromkeys(("fluids", "title", "goal", "preset", "quality", "light"), True),
+    **dict.fromkeys(("fluids", "title", "goal", "preset", "quality", "light", "film"), True),
     "materials": {"__all__": {"clarity", "glow"}},
 }
 

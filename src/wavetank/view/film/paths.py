@@ -122,6 +122,7 @@ def follow(
                 cover = line_on_way(setting, p, ahead, hit.w)
                 if cover > 0.0:
                     light += value * look.line_strength * cover * look.line
+                    albedo += value.max() * look.line_strength * cover * look.line
                     value *= 1.0 - look.line_strength * cover
             if was_wet == 1:
                 far = qd.min(hit.w, 1e3)
@@ -149,7 +150,7 @@ def follow(
                 share = qd.select(what == 0, 1.0, far)
                 light += value * share * sky
                 if matte == 0:
-                    albedo = share * vec3(1.0, 1.0, 1.0)
+                    albedo += share * value.max() * vec3(1.0, 1.0, 1.0)
                 value *= 1.0 - share
                 if what == 0 or far > 0.999:
                     going = 0

@@ -31,7 +31,8 @@ class Watch:
 
 def digest_of(shot: Any, options: tuple[Any, ...]) -> str:
     """Return what tells one picture from another: water, solids, eye, light, and how it is taken."""
-    frame, found = shot.frame, hashlib.sha256(repr((VERSION, FORMAT, options, frame.time, frame.count)).encode())
+    frame = shot.frame
+    found = hashlib.sha256(repr((VERSION, FORMAT, options, frame.time, frame.count)).encode())
     count, foam = frame.count, frame.foam_count
     arrays = [download(array)[:count] for array in (frame.x, frame.v, frame.id, frame.dye, frame.material)]
     if frame.diffuse is not None and foam:

@@ -24,7 +24,7 @@ from wavetank.view.style import Style
 from wavetank.view.water_buffers import water_of
 from wavetank.view.weights import under_water
 
-PHOTONS_A_ROUND, ROUNDS = 250_000, 16
+PHOTONS, ROUNDS = 1_600_000, 16  # of a picture: in all, and rounds in which they are sent
 TEXELS_A_SPACING, MOST_TEXELS = 4.0, 1400  # of the floor's map
 BRIGHTEST = 4.0
 SLICES, TURNS = 8, (0, 2, 4, 6, 1, 3, 5, 7)  # instants of an open shutter: both halves of the samples see all of it
@@ -91,7 +91,7 @@ class Tracer:
                 continue
             now = self._moved(shot, moved)
             world = self._world(now, shutter, moved)
-            photons = self._lit(now, world, medium, number)
+            photons = self._lit(now, world, medium, number, len(slices))
             around = remembered(dataclasses.replace(setting, under=under_water(now, self.buffers)))
             while done < end:
                 count = min(self._at_once(), end - done)
@@ -153,7 +153,7 @@ class Tracer:
             window=solids.window(shot), paints=paints,
         )  # fmt: skip
 
-    def _lit(self, shot: Shot, world: World, medium: paths.Medium, slice: int) -> light.Photons:
+    def _lit(self, shot: Shot, world: World, medium: paths.Medium, slice: int, slices: int) -> light.Photons:
         """Return the light that the water of an instant brings."""
         grid, look, d = world.field.grid, shot.look, shot.extent.spacing
         lower, upper = np.asarray(grid.lower, float), np.asarray(grid.upper, float)
@@ -165,13 +165,15 @@ class Tracer:
         a, b, c = corners @ side, corners @ top, corners @ to_sun
         begin = side * a.min() + top * b.min() + to_sun * (c.max() + 0.05 * shot.extent.radius)
         wide, tall = float(np.ptp(a)), float(np.ptp(b))
-        across = max(8, round(math.sqrt(PHOTONS_A_ROUND * wide / tall)))
-        rows = max(8, round(PHOTONS_A_ROUND / across))
+        rounds = max(1, ROUNDS // slices)
+        together = min(PHOTONS, 8 * self.buffers.rows * self.buffers.columns) / (slices * rounds)
+        across = max(8, round(math.sqrt(together * wide / tall)))
+        rows = max(8, round(together / across))
         margin = 1.2 * (upper[1] - lower[1]) + 4.0 * d
         size = upper[[0, 2]] - lower[[0, 2]] + 2.0 * margin
         texel = max(d / TEXELS_A_SPACING, float(size.max()) / MOST_TEXELS)
         texels = [int(math.ceil(length / texel)) for length in size]
-        has_solids = shot.frame.solids.count > shot.frame.solids.tank_count or len(world.motes.kind.to_numpy()) > 1
+        has_solids = shot.frame.solids.count > shot.frame.solids.tank_count or int(world.motes.list.shape[0]) > 1
         cells = grid.nx * grid.ny * grid.nz // 8 if has_solids else 1
         shapes = ((texels[1], texels[0], 3), (cells, 6))
         kept = self._photons
@@ -184,12 +186,12 @@ class Tracer:
         photons = light.Photons(
             floor=floor, flow=flow, corner=vector(lower[0] - margin, texel, lower[2] - margin),
             begin=vector(*begin), right=vector(*(side * wide)), up=vector(*(top * tall)), across=across, rows=rows,
-            power=wide * tall / (across * rows * ROUNDS), has_flow=int(has_solids),
+            power=wide * tall / (across * rows * rounds), has_flow=int(has_solids),
         )  # fmt: skip
         self._photons = photons
         if float(np.max(look.sun)) > 0.0:
-            for number in range(ROUNDS):
-                light.shine(photons, world, look, medium.absorption, slice * ROUNDS + number)
+            for number in range(rounds):
+                light.shine(photons, world, look, medium.absorption, slice * rounds + number)
         return photons
 
 

@@ -1,0 +1,66 @@
+"""The command that films a scene."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wavetank.cli.options import (
+    AllowLarge,
+    Arch,
+    Environment,
+    Floor,
+    Json,
+    SceneName,
+    Settings,
+    Sun,
+    app,
+    configured,
+    console,
+    size_of,
+)
+
+
+@app.command()
+def film(
+    scene: SceneName,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="The film, MP4 or GIF; named after the scene unless told.")
+    ] = None,
+    quality: Annotated[
+        str | None, typer.Option(help="draft, standard, high or film; that of the scene's film unless told.")
+    ] = None,
+    samples: Annotated[int | None, typer.Option(help="Samples a pixel, of high and film.")] = None,
+    size: Annotated[str | None, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of a picture.")] = None,
+    fps: Annotated[float | None, typer.Option(help="Frames per second of film.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Seconds of film.")] = None,
+    speed: Annotated[float | None, typer.Option(help="Seconds of water in a second of film.")] = None,
+    keep: Annotated[bool, typer.Option("--keep", help="Leave the frames beside the film.")] = False,
+    environment: Environment = None,
+    sun: Sun = None,
+    floor: Floor = None,
+    allow_large: AllowLarge = False,
+    settings: Settings = [],  # noqa: B006
+    arch: Arch = "cpu",
+    as_json: Json = False,
+) -> None:
+    """Film a scene by the camera and the slow motion in its table [film]; one that was stopped goes on."""
+    from wavetank.front.filming import film as make
+    from wavetank.simulation.cost import large_worlds_allowed
+
+    world, path = configured(scene, settings), out or Path(Path(scene).stem + ".mp4")
+    changes = {"quality": quality, "samples": samples, "fps": fps, "duration": duration, "speed": speed}
+    with large_worlds_allowed(allow_large):
+        figures = make(
+            world, path, arch=arch, console=console, keep=keep, environment=environment, sun=sun, floor=floor,
+            size=size_of(size) if size else None, **changes,
+        )  # fmt: skip
+    if as_json:
+        print(json.dumps(figures))
+    elif figures["interrupted"]:
+        print(f"{figures['frames']:,} of {figures['of']:,} frames are kept in {figures['file']}; the same command goes on.")
+    else:
+        print(f"{figures['frames']:,} frames, {figures['rendered']:,} of them made now\n{path}")
+    if figures["interrupted"]:
+        raise typer.Exit(figures["exit_code"])
