@@ -79,9 +79,9 @@ def trace(
                 off = setting.aperture * disc(pair(seed, sample, 1))
                 p += off.x * lens.right + off.y * lens.up
             ahead = (at_focus - p).normalized(1e-12)
-            light, albedo, shape = follow(world, photons, lens, look, medium, setting, seed, sample, p, ahead)
+            light, albedo, shape, smooth = follow(world, photons, lens, look, medium, setting, seed, sample, p, ahead)
             bright = light.max()
-            if bright > 1.0:
+            if bright > 1.0 and smooth > 0:
                 # What is much brighter than white counts as a little less, or single samples would stand out.
                 light *= (1.0 + (bright - 1.0) / (1.0 + (bright - 1.0) / setting.brightest)) / bright
             share = 1.0 / (sample + 1)
@@ -101,7 +101,7 @@ def follow(
     world: World, photons: Photons, lens: Lens, look: Look, medium: Medium, setting: Setting, seed, sample, begin,
     direction,
 ):  # fmt: skip
-    """Radiance along a ray; the albedo at its first matte surface, and what its first surface is."""
+    """Radiance along a ray; the albedo at its first matte surface, what its first surface is, how many it has met."""
     light, value, waits = vec3(0.0, 0.0, 0.0), vec3(1.0, 1.0, 1.0), vec3(0.0, 0.0, 0.0)
     albedo, shape = vec3(0.0, 0.0, 0.0), qd.Vector([0.0, 0.0, 0.0, 0.0])
     p, ahead, wet = begin, direction, setting.under
@@ -222,7 +222,7 @@ def follow(
             bounce += 1
         if bounce >= 24 or (shadow == 0 and value.max() < 1e-3):
             going = 0
-    return light, albedo, shape
+    return light, albedo, shape, glossy + matte
 
 
 @qd.func

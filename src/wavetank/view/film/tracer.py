@@ -26,7 +26,7 @@ from wavetank.view.weights import under_water
 
 PHOTONS, ROUNDS = 1_600_000, 16  # of a picture: in all, and rounds in which they are sent
 TEXELS_A_SPACING, MOST_TEXELS = 4.0, 1400  # of the floor's map
-BRIGHTEST = 4.0
+BRIGHTEST = 8.0
 SLICES, TURNS = 8, (0, 2, 4, 6, 1, 3, 5, 7)  # instants of an open shutter: both halves of the samples see all of it
 
 

@@ -1,0 +1,220 @@
+"""The path tracer: laws of optics against their closed forms, light that is not lost, bits that repeat."""
+
+import dataclasses
+import math
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import wavetank as wt
+from wavetank.device.compiler import download, qd, upload
+from wavetank.view.film import denoise, field, light, paths
+from wavetank.view.film.interface import bent
+from wavetank.view.film.samples import Watch
+from wavetank.view.film.tracer import Tracer
+from wavetank.view.lens import vec2, vec3, vec4, vector
+from wavetank.view.renderer import Renderer
+from wavetank.view.style import Style
+
+ETA = 1.33
+
+
+@qd.kernel
+def bend_all(found: qd.types.ndarray(), ahead: qd.types.ndarray(), eta: qd.f32, count: qd.i32):
+    for k in range(count):
+        found[k] = bent(ahead[k], vec3(0.0, 1.0, 0.0), eta)
+
+
+def full_tank(**fluid):
+    scene = wt.Scene(
+        spacing=0.1, tank=wt.Tank(size=(1.0, 1.0, 0.6)), fluids=[wt.Block(lower=(0, 0, 0), upper=(1.0, 0.8, 0.6))]
+    )
+    return wt.Simulation(scene.changed(**fluid) if fluid else scene).frame()
+
+
+def shot_of(frame, size=(8, 8), eye=(0.5, 0.4, 3.0), target=(0.5, 0.4, 0.3), **style):
+    renderer = Renderer(*size, 1)
+    camera = wt.Camera(eye=eye, target=target, field_of_view=math.radians(2.0))
+    return renderer, renderer.shot(frame, camera, Style(**style))
+
+
+def in_white(look):
+    """The same light, the same from everywhere."""
+    white, black = vector(1.0, 1.0, 1.0), vector(0.0, 0.0, 0.0)
+    return dataclasses.replace(
+        look, outdoors=0, horizon=white, zenith=white, below=white, sky=white, sun=black, line_strength=0.0, paving=0,
+        tile=0.0, floor=white,
+    )  # fmt: skip
+
+
+def mean_radiance(shot, renderer, medium, samples=256):
+    tracer = Tracer(renderer.buffers)
+    world = tracer._world(shot, 0.0, 0.0)
+    photons = tracer._lit(shot, world, medium, 0, 1)
+    setting = dataclasses.replace(tracer.setting(shot, 0.0, None), brightest=1e9)
+    paths.trace(tracer.film, world, photons, shot.lens, shot.look, medium, setting, 0, samples, samples // 2)
+    return download(tracer.film.mean)
+
+
+def test_the_surface_bends_and_mirrors_as_snell_and_fresnel_say():
+    angles = np.radians(np.linspace(0.0, 89.0, 90))
+    ahead, found = qd.ndarray(vec3, shape=(90,)), qd.ndarray(vec4, shape=(90,))
+    upload(ahead, np.stack([np.sin(angles), -np.cos(angles), 0 * angles], axis=1).astype(np.float32))
+    for eta in (1.0 / ETA, ETA):
+        bend_all(found, ahead, eta, 90)
+        got = download(found)
+        sine = eta * np.sin(angles)
+        total = sine >= 1.0
+        cosi, cost = np.cos(angles), np.sqrt(np.maximum(1.0 - sine**2, 0.0))
+        s = ((eta * cosi - cost) / (eta * cosi + cost)) ** 2
+        p = ((eta * cost - cosi) / (eta * cost + cosi)) ** 2
+        np.testing.assert_allclose(got[:, 3], np.where(total, 1.0, 0.5 * (s + p)), atol=2e-4)
+        np.testing.assert_allclose(got[~total, 0], sine[~total], atol=1e-4)
+        np.testing.assert_allclose(got[~total, 1], -cost[~total], atol=3e-4)
+
+
+@pytest.mark.parametrize("absorption", [0.0, 2.0])
+def test_a_slab_of_water_dims_a_white_world_as_its_closed_form(absorption):
+    """Between parallel panes: F + (1 - F)^2 T / (1 - F T), with T of Beer and Lambert (incoherent slab)."""
+    renderer, shot = shot_of(full_tank())
+    shot = dataclasses.replace(shot, look=in_white(shot.look))
+    medium = paths.Medium(
+        absorption=vector(absorption, 0.0, 0.5 * absorption), scattering=0.0, glow=vector(0.0, 0.0, 0.0)
+    )
+    mirror = ((ETA - 1.0) / (ETA + 1.0)) ** 2
+    left = np.exp(-0.6 * np.array([absorption, 0.0, 0.5 * absorption]))
+    expected = mirror + (1.0 - mirror) ** 2 * left / (1.0 - mirror * left)
+    np.testing.assert_allclose(mean_radiance(shot, renderer, medium).mean(axis=(0, 1)), expected, atol=2e-3)
+
+
+def test_water_and_drops_in_a_white_world_cannot_be_seen():
+    """The white furnace: what loses no light is as bright as what is around it."""
+    rng = np.random.default_rng(3)
+    scattered = wt.Points(positions=rng.uniform(0.1, 0.9, (60, 3)))
+    ball = wt.Ball(center=(0.5, 0.5, 0.5), radius=0.3)
+    scene = wt.Scene(spacing=0.06, tank=wt.Tank(size=(1.0, 1.0, 1.0)), fluids=[ball, scattered])
+    renderer, shot = shot_of(wt.Simulation(scene).frame(), (48, 48), (0.5, 0.9, 3.0), (0.5, 0.5, 0.5))
+    camera = wt.Camera(eye=(0.5, 0.9, 3.0), target=(0.5, 0.5, 0.5), field_of_view=math.radians(20.0))
+    shot = dataclasses.replace(shot, look=in_white(shot.look), lens=camera.lens(48, 48))
+    clear = paths.Medium(absorption=vector(0.0, 0.0, 0.0), scattering=0.0, glow=vector(0.0, 0.0, 0.0))
+    seen = mean_radiance(shot, renderer, clear, 16)
+    assert abs(seen.mean() - 1.0) < 0.004
+    assert (np.abs(seen - 1.0) > 0.1).mean() < 0.01
+
+
+def test_still_water_is_flat_to_a_hundredth_of_a_spacing():
+    frame = full_tank()
+    renderer, shot = shot_of(frame)
+    tracer = Tracer(renderer.buffers)
+    world = tracer._world(shot, 0.0, 0.0)
+    level, grid = field.host_level(world.field), world.field.grid
+    above = (level[:, :-1] > 0.0) & (level[:, 1:] <= 0.0)
+    assert np.all(above.sum(axis=1) == 1)  # one surface, without holes, and nothing above it
+    j = above.argmax(axis=1)[:, None]
+    a, b = (np.take_along_axis(level, j + k, axis=1)[:, 0] for k in (0, 1))
+    height = grid.lower[1] + (j[:, 0] + 0.5 + a / (a - b)) * grid.step[1]
+    assert np.std(height) < 0.01 * 0.1
+    assert abs(height.mean() - 0.8) < 0.05 * 0.1
+
+
+def test_the_sun_s_light_in_a_tank_is_neither_lost_nor_made():
+    """What enters through the top, (1 - F) of what falls on it, arrives on the floor: panes mirror it totally."""
+    renderer, shot = shot_of(full_tank(), sun="0,80", environment="pool")
+    shot = dataclasses.replace(shot, look=dataclasses.replace(shot.look, sun_size=1e-4))
+    tracer = Tracer(renderer.buffers)
+    tracer.buffers.pixels  # noqa: B018
+    world = tracer._world(shot, 0.0, 0.0)
+    clear = paths.Medium(absorption=vector(0.0, 0.0, 0.0), scattering=0.0, glow=vector(0.0, 0.0, 0.0))
+    photons = tracer._lit(shot, world, clear, 0, 1)
+    arrived = download(photons.floor)[..., 1].sum() / light.UNIT * float(photons.corner[1]) ** 2
+    height = math.sin(math.radians(80.0))
+    top, side = 1.0 * 0.6 * height, 1.0 * 0.8 * math.cos(math.radians(80.0))  # m^2 across the sun's rays
+    # Fresnel at 10 degrees is that at 0 to a tenth of a per cent; at the pane, at 80 degrees, it is 0.388.
+    through = top * (1.0 - ((ETA - 1.0) / (ETA + 1.0)) ** 2) + side * (1.0 - 0.388)
+    assert arrived == pytest.approx(through, rel=0.04)
+
+
+def test_what_is_left_of_the_noise_goes_and_edges_stay():
+    rng = np.random.default_rng(1)
+    shape = (48, 64)
+    film = paths.Film(
+        mean=qd.ndarray(vec3, shape=shape), half=qd.ndarray(vec3, shape=shape), albedo=qd.ndarray(vec3, shape=shape),
+        shape=qd.ndarray(vec4, shape=shape),
+    )  # fmt: skip
+    truth = np.where(np.arange(64) < 32, 0.3, 0.6)[None, :, None] * np.ones((48, 64, 3), np.float32)
+    noise = rng.normal(0.0, 0.02, (2, *shape, 1)).astype(np.float32)
+    upload(film.mean, (truth + 0.5 * (noise[0] + noise[1])).astype(np.float32))
+    upload(film.half, (truth + noise[0]).astype(np.float32))
+    spare = (qd.ndarray(vec3, shape=shape), qd.ndarray(vec3, shape=shape), qd.ndarray(vec2, shape=shape))
+    clean = download(denoise.clean(film, spare))
+    assert np.abs(clean - truth)[:, :30].std() < 0.3 * 0.02 / math.sqrt(2.0)
+    assert np.abs(clean - truth).max() < 0.06  # nothing of the other side of the edge
+    upload(film.half, download(film.mean).copy())  # no noise at all: nothing is averaged
+    np.testing.assert_allclose(download(denoise.clean(film, spare)), download(film.mean), atol=2e-3)
+
+
+def dam():
+    scene = wt.Scene(
+        spacing=0.08, tank=wt.Tank(size=(1.2, 0.8, 0.6)), fluids=[wt.Block(lower=(0, 0, 0), upper=(0.5, 0.6, 0.6))],
+        solids=[wt.Sphere(center=(0.8, 0.2, 0.3), radius=0.15)],
+    )  # fmt: skip
+    sim = wt.Simulation(scene)
+    sim.advance(0.2)
+    return sim
+
+
+def test_a_picture_that_was_stopped_goes_on_to_the_same_bits(tmp_path):
+    frame = dam().frame()
+    options = {"traced": True, "samples": 6, "aperture": 0.01, "shutter": 0.01}
+    whole = Renderer(48, 27, 1).render(frame, **options)
+    path = tmp_path / "kept.npz"
+    watch = Watch(tell=lambda done, of: False, path=path)
+    Renderer(48, 27, 1).render(frame, watch=watch, **options)
+    assert not watch.whole and 0 < watch.done < 6 and path.exists()
+    watch = Watch(path=path)
+    again = Renderer(48, 27, 1).render(frame, watch=watch, **options)
+    assert watch.begun > 0 and watch.whole and not path.exists()
+    np.testing.assert_array_equal(again, whole)
+
+
+def test_samples_of_another_picture_are_begun_anew(tmp_path):
+    frame, path = dam().frame(), tmp_path / "kept.npz"
+    stopped = Watch(tell=lambda done, of: False, path=path)
+    Renderer(16, 16, 1).render(frame, watch=stopped, traced=True, samples=40)
+    watch = Watch(path=path)
+    Renderer(16, 16, 1).render(frame, watch=watch, traced=True, samples=2, sun="10,30")
+    assert watch.begun == 0
+
+
+PICTURE = """
+import hashlib, wavetank as wt
+scene = wt.Scene(
+    spacing=0.1, tank=wt.Tank(size=(1.2, 0.8, 0.6)), fluids=[wt.Block(lower=(0, 0, 0), upper=(0.5, 0.6, 0.6))],
+    solids=[wt.Sphere(center=(0.8, 0.2, 0.3), radius=0.15)],
+)
+sim = wt.Simulation(scene)
+sim.advance(0.2)
+print(hashlib.sha256(wt.render(sim, 40, 24, quality="film", samples=3, shutter=0.01).tobytes()).hexdigest())
+"""
+
+
+def test_one_thread_and_two_take_the_same_picture():
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", PICTURE], env=os.environ | {"QD_CPU_MAX_NUM_THREADS": threads}, check=True,
+            capture_output=True, text=True,
+        ).stdout
+        for threads in ("1", "2")
+    }  # fmt: skip
+    assert len(found) == 1
+
+
+def test_film_is_for_water_in_space_and_other_pictures_are_averaged():
+    flat = wt.Simulation(wt.Scene.load("drop-2d").changed(spacing=0.05))
+    high = wt.render(flat, 32, 24, quality="high", samples=2)
+    np.testing.assert_array_equal(wt.render(flat, 32, 24, quality="film", samples=2), high)
+    with pytest.raises(wt.WavetankError, match="aperture = -1"):
+        wt.render(flat, 32, 24, quality="film", aperture=-1)
