@@ -59,7 +59,7 @@ def film(
     if as_json:
         print(json.dumps(figures))
     elif figures["interrupted"]:
-        print(f"{figures['frames']:,} of {figures['of']:,} frames are kept in {figures['file']}; the same command goes on.")
+        print(f"{figures['frames']:,} of {figures['of']:,} frames are kept; the same command goes on.")
     else:
         print(f"{figures['frames']:,} frames, {figures['rendered']:,} of them made now\n{path}")
     if figures["interrupted"]:

@@ -19,7 +19,10 @@ Settings = Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help
 Arch = Annotated[str, typer.Option(help="Back end: cpu, gpu (the best there is), cuda, vulkan, metal, amdgpu.")]
 Size = Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of a picture.")]
 View = Annotated[str | None, typer.Option(help="water, particles, slice or foam; water unless particles are coloured.")]
-Quality = Annotated[str, typer.Option(help="draft, standard (2 x 2 samples a pixel), high (64 pictures averaged) or film (paths of light).")]
+Quality = Annotated[
+    str,
+    typer.Option(help="draft, standard (2 x 2 samples a pixel), high (64 pictures averaged) or film (paths of light)."),
+]
 ColorBy = Annotated[str | None, typer.Option(help="speed, density, material, foam, or a colour such as #3f99da.")]
 Environment = Annotated[
     str | None,

@@ -205,14 +205,15 @@ def render(
               view=view, color_by=color_by, cut=cut, environment=environment, sun=sun, floor=floor)  # fmt: skip
         return
     figures = take(
-        world, scene, out, across, down, at=at, arch=arch, quality=quality or "standard", samples=samples, eye=eye, target=target,
-        timings=timings, view=view, color_by=color_by, cut=cut, environment=environment, sun=sun, floor=floor,
+        world, scene, out, across, down, at=at, arch=arch, quality=quality or "standard", samples=samples, eye=eye,
+        target=target, timings=timings, view=view, color_by=color_by, cut=cut, environment=environment, sun=sun,
+        floor=floor,
     )  # fmt: skip
     if as_json:
         print(json.dumps(figures))
     if figures.get("interrupted"):
         if not as_json:
-            print(f"{figures['samples']} of {figures['of']} samples are kept in {figures['file']}; the same command goes on.")
+            print(f"{figures['samples']} of {figures['of']} samples are kept; the same command goes on.")
         raise typer.Exit(figures["exit_code"])
     if as_json:
         return

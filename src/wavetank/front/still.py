@@ -58,9 +58,10 @@ def take(
     renderer = Renderer(width, height, affordable(width, height, supersample))
     camera = _camera_of(frame, eye, target, width / max(height, 1))
     began = time.perf_counter()
-    with asked_to_end(say=STOPS if style["traced"] else "") as asked, Progress(
-        *PARTS, console=console or Console(stderr=True), transient=True, disable=not style["traced"]
-    ) as bar:
+    with (
+        asked_to_end(say=STOPS if style["traced"] else "") as asked,
+        Progress(*PARTS, console=console or Console(stderr=True), transient=True, disable=not style["traced"]) as bar,
+    ):
         watch = Watch(path=path.with_name(path.name + SAMPLES) if style["traced"] else None)
         watch.tell = telling(bar, asked)
         image = renderer.render(frame, camera, watch=watch, **style)

@@ -209,11 +209,9 @@ class Scene(Timetable, Parameters):
 
     def kinds(self) -> np.ndarray:
         """Return the number of the material of each particle, int32 [n], in the order of `particles`."""
-        names = [material.name for material in self.palette()[1:]]
-        parts = [
-            np.full(len(x), 0 if fluid.material is None else 1 + names.index(fluid.material), np.int32)
-            for fluid, (x, _) in zip(self.fluids, self._lattices(), strict=True)
-        ]
+        numbers = {None: 0} | {material.name: k for k, material in enumerate(self.materials, 1)}
+        pairs = zip(self.fluids, self._lattices(), strict=True)
+        parts = [np.full(len(x), numbers[fluid.material], np.int32) for fluid, (x, _) in pairs]
         return np.concatenate([np.empty(0, np.int32), *parts])
 
     def has_own_place(self) -> np.ndarray:

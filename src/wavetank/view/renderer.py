@@ -240,8 +240,8 @@ def render(
     """Return a picture of a `Frame` or a `Simulation`, uint8 [height, width, 3].
 
     `options` are those of `Renderer.render`: a view by name, a camera and the fields of `Style`. `quality` is draft,
-    standard, high or film. Without either `supersample` is 2, or 1 for pictures of more than 16 million pixels. Renderers of
-    the last few sizes are kept.
+    standard, high or film. Without either `supersample` is 2, or 1 for pictures of more than 16 million pixels.
+    Renderers of the last few sizes are kept.
     """
     if quality is not None:
         usual_samples, chosen = quality_options(quality)

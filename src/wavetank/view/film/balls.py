@@ -1,7 +1,5 @@
 """Lone drops, spray and foam as balls: found on the host, sorted into the cells that they touch."""
 
-import dataclasses
-
 import numpy as np
 
 from wavetank.device.compiler import download, qd, upload

@@ -64,7 +64,7 @@ def average(
     """
     rows, columns = film.mean.shape[0], film.mean.shape[1]
     for row, column in qd.ndrange(rows, columns):
-        here, gray = before[row, column], brightness(before[row, column])
+        gray = brightness(before[row, column])
         own = noise[row, column][turn]
         guide, form = film.albedo[row, column], film.shape[row, column]
         total, weight, rest = vec3(0.0, 0.0, 0.0), 0.0, 0.0

@@ -1,9 +1,9 @@
 """What a smooth surface of water does to a ray: Snell's law and Fresnel's equations for light without polarisation.
 
-    code      symbol   meaning                                                        unit
-    n                  unit normal against the ray                                    1
-    eta                refractive index on the ray's side over that on the other      1
-    mirror    F        share of the light that is reflected                           1
+code      symbol   meaning                                                        unit
+n                  unit normal against the ray                                    1
+eta                refractive index on the ray's side over that on the other      1
+mirror    F        share of the light that is reflected                           1
 """
 
 from wavetank.device.compiler import qd

@@ -49,7 +49,11 @@ def shine(photons: Photons, world: World, look: Look, absorption: vec3, round: q
         column, row = number % photons.across, number // photons.across
         seed = scrambled(qd.cast(number, qd.u32) ^ qd.u32(0x51ED270B))
         u, lamp = pair(seed, round, 0), pair(seed, round, 1)
-        p = photons.begin + ((column + u.x) / photons.across) * photons.right + ((row + u.y) / photons.rows) * photons.up
+        p = (
+            photons.begin
+            + ((column + u.x) / photons.across) * photons.right
+            + ((row + u.y) / photons.rows) * photons.up
+        )
         ahead = -towards(look.to_sun, look.sun_size, lamp)
         weight, wet, crossed, going, bounce = vec3(1.0, 1.0, 1.0), 0, 0, 1, 0
         while going == 1:
@@ -178,9 +182,7 @@ def flow_at(photons: Photons, grid: Grid, x):
         u, v, w = q.x - i, q.y - j, q.z - k
         share = qd.select(m % 2 == 1, u, 1.0 - u) * qd.select(m // 2 % 2 == 1, v, 1.0 - v)
         share *= qd.select(m // 4 == 1, w, 1.0 - w) / 4096.0
-        at = (
-            qd.min(i + m % 2, mx - 1) + mx * (qd.min(j + m // 2 % 2, my - 1) + my * qd.min(k + m // 4, mz - 1))
-        )
+        at = qd.min(i + m % 2, mx - 1) + mx * (qd.min(j + m // 2 % 2, my - 1) + my * qd.min(k + m // 4, mz - 1))
         for c in qd.static(range(3)):
             vector[c] += share * photons.flow[at, c]
             colors[c] += share * photons.flow[at, 3 + c]

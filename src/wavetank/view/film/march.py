@@ -1,16 +1,16 @@
 """Where a ray meets water, solids, motes or the floor.
 
-    code      symbol   meaning                                                        unit
-    p, ahead           where a ray begins, and its unit direction                     m, 1
-    t                  way along it                                                   m
-    wet                1 where the ray runs in the water                              1
-    cell               edge of a cell of the grid, two nodes                          m
+code      symbol   meaning                                                        unit
+p, ahead           where a ray begins, and its unit direction                     m, 1
+t                  way along it                                                   m
+wet                1 where the ray runs in the water                              1
+cell               edge of a cell of the grid, two nodes                          m
 """
 
 import dataclasses
 
 from wavetank.device.compiler import qd
-from wavetank.solids.distance import SolidSet, around
+from wavetank.solids.distance import SolidSet
 from wavetank.view.film.grid import Field, Grid, outward_at, value_at
 from wavetank.view.film.motes import Motes
 from wavetank.view.lens import vec3, vec4
@@ -185,7 +185,8 @@ def face(grid: Grid, x, ahead, side):
 @qd.func
 def first_hit(world: World, p, ahead, wet, seen):
     """(normal, way) of the first thing on a ray, what it is (0 sky, 1 floor, 2 solid, 3 water, 4 drop, 5 froth), the
-    number of the solid or ball, and whether the ray was wet on its way."""
+    number of the solid or ball, and whether the ray was wet on its way.
+    """
     far, what, which = 1e9, 0, -1
     result = vec4(0.0, 1.0, 0.0, 1e9)
     if p.y > 0.0 and ahead.y < -1e-6:

@@ -1,8 +1,8 @@
 """Small balls in the cells of the grid: lone drops of water, and what spray and foam consist of.
 
-    code      symbol   meaning                                    unit
-    ball               middle and radius                          m
-    kind               0 water, 1 white froth                     1
+code      symbol   meaning                                    unit
+ball               middle and radius                          m
+kind               0 water, 1 white froth                     1
 """
 
 import dataclasses

@@ -17,7 +17,7 @@ import dataclasses
 
 from wavetank.device.compiler import qd
 from wavetank.view.film.interface import bent, index_of_water, mirrored
-from wavetank.view.film.light import Photons, floor_light, flow_at, solid_light
+from wavetank.view.film.light import Photons, floor_light, solid_light
 from wavetank.view.film.march import World, first_hit
 from wavetank.view.film.sampling import around, disc, pair, towards
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, view_ray
@@ -249,7 +249,7 @@ def floor_albedo(look: Look, at, wide, steep, matte):
             share = stone(place, grain)
         elif look.paving == 3:
             share = sand(place, grain)
-    return qd.min(share * look.floor, 0.97)
+    return qd.min(share * look.floor, 1.0)
 
 
 @qd.func

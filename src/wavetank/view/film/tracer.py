@@ -15,7 +15,6 @@ from wavetank.view.film.march import World
 from wavetank.view.film.samples import Watch, digest_of, load, store
 from wavetank.view.lens import vec2, vec3, vec4, vector
 from wavetank.view.look import Look
-from wavetank.view.optics.rays import box
 from wavetank.view.optics.radiance import background
 from wavetank.view.paints import colors_of
 from wavetank.view.passes import ellipsoids, solids
@@ -96,7 +95,15 @@ class Tracer:
             while done < end:
                 count = min(self._at_once(), end - done)
                 paths.trace(
-                    self.film, world, photons, shot.lens, shot.look, medium, around, done, count,
+                    self.film,
+                    world,
+                    photons,
+                    shot.lens,
+                    shot.look,
+                    medium,
+                    around,
+                    done,
+                    count,
                     max(1, samples // 2),
                 )
                 synchronize()
@@ -123,9 +130,7 @@ class Tracer:
 
     def medium(self, shot: Shot) -> paths.Medium:
         """Return what the water does to light."""
-        return remembered(
-            paths.Medium(absorption=shot.absorption, scattering=shot.scattering, glow=glow_of(shot))
-        )
+        return remembered(paths.Medium(absorption=shot.absorption, scattering=shot.scattering, glow=glow_of(shot)))
 
     def _moved(self, shot: Shot, moved: float) -> Shot:
         """Return the shot of an instant, with the particles where they have gone to."""
@@ -172,7 +177,7 @@ class Tracer:
         margin = 1.2 * (upper[1] - lower[1]) + 4.0 * d
         size = upper[[0, 2]] - lower[[0, 2]] + 2.0 * margin
         texel = max(d / TEXELS_A_SPACING, float(size.max()) / MOST_TEXELS)
-        texels = [int(math.ceil(length / texel)) for length in size]
+        texels = [math.ceil(length / texel) for length in size]
         has_solids = shot.frame.solids.count > shot.frame.solids.tank_count or int(world.motes.list.shape[0]) > 1
         cells = grid.nx * grid.ny * grid.nz // 8 if has_solids else 1
         shapes = ((texels[1], texels[0], 3), (cells, 6))
