@@ -128,7 +128,7 @@ def gallery(names: list[str]) -> None:
         eye = f" --eye {','.join(map(str, SEEN_FROM[name]))}" if name in SEEN_FROM else ""
         rows.append(
             f"## {scene.title}\n\n![{scene.title}](gallery/{name}.jpg)\n\n"
-            f"`wavetank render {name} --at {moment:g} --set spacing={scene.spacing:g}{eye} --quality film`"
+            f"`wavetank render {name} --at {moment:g} --set spacing={scene.spacing:g}{eye} --quality high`"
             f" ({count:,} particles)\n"
         )
     head = "# Gallery\n\nEvery bundled scene, drawn by the command below its picture; made by `make gallery`.\n\n"

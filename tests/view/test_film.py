@@ -13,6 +13,7 @@ import wavetank as wt
 from wavetank.device.compiler import download, qd, upload
 from wavetank.view.film import denoise, field, light, paths
 from wavetank.view.film.interface import bent
+from wavetank.view.film.medium import Medium, is_clear, medium_of
 from wavetank.view.film.samples import Watch
 from wavetank.view.film.tracer import Tracer
 from wavetank.view.lens import vec2, vec3, vec4, vector
@@ -50,6 +51,13 @@ def in_white(look):
     )  # fmt: skip
 
 
+def clear_medium(*absorption):
+    """Water that adds nothing and absorbs so much [1/m]."""
+    black = vector(0.0, 0.0, 0.0)
+    nothing = [qd.ndarray(vec3, shape=(1,)) for _ in range(2)]
+    return Medium(vector(*absorption) if absorption else black, 0.0, black, *nothing, 0)
+
+
 def mean_radiance(shot, renderer, medium, samples=256):
     tracer = Tracer(renderer.buffers)
     world = tracer._world(shot, 0.0, 0.0)
@@ -81,13 +89,58 @@ def test_a_slab_of_water_dims_a_white_world_as_its_closed_form(absorption):
     """Between parallel panes: F + (1 - F)^2 T / (1 - F T), with T of Beer and Lambert (incoherent slab)."""
     renderer, shot = shot_of(full_tank())
     shot = dataclasses.replace(shot, look=in_white(shot.look))
-    medium = paths.Medium(
-        absorption=vector(absorption, 0.0, 0.5 * absorption), scattering=0.0, glow=vector(0.0, 0.0, 0.0)
-    )
+    medium = clear_medium(absorption, 0.0, 0.5 * absorption)
     mirror = ((ETA - 1.0) / (ETA + 1.0)) ** 2
     left = np.exp(-0.6 * np.array([absorption, 0.0, 0.5 * absorption]))
     expected = mirror + (1.0 - mirror) ** 2 * left / (1.0 - mirror * left)
     np.testing.assert_allclose(mean_radiance(shot, renderer, medium).mean(axis=(0, 1)), expected, atol=2e-3)
+
+
+def test_a_layer_of_dye_dims_as_beer_and_lambert_say():
+    """Half of the tank is dyed: what crosses that half alone sees the dye's absorption."""
+    sim = wt.Simulation(
+        wt.Scene(
+            spacing=0.05, tank=wt.Tank(size=(1.0, 1.0, 0.6)), fluids=[
+                wt.Block(lower=(0, 0, 0), upper=(0.5, 0.8, 0.6)),
+                wt.Block(lower=(0.5, 0, 0), upper=(1.0, 0.8, 0.6), material="red"),
+            ], materials=[{"name": "red", "color": "#ff4030"}],
+        )
+    )  # fmt: skip
+    renderer, shot = shot_of(sim.frame(), eye=(0.8, 0.4, 3.0), target=(0.8, 0.4, 0.3))
+    assert is_clear(shot)
+    shot = dataclasses.replace(shot, look=in_white(shot.look))
+    shot = dataclasses.replace(
+        shot, scattering=0.0, look=dataclasses.replace(shot.look, glow=vector(0.0, 0.0, 0.0)), usual=0.6
+    )
+    tracer = Tracer(renderer.buffers)
+    medium = medium_of(shot, tracer._world(shot, 0.0, 0.0).field.grid)
+    color = np.array([1.0, (64 / 255 + 0.055) ** 2.4 / 1.055**2.4, (48 / 255 + 0.055) ** 2.4 / 1.055**2.4])
+    left = color.clip(0.02, 0.98) ** 2.5  # 0.6 m of it, 2.5 layers as thick as is usual
+    mirror = ((ETA - 1.0) / (ETA + 1.0)) ** 2
+    expected = mirror + (1.0 - mirror) ** 2 * left / (1.0 - mirror * left)
+    np.testing.assert_allclose(mean_radiance(shot, renderer, medium).mean(axis=(0, 1)), expected, atol=4e-3)
+
+
+@pytest.mark.parametrize("tank", [True, False])
+def test_no_water_and_one_drop_have_pictures(tank):
+    walls = {"tank": wt.Tank(size=(1.0, 1.0, 1.0))} if tank else {}
+    for points in ([], [[0.5, 0.5, 0.5]]):
+        scene = wt.Scene(spacing=0.1, fluids=[wt.Points(positions=np.array(points).reshape(-1, 3))], **walls)
+        image = wt.render(wt.Simulation(scene), 9, 1, quality="film", samples=1)
+        assert image.shape == (1, 9, 3) and image.max() > 0
+
+
+def test_fluids_that_are_not_clear_are_averaged():
+    scene = wt.Scene(
+        spacing=0.1, tank=wt.Tank(size=(1.0, 1.0, 0.6)), materials=[{"name": "milk", "clarity": "cloudy"}],
+        fluids=[wt.Block(lower=(0, 0, 0), upper=(0.5, 0.8, 0.6), material="milk")],
+    )  # fmt: skip
+    frame = wt.Simulation(scene).frame()
+    _, shot = shot_of(frame)
+    assert not is_clear(shot)
+    np.testing.assert_array_equal(
+        wt.render(frame, 24, 16, quality="film", samples=2), wt.render(frame, 24, 16, quality="high", samples=2)
+    )
 
 
 def test_water_and_drops_in_a_white_world_cannot_be_seen():
@@ -99,7 +152,7 @@ def test_water_and_drops_in_a_white_world_cannot_be_seen():
     renderer, shot = shot_of(wt.Simulation(scene).frame(), (48, 48), (0.5, 0.9, 3.0), (0.5, 0.5, 0.5))
     camera = wt.Camera(eye=(0.5, 0.9, 3.0), target=(0.5, 0.5, 0.5), field_of_view=math.radians(18.0))
     shot = dataclasses.replace(shot, look=in_white(shot.look), lens=camera.lens(48, 48))
-    clear = paths.Medium(absorption=vector(0.0, 0.0, 0.0), scattering=0.0, glow=vector(0.0, 0.0, 0.0))
+    clear = clear_medium()
     seen = mean_radiance(shot, renderer, clear, 16)
     assert abs(seen.mean() - 1.0) < 0.004
     assert (np.abs(seen - 1.0) > 0.1).mean() < 0.01
@@ -121,14 +174,15 @@ def test_still_water_is_flat_to_a_hundredth_of_a_spacing():
 
 
 def test_the_sun_s_light_in_a_tank_is_neither_lost_nor_made():
-    """Of what falls on the top (1 - F) arrives on the floor, as panes mirror it totally; and all that a pane gets, which
-    it lets through or mirrors to the floor before it.
+    """Of what falls on the top (1 - F) arrives on the floor, as panes mirror it totally; and all that a pane gets.
+
+    What a pane mirrors falls on the floor before it.
     """
     renderer, shot = shot_of(full_tank(), sun="0,80", environment="pool")
     shot = dataclasses.replace(shot, look=dataclasses.replace(shot.look, sun_size=1e-4))
     tracer = Tracer(renderer.buffers)
     world = tracer._world(shot, 0.0, 0.0)
-    clear = paths.Medium(absorption=vector(0.0, 0.0, 0.0), scattering=0.0, glow=vector(0.0, 0.0, 0.0))
+    clear = clear_medium()
     photons = tracer._lit(shot, world, clear, 0, 1)
     arrived = download(photons.floor)[..., 1].sum() / light.UNIT * float(photons.corner[1]) ** 2
     height = math.sin(math.radians(80.0))

@@ -135,7 +135,8 @@ def record(
     with asked_to_end(say="asked to end; the files are being completed (once more stops at once)") as asked:
         supersample, _ = quality_options(order.quality)
         renderer = Renderer(*order.size, supersample)
-        renderer.render(sim.frame(), **order.style)  # what is wrong with the look shows before anything is written
+        # What is wrong with the look shows before anything is written.
+        renderer.render(sim.frame(), **order.style | {"samples": 1})
         work = _Work(sim, order, asked, begun)
         with ExitStack() as stack:
             sinks = _open_sinks(order, stack, work)

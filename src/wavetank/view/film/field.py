@@ -68,8 +68,8 @@ def grid_around(shot: Shot, reach: float) -> Grid:
     step *= max(1.0, (float(np.prod(size / step)) / MOST_NODES) ** (1.0 / 3.0))
     count = [max(4, 2 * round(float(length) / (2.0 * step))) for length in size]
     return remembered(Grid(
-        lower=vector(*lower), upper=vector(*upper), box=box(lower, upper), step=vector(*(size / count)), nx=count[0], ny=count[1],
-        nz=count[2], spacing=d, walled=int(tank is not None),
+        lower=vector(*lower), upper=vector(*upper), box=box(lower, upper), step=vector(*(size / count)),
+        nx=count[0], ny=count[1], nz=count[2], spacing=d, walled=int(tank is not None),
     ))  # fmt: skip
 
 

@@ -1,9 +1,9 @@
 """The sun's light that has passed or left the surface of the water: photons, gathered where they arrive.
 
-H. W. Jensen, "Global illumination using photon maps" (1996), with two maps in place of a tree: the floor has texels, and
-solids read the flow of light in the cells of the water's grid (vector irradiance, A. Gershun 1936), which is found from
-the ways of the photons through the cells. Light that meets nothing on its way from the sun is not in the maps: shadow
-rays see to it. All sums are whole numbers.
+H. W. Jensen, "Global illumination using photon maps" (1996), with two maps in place of a tree: the floor has texels,
+and solids read the flow of light in the cells of the water's grid (vector irradiance, A. Gershun 1936), which is found
+from the ways of the photons through the cells. Light that meets nothing on its way from the sun is not in the maps:
+shadow rays see to it. All sums are whole numbers.
 
     code      symbol   meaning                                                        unit
     floor              light on a texel over that of the bare sun on a plane to it    1
@@ -17,13 +17,13 @@ from wavetank.device.compiler import qd
 from wavetank.view.film.grid import Grid
 from wavetank.view.film.interface import bent, index_of_water, mirrored
 from wavetank.view.film.march import World, first_hit
+from wavetank.view.film.medium import Medium, absorbed_at, through_water
 from wavetank.view.film.sampling import pair, towards
 from wavetank.view.lens import vec3
 from wavetank.view.look import Look
 from wavetank.view.optics.chance import scrambled
 
 UNIT = 4096.0  # steps of a map in the light of the bare sun
-MOST_BOUNCES = 12
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Photons:
 
 
 @qd.kernel(fastcache=True)
-def shine(photons: Photons, world: World, look: Look, absorption: vec3, round: qd.i32):
+def shine(photons: Photons, world: World, look: Look, medium: Medium, round: qd.i32):
     """Send one round of photons from the sun, each from its own place of the rectangle, and add what arrives."""
     for number in range(photons.across * photons.rows):
         column, row = number % photons.across, number // photons.across
@@ -61,9 +61,10 @@ def shine(photons: Photons, world: World, look: Look, absorption: vec3, round: q
             n = vec3(hit.x, hit.y, hit.z)
             at = p + hit.w * ahead
             if crossed > 0 and photons.has_flow == 1:
-                leave_in_cells(photons, world.field.grid, p, ahead, qd.min(hit.w, 1e3), weight, absorption, was_wet)
+                leave_in_cells(photons, world.field.grid, p, ahead, qd.min(hit.w, 1e3), weight, medium, was_wet)
             if was_wet == 1:
-                weight *= qd.exp(-qd.min(hit.w, 1e3) * absorption)
+                left, _added = through_water(medium, world.field.grid, p, ahead, qd.min(hit.w, 1e3))
+                weight *= left
             chance = pair(seed, round, 2 + bounce)
             if what == 3:
                 inward = qd.select(n.dot(ahead) > 0.0, -n, n)
@@ -93,7 +94,7 @@ def shine(photons: Photons, world: World, look: Look, absorption: vec3, round: q
                     p = at + chord * inner
                     ahead = (2.0 * inner.dot(ahead) * inner - ahead).normalized(1e-12)
                     p += 1e-4 * ball.w * ahead
-                    weight *= qd.exp(-chord * absorption)
+                    weight *= qd.exp(-chord * absorbed_at(medium, world.field.grid, at))
             else:
                 if what == 1 and crossed > 0:
                     arrive(photons, at, weight)
@@ -132,14 +133,14 @@ def cell_of(grid: Grid, x):
 
 
 @qd.func
-def leave_in_cells(photons: Photons, grid: Grid, p, ahead, far, weight, absorption, wet):
+def leave_in_cells(photons: Photons, grid: Grid, p, ahead, far, weight, medium: Medium, wet):
     """Add a straight way of a photon to the cells that it passes, in steps of half a cell."""
     step = grid.step
     cell = 8.0 * step.x * step.y * step.z
     pace = step.x
     amount = 4096.0 * photons.power * pace / cell
     count = qd.min(qd.cast(far / pace + 0.5, qd.i32), 2000)
-    left, per, gone = weight, qd.exp(-pace * absorption), 0
+    left, gone = weight, 0
     for part in range(count):
         if gone == 0:
             number = cell_of(grid, p + (part + 0.5) * pace * ahead)
@@ -151,7 +152,7 @@ def leave_in_cells(photons: Photons, grid: Grid, p, ahead, far, weight, absorpti
             elif part > 2:
                 gone = 1
             if wet == 1:
-                left *= per
+                left *= qd.exp(-pace * absorbed_at(medium, grid, p + (part + 0.5) * pace * ahead))
 
 
 @qd.func

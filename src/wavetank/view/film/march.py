@@ -17,9 +17,6 @@ from wavetank.view.lens import vec3, vec4
 from wavetank.view.optics.rays import box_interval
 from wavetank.view.passes.solids import Window, ball_interval, meet
 
-#: What a ray has met: `Hit.what`.
-SKY, FLOOR, SOLID, WATER, DROP, FROTH = range(6)
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class World:
@@ -70,7 +67,7 @@ def first_mote(motes: Motes, cell, p, ahead, far, within):
 
 @qd.func
 def first_water(level: qd.template(), skip: qd.template(), grid: Grid, motes: Motes, p, ahead, far, wet, seen):
-    """Follow a ray through the grid: (normal out of what it meets, way), what it is, a ball's number, whether it is wet.
+    """Follow a ray through the grid: (normal out of what it meets, way), what it is, a ball's number, if it is wet.
 
     The way is -1 where it meets neither surface, pane nor mote nearer than `far`. A ray whose state does not fit the
     field, by rounding, takes the field's. With `seen` of 0 motes are not looked for.

@@ -19,6 +19,7 @@ from wavetank.device.compiler import qd
 from wavetank.view.film.interface import bent, index_of_water, mirrored
 from wavetank.view.film.light import Photons, floor_light, solid_light
 from wavetank.view.film.march import World, first_hit
+from wavetank.view.film.medium import Medium, absorbed_at, through_water
 from wavetank.view.film.sampling import around, disc, pair, towards
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, view_ray
 from wavetank.view.look import Look
@@ -36,15 +37,6 @@ class Film:
     half: qd.types.ndarray()  # vec3: what it was when half of the samples were there
     albedo: qd.types.ndarray()  # vec3: of the first matte surface, however it is seen
     shape: qd.types.ndarray()  # vec4: normal of the first surface, and the inverse of its distance
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Medium:
-    """What water does to light on its way, on the device."""
-
-    absorption: vec3  # 1/m
-    scattering: qd.f32  # 1/m
-    glow: vec3  # radiance of light that comes back out of deep water
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -126,9 +118,9 @@ def follow(
                     value *= 1.0 - look.line_strength * cover
             if was_wet == 1:
                 far = qd.min(hit.w, 1e3)
-                left = qd.exp(-medium.scattering * far)
-                light += value * (1.0 - left) * medium.glow
-                value *= qd.exp(-far * medium.absorption)
+                left, added = through_water(medium, world.field.grid, p, ahead, far)
+                light += value * added
+                value *= left
             way += qd.min(hit.w, 1e6)
             if guided == 0:
                 guided = 1
@@ -182,7 +174,7 @@ def follow(
                     p = at + chord * inner
                     ahead = (2.0 * inner.dot(ahead) * inner - ahead).normalized(1e-12)
                     p += 1e-4 * ball.w * ahead
-                    value *= qd.exp(-chord * medium.absorption)
+                    value *= qd.exp(-chord * absorbed_at(medium, world.field.grid, at))
                 wet = 0
             elif going == 1:
                 color = vec3(0.92, 0.93, 0.94)  # froth

@@ -50,7 +50,7 @@ def digest_of(shot: Any, options: tuple[Any, ...]) -> str:
 
 def store(path: Path, film: Film, digest: str, done: int) -> None:
     """Write the samples to a file, which is complete or not there."""
-    with replacing(path) as partial, open(partial, "wb") as out:
+    with replacing(path) as partial, partial.open("wb") as out:
         arrays: dict[str, Any] = {name: download(getattr(film, name)) for name in NAMES}
         np.savez(out, digest=digest, done=done, **arrays)
 

@@ -12,6 +12,7 @@ from wavetank.device.state import remembered
 from wavetank.view.buffers import Buffers
 from wavetank.view.film import balls, denoise, field, light, paths
 from wavetank.view.film.march import World
+from wavetank.view.film.medium import Medium, medium_of
 from wavetank.view.film.samples import Watch, digest_of, load, store
 from wavetank.view.lens import vec2, vec3, vec4, vector
 from wavetank.view.look import Look
@@ -27,11 +28,6 @@ PHOTONS, ROUNDS = 1_600_000, 16  # of a picture: in all, and rounds in which the
 TEXELS_A_SPACING, MOST_TEXELS = 4.0, 1400  # of the floor's map
 BRIGHTEST = 8.0
 SLICES, TURNS = 8, (0, 2, 4, 6, 1, 3, 5, 7)  # instants of an open shutter: both halves of the samples see all of it
-
-
-def glow_of(shot: Shot) -> Any:
-    """Return the radiance of light that comes back out of deep water."""
-    return vector(*(shot.look.glow * shot.tint))
 
 
 class Tracer:
@@ -82,7 +78,7 @@ class Tracer:
         [s]. `tell` is called with the number of samples after each few, and ends the work by returning False.
         """
         slices = [0.0] if shutter == 0.0 else [shutter * ((k + 0.5) / SLICES - 0.5) for k in TURNS]
-        setting, medium = self.setting(shot, aperture, focus), self.medium(shot)
+        setting = self.setting(shot, aperture, focus)
         done = first
         for number, moved in enumerate(slices):
             end = samples * (number + 1) // len(slices)
@@ -90,6 +86,7 @@ class Tracer:
                 continue
             now = self._moved(shot, moved)
             world = self._world(now, shutter, moved)
+            medium = medium_of(now, world.field.grid)
             photons = self._lit(now, world, medium, number, len(slices))
             around = remembered(dataclasses.replace(setting, under=under_water(now, self.buffers)))
             while done < end:
@@ -128,10 +125,6 @@ class Tracer:
             brightest=BRIGHTEST,
         )  # fmt: skip
 
-    def medium(self, shot: Shot) -> paths.Medium:
-        """Return what the water does to light."""
-        return remembered(paths.Medium(absorption=shot.absorption, scattering=shot.scattering, glow=glow_of(shot)))
-
     def _moved(self, shot: Shot, moved: float) -> Shot:
         """Return the shot of an instant, with the particles where they have gone to."""
         if moved == 0.0 or not shot.frame.count:
@@ -158,7 +151,7 @@ class Tracer:
             window=solids.window(shot), paints=paints,
         )  # fmt: skip
 
-    def _lit(self, shot: Shot, world: World, medium: paths.Medium, slice: int, slices: int) -> light.Photons:
+    def _lit(self, shot: Shot, world: World, medium: Medium, slice: int, slices: int) -> light.Photons:
         """Return the light that the water of an instant brings."""
         grid, look, d = world.field.grid, shot.look, shot.extent.spacing
         lower, upper = np.asarray(grid.lower, float), np.asarray(grid.upper, float)
@@ -196,7 +189,7 @@ class Tracer:
         self._photons = photons
         if float(np.max(look.sun)) > 0.0:
             for number in range(rounds):
-                light.shine(photons, world, look, medium.absorption, slice * rounds + number)
+                light.shine(photons, world, look, medium, slice * rounds + number)
         return photons
 
 

@@ -1,0 +1,133 @@
+"""What the water does to light between its surfaces: Beer-Lambert, in one colour or in as many as there are cells.
+
+code      symbol   meaning                                                            unit
+swallow   sigma_a  absorption in every cell, per colour                               1/m
+shine              radiance of light that comes back out of deep water there          1
+left      T        share of the light that a way leaves, per colour                   1
+added              what the way adds, but for what is absorbed of it                  1
+"""
+
+import dataclasses
+
+import numpy as np
+
+from wavetank.device.compiler import download, qd, upload
+from wavetank.view.film.grid import Grid
+from wavetank.view.lens import vec3, vector
+from wavetank.view.matter import matter_of
+from wavetank.view.shot import Shot
+
+STRONG = 2.5  # layers as thick as is usual hold so much of a fluid's colour, as in `optics/mixture.py`
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Medium:
+    """What water does to light on its way, on the device."""
+
+    absorption: vec3  # 1/m, where all of it is the same
+    scattering: qd.f32  # 1/m
+    glow: vec3  # radiance of light that comes back out of deep water, likewise
+    swallow: qd.types.ndarray()  # vec3 [cells], 1/m; [1] where all of it is the same
+    shine: qd.types.ndarray()  # vec3 [cells], likewise
+    varied: qd.i32  # 1 where it is not
+
+
+def medium_of(shot: Shot, grid: Grid) -> Medium:
+    """Return what the water of a picture does to light, cell by cell where there are several fluids, or dye."""
+    glow = np.asarray(shot.look.glow * shot.tint, float)
+    plain, varied = np.concatenate([np.asarray(shot.absorption, float), glow]), _particles(shot)
+    cells = np.zeros((0, 6)) if varied is None else _in_cells(shot, grid, varied, plain)
+    arrays = [qd.ndarray(vec3, shape=(max(len(cells), 1),)) for _ in range(2)]
+    for array, part in zip(arrays, (cells[:, :3], cells[:, 3:]), strict=True):
+        upload(array, part.astype(np.float32))
+    return Medium(
+        absorption=shot.absorption, scattering=shot.scattering, glow=vector(*glow), swallow=arrays[0],
+        shine=arrays[1], varied=int(varied is not None),
+    )  # fmt: skip
+
+
+def is_clear(shot: Shot) -> bool:
+    """Say whether all fluids of a picture are clear: none is cloudy, opaque, ice, or shines."""
+    table = matter_of(shot.frame, shot.extent)
+    return not len(table) or not bool(np.any(table[:, 3:] > 0.0))
+
+
+def _particles(shot: Shot) -> np.ndarray | None:
+    """Return absorption [1/m] and shine of every particle, float64 [count, 6], or None where all agree."""
+    frame, usual = shot.frame, shot.usual
+    table = matter_of(frame, shot.extent)
+    dye = download(frame.dye)[: frame.count].astype(np.int64)
+    if not len(table) and not dye.any():
+        return None
+    glow = np.asarray(shot.look.glow, float)
+    plain = np.concatenate([np.asarray(shot.absorption, float), glow * np.asarray(shot.tint, float)])
+    found = np.tile(plain, (frame.count, 1))
+    if len(table):
+        kind = download(frame.material)[: frame.count]
+        for number, row in enumerate(table.astype(float)):
+            if row[0] >= 0.0:
+                found[kind == number] = np.concatenate([-np.log(row[:3]) * STRONG / usual, glow * row[:3] ** 0.6])
+    stained = np.flatnonzero(dye)
+    own = dye[stained]
+    color = (np.stack([own >> 16 & 255, own >> 8 & 255, own & 255], axis=1) / 255.0) ** 2.2
+    color, share = color.clip(0.02, 0.98), ((own >> 24 & 127) / 127.0)[:, None]
+    target = np.concatenate([-np.log(color) * STRONG / usual, glow * color**0.6], axis=1)
+    found[stained] += share * (target - found[stained])
+    return found
+
+
+def _in_cells(shot: Shot, grid: Grid, found: np.ndarray, plain: np.ndarray) -> np.ndarray:
+    """Return the means of the particles in and next to every cell, float64 [cells, 6]."""
+    counts = (grid.nz // 2, grid.ny // 2, grid.nx // 2)
+    place = (download(shot.frame.x)[: shot.frame.count] - grid.lower) / (2.0 * np.asarray(grid.step))
+    at = np.floor(place).astype(int).clip(0, np.array(counts[::-1]) - 1)
+    number = at[:, 0] + counts[2] * (at[:, 1] + counts[1] * at[:, 2])
+    total = int(np.prod(counts))
+    weights = [None, *found.T]
+    sums = np.stack([np.bincount(number, weight, total) for weight in weights], axis=1).reshape(*counts, 7)
+    near = sums.copy()
+    for axis in range(3):
+        padded = np.pad(near, [(1, 1) if k == axis else (0, 0) for k in range(4)])
+        before, after = (np.take(padded, range(k, k + counts[axis]), axis) for k in (0, 2))
+        near = near + 0.5 * (before + after)
+    # A cell of its own particles and a little of those beside it; without any it is as those beside it.
+    mixed = (sums + 0.15 * near).reshape(-1, 7)
+    there = mixed[:, 0] > 0.0
+    result = np.tile(plain, (total, 1))
+    result[there] = mixed[there, 1:] / mixed[there, :1]
+    return result
+
+
+@qd.func
+def cell_near(grid: Grid, x):
+    """Number of the cell at a point, of the nearest one outside of the grid."""
+    c = qd.cast(qd.floor((x - grid.lower) / (2.0 * grid.step)), qd.i32)
+    mx, my, mz = grid.nx // 2, grid.ny // 2, grid.nz // 2
+    i, j, k = qd.max(qd.min(c.x, mx - 1), 0), qd.max(qd.min(c.y, my - 1), 0), qd.max(qd.min(c.z, mz - 1), 0)
+    return i + mx * (j + my * k)
+
+
+@qd.func
+def absorbed_at(medium: Medium, grid: Grid, x):
+    """Absorption [1/m] at a point."""
+    result = medium.absorption
+    if medium.varied == 1:
+        result = medium.swallow[cell_near(grid, x)]
+    return result
+
+
+@qd.func
+def through_water(medium: Medium, grid: Grid, p, ahead, far):
+    """(share of the light that a straight way through the water leaves, radiance that it adds), each a vec3."""
+    left, added = qd.exp(-far * medium.absorption), (1.0 - qd.exp(-far * medium.scattering)) * medium.glow
+    if medium.varied == 1:
+        left, added = vec3(1.0, 1.0, 1.0), vec3(0.0, 0.0, 0.0)
+        count = qd.min(qd.cast(far / (2.0 * grid.step.x), qd.i32) + 1, 256)
+        pace, clear = far / count, 1.0
+        per = qd.exp(-pace * medium.scattering)
+        for part in range(count):
+            cell = cell_near(grid, p + (part + 0.5) * pace * ahead)
+            added += clear * (1.0 - per) * medium.shine[cell]
+            clear *= per
+            left *= qd.exp(-pace * medium.swallow[cell])
+    return left, added
