@@ -110,7 +110,7 @@ class Tracer:
         return done
 
     def _at_once(self) -> int:
-        return max(1, min(16, 4_000_000 // (self.buffers.rows * self.buffers.columns)))
+        return max(1, min(16, 1_500_000 // (self.buffers.rows * self.buffers.columns)))
 
     def setting(self, shot: Shot, aperture: float, focus: float | None) -> paths.Setting:
         """Return what surrounds the water, and how it is looked at."""
