@@ -74,7 +74,7 @@ def test_run_writes_what_was_asked_for(tmp_path):
         (("render", "no-such-scene"), ["no-such-scene", "obstacle-tank"]),
         (("render", "no-such.npz"), ["no-such.npz"]),
         (("render", "drop", "--view", "glass"), ["'glass'", "water, particles, slice, foam"]),
-        (("render", "drop", "--quality", "best"), ["'best'", "draft, standard, film"]),
+        (("render", "drop", "--quality", "best"), ["'best'", "draft, standard, high, film"]),
         (("render", "drop", "--at", "-1"), ["--at = -1.0"]),
         (("render", "drop", "--at", "nan"), ["--at = nan"]),
         (("render", "drop-2d", "--at", "0", "--eye", "1,2"), ["--eye = '1,2'", "2,1,3"]),

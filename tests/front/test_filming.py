@@ -86,12 +86,12 @@ def test_a_film_that_is_stopped_goes_on_to_the_same_frames(scene, tmp_path, monk
             import os
             import signal
 
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signal.SIGTERM)
         return real(self, *arguments, **options)
 
     monkeypatch.setattr(filming.Renderer, "render", stopping)
     figures = filming.film(scene, tmp_path / "x.gif")
-    assert figures["interrupted"] and figures["frames"] == 3 and figures["exit_code"] == 130
+    assert figures["interrupted"] and figures["frames"] == 3 and figures["exit_code"] == 143
     about = json.loads((tmp_path / "x.gif.frames" / "film.json").read_text())
     assert about["state"] == 2
     rest = filming.film(scene, tmp_path / "x.gif", keep=True)

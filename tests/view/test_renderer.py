@@ -252,7 +252,7 @@ def test_render_takes_frames_and_whatever_has_one(splash):
     assert (image == render(splash, *SIZE)).all()
     assert (image == Renderer(*SIZE, 2).render(splash)).all()
     assert (render(splash, *SIZE, quality="draft") == Renderer(*SIZE, 1).render(splash)).all()
-    with pytest.raises(WavetankError, match="quality = 'best' is not known; use one of draft, standard, film"):
+    with pytest.raises(WavetankError, match="quality = 'best' is not known; use one of draft, standard, high, film"):
         render(splash, *SIZE, quality="best")
     with pytest.raises(WavetankError, match="int"):
         render(3)
