@@ -158,8 +158,12 @@ def test_water_and_drops_in_a_white_world_cannot_be_seen():
     assert (np.abs(seen - 1.0) > 0.1).mean() < 0.01
 
 
-def test_still_water_is_flat_to_a_hundredth_of_a_spacing():
-    frame = full_tank()
+def test_the_surface_does_not_show_its_particles():
+    """Particles lie a tenth of a spacing off their places, as in water that has settled."""
+    rest = full_tank().positions
+    places = rest + np.random.default_rng(2).uniform(-0.01, 0.01, rest.shape)
+    tank = wt.Tank(size=(1.0, 1.0, 0.6))
+    frame = wt.Simulation(wt.Scene(spacing=0.1, tank=tank, fluids=[wt.Points(positions=places)])).frame()
     renderer, shot = shot_of(frame)
     tracer = Tracer(renderer.buffers)
     world = tracer._world(shot, 0.0, 0.0)
@@ -169,7 +173,7 @@ def test_still_water_is_flat_to_a_hundredth_of_a_spacing():
     j = above.argmax(axis=1)[:, None]
     a, b = (np.take_along_axis(level, j + k, axis=1)[:, 0] for k in (0, 1))
     height = grid.lower[1] + (j[:, 0] + 0.5 + a / (a - b)) * grid.step[1]
-    assert np.std(height) < 0.01 * 0.1
+    assert np.std(height) < 0.033 * 0.1  # without the blur it is 0.044
     assert abs(height.mean() - 0.8) < 0.05 * 0.1
 
 
@@ -229,9 +233,11 @@ def test_a_picture_that_was_stopped_goes_on_to_the_same_bits(tmp_path):
     watch = Watch(tell=lambda done, of: False, path=path)
     Renderer(48, 27, 1).render(frame, watch=watch, **options)
     assert not watch.whole and 0 < watch.done < 6 and path.exists()
-    watch = Watch(path=path)
+    told = []
+    watch = Watch(tell=lambda done, of: told.append(done) or True, path=path)
     again = Renderer(48, 27, 1).render(frame, watch=watch, **options)
     assert watch.begun > 0 and watch.whole and not path.exists()
+    assert min(told) > watch.begun  # what was there is not taken again
     np.testing.assert_array_equal(again, whole)
 
 
