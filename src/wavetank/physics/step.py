@@ -22,6 +22,7 @@ from wavetank.physics.dynamic_viscosity.implicit_viscosity import carry_on, solv
 from wavetank.physics.friction import apply_friction
 from wavetank.physics.grid_pressure.correction import correct_pressure
 from wavetank.physics.integrate import predict, update_velocities
+from wavetank.physics.near_solids import FARTHEST, hand_over_pushes, look_again, look_at_solids
 from wavetank.physics.neighbors import find_neighbors, sort_particles
 from wavetank.physics.plan import Plan, plan_step
 from wavetank.physics.population import hold_frozen, stop_frozen
@@ -36,6 +37,7 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     plan = plan_step(world, params, dt)
     c = coefficients(params, dt, speed_limit, carries=plan.carried, parts=plan.parts, held=plan.held)
     world.keep_viscosity(plan.is_viscous)
+    world.keep_solids()
 
     predict(world.particles, world.grid, world.solids, world.fluids.rows, c, world.count, plan.searched)  # 1-4
 
@@ -45,6 +47,8 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
 
     prepare_fluids(world, plan.kinds, params, dt)
     act_on_fluids(world, plan, params, c)
+    if plan.searched:
+        look_at_solids(world.scratch, world.particles, world.solids, c, world.count)
     if plan.on_grid:
         correct_on_grid(world, plan, params, c)
 
@@ -58,6 +62,8 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
     update_velocities(world.particles, c, world.count)  # 21, 23
     if plan.is_rubbed:
         apply_friction(world.particles, world.scratch, world.solids, world.walls, c, world.count)
+    if plan.searched == 2:
+        hand_over_pushes(world.scratch, world.particles, world.solids, world.count)
     if plan.is_smoothed or plan.turning:
         smooth_and_confine(world, plan, c)  # 22
     if world.frozen:
@@ -87,6 +93,8 @@ def find_multipliers(world: World, plan: Plan, c: Coefficients, *, first: bool) 
     """Find the multipliers that correct the densities: the `first` of a step, or better ones."""
     scratch, particles, grid = world.scratch, world.particles, world.grid
     solids, walls, count = world.solids, world.walls, world.count
+    if plan.searched and not first:
+        look_again(scratch, particles, solids, c, FARTHEST * c.h, count)
     if first:
         start_multipliers(scratch, particles, grid, solids, walls, c, count, plan.method, plan.kinds.mixed)
     else:

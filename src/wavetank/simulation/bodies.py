@@ -58,6 +58,7 @@ class Bodies(Mapping[str, Body]):
         self.gravity = np.zeros(3)  # m/s^2, of the present step
         self.pieces: Pieces | None = None  # of all bodies, on the device
         self.joints = Joints()
+        self._told: dict[int, tuple[float, ...]] = {}  # water that goes along with each body, as the engine knows it
         solids.feeling, solids.passing = {}, {}
         numbers = [number for number, solid in enumerate(solids.members) if solid.is_body]
         if not numbers:
@@ -154,10 +155,13 @@ class Bodies(Mapping[str, Body]):
 
     def _weigh(self, body: Body, rigid: Any) -> None:
         """Tell the engine the mass of a body and of the water that goes along."""
-        mass, inertia = self.coupling.along[body.row]
+        along = tuple(self.coupling.along[body.row].tolist())
+        if self._told.get(body.row) == along:
+            return
+        self._told[body.row], (mass, inertia) = along, along
         moments = (self.moments[body.row] + inertia).tolist()
         center, frame = body.dry.center.tolist(), self.frames[body.row]
-        properties = self.engine.MassProperties(center, body.dry.mass + float(mass), moments, frame)
+        properties = self.engine.MassProperties(center, body.dry.mass + mass, moments, frame)
         rigid.set_additional_mass_properties(properties)
 
     def _pieces(self) -> Pieces:
@@ -191,9 +195,9 @@ class Bodies(Mapping[str, Body]):
     def _move(self, dt: float, share: float) -> None:
         """Let the engine take the step, from where it began, with the velocities that are wanted."""
         rigid = [body.rigid() for body in self.members]
-        for body, now, row in zip(self.members, rigid, self.coupling.wanted, strict=True):
+        for body, now, velocity in zip(self.members, rigid, self._slowed(self.coupling.wanted), strict=True):
             self._weigh(body, now)
-            self._set_velocity(now, row, body.solid.reach())
+            now.linvel, now.angvel = velocity[:3], velocity[3:]
         begun = self._velocities(rigid)
         for number in self.solids.targets:
             pose = self._isometry(*self.solids.between(number, share))
@@ -220,7 +224,8 @@ class Bodies(Mapping[str, Body]):
             if turn + 1 == MOST_TRIES or not self.yielded(dt, part[1]):
                 break
             self.retry.restore(world.particles, world.count)
-            world.solids_version = self.solids.move_to(*part)
+            # The room that bodies leave for water is what it was, but for what they yielded by.
+            world.solids_version = world.room_version = self.solids.move_to(*part)
 
     def feel(self, world: World, dt: float) -> None:
         """Take what the water did to the bodies in a step of `dt` [s]."""
@@ -271,11 +276,14 @@ class Bodies(Mapping[str, Body]):
         self.solids.passing[body.number] = (begin, end)
         self.solids.poses[body.number] = end
 
-    def _set_velocity(self, rigid: Any, row: np.ndarray, reach: float) -> None:
-        """Set the velocity [6] of a body; no part of its surface is left faster than the water may get."""
-        speed, spin = float(np.linalg.norm(row[:3])), float(np.linalg.norm(row[3:])) * reach
-        rigid.linvel = (row[:3] * min(1.0, self.fastest / max(speed, 1e-30))).tolist()
-        rigid.angvel = (row[3:] * min(1.0, self.fastest / max(spin, 1e-30))).tolist()
+    def _slowed(self, velocities: np.ndarray) -> list[list[float]]:
+        """Return the velocities [n, 6] of which no part of a body's surface is faster than the water may get."""
+        speeds = np.linalg.norm(velocities.reshape(-1, 2, 3), axis=2)
+        speeds[:, 1] *= self.coupling.reaches
+        slowed: list[list[float]] = (
+            velocities * np.repeat(np.minimum(1.0, self.fastest / np.maximum(speeds, 1e-30)), 3, axis=1)
+        ).tolist()
+        return slowed
 
     def _velocities(self, rigid: list[Any]) -> np.ndarray:
         return np.array([(*_three(now.linvel), *_three(now.angvel)) for now in rigid])
@@ -321,6 +329,7 @@ class Bodies(Mapping[str, Body]):
             self.world = self.engine.PhysicsWorld.restore(arrays["bodies_engine"].tobytes())
         except self.engine.SerializationError as error:
             raise WavetankError(f"the engine's state of the bodies cannot be read: {error}.") from None
+        self._told.clear()
         for row, memory in enumerate(arrays["bodies_memory"]):
             self.coupling.recall(row, memory)
 

@@ -39,6 +39,7 @@ import numpy as np
 from wavetank.foundation.rotations import matrix_of
 
 TOLERANCE = 0.05  # of sqrt(g d), or of its speed: a body's wrong velocity, times k / m, that is worth a second step
+TURNING = 1.0
 LATER = 1.0  # the same for a third step and more
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
 AT_ONCE = 0.2  # of what is owed: more would ring
@@ -144,7 +145,7 @@ class Coupling:
         alone = self.solved(rotations, asked, 0.0)
         heavier = np.minimum(self.along, self.added) / self._inertias
         wrong = np.stack([np.linalg.norm(alone[:, block], axis=1) for block in BLOCKS], axis=1) * heavier
-        wrong[:, 1] *= self.reaches
+        wrong[:, 1] *= TURNING * self.reaches
         speeds = np.linalg.norm(self.velocity[:, :3], axis=1)
         yielding = wrong.max(axis=1) > np.where(self._yielded, LATER, TOLERANCE) * np.maximum(slow, speeds)
         self.along = np.where(yielding[:, None], self.along, before)

@@ -10,7 +10,7 @@ import numpy as np
 from wavetank.device.compiler import upload
 from wavetank.device.state import Particles
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.rotations import interpolate, turned, unit_quaternion
+from wavetank.foundation.rotations import interpolate, matrix_of, turned, unit_quaternion
 from wavetank.physics.population import free_places
 from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene
@@ -244,7 +244,9 @@ class MovingSolids:
 
     def _instant(self, share: float, last: int) -> list[Pose]:
         """Return all poses at a `share` of the frame; those of bodies at the begin of a time step, or its `last`."""
-        poses = [self.between(number, share) for number in range(len(self.poses))]
+        poses = list(self.poses)
+        for number in self.targets:
+            poses[number] = self.between(number, share)
         for number, ends in self.passing.items():
             poses[number] = ends[last]
         return poses
@@ -252,8 +254,10 @@ class MovingSolids:
     def _centers(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Return where the centres of mass are at these poses, [n, 3]."""
         centers = positions.copy()
-        for number, (center, _) in self.feeling.items():
-            centers[number] = positions[number] + turned(rotations[number], center)
+        if self.feeling:
+            numbers = [*self.feeling]
+            own = np.array([center for center, _ in self.feeling.values()])
+            centers[numbers] += (matrix_of(rotations[numbers]) @ own[..., None])[..., 0]
         return centers
 
     def _planes(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:

@@ -58,6 +58,7 @@ from wavetank.physics.grid_pressure.room import (
 )  # fmt: skip
 from wavetank.physics.grid_pressure.surface import carried_share, depth_at
 from wavetank.physics.mixture import Blend
+from wavetank.physics.near_solids import facing_at, known, place_of
 from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.smoothing import rest_lattice
@@ -73,7 +74,7 @@ from wavetank.physics.teams import (
     turns_over,
 )  # fmt: skip
 from wavetank.physics.world import World
-from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, signed_distance, to_local, vec3, vec4
+from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, to_local, vec3
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
@@ -174,27 +175,34 @@ def add_fill(
 
 
 @qd.func
-def approached(x, p, near, solids: SolidSet, walls: Walls, c: Coefficients, searched: qd.template()):
-    """Relative density that the marked solids have added on the way from `x` to `p`, in their motion."""
+def approached(
+    i, x, p, near, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, searched: qd.template()
+):  # fmt: skip
+    """Relative density that the solids near particle `i` have added on its way from `x` to `p`, in their motion."""
     added, free = 0.0, 1.0
     k = next_near(near, -1, solids)
-    while k < (solids.count if qd.static(searched) else solids.tank_count):
-        value = vec4(0.0, 0.0, 0.0, 0.0)
-        way = p - x
-        if qd.static(searched):
-            value = signed_distance(solids, k, p)
-            if k >= solids.tank_count:
+    while k < solids.tank_count:
+        add_approach(added, free, plane_distance(solids, k, p), p - x, walls, c)
+        k = next_near(near, k, solids)
+    if qd.static(searched):
+        if near >> solids.tank_count != 0:
+            for slot in range(known(scratch, i)):
+                at = place_of(scratch, i, slot)
+                k = scratch.solid[at]
                 own = to_local(solids.old_position[k], solids.old_rotation[k], x)
                 way = p - solids.position[k] - rotate(solids.rotation[k], own)
-        else:
-            value = plane_distance(solids, k, p)
-        if value.w < c.h:
-            share = wall_share(walls, value.w, c.h) * c.wall_density
-            inward = -way.dot(vec3(value.x, value.y, value.z))
-            added = added * (1.0 - share[0]) + inward * free * share[1] / c.h
-            free *= 1.0 - share[0]
-        k = next_near(near, k, solids)
+                add_approach(added, free, facing_at(scratch, at, i, p), way, walls, c)
     return added
+
+
+@qd.func
+def add_approach(added: qd.template(), free: qd.template(), value, way, walls: Walls, c: Coefficients):
+    """Add what a solid, (gradient, distance) as `value`, has added on a `way` [m] relative to it."""
+    if value.w < c.h:
+        share = wall_share(walls, value.w, c.h) * c.wall_density
+        inward = -way.dot(vec3(value.x, value.y, value.z))
+        added = added * (1.0 - share[0]) + inward * free * share[1] / c.h
+        free *= 1.0 - share[0]
 
 
 @qd.func
@@ -214,7 +222,7 @@ def add_errors(
         if near != 0:
             x = lift(particles.x[i])
             added[0, i - first] = e.missing * approached(
-                x, lift(predicted(particles, i)), near, solids, walls, c, searched
+                i, x, lift(predicted(particles, i)), near, scratch, solids, walls, c, searched
             )
     for lane in range(lanes):
         s = in_cells(grid, predicted(particles, first + lane))

@@ -107,8 +107,12 @@ def nearest_wall(grid: CoarseGrid, solids: SolidSet, n):
         center.z = 0.0
     nearest = vec4(0.0, 1.0, 0.0, 4.0 * edge)
     for k in range(solids.tank_count, solids.count):
-        if (center - solids.position[k]).norm() - solids.reach[k] < nearest.w and nearest.w > -2.0 * edge:
-            value = signed_distance(solids, k, center)
+        way, reach = center - solids.position[k], solids.reach[k]
+        if way.norm_sqr() < (reach + nearest.w) ** 2 and reach + nearest.w > 0.0 and nearest.w > -2.0 * edge:
+            # What is farther away takes no room: that of the ball around the solid is good enough there.
+            value = vec4(way.x, way.y, way.z, way.norm() - reach)
+            if value.w < 2.0 * edge:
+                value = signed_distance(solids, k, center)
             if value.w < nearest.w:
                 nearest = value
     return nearest
@@ -183,15 +187,14 @@ def open_tents(grid: CoarseGrid, at: qd.template(), s, dim: qd.template()):
 
 
 @qd.func
-def clear_at(grid: CoarseGrid, n):
-    """1 where no solid takes room within two cells of node `n`, diagonals included; else 0."""
-    c = coordinates(grid, n)
-    apart = 0.0
-    for z in range(qd.max(c[2] - 2, 0), qd.min(c[2] + 3, grid.nz)):
-        for y in range(qd.max(c[1] - 2, 0), qd.min(c[1] + 3, grid.ny)):
-            for x in range(qd.max(c[0] - 2, 0), qd.min(c[0] + 3, grid.nx)):
-                apart = qd.max(apart, qd.abs(grid.room[x + grid.nx * (y + grid.ny * z)] - 1.0))
-    return 1.0 if apart < 1e-3 else 0.0
+def largest_along(values: qd.template(), grid: CoarseGrid, n, axis: qd.template()):
+    """Largest value within two cells of node `n` along an axis."""
+    largest = 0.0
+    for aside in qd.static(range(-2, 3)):
+        c = coordinates(grid, n)
+        c[axis] += aside
+        largest = qd.max(largest, values[nearest(grid, c)])
+    return largest
 
 
 @qd.kernel(fastcache=True)
@@ -218,5 +221,11 @@ def find_room(
             if grid.room[n] > 0.0 and grid.lam[n] < 2.0 * longest_edge(grid):
                 grid.room[n] = grid.sums[n] / unit
             grid.sums[n] = 0
+            grid.slope_x[n] = qd.abs(grid.room[n] - 1.0)
+        # No solid takes room within two cells, diagonals included: along one axis after the other.
         for n in range(grid.nx * grid.ny * grid.nz):
-            grid.clear[n] = clear_at(grid, n)
+            grid.slope_y[n] = largest_along(grid.slope_x, grid, n, 0)
+        for n in range(grid.nx * grid.ny * grid.nz):
+            grid.slope_z[n] = largest_along(grid.slope_y, grid, n, 1)
+        for n in range(grid.nx * grid.ny * grid.nz):
+            grid.clear[n] = 1.0 if largest_along(grid.slope_z, grid, n, 2) < 1e-3 else 0.0
