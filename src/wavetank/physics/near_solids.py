@@ -118,6 +118,7 @@ def hand_over_pushes(scratch: Scratch, particles: Particles, solids: SolidSet, c
             k = scratch.solid[at]
             if solids.unit[k] > 0.0:
                 push_back(solids, k, lift(predicted(particles, i)), scratch.push[at])
+                scratch.push[at] = vec3(0.0, 0.0, 0.0)
 
 
 @qd.func

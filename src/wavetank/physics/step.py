@@ -6,6 +6,7 @@ and contact is part of every correction.
 """
 
 import math
+from collections.abc import Callable
 
 from wavetank.device.state import Coefficients
 from wavetank.foundation.params import Parameters
@@ -31,9 +32,18 @@ from wavetank.physics.vorticity import confine_vorticity
 from wavetank.physics.world import World
 from wavetank.physics.xsph_viscosity import apply_mixed_xsph, apply_xsph, pack_velocities
 
+SETTLING = 2  # iterations after bodies have yielded
+Settle = Callable[[], bool | None]
 
-def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
-    """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
+
+def step(
+    world: World, params: Parameters, dt: float, speed_limit: float = math.inf, settle: Settle | None = None
+) -> bool:  # fmt: skip
+    """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s].
+
+    `settle` lets bodies yield to what the water has done to them so far. True: they have, and the water is to follow.
+    None: they have gone so far that the step is to be taken again; it ends here, and returns False.
+    """
     plan = plan_step(world, params, dt)
     c = coefficients(params, dt, speed_limit, carries=plan.carried, parts=plan.parts, held=plan.held)
     world.keep_viscosity(plan.is_viscous)
@@ -57,6 +67,9 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         find_multipliers(world, plan, c, first=number == 0)  # 9-11
         apply_corrections(world, plan, c, first=number == 0)  # 12-18
 
+    if settle and not settle_bodies(world, plan, params, c, settle):
+        return False
+
     if plan.is_thick:
         carry_on(world, plan.kinds, params, c)
     update_velocities(world.particles, c, world.count)  # 21, 23
@@ -68,6 +81,20 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         smooth_and_confine(world, plan, c)  # 22
     if world.frozen:
         stop_frozen(world.particles, world.count)
+    return True
+
+
+def settle_bodies(world: World, plan: Plan, params: Parameters, c: Coefficients, settle: Settle) -> bool:
+    """Let bodies yield and the water follow, until neither is to; return False where the step is to be taken again."""
+    hand_over_pushes(world.scratch, world.particles, world.solids, world.count)
+    while (yielded := settle()) is True:
+        look_at_solids(world.scratch, world.particles, world.solids, c, world.count)
+        for relaxation, momentum in relaxations(params, plan.kinds.density_ratio)[:SETTLING]:
+            c = in_iteration(c, relaxation, momentum)
+            find_multipliers(world, plan, c, first=False)
+            apply_corrections(world, plan, c, first=False)
+        hand_over_pushes(world.scratch, world.particles, world.solids, world.count)
+    return yielded is not None
 
 
 def act_on_fluids(world: World, plan: Plan, params: Parameters, c: Coefficients) -> None:

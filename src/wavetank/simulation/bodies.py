@@ -32,6 +32,7 @@ from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
 MOST_TRIES = 4  # of a step
+FAR = 0.3  # of a spacing: bodies that yield by more begin the step anew
 FEWEST = 6.0  # pieces across a body
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
 
@@ -75,6 +76,7 @@ class Bodies(Mapping[str, Body]):
         self.units = np.array([body.unit for body in self.members])  # 1/m
         self.wet_masses = np.array([body.wet.mass for body in self.members])  # kg
         self.pieces = self._pieces()
+        self.nothing = np.zeros(PARTS * len(solids.members), np.int32)
 
     @override
     def __getitem__(self, name: str) -> Body:
@@ -212,25 +214,36 @@ class Bodies(Mapping[str, Body]):
     def step(self, world: World, scene: Scene, dt: float, fastest: float, part: tuple[float, float]) -> None:
         """Let the water take a step of `dt` [s], which is that `part` of a frame.
 
-        Where bodies are pushed harder than they were, it is taken again while they yield.
+        Where bodies are pushed harder than they were, they yield, and the water follows; where that is far, the step
+        is taken again.
         """
         if not self.members:
             take_step(world, scene, dt, fastest)
             return
         self.retry.keep(world.particles, self.dim, world.count)
-        for turn in range(MOST_TRIES):
-            take_step(world, scene, dt, fastest)
+        tries = 1
+
+        def settle() -> bool | None:
+            nonlocal tries
             self.feel(world, dt)
-            if turn + 1 == MOST_TRIES or not self.yielded(dt, part[1]):
-                break
-            self.retry.restore(world.particles, world.count)
+            if tries == MOST_TRIES or not self.yielded(dt, part[1]):
+                return False
+            tries += 1
             # The room that bodies leave for water is what it was, but for what they yielded by.
             world.solids_version = world.room_version = self.solids.move_to(*part)
+            far = self.coupling.is_hit or self.coupling.yielded_by * dt > FAR * scene.spacing
+            return None if far else True
+
+        while True:
+            upload(world.solids.reaction, self.nothing)
+            if take_step(world, scene, dt, fastest, settle):
+                break
+            self.retry.restore(world.particles, world.count)
+        self.feel(world, dt)
 
     def feel(self, world: World, dt: float) -> None:
         """Take what the water did to the bodies in a step of `dt` [s]."""
         sums = download(world.solids.reaction).astype(float).reshape(-1, PARTS)
-        upload(world.solids.reaction, np.zeros(sums.size, np.int32))
         particle = blend(world.materials, self.scene).largest_density * self.scene.spacing**self.dim
         rows, coupling, wet = sums[self.numbers] / self.units[:, None], self.coupling, self.wet_masses
         scale = np.repeat(np.stack([np.ones(len(wet)), coupling.reaches], axis=1), 3, axis=1) * (particle / dt)

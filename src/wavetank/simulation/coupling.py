@@ -39,8 +39,8 @@ import numpy as np
 from wavetank.foundation.rotations import matrix_of
 
 TOLERANCE = 0.05  # of sqrt(g d), or of its speed: a body's wrong velocity, times k / m, that is worth a second step
-TURNING = 1.0
 LATER = 1.0  # the same for a third step and more
+HARD = 0.5  # the same where the water was pushed aside so hard that it must not have been
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
 AT_ONCE = 0.2  # of what is owed: more would ring
 STAYS = 0.9  # share that is left after a step of what was seen of how much water goes along
@@ -77,6 +77,8 @@ class Coupling:
         self._pushed = np.zeros((count, 6))  # `impulse` of the try before
         self._given_way = np.zeros((count, 6))  # m/s, rad/s, by how much they have yielded in this step,
         self._yielded = np.zeros(count, bool)  # and whether they have
+        self.is_hit = False  # whether one was so hard that the step has to begin anew
+        self.yielded_by = 0.0  # m/s, the most that any place of one has yielded by in the last try
 
     @property
     def owed(self) -> np.ndarray:
@@ -145,11 +147,15 @@ class Coupling:
         alone = self.solved(rotations, asked, 0.0)
         heavier = np.minimum(self.along, self.added) / self._inertias
         wrong = np.stack([np.linalg.norm(alone[:, block], axis=1) for block in BLOCKS], axis=1) * heavier
-        wrong[:, 1] *= TURNING * self.reaches
+        wrong[:, 1] *= self.reaches
         speeds = np.linalg.norm(self.velocity[:, :3], axis=1)
-        yielding = wrong.max(axis=1) > np.where(self._yielded, LATER, TOLERANCE) * np.maximum(slow, speeds)
+        worst = wrong.max(axis=1) / np.maximum(slow, speeds)
+        yielding = worst > np.where(self._yielded, LATER, TOLERANCE)
+        self.is_hit = bool((worst > HARD).any())
         self.along = np.where(yielding[:, None], self.along, before)
         step = np.where(yielding[:, None], self.solved(rotations, asked), 0.0)
+        turns = self.reaches * np.linalg.norm(step[:, 3:], axis=1)
+        self.yielded_by = float((np.linalg.norm(step[:, :3], axis=1) + turns).max())
         self.wanted, self._given_way = self.wanted + step, self._given_way + step
         self._pushed, self._yielded = self.impulse, self._yielded | yielding
         return bool(yielding.any())

@@ -45,6 +45,7 @@ class MovingSolids:
         self.passing: dict[int, tuple[Pose, Pose]] = {}  # begin and end of a time step, of bodies
         self.feeling: dict[int, tuple[np.ndarray, float]] = {}  # centre of mass [m] and `SolidSet.unit`, of bodies
         self.version = 0  # of what is on the device
+        self._stand, self._tank = b"", np.zeros((0, 4))  # how the tank stands, and its planes then
         self.rebuild()
 
     def rebuild(self, members: list[Solid] | None = None) -> None:
@@ -262,11 +263,15 @@ class MovingSolids:
 
     def _planes(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Return (normal, offset) of the tank's walls at these poses, [tank_count, 4]: the distance is n x + b."""
+        stand = positions[: self.tank_count].tobytes() + rotations[: self.tank_count].tobytes()
+        if stand == self._stand:  # as in most steps
+            return self._tank
         planes = np.zeros((self.tank_count, 4))
         for k, wall in enumerate(self.walls):
             normal = turned(rotations[k], turned(wall.turn, np.array([0.0, 1.0, 0.0])))
             point = positions[k] + turned(rotations[k], wall.offset)
             planes[k] = *normal, -normal @ point
+        self._stand, self._tank = stand, planes
         return planes
 
     def _free_name(self, name: str) -> str:

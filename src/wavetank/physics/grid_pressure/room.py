@@ -187,14 +187,31 @@ def open_tents(grid: CoarseGrid, at: qd.template(), s, dim: qd.template()):
 
 
 @qd.func
-def largest_along(values: qd.template(), grid: CoarseGrid, n, axis: qd.template()):
-    """Largest value within two cells of node `n` along an axis."""
-    largest = 0.0
-    for aside in qd.static(range(-2, 3)):
-        c = coordinates(grid, n)
-        c[axis] += aside
-        largest = qd.max(largest, values[nearest(grid, c)])
-    return largest
+def beside(grid: CoarseGrid, x, row, axis: qd.template(), aside):
+    """Number of the node `aside` along an axis of the one that is `x` in its row, or of the nearest."""
+    c = qd.Vector([x, row % grid.ny, row // grid.ny])
+    c[axis] += aside
+    return nearest(grid, c)
+
+
+@qd.func
+def largest_along(
+    to: qd.template(), values: qd.template(), grid: CoarseGrid, row, axis: qd.template(), far: qd.template()
+):
+    """Put the largest of the values of `far` nodes on each side along an axis to the nodes of a row."""
+    for x in range(grid.nx):
+        largest = 0.0
+        for aside in qd.static(range(-far, far + 1)):
+            largest = qd.max(largest, values[beside(grid, x, row, axis, aside)])
+        to[x + grid.nx * row] = largest
+
+
+@qd.func
+def spread_along(to: qd.template(), values: qd.template(), grid: CoarseGrid, row, axis: qd.template()):
+    """Put what the free cells beside a node count there along an axis, see `add_tents`, to the nodes of a row."""
+    for x in range(grid.nx):
+        around = values[beside(grid, x, row, axis, -1)] + values[beside(grid, x, row, axis, 1)]
+        to[x + grid.nx * row] = 0.75 * values[x + grid.nx * row] + 0.125 * around
 
 
 @qd.kernel(fastcache=True)
@@ -203,7 +220,9 @@ def find_room(
 ):  # fmt: skip
     """Find which room each node has for water where solids are `searched`; else the tank ends where the cells do.
 
-    Sums are of whole multiples of the inverse of `unit`, so that the order of threads does not matter; 0 before.
+    Sums are of whole multiples of the inverse of `unit`, so that the order of threads does not matter; 0 before. Cells
+    that are free, and beside which all nodes have room, count the same at the nodes around: along one axis after the
+    other. What a step finds anew serves as memory.
     """
     if qd.static(not searched):
         for n in range(grid.nx * grid.ny * grid.nz):
@@ -214,18 +233,35 @@ def find_room(
             wall = nearest_wall(grid, solids, n)
             grid.slope_x[n], grid.slope_y[n], grid.slope_z[n], grid.lam[n] = wall.x, wall.y, wall.z, wall.w
             grid.room[n] = qd.cast(open_share(grid, n) >= least_open, qd.f32)
+            grid.rhs[n] = 1.0 - grid.room[n]
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.depth, grid.rhs, grid, row, 0, 1)
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.gaps, grid.depth, grid, row, 1, 1)
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.rhs, grid.gaps, grid, row, 2, 1)
         for n in range(grid.nx * grid.ny * grid.nz):
-            if grid.lam[n] < 4.0 * longest_edge(grid) and grid.lam[n] > -longest_edge(grid):
+            edge = longest_edge(grid)
+            grid.rhs[n] = qd.cast(grid.rhs[n] == 0.0 and grid.lam[n] >= 0.75 * edge, qd.f32)
+            if grid.rhs[n] == 0.0 and grid.lam[n] > -edge:
                 add_tents(grid, n, unit, dim)
+        for row in range(grid.ny * grid.nz):
+            spread_along(grid.depth, grid.rhs, grid, row, 0)
+        for row in range(grid.ny * grid.nz):
+            spread_along(grid.gaps, grid.depth, grid, row, 1)
+        for row in range(grid.ny * grid.nz):
+            spread_along(grid.rhs, grid.gaps, grid, row, 2)
         for n in range(grid.nx * grid.ny * grid.nz):
             if grid.room[n] > 0.0 and grid.lam[n] < 2.0 * longest_edge(grid):
-                grid.room[n] = grid.sums[n] / unit
+                grid.room[n] = grid.sums[n] / unit + grid.rhs[n]
             grid.sums[n] = 0
-            grid.slope_x[n] = qd.abs(grid.room[n] - 1.0)
-        # No solid takes room within two cells, diagonals included: along one axis after the other.
+            grid.rhs[n] = qd.abs(grid.room[n] - 1.0)
+        # No solid takes room within two cells, diagonals included.
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.depth, grid.rhs, grid, row, 0, 2)
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.gaps, grid.depth, grid, row, 1, 2)
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.clear, grid.gaps, grid, row, 2, 2)
         for n in range(grid.nx * grid.ny * grid.nz):
-            grid.slope_y[n] = largest_along(grid.slope_x, grid, n, 0)
-        for n in range(grid.nx * grid.ny * grid.nz):
-            grid.slope_z[n] = largest_along(grid.slope_y, grid, n, 1)
-        for n in range(grid.nx * grid.ny * grid.nz):
-            grid.clear[n] = 1.0 if largest_along(grid.slope_z, grid, n, 2) < 1e-3 else 0.0
+            grid.clear[n] = 1.0 if grid.clear[n] < 1e-3 else 0.0
