@@ -5,6 +5,7 @@ passes them. What the water did to them moves them in the next step, or at once 
 (`coupling.py`).
 """
 
+import functools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -19,11 +20,14 @@ from wavetank.physics.mixture import blend
 from wavetank.physics.reactions import IMMERSION, OF_GRID
 from wavetank.physics.step import step as take_step
 from wavetank.physics.world import World
+from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
+from wavetank.simulation.acting import Acting
 from wavetank.simulation.added_mass import added_mass
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
 from wavetank.simulation.coupling import Coupling
+from wavetank.simulation.effort import given
 from wavetank.simulation.joints import Joints, put_joints
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.solids.distance import PARTS
@@ -59,6 +63,8 @@ class Bodies(Mapping[str, Body]):
         self.gravity = np.zeros(3)  # m/s^2, of the present step
         self.pieces: Pieces | None = None  # of all bodies, on the device
         self.joints = Joints()
+        self.acting: Acting | None = None  # made when forces first act
+        self.pushes: np.ndarray | None = None  # kg m/s, kg m^2/s: by forces, in the next step
         self._told: dict[int, tuple[float, ...]] = {}  # water that goes along with each body, as the engine knows it
         solids.feeling, solids.passing = {}, {}
         numbers = [number for number, solid in enumerate(solids.members) if solid.is_body]
@@ -70,6 +76,8 @@ class Bodies(Mapping[str, Body]):
         self.world.integration_parameters.length_unit = max(10.0 * scene.spacing, 1e-3)
         self.handles = [self._add(number, solid) for number, solid in enumerate(solids.members)]
         self.joints = put_joints(self.engine, lambda: self.world, self.handles, solids, scene.joints)
+        for joint in self.joints.values():
+            joint.ask(functools.partial(given, self.members, self.joints))
         self._weigh_all(numbers)
         solids.feel({body.number: (body.dry.center, body.unit) for body in self.members})
         self.numbers = np.array([body.number for body in self.members])
@@ -178,6 +186,12 @@ class Bodies(Mapping[str, Body]):
 
     # --- a step ---
 
+    def push(self, forces: Sequence[Force], dt: float, time: float) -> None:
+        """Let forces act on the bodies in the next step, of `dt` [s] from `time` [s] of the water on."""
+        if forces and self.acting is None:
+            self.acting = Acting(self.members, self.dim, self.scene.spacing)
+        self.pushes = self.acting.impulses(forces, dt, time) if forces and self.acting else None
+
     def advance(self, gravity: tuple[float, ...], dt: float, share: float, fastest: float, clock: float) -> None:
         """Move the bodies for a step of `dt` [s], which ends at a `share` of the frame; none is left faster [m/s].
 
@@ -185,7 +199,7 @@ class Bodies(Mapping[str, Body]):
         """
         self.fastest, self.gravity = fastest, np.array([*gravity, 0.0][:3])
         self.coupling.held = np.array([self._is_held(body) for body in self.members])
-        self.coupling.begin(self._rotations(), self.gravity, dt)
+        self.coupling.begin(self._rotations(), self.gravity, dt, self.pushes)
         for body in self.members:
             self._hold(body, body.rigid())
         for joint in self.joints.values():

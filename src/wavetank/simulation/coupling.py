@@ -72,6 +72,7 @@ class Coupling:
         self.held = np.zeros(count, bool)  # they have no momentum of their own
         self.lasted = 0.0  # s, of the last step
         self.wanted = np.zeros((count, 6))  # m/s, rad/s, but for contact
+        self.pulled = np.zeros((count, 6))  # kg m/s, kg m^2/s: by contact and joints
         self._inertias = np.stack([masses, np.linalg.norm(tensors, 2, axis=(1, 2))], axis=1)  # kg, kg m^2
         self._moved = np.zeros((count, 6))  # m/s, rad/s, from the try before to this one
         self._pushed = np.zeros((count, 6))  # `impulse` of the try before
@@ -85,13 +86,20 @@ class Coupling:
         """Momentum [n, 6] that bodies are still to get."""
         return np.where(self.held[:, None], 0.0, self.due + self.impulse - self.given)
 
-    def begin(self, rotations: np.ndarray, gravity: np.ndarray, dt: float) -> None:
-        """Find the velocities `wanted` [n, 6] for a step of `dt` [s] of bodies that are turned so [n, 4]."""
+    def begin(
+        self, rotations: np.ndarray, gravity: np.ndarray, dt: float, pushes: np.ndarray | None = None
+    ) -> None:  # fmt: skip
+        """Find the velocities `wanted` [n, 6] for a step of `dt` [s] of bodies that are turned so [n, 4].
+
+        Besides gravity, forces of the scene give them the momentum `pushes` [n, 6].
+        """
         self._heavy = self.masses * np.linalg.norm(gravity)
         self._learn()
         owed = self.owed
         weight = np.zeros_like(owed)
         weight[:, :3] = self.masses[:, None] * gravity * dt
+        if pushes is not None:
+            weight += pushes
         ratio = dt / (self.lasted or dt)
         self.due = owed + weight
         wanted = AT_ONCE * owed + weight + ratio * (self.impulse + np.repeat(self.along, 3, axis=1) * self.change)
@@ -107,7 +115,9 @@ class Coupling:
         self._moved = velocity - self.velocity
         self.velocity, self.change = velocity, velocity - self.before - self._given_way
         self.given = self.weighed(rotations, self.wanted - self.before)
-        self.given -= np.repeat(self.along, 3, axis=1) * (velocity - begun)
+        pulled, along = velocity - begun, np.repeat(self.along, 3, axis=1)
+        self.pulled = self.weighed(rotations, pulled) + along * pulled
+        self.given -= along * pulled
         self.lasted = dt
 
     def _learn(self) -> None:
@@ -149,7 +159,7 @@ class Coupling:
         wrong = np.stack([np.linalg.norm(alone[:, block], axis=1) for block in BLOCKS], axis=1) * heavier
         wrong[:, 1] *= self.reaches
         speeds = np.linalg.norm(self.velocity[:, :3], axis=1)
-        worst = wrong.max(axis=1) / np.maximum(slow, speeds)
+        worst = wrong.max(axis=1) / np.maximum(np.maximum(slow, speeds), 1e-30)
         yielding = worst > np.where(self._yielded, LATER, TOLERANCE)
         self.is_hit = bool((worst > HARD).any())
         self.along = np.where(yielding[:, None], self.along, before)

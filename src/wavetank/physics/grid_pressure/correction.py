@@ -106,6 +106,7 @@ class Errors:
     slit: qd.f32  # fill from which on there is no slit
     closing: qd.f32  # 1/m^2: what lacks is closed by in a step, over the stiffness M
     least_theta: qd.f32  # of an edge
+    spacing: qd.f32  # m
 
 
 @dataclasses.dataclass(frozen=True)
@@ -176,13 +177,14 @@ def add_fill(
 
 @qd.func
 def approached(
-    i, x, p, near, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, searched: qd.template()
+    i, x, p, driven, near, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, e: Errors,
+    searched: qd.template(),
 ):  # fmt: skip
     """Relative density that the solids near particle `i` have added on its way from `x` to `p`, in their motion."""
     added, free = 0.0, 1.0
     k = next_near(near, -1, solids)
     while k < solids.tank_count:
-        add_approach(added, free, plane_distance(solids, k, p), p - x, walls, c)
+        add_approach(added, free, plane_distance(solids, k, p), p - x, walls, c, e)
         k = next_near(near, k, solids)
     if qd.static(searched):
         if near >> solids.tank_count != 0:
@@ -190,17 +192,31 @@ def approached(
                 at = place_of(scratch, i, slot)
                 k = scratch.solid[at]
                 own = to_local(solids.old_position[k], solids.old_rotation[k], x)
-                way = p - solids.position[k] - rotate(solids.rotation[k], own)
-                add_approach(added, free, facing_at(scratch, at, i, p), way, walls, c)
+                moved = solids.position[k] + rotate(solids.rotation[k], own) - x
+                value = facing_at(scratch, at, i, p)
+                if solids.sweep[k].norm_sqr() > 0.0:
+                    added += free * not_answered(value, moved - driven, walls, c, e)
+                add_approach(added, free, value, p - x - moved, walls, c, e)
     return added
 
 
 @qd.func
-def add_approach(added: qd.template(), free: qd.template(), value, way, walls: Walls, c: Coefficients):
+def not_answered(value, moved, walls: Walls, c: Coefficients, e: Errors):
+    """What lacks of the answer to a solid, (gradient, distance) as `value`, that has `moved` [m] in this step.
+
+    Its layer of particles has to make room for all of its way.
+    """
+    layer = qd.min(qd.max(2.5 - 2.0 * value.w / e.spacing, 0.0), 1.0) / e.spacing
+    answer = (1.0 + e.missing) * wall_share(walls, value.w, c.h)[1] * c.wall_density / c.h
+    return moved.dot(vec3(value.x, value.y, value.z)) * qd.max(layer - answer, 0.0)
+
+
+@qd.func
+def add_approach(added: qd.template(), free: qd.template(), value, way, walls: Walls, c: Coefficients, e: Errors):
     """Add what a solid, (gradient, distance) as `value`, has added on a `way` [m] relative to it."""
     if value.w < c.h:
         share = wall_share(walls, value.w, c.h) * c.wall_density
-        inward = -way.dot(vec3(value.x, value.y, value.z))
+        inward = -e.missing * way.dot(vec3(value.x, value.y, value.z))
         added = added * (1.0 - share[0]) + inward * free * share[1] / c.h
         free *= 1.0 - share[0]
 
@@ -217,12 +233,23 @@ def add_errors(
     at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
     amounts = qd.Matrix.zero(qd.i32, 2**dim, lanes)
     added = qd.Matrix.zero(qd.f32, 1, lanes)
+    gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
     for i in range(first, qd.min(first + lanes, count)):
         near = particles.near[i]
         if near != 0:
-            x = lift(particles.x[i])
-            added[0, i - first] = e.missing * approached(
-                i, x, lift(predicted(particles, i)), near, scratch, solids, walls, c, searched
+            x, p = lift(particles.x[i]), lift(predicted(particles, i))
+            added[0, i - first] = approached(
+                i,
+                x,
+                p,
+                p - x - c.dt * c.dt * (gravity + lift(particles.a[i])),
+                near,
+                scratch,
+                solids,
+                walls,
+                c,
+                e,
+                searched,
             )
     for lane in range(lanes):
         s = in_cells(grid, predicted(particles, first + lane))
@@ -404,5 +431,5 @@ def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
     return remembered(Errors(
         unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness, inner_from=INNER[0],
         inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT,
-        closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA,
+        closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, spacing=params.spacing,
     ))  # fmt: skip
