@@ -40,7 +40,7 @@ from wavetank.foundation.rotations import matrix_of
 
 TOLERANCE = 0.05  # of sqrt(g d), or of its speed: a body's wrong velocity, times k / m, that is worth a second step
 LATER = 1.0  # the same for a third step and more
-HARD = 0.5  # the same where the water was pushed aside so hard that it must not have been
+HARD = 0.5  # the same, in motion alone, where water was pushed aside so hard that it must not have been
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
 AT_ONCE = 0.2  # of what is owed: more would ring
 STAYS = 0.9  # share that is left after a step of what was seen of how much water goes along
@@ -159,9 +159,9 @@ class Coupling:
         wrong = np.stack([np.linalg.norm(alone[:, block], axis=1) for block in BLOCKS], axis=1) * heavier
         wrong[:, 1] *= self.reaches
         speeds = np.linalg.norm(self.velocity[:, :3], axis=1)
-        worst = wrong.max(axis=1) / np.maximum(np.maximum(slow, speeds), 1e-30)
-        yielding = worst > np.where(self._yielded, LATER, TOLERANCE)
-        self.is_hit = bool((worst > HARD).any())
+        wrong /= np.maximum(np.maximum(slow, speeds), 1e-30)[:, None]
+        yielding = wrong.max(axis=1) > np.where(self._yielded, LATER, TOLERANCE)
+        self.is_hit = bool((wrong[:, 0] > HARD).any())
         self.along = np.where(yielding[:, None], self.along, before)
         step = np.where(yielding[:, None], self.solved(rotations, asked), 0.0)
         turns = self.reaches * np.linalg.norm(step[:, 3:], axis=1)

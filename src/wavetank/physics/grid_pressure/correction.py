@@ -42,7 +42,8 @@ import math
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls, remembered
 from wavetank.foundation.params import Parameters
-from wavetank.physics.boundary import flattened, kept_in_tank, next_near, wall_share
+from wavetank.physics.boundary import flattened, kept_in_tank
+from wavetank.physics.grid_pressure.approach import approached
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, open_area, solve_levels
@@ -58,7 +59,6 @@ from wavetank.physics.grid_pressure.room import (
 )  # fmt: skip
 from wavetank.physics.grid_pressure.surface import carried_share, depth_at
 from wavetank.physics.mixture import Blend
-from wavetank.physics.near_solids import facing_at, known, place_of
 from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.smoothing import rest_lattice
@@ -74,7 +74,7 @@ from wavetank.physics.teams import (
     turns_over,
 )  # fmt: skip
 from wavetank.physics.world import World
-from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, to_local, vec3
+from wavetank.solids.distance import SolidSet, lift, vec3
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
@@ -176,52 +176,6 @@ def add_fill(
 
 
 @qd.func
-def approached(
-    i, x, p, driven, near, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, e: Errors,
-    searched: qd.template(),
-):  # fmt: skip
-    """Relative density that the solids near particle `i` have added on its way from `x` to `p`, in their motion."""
-    added, free = 0.0, 1.0
-    k = next_near(near, -1, solids)
-    while k < solids.tank_count:
-        add_approach(added, free, plane_distance(solids, k, p), p - x, walls, c, e)
-        k = next_near(near, k, solids)
-    if qd.static(searched):
-        if near >> solids.tank_count != 0:
-            for slot in range(known(scratch, i)):
-                at = place_of(scratch, i, slot)
-                k = scratch.solid[at]
-                own = to_local(solids.old_position[k], solids.old_rotation[k], x)
-                moved = solids.position[k] + rotate(solids.rotation[k], own) - x
-                value = facing_at(scratch, at, i, p)
-                if solids.sweep[k].norm_sqr() > 0.0:
-                    added += free * not_answered(value, moved - driven, walls, c, e)
-                add_approach(added, free, value, p - x - moved, walls, c, e)
-    return added
-
-
-@qd.func
-def not_answered(value, moved, walls: Walls, c: Coefficients, e: Errors):
-    """What lacks of the answer to a solid, (gradient, distance) as `value`, that has `moved` [m] in this step.
-
-    Its layer of particles has to make room for all of its way.
-    """
-    layer = qd.min(qd.max(2.5 - 2.0 * value.w / e.spacing, 0.0), 1.0) / e.spacing
-    answer = (1.0 + e.missing) * wall_share(walls, value.w, c.h)[1] * c.wall_density / c.h
-    return moved.dot(vec3(value.x, value.y, value.z)) * qd.max(layer - answer, 0.0)
-
-
-@qd.func
-def add_approach(added: qd.template(), free: qd.template(), value, way, walls: Walls, c: Coefficients, e: Errors):
-    """Add what a solid, (gradient, distance) as `value`, has added on a `way` [m] relative to it."""
-    if value.w < c.h:
-        share = wall_share(walls, value.w, c.h) * c.wall_density
-        inward = -e.missing * way.dot(vec3(value.x, value.y, value.z))
-        added = added * (1.0 - share[0]) + inward * free * share[1] / c.h
-        free *= 1.0 - share[0]
-
-
-@qd.func
 def add_errors(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     e: Errors, cells: Grid, team, part, count, searched: qd.template(),
@@ -238,18 +192,9 @@ def add_errors(
         near = particles.near[i]
         if near != 0:
             x, p = lift(particles.x[i]), lift(predicted(particles, i))
+            driven = p - x - c.dt * c.dt * (gravity + lift(particles.a[i]))
             added[0, i - first] = approached(
-                i,
-                x,
-                p,
-                p - x - c.dt * c.dt * (gravity + lift(particles.a[i])),
-                near,
-                scratch,
-                solids,
-                walls,
-                c,
-                e,
-                searched,
+                i, x, p, driven, near, scratch, solids, walls, c, e.missing, e.spacing, searched
             )
     for lane in range(lanes):
         s = in_cells(grid, predicted(particles, first + lane))
