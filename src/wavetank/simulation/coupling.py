@@ -40,7 +40,8 @@ from wavetank.foundation.rotations import matrix_of
 
 TOLERANCE = 0.05  # of sqrt(g d), or of its speed: a body's wrong velocity, times k / m, that is worth a second step
 LATER = 1.0  # the same for a third step and more
-HARD = 0.5  # the same, in motion alone, where water was pushed aside so hard that it must not have been
+HARD = 0.5  # the same where water was pushed aside so hard that it must not have been: the step begins anew
+JAMMING = 6.0  # by how much less a body may yield towards the water than away from it within a step
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
 AT_ONCE = 0.2  # of what is owed: more would ring
 STAYS = 0.9  # share that is left after a step of what was seen of how much water goes along
@@ -161,11 +162,13 @@ class Coupling:
         speeds = np.linalg.norm(self.velocity[:, :3], axis=1)
         wrong /= np.maximum(np.maximum(slow, speeds), 1e-30)[:, None]
         yielding = wrong.max(axis=1) > np.where(self._yielded, LATER, TOLERANCE)
-        self.is_hit = bool((wrong[:, 0] > HARD).any())
+        self.is_hit = bool((wrong > HARD).any())
         self.along = np.where(yielding[:, None], self.along, before)
         step = np.where(yielding[:, None], self.solved(rotations, asked), 0.0)
         turns = self.reaches * np.linalg.norm(step[:, 3:], axis=1)
-        self.yielded_by = float((np.linalg.norm(step[:, :3], axis=1) + turns).max())
+        # One that yields towards what pushes it may jam particles that are where they are by its other way.
+        jams = np.where((step[:, :3] * self.impulse[:, :3]).sum(axis=1) < 0.0, JAMMING, 1.0)
+        self.yielded_by = float((jams * np.linalg.norm(step[:, :3], axis=1) + turns).max())
         self.wanted, self._given_way = self.wanted + step, self._given_way + step
         self._pushed, self._yielded = self.impulse, self._yielded | yielding
         return bool(yielding.any())
