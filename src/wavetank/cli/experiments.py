@@ -82,6 +82,9 @@ def bench(
         bool, typer.Option("--roofline", help="Compare each kernel with what this machine can do.")
     ] = False,
     search: Annotated[bool, typer.Option("--search", help="Compare the neighbour search with a k-d tree.")] = False,
+    bodies: Annotated[
+        bool, typer.Option("--bodies", help="Compare a pool with itself when fifty bodies rain into it.")
+    ] = False,
     page: Annotated[bool, typer.Option("--page", help="Measure the page in a headless Chromium.")] = False,
     start_up: Annotated[bool, typer.Option(help="Measure the start of a fresh process too.")] = True,
     out: Annotated[Path | None, typer.Option(help="Write the result to this JSON file.")] = None,
@@ -94,8 +97,8 @@ def bench(
 
     order = bench_run.Order(
         scenes=scenes, sizes=sizes, seconds=seconds, repeats=repeats, threads=threads, peers=peers,
-        their_scenes=their_scenes, pictures=pictures, roofline=roofline, search=search, page=page, start_up=start_up,
-        compare=compare, arch=arch,
+        their_scenes=their_scenes, pictures=pictures, roofline=roofline, search=search, bodies=bodies,
+        page=page, start_up=start_up, compare=compare, arch=arch,
     )  # fmt: skip
     result, tables = bench_run.perform(order, console.print)
     if out is not None:

@@ -58,6 +58,12 @@ class Scratch:
     omega: qd.types.ndarray()  # vec3 [capacity], 1/s: vorticity
     wall: qd.types.ndarray()  # vec4 [capacity]: (gradient [1/m], share of rho_0) of the solids, where any is near
     weight: qd.types.ndarray()  # f32 [capacity]: largest rest density of all fluids over its own; 1 where all are equal
+    # The solids near each particle, see `physics/near_solids.py`; one row in worlds without solids but for the tank.
+    solids: qd.types.ndarray()  # i32 [capacity]: how many there are, even if it had no room
+    seen: qd.types.ndarray()  # vec3 [capacity], m: where their distances were asked for
+    solid: qd.types.ndarray()  # i32 [places * capacity]: their numbers, the first of all particles first
+    facing: qd.types.ndarray()  # vec4 [places * capacity]: outward normal [1] and distance [m] there
+    push: qd.types.ndarray()  # vec3 [places * capacity], m, heaviest particle's mass: what they have moved it by
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -350,7 +356,21 @@ def new_scratch(capacity: int) -> Scratch:
     rows = capacity + MARGIN
     rho, lam, dlam, squares, weight = (scalars(rows) for _ in range(5))
     weight.fill(1.0)
-    return Scratch(rho, lam, dlam, squares, omega=vectors(3, rows), wall=vectors(4, rows), weight=weight)
+    return Scratch(
+        rho, lam, dlam, squares, omega=vectors(3, rows), wall=vectors(4, rows), weight=weight, solids=integers(1),
+        seen=vectors(3, 1), solid=integers(1), facing=vectors(4, 1), push=vectors(3, 1),
+    )  # fmt: skip
+
+
+def with_solids(scratch: Scratch, places: int) -> Scratch:
+    """Return scratch arrays with room for so many solids near each particle."""
+    rows = scratch.rho.shape[0]
+    if scratch.solids.shape[0] == rows:
+        return scratch
+    return dataclasses.replace(
+        scratch, solids=integers(rows), seen=vectors(3, rows), solid=integers(places * rows),
+        facing=vectors(4, places * rows), push=vectors(3, places * rows),
+    )  # fmt: skip
 
 
 def new_diffuse(dim: int, capacity: int) -> Diffuse:

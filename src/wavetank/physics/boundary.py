@@ -111,51 +111,6 @@ def fall(c: Coefficients):
 
 
 @qd.func
-def find_walls(sums: qd.template(), team, particles: Particles, solids: SolidSet, walls: Walls, c: Coefficients):
-    """Find, in a column for each particle of a team, (gradient [1/m], free share) by the marked solids.
-
-    Returns the bits of the solids that one of them is near. The walls of the tank are computed in all lanes at once.
-    """
-    first = team * sums.m
-    near = 0
-    for lane in range(sums.m):
-        near |= particles.near[first + lane]
-    for lane in range(sums.m):
-        sums[3, lane] = 1.0
-    way = fall(c)
-    k = next_near(near, -1, solids)
-    while k < solids.tank_count:
-        for lane in range(sums.m):
-            add_wall(sums, lane, plane_distance(solids, k, lift(predicted(particles, first + lane)) - way), walls, c)
-        k = next_near(near, k, solids)
-    if near >> solids.tank_count != 0:
-        for lane in range(sums.m):
-            p = lift(predicted(particles, first + lane)) - way
-            add_solids(sums, lane, p, particles.near[first + lane], solids.tank_count - 1, solids, walls, c)
-    return near
-
-
-@qd.func
-def press_back(p, near, found, push, solids: SolidSet, walls: Walls, c: Coefficients):
-    """Let bodies feel what their share of the density at `p` moves a particle by: `push` [m^2] times the gradient.
-
-    `found` is what `wall_density` says of the place; where one solid alone is marked it is the body's.
-    """
-    k = next_near(near, solids.tank_count - 1, solids)
-    if near & (near - 1) == 0 and solids.count - solids.tank_count <= marks() - solids.tank_count:
-        if solids.unit[k] > 0.0:
-            push_back(solids, k, p, vec3(found.x, found.y, found.z) * push)
-        k = solids.count
-    while k < solids.count:
-        if solids.unit[k] > 0.0:
-            value = signed_distance(solids, k, p)
-            share = wall_share(walls, value.w, c.h) * c.wall_density
-            others = (1.0 - found.w) / qd.max(1.0 - share[0], 1e-6)
-            push_back(solids, k, p, vec3(value.x, value.y, value.z) * (-push * others * share[1] * c.inverse_h))
-        k = next_near(near, k, solids)
-
-
-@qd.func
 def wall_density(x: qd.template(), near, solids: SolidSet, walls: Walls, c: Coefficients):
     """(gradient [1/m], relative density) that the marked solids add at `x`."""
     sums = qd.Matrix([[0.0], [0.0], [0.0], [1.0]])
@@ -234,17 +189,19 @@ def stopped(origin, target, near, solids: SolidSet, gap, mass):
         last, push = -1, vec3(0.0, 0.0, 0.0)
         k = next_near(near, solids.tank_count - 1, solids)
         while k < solids.count:
-            rotation = solids.rotation[k]
-            end = to_local(solids.position[k], rotation, target)
-            at = to_local(solids.old_position[k], solids.old_rotation[k], origin)
-            out = follow(k, at, end, solids, gap)
-            if (out - end).norm() > 0.0:
-                before = target
-                target = solids.position[k] + rotate(rotation, out)
-                moved = 1
-                if mass > 0.0:
-                    last, push = k, target - before
-                    push_back(solids, k, target, mass * push)
+            away = (target - solids.position[k]).norm()
+            if away < solids.reach[k] + gap + moves_by(k, (target - origin).norm(), target, solids):
+                rotation = solids.rotation[k]
+                end = to_local(solids.position[k], rotation, target)
+                at = to_local(solids.old_position[k], solids.old_rotation[k], origin)
+                out = follow(k, at, end, solids, gap)
+                if (out - end).norm() > 0.0:
+                    before = target
+                    target = solids.position[k] + rotate(rotation, out)
+                    moved = 1
+                    if mass > 0.0:
+                        last, push = k, target - before
+                        push_back(solids, k, target, mass * push)
             k = next_near(near, k, solids)
         walls = near
         if moved == 1:  # perhaps farther than its marks reach
@@ -289,29 +246,38 @@ def moves_by(k, length, at, solids: SolidSet):
 
 
 @qd.func
-def is_clear(near, share, before, origin, target, solids: SolidSet, walls: Walls, c: Coefficients):
-    """Say whether the way from `origin` to `target` touches none of the marked solids, without their distances.
+def bodies_around(origins: qd.template(), targets: qd.template(), solids: SolidSet, h):
+    """Bits of the solids, other than the tank's walls, that any of several particles on their ways may touch or feel.
 
-    At the place `before` they had this `share` of the density together, which tells how far away the nearest is.
+    A column for each particle, as in `walls_near`: those of a team are close together.
     """
-    length, moved = (target - origin).norm(), (target - before).norm()
-    least = c.wall_gap
-    k = next_near(near, solids.tank_count - 1, solids)
-    while k < solids.count:
-        least = qd.max(least, moves_by(k, length, target, solids))
-        k = next_near(near, k, solids)
-    return share < 0.999 * c.wall_density * wall_share(walls, least + moved, c.h)[0]
+    low = vec3(targets[0, 0], targets[1, 0], targets[2, 0])
+    high, longest = low, 0.0
+    for lane in range(origins.m):
+        x = vec3(origins[0, lane], origins[1, lane], origins[2, lane])
+        p = vec3(targets[0, lane], targets[1, lane], targets[2, lane])
+        low, high, longest = qd.min(low, p), qd.max(high, p), qd.max(longest, (p - x).norm_sqr())
+    middle = 0.5 * (low + high)
+    way = 0.5 * (high - low).norm() + 1.2 * h + qd.sqrt(longest)
+    bits = 0
+    for k in range(solids.tank_count, solids.count):
+        reach = solids.reach[k]
+        farthest = reach + way + solids.sweep[k][0] + solids.sweep[k][1] * reach
+        if (middle - solids.position[k]).norm_sqr() < farthest * farthest:
+            bits |= 1 << bit_of(k, solids)
+    return bits
 
 
 @qd.func
-def near_bodies(x, p, solids: SolidSet, c: Coefficients):
+def near_bodies(x, p, among, solids: SolidSet, c: Coefficients):
     """Bits of the solids, other than the tank's walls, that a particle on its way from `x` to `p` may touch or feel.
 
-    A second number says whether it may touch any.
+    They are looked for `among` those marked. A second number says whether it may touch any.
     """
     near, touched, length = 0, 0, (p - x).norm()
     way = 1.2 * c.h + length
-    for k in range(solids.tank_count, solids.count):
+    k = next_near(among, solids.tank_count - 1, solids)
+    while k < solids.count:
         reach = solids.reach[k]
         farthest = reach + way + solids.sweep[k][0] + solids.sweep[k][1] * reach
         away = (p - solids.position[k]).norm_sqr()
@@ -322,6 +288,7 @@ def near_bodies(x, p, solids: SolidSet, c: Coefficients):
                 near |= 1 << bit_of(k, solids)
                 if distance < qd.max(c.wall_gap, moves_by(k, length, p, solids)):
                     touched = 1
+        k = next_near(among, k, solids)
     return vec2i(near, touched)
 
 
@@ -362,7 +329,7 @@ def keep_out_of_solids(particles: Particles, scratch: Scratch, solids: SolidSet,
         near_tank = qd.Matrix.zero(qd.i32, 1, 1)
         nearest = qd.Matrix.zero(qd.f32, 1, 1)
         walls_near(near_tank, nearest, origin, target, solids, c.h)
-        found = near_bodies(lift(x), lift(p), solids, c)
+        found = near_bodies(lift(x), lift(p), bodies_around(origin, target, solids, c.h), solids, c)
         near = near_tank[0, 0] | found[0]
         particles.near[i] = near
         if found[1] == 1:

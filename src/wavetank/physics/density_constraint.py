@@ -32,7 +32,8 @@ multiplier: Moreau and Jean's projected iteration, as in Tonge et al. 2012 (10.1
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles, Scratch, Walls
-from wavetank.physics.boundary import find_walls, flattened, is_clear, kept_in_tank, press_back, stopped
+from wavetank.physics.boundary import flattened, kept_in_tank, stopped
+from wavetank.physics.near_solids import find_walls, is_clear, press_back
 from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.smoothing import kernel
@@ -130,7 +131,7 @@ def start_multipliers(
             sums = qd.Matrix.zero(qd.f32, dim + 2, grid.lanes)
             add_neighbors(sums, qd.static(DENSITIES[mixed]), team, particles, scratch.weight, grid, c, method)
             found = qd.Matrix.zero(qd.f32, 4, grid.lanes)
-            near = find_walls(found, team, particles, solids, walls, c)
+            near = find_walls(found, team, particles, scratch, solids, walls, c)
             for i in range(team * grid.lanes, end_of(team, grid, count)):
                 sum = column(sums, i - team * grid.lanes)
                 wall = kept_wall(found, i - team * grid.lanes, i, near, scratch)
@@ -156,7 +157,7 @@ def solve_multipliers(
             sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)
             add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
             found = qd.Matrix.zero(qd.f32, 4, grid.lanes)
-            near = find_walls(found, team, particles, solids, walls, c)
+            near = find_walls(found, team, particles, scratch, solids, walls, c)
             for i in range(team * grid.lanes, end_of(team, grid, count)):
                 wall = kept_wall(found, i - team * grid.lanes, i, near, scratch)
                 constraint = c.density_scale * sums[0, i - team * grid.lanes] + wall.w - 1.0  # Eq. 2
@@ -199,12 +200,12 @@ def correct_positions(
                     if qd.static(searched):
                         if near >> solids.tank_count != 0:
                             mass = 1.0 / scratch.weight[i] if qd.static(searched == 2) else 0.0
-                            x, found = lift(particles.x[i]), scratch.wall[i]
-                            if not is_clear(near, found.w, before, x, lift(p), solids, walls, c):
+                            x = lift(particles.x[i])
+                            if not is_clear(i, x, lift(p), scratch, solids, c):
                                 p = flattened(stopped(x, lift(p), near, solids, c.wall_gap, mass), p)
                             if qd.static(searched == 2):
-                                push = scratch.dlam[i] * short
-                                press_back(before, near, found, push, solids, walls, c)
+                                push, free = scratch.dlam[i] * short, 1.0 - scratch.wall[i].w
+                                press_back(i, before, free, push, scratch, solids, walls, c)
                 predict_at(corrected, i, p)
 
 
@@ -219,7 +220,7 @@ def measure_density(
             sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)
             add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
             found = qd.Matrix.zero(qd.f32, 4, grid.lanes)
-            find_walls(found, team, particles, solids, walls, c)
+            find_walls(found, team, particles, scratch, solids, walls, c)
             for i in range(team * grid.lanes, end_of(team, grid, count)):
                 rho = c.density_scale * sums[0, i - team * grid.lanes] + (1.0 - found[3, i - team * grid.lanes])
                 scratch.rho[i] = largest_density * rho / scratch.weight[i]

@@ -16,9 +16,9 @@ slid to and fro for minutes on what the coarse grid has wrong about the room bes
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Particles, Scratch, Walls
 from wavetank.physics.boundary import is_near, wall_share
+from wavetank.physics.near_solids import facing_at, known, place_of
 from wavetank.physics.predicted_positions import predicted
-from wavetank.physics.reactions import push_back
-from wavetank.solids.distance import SolidSet, lift, rotate, signed_distance, to_local, vec3
+from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, to_local, vec3, vec4
 
 
 @qd.kernel(fastcache=True)
@@ -31,29 +31,36 @@ def apply_friction(
         if near >> solids.tank_count != 0 or (near != 0 and solids.friction[0] > 0.0):
             p = lift(predicted(particles, i))
             v = lift(particles.v[i])
-            for k in range(solids.count):
-                if is_near(near, k, solids) == 1 and (solids.friction[k] > 0.0 or k >= solids.tank_count):
-                    value = signed_distance(solids, k, p)
-                    n = vec3(value.x, value.y, value.z)
-                    push = (
-                        scratch.weight[i]
-                        * qd.abs(scratch.lam[i])
-                        * wall_share(walls, value.w, c.h)[1]
-                        * c.wall_density
-                        / c.h
-                    )
+            walls_near = solids.tank_count if solids.friction[0] > 0.0 else 0
+            others = known(scratch, i) if near >> solids.tank_count != 0 else 0
+            for number in range(walls_near + others):
+                at, k = 0, number
+                value = vec4(0.0, 0.0, 0.0, 0.0)
+                if number < walls_near:
+                    value = plane_distance(solids, k, p)
+                else:
+                    at = place_of(scratch, i, number - walls_near)
+                    k = scratch.solid[at]
+                    value = facing_at(scratch, at, i, p)
+                n = vec3(value.x, value.y, value.z)
+                push = (
+                    scratch.weight[i] * qd.abs(scratch.lam[i]) * wall_share(walls, value.w, c.h)[1] * c.wall_density
+                    / c.h
+                )  # fmt: skip
+                if value.w < c.h and (k >= solids.tank_count or is_near(near, k, solids) == 1):
                     moving = surface_velocity(solids, k, p, c.dt)
                     relative = v - moving
                     slip = relative - n * n.dot(relative)
                     share = solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12)
-                    if k >= solids.tank_count and value.w < c.h:
+                    if k >= solids.tank_count:
                         calming = c.calming_at_solids * qd.max(0.0, 1.0 - slip.norm_sqr() * c.slow_at_solids)
                         if solids.unit[k] > 0.0:  # a body that is on its way is not held up
                             calming *= qd.max(free(), 1.0 - moving.norm_sqr() * resting() * c.slow_at_solids)
                         share += calming
                     change = slip * qd.min(1.0, share)
                     v -= change
-                    push_back(solids, k, p - n * value.w, -change * (c.dt / scratch.weight[i]))
+                    if solids.unit[k] > 0.0:
+                        scratch.push[at] -= change * (c.dt / scratch.weight[i])
             held = particles.v[i]
             for axis in qd.static(range(held.n)):
                 held[axis] = v[axis]

@@ -2,7 +2,7 @@
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles
-from wavetank.physics.boundary import flattened, kept_in_tank, near_bodies, stopped, walls_near
+from wavetank.physics.boundary import bodies_around, flattened, kept_in_tank, near_bodies, stopped, walls_near
 from wavetank.physics.neighbors import cell_of
 from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.teams import end_team, first_team, turns
@@ -63,6 +63,9 @@ def predict(
             walls = qd.Matrix.zero(qd.i32, 1, grid.lanes)
             nearest = qd.Matrix.zero(qd.f32, 1, grid.lanes) + 1e9
             walls_near(walls, nearest, origins, targets, solids, c.h)
+            around = 0
+            if qd.static(searched):
+                around = bodies_around(origins, targets, solids, c.h)
             for i in range(first, qd.min(first + grid.lanes, count)):
                 x = particles.x[i]
                 v = particles.v[i]
@@ -78,7 +81,7 @@ def predict(
                 if nearest[0, i - first] < 1.1 * c.wall_gap and c.dt > 0.0:
                     p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), x)
                 if qd.static(searched):
-                    found = near_bodies(lift(x), lift(p), solids, c)
+                    found = near_bodies(lift(x), lift(p), around, solids, c)
                     near |= found[0]
                     if found[1] == 1 and c.dt > 0.0:
                         mass = mass_of(particles, i, rows) if qd.static(searched == 2) else 0.0

@@ -7,6 +7,7 @@ from wavetank.physics.coefficients import coefficients, method_number
 from wavetank.physics.density_constraint import measure_density
 from wavetank.physics.integrate import predict
 from wavetank.physics.mixture import blend
+from wavetank.physics.near_solids import look_at_solids
 from wavetank.physics.neighbors import find_neighbors, sort_particles
 from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.tension import prepare_fluids
@@ -21,6 +22,9 @@ def update_densities(world: World, params: Parameters) -> None:
     world.swap()
     world.grid = find_neighbors(world.particles, world.grid, c, count)
     prepare_fluids(world, kinds, params, params.frame_time)
+    if world.has_solids:
+        world.keep_solids()
+        look_at_solids(world.scratch, world.particles, world.solids, c, count)
     measure_density(
         world.scratch, world.particles, world.grid, world.solids, world.walls, c, kinds.largest_density, count,
         method_number(params),

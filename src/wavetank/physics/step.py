@@ -6,6 +6,7 @@ and contact is part of every correction.
 """
 
 import math
+from collections.abc import Callable
 
 from wavetank.device.state import Coefficients
 from wavetank.foundation.params import Parameters
@@ -22,6 +23,7 @@ from wavetank.physics.dynamic_viscosity.implicit_viscosity import carry_on, solv
 from wavetank.physics.friction import apply_friction
 from wavetank.physics.grid_pressure.correction import correct_pressure
 from wavetank.physics.integrate import predict, update_velocities
+from wavetank.physics.near_solids import FARTHEST, hand_over_pushes, look_again, look_at_solids
 from wavetank.physics.neighbors import find_neighbors, sort_particles
 from wavetank.physics.plan import Plan, plan_step
 from wavetank.physics.population import hold_frozen, stop_frozen
@@ -30,12 +32,22 @@ from wavetank.physics.vorticity import confine_vorticity
 from wavetank.physics.world import World
 from wavetank.physics.xsph_viscosity import apply_mixed_xsph, apply_xsph, pack_velocities
 
+SETTLING = 2  # iterations after bodies have yielded
+Settle = Callable[[], bool | None]
 
-def step(world: World, params: Parameters, dt: float, speed_limit: float = math.inf) -> None:
-    """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s]."""
+
+def step(
+    world: World, params: Parameters, dt: float, speed_limit: float = math.inf, settle: Settle | None = None
+) -> bool:  # fmt: skip
+    """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s].
+
+    `settle` lets bodies yield to what the water has done to them so far. True: they have, and the water is to follow.
+    None: they have gone so far that the step is to be taken again; it ends here, and returns False.
+    """
     plan = plan_step(world, params, dt)
     c = coefficients(params, dt, speed_limit, carries=plan.carried, parts=plan.parts, held=plan.held)
     world.keep_viscosity(plan.is_viscous)
+    world.keep_solids()
 
     predict(world.particles, world.grid, world.solids, world.fluids.rows, c, world.count, plan.searched)  # 1-4
 
@@ -45,6 +57,8 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
 
     prepare_fluids(world, plan.kinds, params, dt)
     act_on_fluids(world, plan, params, c)
+    if plan.searched:
+        look_at_solids(world.scratch, world.particles, world.solids, c, world.count)
     if plan.on_grid:
         correct_on_grid(world, plan, params, c)
 
@@ -53,15 +67,34 @@ def step(world: World, params: Parameters, dt: float, speed_limit: float = math.
         find_multipliers(world, plan, c, first=number == 0)  # 9-11
         apply_corrections(world, plan, c, first=number == 0)  # 12-18
 
+    if settle and not settle_bodies(world, plan, params, c, settle):
+        return False
+
     if plan.is_thick:
         carry_on(world, plan.kinds, params, c)
     update_velocities(world.particles, c, world.count)  # 21, 23
     if plan.is_rubbed:
         apply_friction(world.particles, world.scratch, world.solids, world.walls, c, world.count)
+    if plan.searched == 2:
+        hand_over_pushes(world.scratch, world.particles, world.solids, world.count)
     if plan.is_smoothed or plan.turning:
         smooth_and_confine(world, plan, c)  # 22
     if world.frozen:
         stop_frozen(world.particles, world.count)
+    return True
+
+
+def settle_bodies(world: World, plan: Plan, params: Parameters, c: Coefficients, settle: Settle) -> bool:
+    """Let bodies yield and the water follow, until neither is to; return False where the step is to be taken again."""
+    hand_over_pushes(world.scratch, world.particles, world.solids, world.count)
+    while (yielded := settle()) is True:
+        look_at_solids(world.scratch, world.particles, world.solids, c, world.count)
+        for relaxation, momentum in relaxations(params, plan.kinds.density_ratio)[:SETTLING]:
+            c = in_iteration(c, relaxation, momentum)
+            find_multipliers(world, plan, c, first=False)
+            apply_corrections(world, plan, c, first=False)
+        hand_over_pushes(world.scratch, world.particles, world.solids, world.count)
+    return yielded is not None
 
 
 def act_on_fluids(world: World, plan: Plan, params: Parameters, c: Coefficients) -> None:
@@ -89,6 +122,8 @@ def find_multipliers(world: World, plan: Plan, c: Coefficients, *, first: bool) 
     """Find the multipliers that correct the densities: the `first` of a step, or better ones."""
     scratch, particles, grid = world.scratch, world.particles, world.grid
     solids, walls, count = world.solids, world.walls, world.count
+    if plan.searched and not first:
+        look_again(scratch, particles, solids, c, FARTHEST * c.h, count)
     if first:
         start_multipliers(scratch, particles, grid, solids, walls, c, count, plan.method, plan.kinds.mixed)
     else:

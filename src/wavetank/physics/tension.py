@@ -43,6 +43,7 @@ from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend, fill_table, weigh
 from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.predicted_positions import predicted
+from wavetank.physics.reactions import push_back
 from wavetank.physics.smoothing import TABLE_SIZE, interpolated, rest_points
 from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.physics.world import World
@@ -221,6 +222,7 @@ def attract(
                                 share = wetting * interpolated(table, value.w / c.h)
                                 for axis in qd.static(range(p.n)):
                                     force[axis] -= share * n[axis]
+                                push_back(solids, k, lift(p), -n * (share * pull.rate * c.dt))
                 v = lift(particles.v[i] + force * (pull.rate * scratch.weight[i]))
                 pulled[i] = vec4(v.x, v.y, v.z, 0.0)
 

@@ -14,12 +14,14 @@ from wavetank.device.state import (
     Scratch,
     Walls,
     exchanged,
+    with_solids,
     with_viscosity,
     without_viscosity,
 )  # fmt: skip
 from wavetank.foundation.materials import Material
 from wavetank.physics.bodies import Pieces
 from wavetank.physics.foam.pool import Pool
+from wavetank.physics.near_solids import PLACES
 from wavetank.solids.distance import SolidSet
 
 
@@ -73,6 +75,11 @@ class World:
         self.particles = particles
         if self.remembers_viscosity:
             self.remember_viscosity()
+
+    def keep_solids(self) -> None:
+        """Make room for the solids near each particle where there are any."""
+        if self.has_solids:
+            self.scratch = with_solids(self.scratch, PLACES)
 
     def keep_viscosity(self, is_viscous: bool) -> None:
         """Keep what viscosity does to each particle where fluids are viscous, and forget it where none is any more."""

@@ -5,6 +5,7 @@ passes them. What the water did to them moves them in the next step, or at once 
 (`coupling.py`).
 """
 
+import functools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -19,11 +20,14 @@ from wavetank.physics.mixture import blend
 from wavetank.physics.reactions import IMMERSION, OF_GRID
 from wavetank.physics.step import step as take_step
 from wavetank.physics.world import World
+from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
+from wavetank.simulation.acting import Acting
 from wavetank.simulation.added_mass import added_mass
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
 from wavetank.simulation.coupling import Coupling
+from wavetank.simulation.effort import given
 from wavetank.simulation.joints import Joints, put_joints
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.solids.distance import PARTS
@@ -32,6 +36,7 @@ from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
 MOST_TRIES = 4  # of a step
+FAR = 0.3  # of a spacing: bodies that yield by more begin the step anew
 FEWEST = 6.0  # pieces across a body
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
 
@@ -58,6 +63,9 @@ class Bodies(Mapping[str, Body]):
         self.gravity = np.zeros(3)  # m/s^2, of the present step
         self.pieces: Pieces | None = None  # of all bodies, on the device
         self.joints = Joints()
+        self.acting: Acting | None = None  # made when forces first act
+        self.pushes: np.ndarray | None = None  # kg m/s, kg m^2/s: by forces, in the next step
+        self._told: dict[int, tuple[float, ...]] = {}  # water that goes along with each body, as the engine knows it
         solids.feeling, solids.passing = {}, {}
         numbers = [number for number, solid in enumerate(solids.members) if solid.is_body]
         if not numbers:
@@ -68,12 +76,15 @@ class Bodies(Mapping[str, Body]):
         self.world.integration_parameters.length_unit = max(10.0 * scene.spacing, 1e-3)
         self.handles = [self._add(number, solid) for number, solid in enumerate(solids.members)]
         self.joints = put_joints(self.engine, lambda: self.world, self.handles, solids, scene.joints)
+        for joint in self.joints.values():
+            joint.ask(functools.partial(given, self.members, self.joints))
         self._weigh_all(numbers)
         solids.feel({body.number: (body.dry.center, body.unit) for body in self.members})
         self.numbers = np.array([body.number for body in self.members])
         self.units = np.array([body.unit for body in self.members])  # 1/m
         self.wet_masses = np.array([body.wet.mass for body in self.members])  # kg
         self.pieces = self._pieces()
+        self.nothing = np.zeros(PARTS * len(solids.members), np.int32)
 
     @override
     def __getitem__(self, name: str) -> Body:
@@ -154,10 +165,13 @@ class Bodies(Mapping[str, Body]):
 
     def _weigh(self, body: Body, rigid: Any) -> None:
         """Tell the engine the mass of a body and of the water that goes along."""
-        mass, inertia = self.coupling.along[body.row]
+        along = tuple(self.coupling.along[body.row].tolist())
+        if self._told.get(body.row) == along:
+            return
+        self._told[body.row], (mass, inertia) = along, along
         moments = (self.moments[body.row] + inertia).tolist()
         center, frame = body.dry.center.tolist(), self.frames[body.row]
-        properties = self.engine.MassProperties(center, body.dry.mass + float(mass), moments, frame)
+        properties = self.engine.MassProperties(center, body.dry.mass + mass, moments, frame)
         rigid.set_additional_mass_properties(properties)
 
     def _pieces(self) -> Pieces:
@@ -172,6 +186,12 @@ class Bodies(Mapping[str, Body]):
 
     # --- a step ---
 
+    def push(self, forces: Sequence[Force], dt: float, time: float) -> None:
+        """Let forces act on the bodies in the next step, of `dt` [s] from `time` [s] of the water on."""
+        if forces and self.acting is None:
+            self.acting = Acting(self.members, self.dim, self.scene.spacing)
+        self.pushes = self.acting.impulses(forces, dt, time) if forces and self.acting else None
+
     def advance(self, gravity: tuple[float, ...], dt: float, share: float, fastest: float, clock: float) -> None:
         """Move the bodies for a step of `dt` [s], which ends at a `share` of the frame; none is left faster [m/s].
 
@@ -179,7 +199,7 @@ class Bodies(Mapping[str, Body]):
         """
         self.fastest, self.gravity = fastest, np.array([*gravity, 0.0][:3])
         self.coupling.held = np.array([self._is_held(body) for body in self.members])
-        self.coupling.begin(self._rotations(), self.gravity, dt)
+        self.coupling.begin(self._rotations(), self.gravity, dt, self.pushes)
         for body in self.members:
             self._hold(body, body.rigid())
         for joint in self.joints.values():
@@ -191,9 +211,9 @@ class Bodies(Mapping[str, Body]):
     def _move(self, dt: float, share: float) -> None:
         """Let the engine take the step, from where it began, with the velocities that are wanted."""
         rigid = [body.rigid() for body in self.members]
-        for body, now, row in zip(self.members, rigid, self.coupling.wanted, strict=True):
+        for body, now, velocity in zip(self.members, rigid, self._slowed(self.coupling.wanted), strict=True):
             self._weigh(body, now)
-            self._set_velocity(now, row, body.solid.reach())
+            now.linvel, now.angvel = velocity[:3], velocity[3:]
         begun = self._velocities(rigid)
         for number in self.solids.targets:
             pose = self._isometry(*self.solids.between(number, share))
@@ -208,24 +228,36 @@ class Bodies(Mapping[str, Body]):
     def step(self, world: World, scene: Scene, dt: float, fastest: float, part: tuple[float, float]) -> None:
         """Let the water take a step of `dt` [s], which is that `part` of a frame.
 
-        Where bodies are pushed harder than they were, it is taken again while they yield.
+        Where bodies are pushed harder than they were, they yield, and the water follows; where that is far, the step
+        is taken again.
         """
         if not self.members:
             take_step(world, scene, dt, fastest)
             return
         self.retry.keep(world.particles, self.dim, world.count)
-        for turn in range(MOST_TRIES):
-            take_step(world, scene, dt, fastest)
+        tries = 1
+
+        def settle() -> bool | None:
+            nonlocal tries
             self.feel(world, dt)
-            if turn + 1 == MOST_TRIES or not self.yielded(dt, part[1]):
+            if tries == MOST_TRIES or not self.yielded(dt, part[1]):
+                return False
+            tries += 1
+            # The room that bodies leave for water is what it was, but for what they yielded by.
+            world.solids_version = world.room_version = self.solids.move_to(*part)
+            far = self.coupling.is_hit or self.coupling.yielded_by * dt > FAR * scene.spacing
+            return None if far else True
+
+        while True:
+            upload(world.solids.reaction, self.nothing)
+            if take_step(world, scene, dt, fastest, settle):
                 break
             self.retry.restore(world.particles, world.count)
-            world.solids_version = self.solids.move_to(*part)
+        self.feel(world, dt)
 
     def feel(self, world: World, dt: float) -> None:
         """Take what the water did to the bodies in a step of `dt` [s]."""
         sums = download(world.solids.reaction).astype(float).reshape(-1, PARTS)
-        upload(world.solids.reaction, np.zeros(sums.size, np.int32))
         particle = blend(world.materials, self.scene).largest_density * self.scene.spacing**self.dim
         rows, coupling, wet = sums[self.numbers] / self.units[:, None], self.coupling, self.wet_masses
         scale = np.repeat(np.stack([np.ones(len(wet)), coupling.reaches], axis=1), 3, axis=1) * (particle / dt)
@@ -271,11 +303,14 @@ class Bodies(Mapping[str, Body]):
         self.solids.passing[body.number] = (begin, end)
         self.solids.poses[body.number] = end
 
-    def _set_velocity(self, rigid: Any, row: np.ndarray, reach: float) -> None:
-        """Set the velocity [6] of a body; no part of its surface is left faster than the water may get."""
-        speed, spin = float(np.linalg.norm(row[:3])), float(np.linalg.norm(row[3:])) * reach
-        rigid.linvel = (row[:3] * min(1.0, self.fastest / max(speed, 1e-30))).tolist()
-        rigid.angvel = (row[3:] * min(1.0, self.fastest / max(spin, 1e-30))).tolist()
+    def _slowed(self, velocities: np.ndarray) -> list[list[float]]:
+        """Return the velocities [n, 6] of which no part of a body's surface is faster than the water may get."""
+        speeds = np.linalg.norm(velocities.reshape(-1, 2, 3), axis=2)
+        speeds[:, 1] *= self.coupling.reaches
+        slowed: list[list[float]] = (
+            velocities * np.repeat(np.minimum(1.0, self.fastest / np.maximum(speeds, 1e-30)), 3, axis=1)
+        ).tolist()
+        return slowed
 
     def _velocities(self, rigid: list[Any]) -> np.ndarray:
         return np.array([(*_three(now.linvel), *_three(now.angvel)) for now in rigid])
@@ -321,6 +356,7 @@ class Bodies(Mapping[str, Body]):
             self.world = self.engine.PhysicsWorld.restore(arrays["bodies_engine"].tobytes())
         except self.engine.SerializationError as error:
             raise WavetankError(f"the engine's state of the bodies cannot be read: {error}.") from None
+        self._told.clear()
         for row, memory in enumerate(arrays["bodies_memory"]):
             self.coupling.recall(row, memory)
 

@@ -40,6 +40,8 @@ from wavetank.foundation.rotations import matrix_of
 
 TOLERANCE = 0.05  # of sqrt(g d), or of its speed: a body's wrong velocity, times k / m, that is worth a second step
 LATER = 1.0  # the same for a third step and more
+HARD = 0.5  # the same where water was pushed aside so hard that it must not have been: the step begins anew
+JAMMING = 6.0  # by how much less a body may yield towards the water than away from it within a step
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
 AT_ONCE = 0.2  # of what is owed: more would ring
 STAYS = 0.9  # share that is left after a step of what was seen of how much water goes along
@@ -71,24 +73,34 @@ class Coupling:
         self.held = np.zeros(count, bool)  # they have no momentum of their own
         self.lasted = 0.0  # s, of the last step
         self.wanted = np.zeros((count, 6))  # m/s, rad/s, but for contact
+        self.pulled = np.zeros((count, 6))  # kg m/s, kg m^2/s: by contact and joints
         self._inertias = np.stack([masses, np.linalg.norm(tensors, 2, axis=(1, 2))], axis=1)  # kg, kg m^2
         self._moved = np.zeros((count, 6))  # m/s, rad/s, from the try before to this one
         self._pushed = np.zeros((count, 6))  # `impulse` of the try before
         self._given_way = np.zeros((count, 6))  # m/s, rad/s, by how much they have yielded in this step,
         self._yielded = np.zeros(count, bool)  # and whether they have
+        self.is_hit = False  # whether one was so hard that the step has to begin anew
+        self.yielded_by = 0.0  # m/s, the most that any place of one has yielded by in the last try
 
     @property
     def owed(self) -> np.ndarray:
         """Momentum [n, 6] that bodies are still to get."""
         return np.where(self.held[:, None], 0.0, self.due + self.impulse - self.given)
 
-    def begin(self, rotations: np.ndarray, gravity: np.ndarray, dt: float) -> None:
-        """Find the velocities `wanted` [n, 6] for a step of `dt` [s] of bodies that are turned so [n, 4]."""
+    def begin(
+        self, rotations: np.ndarray, gravity: np.ndarray, dt: float, pushes: np.ndarray | None = None
+    ) -> None:  # fmt: skip
+        """Find the velocities `wanted` [n, 6] for a step of `dt` [s] of bodies that are turned so [n, 4].
+
+        Besides gravity, forces of the scene give them the momentum `pushes` [n, 6].
+        """
         self._heavy = self.masses * np.linalg.norm(gravity)
         self._learn()
         owed = self.owed
         weight = np.zeros_like(owed)
         weight[:, :3] = self.masses[:, None] * gravity * dt
+        if pushes is not None:
+            weight += pushes
         ratio = dt / (self.lasted or dt)
         self.due = owed + weight
         wanted = AT_ONCE * owed + weight + ratio * (self.impulse + np.repeat(self.along, 3, axis=1) * self.change)
@@ -104,7 +116,9 @@ class Coupling:
         self._moved = velocity - self.velocity
         self.velocity, self.change = velocity, velocity - self.before - self._given_way
         self.given = self.weighed(rotations, self.wanted - self.before)
-        self.given -= np.repeat(self.along, 3, axis=1) * (velocity - begun)
+        pulled, along = velocity - begun, np.repeat(self.along, 3, axis=1)
+        self.pulled = self.weighed(rotations, pulled) + along * pulled
+        self.given -= along * pulled
         self.lasted = dt
 
     def _learn(self) -> None:
@@ -146,9 +160,15 @@ class Coupling:
         wrong = np.stack([np.linalg.norm(alone[:, block], axis=1) for block in BLOCKS], axis=1) * heavier
         wrong[:, 1] *= self.reaches
         speeds = np.linalg.norm(self.velocity[:, :3], axis=1)
-        yielding = wrong.max(axis=1) > np.where(self._yielded, LATER, TOLERANCE) * np.maximum(slow, speeds)
+        wrong /= np.maximum(np.maximum(slow, speeds), 1e-30)[:, None]
+        yielding = wrong.max(axis=1) > np.where(self._yielded, LATER, TOLERANCE)
+        self.is_hit = bool((wrong > HARD).any())
         self.along = np.where(yielding[:, None], self.along, before)
         step = np.where(yielding[:, None], self.solved(rotations, asked), 0.0)
+        turns = self.reaches * np.linalg.norm(step[:, 3:], axis=1)
+        # One that yields towards what pushes it may jam particles that are where they are by its other way.
+        jams = np.where((step[:, :3] * self.impulse[:, :3]).sum(axis=1) < 0.0, JAMMING, 1.0)
+        self.yielded_by = float((jams * np.linalg.norm(step[:, :3], axis=1) + turns).max())
         self.wanted, self._given_way = self.wanted + step, self._given_way + step
         self._pushed, self._yielded = self.impulse, self._yielded | yielding
         return bool(yielding.any())

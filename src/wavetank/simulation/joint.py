@@ -37,6 +37,7 @@ class LiveJoint:
         self.name, self.joint = name, joint
         self._axis, self._engines, self._starts = axis, engines, starts
         self._poses, self._before, self._lasted = poses, 0.0, 0.0
+        self._given: Callable[[Any, Pose], float] = lambda joint, middle: 0.0
         self.response = joint.response if isinstance(joint, Hinge | Slider) else 0.0
 
     def __repr__(self) -> str:
@@ -93,7 +94,26 @@ class LiveJoint:
             raise WavetankError(f"strength = {value} of joint {self.name!r} must be above 0.")
         self._data().set_motor_max_force(self._axis, float(value))
 
+    @property
+    def effort(self) -> float:
+        """What the joint gave along its way in the last step, N m or N: by its motor, or its stop at a limit.
+
+        It is what moved all that hangs on the joint; what leans on solids elsewhere gets a part of it from these. Not a
+        number where joints form a ring, and 0 before the first step of this run.
+        """
+        middle = self._carried(self._poses())[-1]
+        return self._given(self._moving, middle) if self._lasted else 0.0
+
+    @property
+    def power(self) -> float:
+        """What it put into what hangs on it in the last step [W]; less than 0 where it brakes, and takes it out."""
+        return self.effort * self.velocity
+
     # --- for `Bodies` ---
+
+    def ask(self, given: Callable[[Any, Pose], float]) -> None:
+        """Ask `given` what the joint, which is so turned there, gave."""
+        self._given = given
 
     def drive(self, time: float, dt: float) -> None:
         """Aim at what expression or keyframes say for the step of `dt` [s] that ends at `time` [s]."""
@@ -142,20 +162,21 @@ class LiveJoint:
         return self._data().motor(self._axis) if self._moving else None
 
     def _frames(self, ends: tuple[Pose, Pose]) -> tuple[Pose, Pose]:
-        """Return what were the same frames at the start, x along the axis, as both solids have carried them.
+        """Return the frames of `_carried`; places of a slider are along the axes of the second one."""
+        first, second = self._carried(ends)
+        if isinstance(self.joint, Slider):
+            back = inverse(second[1])
+            return (turned(back, first[0]), first[1]), (turned(back, second[0]), second[1])
+        return first, second
 
-        Places of a slider are along the axes of the second one.
-        """
+    def _carried(self, ends: tuple[Pose, Pose]) -> tuple[Pose, Pose]:
+        """Return what were the same frames at the start, x along the axis, as both solids have carried them."""
         (at, turn), result = self._starts[2], []
         for (position, rotation), (place, before) in zip(ends, self._starts, strict=False):
             there = turned(inverse(before), at - place)
             now = product(rotation, product(inverse(before), turn))
             result.append((position + turned(rotation, there), now))
-        first, second = result
-        if isinstance(self.joint, Slider):
-            back = inverse(second[1])
-            return (turned(back, first[0]), first[1]), (turned(back, second[0]), second[1])
-        return first, second
+        return result[0], result[1]
 
     def _aim(self, what: str, value: Any) -> None:
         if varies(self._moving.speed) or varies(self._moving.target):

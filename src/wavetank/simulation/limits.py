@@ -70,6 +70,8 @@ def find_speed_limit(
 
 def _start_speed(solid: Solid) -> float:
     """Return the largest speed [m/s] that any place of a body begins with."""
+    if solid.velocity is None and solid.angular_velocity is None:
+        return 0.0
     spin = math.hypot(*np.ravel(solid.angular_velocity if solid.angular_velocity is not None else 0.0))
     return math.hypot(*(solid.velocity or (0.0,))) + (spin * solid.reach() if spin else 0.0)
 

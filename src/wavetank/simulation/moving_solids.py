@@ -10,7 +10,7 @@ import numpy as np
 from wavetank.device.compiler import upload
 from wavetank.device.state import Particles
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.rotations import interpolate, turned, unit_quaternion
+from wavetank.foundation.rotations import interpolate, matrix_of, turned, unit_quaternion
 from wavetank.physics.population import free_places
 from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene
@@ -45,6 +45,7 @@ class MovingSolids:
         self.passing: dict[int, tuple[Pose, Pose]] = {}  # begin and end of a time step, of bodies
         self.feeling: dict[int, tuple[np.ndarray, float]] = {}  # centre of mass [m] and `SolidSet.unit`, of bodies
         self.version = 0  # of what is on the device
+        self._stand, self._tank = b"", np.zeros((0, 4))  # how the tank stands, and its planes then
         self.rebuild()
 
     def rebuild(self, members: list[Solid] | None = None) -> None:
@@ -244,7 +245,9 @@ class MovingSolids:
 
     def _instant(self, share: float, last: int) -> list[Pose]:
         """Return all poses at a `share` of the frame; those of bodies at the begin of a time step, or its `last`."""
-        poses = [self.between(number, share) for number in range(len(self.poses))]
+        poses = list(self.poses)
+        for number in self.targets:
+            poses[number] = self.between(number, share)
         for number, ends in self.passing.items():
             poses[number] = ends[last]
         return poses
@@ -252,17 +255,23 @@ class MovingSolids:
     def _centers(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Return where the centres of mass are at these poses, [n, 3]."""
         centers = positions.copy()
-        for number, (center, _) in self.feeling.items():
-            centers[number] = positions[number] + turned(rotations[number], center)
+        if self.feeling:
+            numbers = [*self.feeling]
+            own = np.array([center for center, _ in self.feeling.values()])
+            centers[numbers] += (matrix_of(rotations[numbers]) @ own[..., None])[..., 0]
         return centers
 
     def _planes(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Return (normal, offset) of the tank's walls at these poses, [tank_count, 4]: the distance is n x + b."""
+        stand = positions[: self.tank_count].tobytes() + rotations[: self.tank_count].tobytes()
+        if stand == self._stand:  # as in most steps
+            return self._tank
         planes = np.zeros((self.tank_count, 4))
         for k, wall in enumerate(self.walls):
             normal = turned(rotations[k], turned(wall.turn, np.array([0.0, 1.0, 0.0])))
             point = positions[k] + turned(rotations[k], wall.offset)
             planes[k] = *normal, -normal @ point
+        self._stand, self._tank = stand, planes
         return planes
 
     def _free_name(self, name: str) -> str:

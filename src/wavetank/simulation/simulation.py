@@ -136,11 +136,13 @@ class Simulation(States):
             start, dt = self.time + duration * part / parts, duration / parts
             shares = part / parts, (part + 1) / parts
             scene = self._scene_at(start + 0.5 * dt)
+            acting = self._acting_at(start + 0.5 * dt)
             if self.bodies:
+                self.bodies.push(acting, dt, start)
                 self.bodies.advance(scene.gravity, dt, shares[1], limit, start + dt + self.scene.start_time)
             self.world.solids_version = self.solids.move_to(*shares)
             if self.count:
-                for force in self._acting_at(start + 0.5 * dt):
+                for force in acting:
                     force.apply(self.world.particles, self.count, dt, start)
                 self.bodies.step(self.world, scene, dt, limit, shares)
         self.solids.passing.clear()

@@ -31,6 +31,7 @@ class Order:
     pictures: Path
     roofline: bool
     search: bool
+    bodies: bool
     page: bool
     start_up: bool
     compare: Path | None
@@ -42,8 +43,11 @@ def perform(order: Order, say: Callable[[str], None]) -> tuple[dict[str, Any], l
 
     Raises `WavetankError` for options that do not go together or are out of range.
     """
-    if order.peers + order.roofline + order.search + order.page + (order.compare is not None) > 1:
-        raise WavetankError("--peers, --roofline, --search, --page and --compare are five things; give one of them.")
+    kinds = order.peers + order.roofline + order.search + order.bodies + order.page + (order.compare is not None)
+    if kinds > 1:
+        raise WavetankError(
+            "--peers, --roofline, --search, --bodies, --page and --compare are six things; give one of them."
+        )
     names, sizes = split(order.scenes, order.sizes)
     if order.their_scenes:
         return _their_scenes(order, names, sizes, say)
@@ -51,6 +55,8 @@ def perform(order: Order, say: Callable[[str], None]) -> tuple[dict[str, Any], l
         return _peers(order, names, sizes, say)
     if order.page:
         return _page(order, names, sizes, say)
+    if order.bodies:
+        return _bodies(order, names, sizes, say)
     if order.search:
         from wavetank.lab.bench import search
 
@@ -108,6 +114,20 @@ def _page(
         seconds=page.SECONDS if order.seconds is None else order.seconds, arch=order.arch, say=say,
     )  # fmt: skip
     return result, [page.page_table(result)]
+
+
+def _bodies(
+    order: Order, names: list[str], sizes: list[int], say: Callable[[str], None]
+) -> tuple[dict[str, Any], list[Table]]:
+    from wavetank.lab.bench import bodies
+
+    if names or len(sizes) > 1:
+        raise WavetankError("--bodies measures a pool of its own; give no scene, and at most one of --sizes.")
+    result = bodies.bodies(
+        sizes[0] if sizes else bodies.PARTICLES, seconds=bodies.SECONDS if order.seconds is None else order.seconds,
+        arch=order.arch, threads=order.threads, say=say,
+    )  # fmt: skip
+    return result, [bodies.bodies_table(result)]
 
 
 def _peers(

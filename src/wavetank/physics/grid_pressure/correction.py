@@ -38,6 +38,7 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls, remembered
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import fall, flattened, kept_in_tank
+from wavetank.physics.grid_pressure.approach import approached
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, open_area, solve_levels
@@ -52,7 +53,6 @@ from wavetank.physics.grid_pressure.room import (
     whole,
 )  # fmt: skip
 from wavetank.physics.grid_pressure.surface import carried_share, depth_at
-from wavetank.physics.grid_pressure.walls import approached
 from wavetank.physics.grid_pressure.weight import borne, flow_out
 from wavetank.physics.mixture import Blend
 from wavetank.physics.pairs import column
@@ -70,7 +70,7 @@ from wavetank.physics.teams import (
     turns_over,
 )  # fmt: skip
 from wavetank.physics.world import World
-from wavetank.solids.distance import SolidSet, lift
+from wavetank.solids.distance import SolidSet, lift, vec3
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
@@ -106,6 +106,7 @@ class Errors:
     slit: qd.f32  # fill from which on there is no slit
     closing: qd.f32  # 1/m^2: what lacks is closed by in a step, over the stiffness M
     least_theta: qd.f32  # of an edge
+    spacing: qd.f32  # m
 
 
 @dataclasses.dataclass(frozen=True)
@@ -188,12 +189,14 @@ def add_errors(
     at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
     amounts = qd.Matrix.zero(qd.i32, 2**dim, lanes)
     added = qd.Matrix.zero(qd.f32, 1, lanes)
+    gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
     for i in range(first, qd.min(first + lanes, count)):
         near = particles.near[i]
         if near != 0:
-            x = lift(particles.x[i])
-            added[0, i - first] = e.missing * approached(
-                x, lift(predicted(particles, i)) - fall(c), near, solids, walls, c, searched
+            x, p = lift(particles.x[i]), lift(predicted(particles, i))
+            driven = p - x - c.dt * c.dt * (gravity + lift(particles.a[i]))
+            added[0, i - first] = approached(
+                i, x, p - fall(c), driven, near, scratch, solids, walls, c, e.missing, e.spacing, searched
             )
     for lane in range(lanes):
         s = in_cells(grid, predicted(particles, first + lane))
@@ -386,5 +389,5 @@ def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
         unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness,
         per_way=params.grid_pressure / stiffness, borne_from=BORNE[0], borne_to=BORNE[1], inner_from=INNER[0],
         inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT,
-        closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA,
+        closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, spacing=params.spacing,
     ))  # fmt: skip

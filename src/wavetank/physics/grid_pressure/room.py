@@ -107,8 +107,12 @@ def nearest_wall(grid: CoarseGrid, solids: SolidSet, n):
         center.z = 0.0
     nearest = vec4(0.0, 1.0, 0.0, 4.0 * edge)
     for k in range(solids.tank_count, solids.count):
-        if (center - solids.position[k]).norm() - solids.reach[k] < nearest.w and nearest.w > -2.0 * edge:
-            value = signed_distance(solids, k, center)
+        way, reach = center - solids.position[k], solids.reach[k]
+        if way.norm_sqr() < (reach + nearest.w) ** 2 and reach + nearest.w > 0.0 and nearest.w > -2.0 * edge:
+            # What is farther away takes no room: that of the ball around the solid is good enough there.
+            value = vec4(way.x, way.y, way.z, way.norm() - reach)
+            if value.w < 2.0 * edge:
+                value = signed_distance(solids, k, center)
             if value.w < nearest.w:
                 nearest = value
     return nearest
@@ -183,15 +187,31 @@ def open_tents(grid: CoarseGrid, at: qd.template(), s, dim: qd.template()):
 
 
 @qd.func
-def clear_at(grid: CoarseGrid, n):
-    """1 where no solid takes room within two cells of node `n`, diagonals included; else 0."""
-    c = coordinates(grid, n)
-    apart = 0.0
-    for z in range(qd.max(c[2] - 2, 0), qd.min(c[2] + 3, grid.nz)):
-        for y in range(qd.max(c[1] - 2, 0), qd.min(c[1] + 3, grid.ny)):
-            for x in range(qd.max(c[0] - 2, 0), qd.min(c[0] + 3, grid.nx)):
-                apart = qd.max(apart, qd.abs(grid.room[x + grid.nx * (y + grid.ny * z)] - 1.0))
-    return 1.0 if apart < 1e-3 else 0.0
+def beside(grid: CoarseGrid, x, row, axis: qd.template(), aside):
+    """Number of the node `aside` along an axis of the one that is `x` in its row, or of the nearest."""
+    c = qd.Vector([x, row % grid.ny, row // grid.ny])
+    c[axis] += aside
+    return nearest(grid, c)
+
+
+@qd.func
+def largest_along(
+    to: qd.template(), values: qd.template(), grid: CoarseGrid, row, axis: qd.template(), far: qd.template()
+):
+    """Put the largest of the values of `far` nodes on each side along an axis to the nodes of a row."""
+    for x in range(grid.nx):
+        largest = 0.0
+        for aside in qd.static(range(-far, far + 1)):
+            largest = qd.max(largest, values[beside(grid, x, row, axis, aside)])
+        to[x + grid.nx * row] = largest
+
+
+@qd.func
+def spread_along(to: qd.template(), values: qd.template(), grid: CoarseGrid, row, axis: qd.template()):
+    """Put what the free cells beside a node count there along an axis, see `add_tents`, to the nodes of a row."""
+    for x in range(grid.nx):
+        around = values[beside(grid, x, row, axis, -1)] + values[beside(grid, x, row, axis, 1)]
+        to[x + grid.nx * row] = 0.75 * values[x + grid.nx * row] + 0.125 * around
 
 
 @qd.kernel(fastcache=True)
@@ -200,7 +220,9 @@ def find_room(
 ):  # fmt: skip
     """Find which room each node has for water where solids are `searched`; else the tank ends where the cells do.
 
-    Sums are of whole multiples of the inverse of `unit`, so that the order of threads does not matter; 0 before.
+    Sums are of whole multiples of the inverse of `unit`, so that the order of threads does not matter; 0 before. Cells
+    that are free, and beside which all nodes have room, count the same at the nodes around: along one axis after the
+    other. What a step finds anew serves as memory.
     """
     if qd.static(not searched):
         for n in range(grid.nx * grid.ny * grid.nz):
@@ -211,12 +233,35 @@ def find_room(
             wall = nearest_wall(grid, solids, n)
             grid.slope_x[n], grid.slope_y[n], grid.slope_z[n], grid.lam[n] = wall.x, wall.y, wall.z, wall.w
             grid.room[n] = qd.cast(open_share(grid, n) >= least_open, qd.f32)
+            grid.rhs[n] = 1.0 - grid.room[n]
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.depth, grid.rhs, grid, row, 0, 1)
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.gaps, grid.depth, grid, row, 1, 1)
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.rhs, grid.gaps, grid, row, 2, 1)
         for n in range(grid.nx * grid.ny * grid.nz):
-            if grid.lam[n] < 4.0 * longest_edge(grid) and grid.lam[n] > -longest_edge(grid):
+            edge = longest_edge(grid)
+            grid.rhs[n] = qd.cast(grid.rhs[n] == 0.0 and grid.lam[n] >= 0.75 * edge, qd.f32)
+            if grid.rhs[n] == 0.0 and grid.lam[n] > -edge:
                 add_tents(grid, n, unit, dim)
+        for row in range(grid.ny * grid.nz):
+            spread_along(grid.depth, grid.rhs, grid, row, 0)
+        for row in range(grid.ny * grid.nz):
+            spread_along(grid.gaps, grid.depth, grid, row, 1)
+        for row in range(grid.ny * grid.nz):
+            spread_along(grid.rhs, grid.gaps, grid, row, 2)
         for n in range(grid.nx * grid.ny * grid.nz):
             if grid.room[n] > 0.0 and grid.lam[n] < 2.0 * longest_edge(grid):
-                grid.room[n] = grid.sums[n] / unit
+                grid.room[n] = grid.sums[n] / unit + grid.rhs[n]
             grid.sums[n] = 0
+            grid.rhs[n] = qd.abs(grid.room[n] - 1.0)
+        # No solid takes room within two cells, diagonals included.
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.depth, grid.rhs, grid, row, 0, 2)
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.gaps, grid.depth, grid, row, 1, 2)
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.clear, grid.gaps, grid, row, 2, 2)
         for n in range(grid.nx * grid.ny * grid.nz):
-            grid.clear[n] = clear_at(grid, n)
+            grid.clear[n] = 1.0 if grid.clear[n] < 1e-3 else 0.0

@@ -1,0 +1,184 @@
+"""The solids near each particle, asked for their distances once a step.
+
+Within the iterations of a step solids rest at its end and particles hardly move: from where its distances were asked
+for, a particle takes a solid for the plane that touches its level surface there,
+
+    s(p) = s_0 + n (p - p_0),
+
+and asks anew where it has gone farther than `FARTHEST` of a support. No distance is less than s_0 - |p - p_0|, however
+the solid is bent: whoever is farther away than that from all of them touches none, and the others follow their way
+exactly (`boundary.stopped`). What a body is pushed by is summed up by particle and handed over once, at the end.
+
+    code     symbol     meaning                                                             unit
+    seen     p_0        where distances were asked for                                      m
+    facing   (n, s_0)   outward normal and distance there of each solid near by             1, m
+    push                way that this solid has moved the particle by, times its mass       m, heaviest particle's mass
+"""
+
+from wavetank.device.compiler import qd
+from wavetank.device.state import Coefficients, Particles, Scratch, Walls
+from wavetank.physics.boundary import add_wall, fall, moves_by, next_near, wall_share
+from wavetank.physics.predicted_positions import predicted
+from wavetank.physics.reactions import push_back
+from wavetank.solids.distance import SolidSet, lift, plane_distance, signed_distance, vec3, vec4
+
+FARTHEST = 0.05  # of a support: from where on a particle asks anew
+
+
+@qd.func
+def places():
+    """Solids that a particle knows at once: the nearest."""
+    return 6
+
+
+PLACES = places.fn()
+
+
+@qd.func
+def known(scratch: Scratch, i):
+    """Number of solids that particle `i` knows."""
+    return qd.min(scratch.solids[i], places())
+
+
+@qd.func
+def place_of(scratch: Scratch, i, slot):
+    """Where what particle `i` knows of its solid number `slot` stands."""
+    return slot * scratch.rho.shape[0] + i
+
+
+@qd.func
+def facing_at(scratch: Scratch, at, i, p):
+    """(gradient, distance) at the point `p` of the solid that stands at the place `at` of particle `i`."""
+    facing = scratch.facing[at]
+    way = p - scratch.seen[i]
+    return vec4(facing.x, facing.y, facing.z, facing.w + facing.x * way.x + facing.y * way.y + facing.z * way.z)
+
+
+@qd.func
+def look(i, near, x, p, scratch: Scratch, solids: SolidSet, h):
+    """Ask the marked solids for their distances at `p`; past `places`, the farthest goes."""
+    number = 0
+    way = 1.2 * h + (p - x).norm()
+    k = next_near(near, solids.tank_count - 1, solids)
+    while k < solids.count:
+        reach = solids.reach[k]
+        away = (p - solids.position[k]).norm()
+        margin = way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(reach, away)
+        if away < reach + margin:
+            value = signed_distance(solids, k, p)
+            if value.w < margin:
+                slot = number
+                if number >= places():
+                    slot = 0
+                    for other in range(1, places()):
+                        if scratch.facing[place_of(scratch, i, other)].w > scratch.facing[place_of(scratch, i, slot)].w:
+                            slot = other
+                at = place_of(scratch, i, slot)
+                if number < places() or value.w < scratch.facing[at].w:
+                    scratch.solid[at] = k
+                    scratch.facing[at] = value
+                    scratch.push[at] = vec3(0.0, 0.0, 0.0)
+                number += 1
+        k = next_near(near, k, solids)
+    scratch.solids[i] = number
+    scratch.seen[i] = p
+
+
+@qd.kernel(fastcache=True)
+def look_at_solids(scratch: Scratch, particles: Particles, solids: SolidSet, c: Coefficients, count: qd.i32):
+    """Find the solids that are near the predicted positions, by their marks."""
+    for i in range(count):
+        near = particles.near[i]
+        scratch.solids[i] = 0
+        if near >> solids.tank_count != 0:
+            look(i, near, lift(particles.x[i]), lift(predicted(particles, i)), scratch, solids, c.h)
+
+
+@qd.kernel(fastcache=True)
+def look_again(
+    scratch: Scratch, particles: Particles, solids: SolidSet, c: Coefficients, farthest: qd.f32, count: qd.i32
+):  # fmt: skip
+    """Ask solids anew for their distances to particles that have gone farther than `farthest` [m]."""
+    for i in range(count):
+        if scratch.solids[i] > 0:
+            p = lift(predicted(particles, i))
+            if (p - scratch.seen[i]).norm_sqr() > farthest * farthest:
+                scratch.seen[i] = p
+                for slot in range(known(scratch, i)):
+                    at = place_of(scratch, i, slot)
+                    scratch.facing[at] = signed_distance(solids, scratch.solid[at], p)
+
+
+@qd.kernel(fastcache=True)
+def hand_over_pushes(scratch: Scratch, particles: Particles, solids: SolidSet, count: qd.i32):
+    """Let bodies feel what they have moved particles by."""
+    for i in range(count):
+        for slot in range(known(scratch, i)):
+            at = place_of(scratch, i, slot)
+            k = scratch.solid[at]
+            if solids.unit[k] > 0.0:
+                push_back(solids, k, lift(predicted(particles, i)), scratch.push[at])
+                scratch.push[at] = vec3(0.0, 0.0, 0.0)
+
+
+@qd.func
+def find_walls(
+    sums: qd.template(), team, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients
+):  # fmt: skip
+    """Find, in a column for each particle of a team, (gradient [1/m], free share) by the solids near it.
+
+    Returns the bits of the solids that one of them is near. All are computed in all lanes at once; a particle that
+    knows fewer solids than another has one that is far away.
+    """
+    first = team * sums.m
+    near = 0
+    for lane in range(sums.m):
+        near |= particles.near[first + lane]
+    for lane in range(sums.m):
+        sums[3, lane] = 1.0
+    way = fall(c)
+    k = next_near(near, -1, solids)
+    while k < solids.tank_count:
+        for lane in range(sums.m):
+            add_wall(sums, lane, plane_distance(solids, k, lift(predicted(particles, first + lane)) - way), walls, c)
+        k = next_near(near, k, solids)
+    if near >> solids.tank_count != 0:
+        most = 0
+        for lane in range(sums.m):
+            most = qd.max(most, known(scratch, first + lane))
+        for slot in range(most):
+            for lane in range(sums.m):
+                i = first + lane
+                value = facing_at(scratch, place_of(scratch, i, slot), i, lift(predicted(particles, i)) - way)
+                value.w = value.w if slot < scratch.solids[i] else 2.0 * c.h
+                add_wall(sums, lane, value, walls, c)
+    return near
+
+
+@qd.func
+def is_clear(i, x, p, scratch: Scratch, solids: SolidSet, c: Coefficients):
+    """Say whether the way of particle `i` from `x` to `p` touches none of the solids near it, without asking them."""
+    clear = scratch.solids[i] <= places()
+    length, moved = (p - x).norm(), (p - scratch.seen[i]).norm()
+    for slot in range(known(scratch, i)):
+        at = place_of(scratch, i, slot)
+        least = qd.max(c.wall_gap, moves_by(scratch.solid[at], length, p, solids))
+        if scratch.facing[at].w - moved <= least:
+            clear = False
+    return clear
+
+
+@qd.func
+def press_back(i, p, free, push, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients):
+    """Sum up what the share of bodies in the density at `p` moves a particle by: `push` [m^2] times the gradient.
+
+    `free` is the share of its support that all solids leave.
+    """
+    for slot in range(known(scratch, i)):
+        at = place_of(scratch, i, slot)
+        if solids.unit[scratch.solid[at]] > 0.0:
+            value = facing_at(scratch, at, i, p)
+            if value.w < c.h:
+                share = wall_share(walls, value.w, c.h) * c.wall_density
+                others = free / qd.max(1.0 - share[0], 1e-6)
+                scratch.push[at] -= vec3(value.x, value.y, value.z) * (push * others * share[1] * c.inverse_h)
