@@ -5,6 +5,9 @@ import random
 import subprocess
 import sys
 
+from wavetank.device.compiler import cache_folder
+from wavetank.device.kernel_cache import ENTRY, HEAD, NAME, is_whole
+
 RUN = """
 import sys
 import wavetank as wt
@@ -42,3 +45,15 @@ def test_damaged_caches_change_nothing(tmp_path):
             content = bytearray(b"" if number % 4 == 2 else b"something else")
         path.write_bytes(bytes(content))
     assert run() == first
+
+
+def test_a_damaged_list_of_kernels_is_told_from_a_whole_one():
+    """The compiler's own list; every length and key in it, cut or flipped."""
+    content = (cache_folder() / NAME).read_bytes()
+    assert is_whole(content)
+    assert not is_whole(content[: len(content) // 2]) and not is_whole(b"") and not is_whole(content + b"x")
+    places = [0, 3, 22, 29, HEAD, HEAD + 7, HEAD + 40, HEAD + 73, HEAD + 80, HEAD + 100]
+    for place in [*places, *(place + ENTRY.itemsize for place in places[4:])]:
+        damaged = bytearray(content)
+        damaged[place] ^= 255
+        assert not is_whole(bytes(damaged)), place

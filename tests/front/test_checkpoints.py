@@ -17,6 +17,7 @@ import wavetank as wt
 from wavetank.formats.run_folder import RunFolder
 from wavetank.front.checkpoints import begun
 from wavetank.front.headless import Order, go_on, record
+from wavetank.front.signals import asked_to_end
 
 SCENE = """
 spacing = 0.05
@@ -236,3 +237,22 @@ def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path, 
         partial.write_text("whole")
     for name, stays in names.items():
         assert (tmp_path / name).exists() is stays, name
+
+
+def test_a_second_signal_in_a_finalizer_comes_again_after_it():
+    """What is raised in `__del__` is printed and forgotten: the interrupt waits until it is over."""
+
+    class Slow:
+        def __del__(self) -> None:
+            os.kill(os.getpid(), signal.SIGTERM)
+            self.has_ended = sum(range(1000))
+            ended.append(True)
+
+    ended: list[bool] = []
+    with pytest.raises(KeyboardInterrupt), asked_to_end() as asked:
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert asked.code == 143
+        slow = Slow()
+        del slow
+        assert ended == [True], "the finalizer ends"
+        time.sleep(5.0)

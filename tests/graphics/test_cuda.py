@@ -12,8 +12,8 @@ import pytest
 
 #: of the third frame of each scene of `worlds.compile_kernels`; the driver's launches are the loops of ours
 FRAMES = {
-    "obstacle-tank": {"steps": 1, "launch": 73, "wait": 4},
-    "obstacle-tank-2d": {"steps": 1, "launch": 75, "wait": 4},
+    "obstacle-tank": {"steps": 1, "launch": 83, "wait": 4},
+    "obstacle-tank-2d": {"steps": 1, "launch": 85, "wait": 4},
     "honey": {"steps": 2, "launch": 207, "wait": 10},
     "oil-and-water": {"steps": 1, "launch": 88, "wait": 4},
 }

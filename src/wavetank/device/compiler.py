@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device import patches
+from wavetank.device.kernel_cache import sweep_damaged
 from wavetank.foundation.errors import WavetankError
 
 os.environ.setdefault("QD_LOG_LEVEL", "error")
@@ -93,6 +94,7 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
     if threads is not None:
         options["cpu_max_num_threads"] = threads
     before = _thread_ids()
+    sweep_damaged(cache_folder())
     with contextlib.redirect_stdout(io.StringIO()):
         qd.init(**options)
     came_up = {"x64": "cpu", "arm64": "cpu"}.get(_name(qd.lang.impl.current_cfg().arch), wanted)

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 ASKED = ("SIGINT", "SIGTERM", "SIGHUP")
+AGAIN = 0.01  # s after which a signal comes again that came in a finalizer
 
 
 class Asked:
@@ -51,6 +52,9 @@ def asked_to_end(then: Callable[[], None] = lambda: None, say: str = "") -> Iter
         return
 
     def note(number: int, frame: Any) -> None:
+        if asked and _is_in_finalizer(frame):  # where an interrupt would be printed and forgotten
+            threading.Timer(AGAIN, os.kill, (os.getpid(), number)).start()
+            return
         asked.note(number)
         if say:
             with contextlib.suppress(OSError, ValueError, RuntimeError):
@@ -67,6 +71,14 @@ def asked_to_end(then: Callable[[], None] = lambda: None, say: str = "") -> Iter
     finally:
         for number, action in before.items():
             signal.signal(number, action)
+
+
+def _is_in_finalizer(frame: Any) -> bool:
+    while frame is not None:
+        if frame.f_code.co_name == "__del__":
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _leave_terminal() -> None:
