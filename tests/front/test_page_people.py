@@ -277,7 +277,7 @@ def test_what_was_left_comes_back(open_page, browser):  # noqa: F811
     browser.run("document.querySelector('[data-scene=obstacle-tank]').click()")
     until(lambda: session.sim.scene.title != "Basin")
     assert 200 <= session.sim.count < 20_000, "of 21,952"
-    assert not session.paused
+    until(lambda: not session.paused)
     browser.key("z")
     until(lambda: session.sim.scene.title == "Basin")
     assert world.front.ask(session.sim.digest).result(60) == digest

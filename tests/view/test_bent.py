@@ -89,7 +89,7 @@ def test_the_shadow_of_a_film_does_not_boil():
 
 
 def test_breaking_water_hardly_flickers():
-    """Pixels that jump by more than 40 of 255 against both neighbouring pictures, with foam, in half a second: 0.28 %."""
+    """Pixels that jump by more than 40 of 255 against both neighbours, with foam, in half a second: 0.28 %."""
     sim = Simulation(Scene.load("dam-break"))
     sim.advance(0.6)
     renderer, pictures = Renderer(640, 360), []
