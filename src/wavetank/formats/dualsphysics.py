@@ -16,7 +16,7 @@ from wavetank.formats.dualsphysics_drawing import Drawing, Item, numbers_of
 from wavetank.formats.dualsphysics_motion import courses
 from wavetank.formats.dualsphysics_solids import OURS, Placed, placed_solids
 from wavetank.formats.imported import Imported
-from wavetank.foundation.door import guarded, named, one_line, read_text
+from wavetank.foundation.door import guarded, named, one_line, parse_xml, read_text
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.materials import Material
 from wavetank.scene.filled import Filled
@@ -37,12 +37,7 @@ def load_dualsphysics(path: str | Path, spacing: float | None = None) -> Importe
     origin = named(path)
     with guarded(origin, "scene"):
         text = read_text(path, "case", LARGEST)
-        if "<!" in text.replace("<!--", ""):
-            raise WavetankError(f"{origin}: a document type is not read; a case of DualSPHysics has none.")
-        try:
-            root = ElementTree.fromstring(text)
-        except ElementTree.ParseError as error:
-            raise WavetankError(f"{origin}: this is no XML: {error}.") from None
+        root = parse_xml(text, origin, "a case of DualSPHysics")
         if root.tag != "case" or root.find("casedef/geometry/definition") is None:
             raise WavetankError(f"{origin}: a case of DualSPHysics has case/casedef/geometry/definition; this has not.")
         try:
@@ -109,11 +104,11 @@ class _Reader:
 
     def _walls(self, items: list[Item], fluids: list[Item]) -> Item | None:
         """Return the box of walls that becomes the tank: the largest one that holds the middle of the most fluid."""
-        moving = {int(row.get("ref", -1)) for row in self.root.findall("casedef/motion/objreal")}
+        moving = {int(row.get("ref", -1)) for row in self.root.findall("casedef/motion/objreal")} | {*self._floatings()}
         boxes = [
             item for item in items
             if item.what == "bound" and item.shape == "box" and item.faces and item.is_straight
-            and "bottom" in item.faces and item.mk not in {*moving, *self._floatings()}
+            and "bottom" in item.faces and item.mk not in moving
         ]  # fmt: skip
         largest = max(fluids, key=_volume)
         middle = 0.5 * sum(largest.corners())

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from wavetank.foundation.door import guarded, named, one_line, read_text
+from wavetank.foundation.door import guarded, named, one_line, parse_xml, read_text
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import product, turned, unit_quaternion
 from wavetank.scene.joints import Hinge, Joint, Slider
@@ -61,12 +61,7 @@ def load_urdf(
     place = np.array(position, float), product(upright, STANDING)
     with guarded(origin, "robot"):
         text = read_text(path, "URDF file", LARGEST)
-        if "<!" in text.replace("<!--", ""):
-            raise WavetankError(f"{origin}: a document type is not read; a URDF file has none.")
-        try:
-            root = ElementTree.fromstring(text)
-        except ElementTree.ParseError as error:
-            raise WavetankError(f"{origin}: this is no XML: {error}.") from None
+        root = parse_xml(text, origin, "a URDF file")
         if root.tag != "robot":
             raise WavetankError(f"{origin}: a URDF file has a robot at its top; this one has <{root.tag[:60]}>.")
         try:
