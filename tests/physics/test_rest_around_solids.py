@@ -49,3 +49,16 @@ def test_a_gap_without_a_face_inside_is_held():
     inside = (np.abs(x[:, 0] - 0.5) < 0.1) & (x[:, 1] < GAP)
     assert np.count_nonzero(inside) > 10
     assert pushes(sim)[inside, 1].min() > 0.9
+
+
+@pytest.mark.parametrize("layers", [1.3, 2.4])
+def test_a_film_on_a_floor_lies_still(layers):
+    """Hydrostatics. Grid and iterations both answered the whole of its weight: it jumped from step to step."""
+    d, edge = 0.04, 0.8
+    block = wt.Block(lower=(0, 0, 0), upper=(0.4, 4 * layers * d, 0.4))  # a quarter of the floor
+    tank = wt.Tank(size=(edge, 0.6, edge))
+    sim = wt.Simulation(wt.Scene(spacing=d, tank=tank, fluids=[block], foam=0.0, quality="draft"))
+    sim.advance(12.0)
+    speeds = np.array([np.linalg.norm(frame.velocities, axis=1) for frame in sim.frames(seconds=1.0)])
+    assert speeds.max() < 0.05 * np.sqrt(9.81 * d)
+    assert np.sqrt((speeds**2).mean()) < 0.01 * np.sqrt(9.81 * d)

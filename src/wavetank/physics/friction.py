@@ -8,6 +8,9 @@ Solids of a scene (not the walls of its tank) also take a share of slow sliding 
 them. A layer or two of water on a ledge is thinner than the boundary layer that it has in nature, and without that it
 slid to and fro for minutes on what the coarse grid has wrong about the room beside an edge.
 
+And all of them, but bodies, take the same share from slow motion towards them and away, from the layer next to them.
+Iterations answer what presses a layer or two together with more than all of it, so that it jumped from step to step.
+
     code     symbol    meaning                                           unit
     push     delta     displacement that the wall has given              m
     slip     v_t       velocity along the wall, in the wall's motion     m/s
@@ -25,33 +28,37 @@ from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, to_
 def apply_friction(
     particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, count: qd.i32
 ):
-    """Reduce the velocities along walls and solids."""
+    """Reduce the velocities along walls and solids, and slow ones towards them and away."""
     for i in range(count):
         near = particles.near[i]
-        if near >> solids.tank_count != 0 or (near != 0 and solids.friction[0] > 0.0):
+        if near != 0:
             p = lift(predicted(particles, i))
             v = lift(particles.v[i])
-            walls_near = solids.tank_count if solids.friction[0] > 0.0 else 0
             others = known(scratch, i) if near >> solids.tank_count != 0 else 0
-            for number in range(walls_near + others):
+            for number in range(solids.tank_count + others):
                 at, k = 0, number
                 value = vec4(0.0, 0.0, 0.0, 0.0)
-                if number < walls_near:
+                if number < solids.tank_count:
                     value = plane_distance(solids, k, p)
                 else:
-                    at = place_of(scratch, i, number - walls_near)
+                    at = place_of(scratch, i, number - solids.tank_count)
                     k = scratch.solid[at]
                     value = facing_at(scratch, at, i, p)
                 n = vec3(value.x, value.y, value.z)
-                push = (
-                    scratch.weight[i] * qd.abs(scratch.lam[i]) * wall_share(walls, value.w, c.h)[1] * c.wall_density
-                    / c.h
-                )  # fmt: skip
                 if value.w < c.h and (k >= solids.tank_count or is_near(near, k, solids) == 1):
                     moving = surface_velocity(solids, k, p, c.dt)
                     relative = v - moving
-                    slip = relative - n * n.dot(relative)
-                    share = solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12)
+                    towards = n.dot(relative)
+                    if value.w < layer() * c.h and solids.unit[k] == 0.0:
+                        v -= n * (towards * settled(n, towards, c))
+                    slip = relative - n * towards
+                    share = 0.0
+                    if solids.friction[k] > 0.0:
+                        push = (
+                            scratch.weight[i] * qd.abs(scratch.lam[i]) * wall_share(walls, value.w, c.h)[1]
+                            * c.wall_density / c.h
+                        )  # fmt: skip
+                        share = solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12)
                     if k >= solids.tank_count:
                         calming = c.calming_at_solids * qd.max(0.0, 1.0 - slip.norm_sqr() * c.slow_at_solids)
                         if solids.unit[k] > 0.0:  # a body that is on its way is not held up
@@ -65,6 +72,20 @@ def apply_friction(
             for axis in qd.static(range(held.n)):
                 held[axis] = v[axis]
             particles.v[i] = held
+
+
+@qd.func
+def layer():
+    """Distance over the support up to which particles lie on a solid."""
+    return 0.5
+
+
+@qd.func
+def settled(n, towards, c: Coefficients):
+    """Share of a speed [m/s] along the normal `n` of a solid that it takes; what hangs from a ceiling is left alone."""
+    gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
+    hanging = qd.max(0.0, n.dot(gravity)) / qd.max(gravity.norm(), 1e-9)
+    return c.calming_at_solids * (1.0 - hanging) * qd.max(0.0, 1.0 - towards * towards * c.slow_at_solids)
 
 
 @qd.func

@@ -57,7 +57,7 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         is_viscous=is_viscous(kinds, params, dt),
         is_thick=thick,
         held=thick_share(kinds, params),
-        is_rubbed=world.has_friction or (world.has_solids and params.calming > 0.0),
+        is_rubbed=world.has_friction or params.calming > 0.0,
         is_smoothed=params.viscosity > 0.0 or params.calming > 0.0,
         is_central=not (world.levels or kinds.mixed),
         on_grid=on_grid,

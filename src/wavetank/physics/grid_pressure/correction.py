@@ -41,6 +41,7 @@ from wavetank.physics.boundary import fall, flattened, kept_in_tank
 from wavetank.physics.grid_pressure.approach import approached
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
+from wavetank.physics.grid_pressure.films import left_to_grid
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, open_area, solve_levels
 from wavetank.physics.grid_pressure.room import (
     LEAST_OPEN,
@@ -75,6 +76,7 @@ from wavetank.solids.distance import SolidSet, lift, vec3
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 BORNE = (0.6, 0.9)  # fill of a cell from where to where the grid bears its weight
+FILM = (0.75, 1.25)  # cells of water: from where to where the grid takes part in a film
 REACH = 0.2  # of the support: the longest correction
 DAMPING = 0.1  # of a frame: the length of a step that damps as much, docs/notebook/calm.md
 LARGEST_CARRIED = 1.2  # of gravity
@@ -106,6 +108,8 @@ class Errors:
     slit: qd.f32  # fill from which on there is no slit
     closing: qd.f32  # 1/m^2: what lacks is closed by in a step, over the stiffness M
     least_theta: qd.f32  # of an edge
+    thin: qd.f32  # cells of water that are left to the iterations
+    thick: qd.f32  # and from which on the grid does all
     spacing: qd.f32  # m
 
 
@@ -280,6 +284,7 @@ def gather(
         )
         if qd.static(searched):
             grid.rhs[n] -= grid.slope_x[n] * e.closing * grid.room[n]
+        grid.rhs[n] *= left_to_grid(grid, n, e.thin, e.thick)
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
         couple_nodes(grid, piece, e.least_theta)
@@ -389,5 +394,6 @@ def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
         unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness,
         per_way=params.grid_pressure / stiffness, borne_from=BORNE[0], borne_to=BORNE[1], inner_from=INNER[0],
         inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT,
-        closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, spacing=params.spacing,
+        closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, thin=FILM[0],
+        thick=FILM[1], spacing=params.spacing,
     ))  # fmt: skip
