@@ -62,3 +62,29 @@ def test_a_film_on_a_floor_lies_still(layers):
     speeds = np.array([np.linalg.norm(frame.velocities, axis=1) for frame in sim.frames(seconds=1.0)])
     assert speeds.max() < 0.05 * np.sqrt(9.81 * d)
     assert np.sqrt((speeds**2).mean()) < 0.01 * np.sqrt(9.81 * d)
+
+
+@pytest.mark.parametrize(("walls", "shift"), [(0.6, 0.013), (1.25, 0.0), (2.0, 0.027)])
+def test_water_in_a_thin_cup_rests(walls, shift):
+    """Hydrostatics. The pressure ended in the air behind the wall, and water went round at 0.3 to 1.2 m/s."""
+    d, width, height = 0.02, 0.24, 0.3
+    t, x, y = walls * d, 0.3 + shift, 0.11 + 0.7 * shift
+    right = x + width + 2 * t
+    outline = [(x, y), (right, y), (right, y + height), (right - t, y + height), (right - t, y + t), (x + t, y + t)]
+    cup = wt.Polygon(points=[*outline, (x + t, y + height), (x, y + height)])
+    block = wt.Block(lower=(x + t, y + t), upper=(x + t + width, y + t + 0.2))
+    tank = wt.Tank(size=(1.0, 0.8))
+    sim = wt.Simulation(wt.Scene(spacing=d, tank=tank, fluids=[block], solids=[cup], foam=0.0))
+    sim.advance(8.0)
+    speeds = np.array([np.linalg.norm(frame.velocities, axis=1) for frame in sim.frames(seconds=1.0)])
+    assert speeds.max() < 0.1 * np.sqrt(9.81 * d)
+    assert np.sqrt((speeds**2).mean()) < 0.01 * np.sqrt(9.81 * d)
+    assert np.all((sim.positions[:, 0] > x + t) & (sim.positions[:, 0] < right - t) & (sim.positions[:, 1] > y + t))
+
+
+def test_a_puddle_on_the_floor_stops():
+    """A lone drop slid on for ever: nothing in so little water held it, and nature's films are all boundary layer."""
+    drop = wt.Ball(center=(0.3, 0.05, 0.3), radius=0.04, velocity=(0.3, 0, 0))
+    sim = wt.Simulation(wt.Scene(spacing=0.02, tank=wt.Tank(size=(1.0, 0.4, 0.6)), fluids=[drop], foam=0.0))
+    sim.advance(6.0)
+    assert np.linalg.norm(sim.velocities, axis=1).max() < 0.01

@@ -58,6 +58,7 @@ class Scratch:
     omega: qd.types.ndarray()  # vec3 [capacity], 1/s: vorticity
     wall: qd.types.ndarray()  # vec4 [capacity]: (gradient [1/m], share of rho_0) of the solids, where any is near
     weight: qd.types.ndarray()  # f32 [capacity]: largest rest density of all fluids over its own; 1 where all are equal
+    puddle: qd.types.ndarray()  # f32 [capacity]: how surely it lies in so little water that its cell is hardly filled
     # The solids near each particle, see `physics/near_solids.py`; one row in worlds without solids but for the tank.
     solids: qd.types.ndarray()  # i32 [capacity]: how many there are, even if it had no room
     seen: qd.types.ndarray()  # vec3 [capacity], m: where their distances were asked for
@@ -95,6 +96,13 @@ class CoarseGrid:
     mass_sums: qd.types.ndarray()  # i32 [parts * nodes]: of the tents times densities, where these differ
     room: qd.types.ndarray()  # f32 [nodes]: share of the cell that no solid takes, 0 where next to nothing is left
     clear: qd.types.ndarray()  # f32 [nodes]: 1 where no solid is within two cells, else 0
+    # Thin walls, see `grid_pressure/thin_walls.py`: outward normal of the one that a node lies at, 0 where there is
+    # none, its distance [m], and bits of the faces to the next nodes along x, y and z that one lies in.
+    thin_x: qd.types.ndarray()  # f32 [nodes]
+    thin_y: qd.types.ndarray()  # likewise
+    thin_z: qd.types.ndarray()  # likewise
+    thin_s: qd.types.ndarray()  # f32 [nodes], m
+    shut: qd.types.ndarray()  # f32 [nodes]
     fill: qd.types.ndarray()  # f32 [nodes]: water over room
     gaps: qd.types.ndarray()  # f32 [nodes]: share of the room that is free between rows of particles
     depth: qd.types.ndarray()  # f32 [nodes], m: depth below the surface that the volume of the water has
@@ -357,8 +365,9 @@ def new_scratch(capacity: int) -> Scratch:
     rho, lam, dlam, squares, weight = (scalars(rows) for _ in range(5))
     weight.fill(1.0)
     return Scratch(
-        rho, lam, dlam, squares, omega=vectors(3, rows), wall=vectors(4, rows), weight=weight, solids=integers(1),
-        seen=vectors(3, 1), solid=integers(1), facing=vectors(4, 1), push=vectors(3, 1),
+        rho, lam, dlam, squares, omega=vectors(3, rows), wall=vectors(4, rows), weight=weight,
+        puddle=scalars(rows), solids=integers(1), seen=vectors(3, 1), solid=integers(1), facing=vectors(4, 1),
+        push=vectors(3, 1),
     )  # fmt: skip
 
 

@@ -8,6 +8,8 @@ Solids of a scene (not the walls of its tank) also take a share of slow sliding 
 them. A layer or two of water on a ledge is thinner than the boundary layer that it has in nature, and without that it
 slid to and fro for minutes on what the coarse grid has wrong about the room beside an edge.
 
+The tank's floor takes it from puddles, a layer at most.
+
 And all of them, but bodies, take the same share from slow motion towards them and away, from the layer next to them.
 Iterations answer what presses a layer or two together with more than all of it, so that it jumped from step to step.
 
@@ -26,9 +28,13 @@ from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, to_
 
 @qd.kernel(fastcache=True)
 def apply_friction(
-    particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, count: qd.i32
-):
-    """Reduce the velocities along walls and solids, and slow ones towards them and away."""
+    particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, count: qd.i32,
+    on_grid: qd.template(),
+):  # fmt: skip
+    """Reduce the velocities along walls and solids, and slow ones towards them and away.
+
+    Where the step was taken `on_grid`, the floor of the tank lets puddles come to rest.
+    """
     for i in range(count):
         near = particles.near[i]
         if near != 0:
@@ -59,7 +65,13 @@ def apply_friction(
                             * c.wall_density / c.h
                         )  # fmt: skip
                         share = solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12)
-                    if k >= solids.tank_count:
+                    if k < solids.tank_count:
+                        if qd.static(on_grid):
+                            bearing = -n.dot(down(c))
+                            if bearing > 0.0 and slip.norm_sqr() * c.slow_at_solids < 1.0:
+                                calming = c.calming_at_solids * (1.0 - slip.norm_sqr() * c.slow_at_solids)
+                                share += calming * bearing * scratch.puddle[i]
+                    else:
                         calming = c.calming_at_solids * qd.max(0.0, 1.0 - slip.norm_sqr() * c.slow_at_solids)
                         if solids.unit[k] > 0.0:  # a body that is on its way is not held up
                             calming *= qd.max(free(), 1.0 - moving.norm_sqr() * resting() * c.slow_at_solids)
@@ -75,6 +87,13 @@ def apply_friction(
 
 
 @qd.func
+def down(c: Coefficients):
+    """Direction of gravity; 0 without."""
+    gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
+    return gravity / qd.max(gravity.norm(), 1e-9)
+
+
+@qd.func
 def layer():
     """Distance over the support up to which particles lie on a solid."""
     return 0.5
@@ -83,8 +102,7 @@ def layer():
 @qd.func
 def settled(n, towards, c: Coefficients):
     """Share of a speed [m/s] along the normal `n` of a solid that it takes; what hangs from a ceiling is left alone."""
-    gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
-    hanging = qd.max(0.0, n.dot(gravity)) / qd.max(gravity.norm(), 1e-9)
+    hanging = qd.max(0.0, n.dot(down(c)))
     return c.calming_at_solids * (1.0 - hanging) * qd.max(0.0, 1.0 - towards * towards * c.slow_at_solids)
 
 

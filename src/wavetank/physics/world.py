@@ -14,6 +14,7 @@ from wavetank.device.state import (
     Scratch,
     Walls,
     exchanged,
+    integers,
     with_solids,
     with_viscosity,
     without_viscosity,
@@ -43,6 +44,8 @@ class World:
     frozen: int = 0  # particles that are ice
     solids_version: int = 0  # changes with each motion of the solids
     room_version: int = -1  # of the solids when the grid was last told which room they leave
+    thin_walls: Any = dataclasses.field(default_factory=lambda: integers(1))  # i32 [1]: nodes of the grid at thin walls
+    has_thin_walls: bool = False
     known: dict[tuple[Any, ...], Any] = dataclasses.field(default_factory=dict)  # see `exchanged`
     pieces: Pieces | None = None  # of the bodies, where there are any
     pool: Pool | None = None  # of spray, foam and bubbles; made when the first are

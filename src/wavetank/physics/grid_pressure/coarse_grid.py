@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from wavetank.device.compiler import LANES, lanes, qd, threads, worth_sharing
-from wavetank.device.state import CoarseGrid, integers, scalars
+from wavetank.device.state import CoarseGrid, Grid, integers, scalars
 from wavetank.solids.distance import lift, vec3
 
 EDGE = 1.0  # of a cell, over the support
@@ -62,6 +62,31 @@ def nearest(grid: CoarseGrid, c):
     y = qd.min(qd.max(c[1], 0), grid.ny - 1)
     z = qd.min(qd.max(c[2], 0), grid.nz - 1)
     return x + grid.nx * (y + grid.ny * z)
+
+
+@qd.func
+def add_whole(sums: qd.template(), at, amount, alone: qd.template()):
+    """Add a whole number; `alone` where no other thread adds to these sums."""
+    if qd.static(alone):
+        sums[at] = sums[at] + amount
+    else:
+        qd.atomic_add(sums[at], amount)
+
+
+@qd.func
+def parts_of(grid: CoarseGrid, cells: Grid):
+    """Parts in which threads share the particles."""
+    return grid.parts if qd.static(grid.alone) else cells.parts
+
+
+@qd.func
+def taken(sums: qd.template(), n, nodes, parts):
+    """Sum of all `parts` at node `n`, which are 0 afterwards."""
+    total = 0
+    for part in range(parts):
+        total += sums[part * nodes + n]
+        sums[part * nodes + n] = 0
+    return total
 
 
 def new_levels(box: tuple[np.ndarray, np.ndarray], h: float) -> list[CoarseGrid]:

@@ -40,7 +40,15 @@ from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import fall, flattened, kept_in_tank
 from wavetank.physics.grid_pressure.approach import approached
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
-from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, nearest, tents
+from wavetank.physics.grid_pressure.coarse_grid import (
+    add_whole,
+    corners,
+    in_cells,
+    nearest,
+    parts_of,
+    taken,
+    tents,
+)  # fmt: skip
 from wavetank.physics.grid_pressure.films import left_to_grid
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, open_area, solve_levels
 from wavetank.physics.grid_pressure.room import (
@@ -76,6 +84,7 @@ from wavetank.solids.distance import SolidSet, lift, vec3
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 BORNE = (0.6, 0.9)  # fill of a cell from where to where the grid bears its weight
+PUDDLE = (0.43, 0.6)  # fill at a particle: up to where it lies in a puddle, and from where in none
 FILM = (0.75, 1.25)  # cells of water: from where to where the grid takes part in a film
 REACH = 0.2  # of the support: the longest correction
 DAMPING = 0.1  # of a frame: the length of a step that damps as much, docs/notebook/calm.md
@@ -123,6 +132,8 @@ class Push:
     fade: qd.f32  # m: by how much higher they have none
     borne_from: qd.f32  # the fill from which weight is borne in gaps
     borne_to: qd.f32  # and from which all of it is
+    dry: qd.f32  # the fill up to which water is a puddle
+    wet: qd.f32  # and from which it is none
 
 
 def carried(dt: float, frame_time: float) -> float:
@@ -132,24 +143,9 @@ def carried(dt: float, frame_time: float) -> float:
 
 
 @qd.func
-def add_whole(sums: qd.template(), at, amount, alone: qd.template()):
-    """Add a whole number; `alone` where no other thread adds to these sums."""
-    if qd.static(alone):
-        sums[at] = sums[at] + amount
-    else:
-        qd.atomic_add(sums[at], amount)
-
-
-@qd.func
-def parts_of(grid: CoarseGrid, cells: Grid):
-    """Parts in which threads share the particles."""
-    return grid.parts if qd.static(grid.alone) else cells.parts
-
-
-@qd.func
 def weights_at(grid: CoarseGrid, nodes: qd.template(), s, dim: qd.template(), searched: qd.template()):
-    """Weights of the `nodes` around the place `s` [cells]: tents, which solids cut where they are `searched`."""
-    return open_tents(grid, nodes, s, dim) if qd.static(searched) else tents(s - qd.floor(s), dim)
+    """Weights of the `nodes` around the place `s` [cells]: tents, cut by solids if `searched`, if 2 by thin walls."""
+    return open_tents(grid, nodes, s, dim, searched - 1) if qd.static(searched) else tents(s - qd.floor(s), dim)
 
 
 @qd.func
@@ -219,16 +215,6 @@ def add_errors(
     for lane in range(qd.min(lanes, count - first)):
         for k in qd.static(range(2**dim)):
             add_whole(grid.sums, at[k, lane], amounts[k, lane], grid.alone)
-
-
-@qd.func
-def taken(sums: qd.template(), n, nodes, parts):
-    """Sum of all `parts` at node `n`, which are 0 afterwards."""
-    total = 0
-    for part in range(parts):
-        total += sums[part * nodes + n]
-        sums[part * nodes + n] = 0
-    return total
 
 
 @qd.kernel(fastcache=True)
@@ -324,8 +310,8 @@ def slope_along(
 
 @qd.kernel(fastcache=True)
 def move_particles(
-    grid: CoarseGrid, particles: Particles, cells: Grid, solids: SolidSet, c: Coefficients, push: Push, count: qd.i32,
-    few: qd.template(), searched: qd.template(),
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, solids: SolidSet, c: Coefficients,
+    push: Push, count: qd.i32, few: qd.template(), searched: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by M grad lambda, inside the tank, and carry it on; what sticks out has less.
 
@@ -342,10 +328,12 @@ def move_particles(
             first = team * cells.lanes
             dim = qd.static(particles.x[first].n)
             slopes = qd.Matrix.zero(qd.f32, dim, cells.lanes)
-            shares = qd.Matrix.zero(qd.f32, 1, cells.lanes)
+            shares = qd.Matrix.zero(qd.f32, 2, cells.lanes)
             for lane in range(cells.lanes):
                 s = in_cells(grid, predicted(particles, first + lane))
-                shares[0, lane] = carried_share(grid, s, push.supported, push.fade, dim)
+                carried_at = carried_share(grid, s, push.supported, push.fade, dim)
+                shares[0, lane] = carried_at[0]
+                shares[1, lane] = qd.min(qd.max((push.wet - carried_at[1]) / (push.wet - push.dry), 0.0), 1.0)
                 slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, at_rest.x, push, dim, searched)
                 slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, at_rest.y, push, dim, searched)
                 if qd.static(dim == 3):
@@ -361,6 +349,7 @@ def move_particles(
                 if near != 0:
                     p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
                 predict_at(particles, i, p)
+                scratch.puddle[i] = shares[1, i - first]
 
 
 def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
@@ -371,17 +360,21 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     """
     finest, cells, count, searched = world.levels[0], world.grid, world.count, int(world.has_solids)
     if world.room_version != world.solids_version:
-        find_room(finest, world.solids, LEAST_OPEN, UNIT, searched, params.dim)
+        world.thin_walls.fill(0)
+        find_room(finest, world.thin_walls, world.solids, LEAST_OPEN, UNIT, searched, params.dim)
         world.room_version = world.solids_version
+        world.has_thin_walls = bool(world.thin_walls.to_numpy()[0])
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     few = int(not is_shared(finest))
     gather(
         finest, world.particles, world.scratch, cells, world.solids, world.walls, c,
-        errors(finest, params, stiffness), count, searched, kinds.mixed, few,
+        errors(finest, params, stiffness), count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
     )  # fmt: skip
     solve_levels(world.levels, balanced=c.fallen > 0.0)
-    push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing, *BORNE)
-    move_particles(finest, world.particles, cells, world.solids, c, remembered(push), count, few, searched)
+    push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing, *BORNE, *PUDDLE)
+    move_particles(
+        finest, world.particles, world.scratch, cells, world.solids, c, remembered(push), count, few, searched
+    )
     if world.pieces:
         acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2
         push_on_grid(world, stiffness, stiffness / acting if acting else 0.0)  # nothing is deep without gravity

@@ -10,6 +10,7 @@ through a film.
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.surface import along
+from wavetank.physics.grid_pressure.thin_walls import shut_towards
 
 
 @qd.func
@@ -28,8 +29,9 @@ def thickness(grid: CoarseGrid, n, axis: qd.template()):
         m, ended = n, 0
         for _ in range(qd.min(nodes[0], reach())):
             if ended == 0:
+                before = m
                 m += nodes[1]
-                if grid.room[m] <= 0.0:
+                if grid.room[m] <= 0.0 or shut_towards(grid, before, m, axis) == 1:
                     closed, ended = closed + 1, 1
                 else:
                     total += qd.min(grid.fill[m], 1.0)

@@ -19,6 +19,7 @@ import math
 from wavetank.device.compiler import current_backend, qd, worth_sharing
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import coordinates
+from wavetank.physics.grid_pressure.thin_walls import is_shut
 
 SWEEPS, MOST_SWEEPS = 8, 200  # at once, and of the coarsest level
 #: Sweeps of a level and their relaxation, where weight is balanced or not: eight leave what drives calm water round.
@@ -64,7 +65,7 @@ def open_area(grid: CoarseGrid, n, m):
 
 
 @qd.func
-def coupling(grid: CoarseGrid, n, m, edge, least_theta):
+def coupling(grid: CoarseGrid, n, m, edge, least_theta, shut):
     """What the face between the nodes `n` and `m` couples them with [1/m^2]: 0 into solids and between air and air.
 
     It is the inverse of the density, that of the heaviest fluid being 1, over the square of the distance.
@@ -76,7 +77,7 @@ def coupling(grid: CoarseGrid, n, m, edge, least_theta):
     # Light fluid gives way more: the inverse of the mean density, and of that of the water where there is air.
     mean = 0.5 * (grid.density[n] + grid.density[m])
     density = qd.select(a <= 0.0, grid.density[m], qd.select(b <= 0.0, grid.density[n], mean))
-    is_open = qd.min(qd.max(a, b), qd.min(grid.room[n], grid.room[m])) > 0.0
+    is_open = qd.min(qd.max(a, b), qd.min(grid.room[n], grid.room[m])) > 0.0 and shut == 0
     return qd.select(is_open, open_area(grid, n, m) / qd.max(theta * edge * edge * density, 1e-12), 0.0)
 
 
@@ -99,13 +100,15 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta):
     for lane in range(grid.width):
         x = first + lane
         n = begin + x
-        wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, rim), grid.dx, least_theta)
-        wy = coupling(grid, n, after_y + x, grid.dy, least_theta)
-        wz = coupling(grid, n, after_z + x, grid.dz, least_theta)
+        shut = qd.cast(grid.shut[n], qd.i32)
+        wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, rim), grid.dx, least_theta, shut & 1)
+        wy = coupling(grid, n, after_y + x, grid.dy, least_theta, shut & 2)
+        wz = coupling(grid, n, after_z + x, grid.dz, least_theta, shut & 4)
         diagonal = wx + wy + wz
-        diagonal += coupling(grid, n, qd.select(x > 0, n - 1, rim), grid.dx, least_theta)
-        diagonal += coupling(grid, n, before_y + x, grid.dy, least_theta)
-        diagonal += coupling(grid, n, before_z + x, grid.dz, least_theta)
+        before = qd.select(x > 0, n - 1, rim)
+        diagonal += coupling(grid, n, before, grid.dx, least_theta, is_shut(grid, before, 0))
+        diagonal += coupling(grid, n, before_y + x, grid.dy, least_theta, is_shut(grid, before_y + x, 1))
+        diagonal += coupling(grid, n, before_z + x, grid.dz, least_theta, is_shut(grid, before_z + x, 2))
         is_water = qd.min(grid.fill[n] - 0.5, qd.min(grid.room[n], diagonal)) > 0.0
         found[0, lane] = wx
         found[1, lane] = wy
@@ -247,6 +250,7 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
     fy = fine.ny // coarse.ny
     fz = fine.nz // coarse.nz
     room, fill, rhs, density = 0.0, 0.0, 0.0, 0.0
+    shut_x, shut_y, shut_z = 0, 0, 0
     for z in range(c[2] * fz, c[2] * fz + fz):
         for y in range(c[1] * fy, c[1] * fy + fy):
             row = fine.nx * (y + fine.ny * z)
@@ -255,6 +259,13 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
                 fill += fine.fill[m] * fine.room[m]
                 rhs += fine.rhs[m]
                 density += fine.density[m] * fine.fill[m] * fine.room[m]
+                shut_x += is_shut(fine, m, 0)
+                shut_y += is_shut(fine, m, 1)
+                shut_z += is_shut(fine, m, 2)
+    coarse.shut[n] = (
+        qd.cast(2 * shut_x >= fy * fz, qd.i32) + 2 * qd.cast(2 * shut_y >= fx * fz, qd.i32)
+        + 4 * qd.cast(2 * shut_z >= fx * fy, qd.i32)
+    )  # fmt: skip
     coarse.room[n] = room / (fx * fy * fz)
     coarse.density[n] = density / fill if fill > 0.0 else 1.0
     coarse.fill[n] = fill / qd.max(room, 1e-6)

@@ -3,6 +3,7 @@
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients
 from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, nearest, tents
+from wavetank.physics.grid_pressure.thin_walls import behind, keep_thin, mark_shut, way_from
 from wavetank.solids.distance import SolidSet, signed_distance, vec3, vec4
 
 LEAST_OPEN = 0.1  # a cell that is less open is solid
@@ -169,19 +170,26 @@ def add_tents(grid: CoarseGrid, n, unit, dim: qd.template()):
         free = free_of(wall, way, edge)
         if free > 0.0:
             at = corners(grid, qd.floor(s, qd.i32), dim)
-            weights = open_tents(grid, at, s, dim)
+            weights = open_tents(grid, at, s, dim, 1)
             for corner in qd.static(range(2**dim)):
                 amount = unit * free * weights[corner] / 2.0**dim
                 qd.atomic_add(grid.sums[at[corner]], qd.cast(qd.round(amount), qd.i32))
 
 
 @qd.func
-def open_tents(grid: CoarseGrid, at: qd.template(), s, dim: qd.template()):
-    """Weights of the nodes `at` the corners around the place `s` [cells]; those without room leave theirs to others."""
+def open_tents(grid: CoarseGrid, at: qd.template(), s, dim: qd.template(), thin: qd.template()):
+    """Weights of the nodes `at` the corners around the place `s` [cells]; those without room leave theirs to others.
+
+    So do those that lie behind a `thin` wall, if there are any in this world.
+    """
     weights = tents(s - qd.floor(s), dim)
+    low = qd.floor(s, qd.i32)
     total = 0.0
     for k in qd.static(range(2**dim)):
-        weights[k] *= qd.cast(grid.room[at[k]] > 0.0, qd.f32)
+        is_open = grid.room[at[k]] > 0.0
+        if qd.static(thin):
+            is_open = is_open and not behind(grid, at[k], way_from(grid, low, k, s))
+        weights[k] *= qd.cast(is_open, qd.f32)
         total += weights[k]
     return weights / qd.max(total, 1e-3)
 
@@ -216,13 +224,14 @@ def spread_along(to: qd.template(), values: qd.template(), grid: CoarseGrid, row
 
 @qd.kernel(fastcache=True)
 def find_room(
-    grid: CoarseGrid, solids: SolidSet, least_open: qd.f32, unit: qd.f32, searched: qd.template(), dim: qd.template()
+    grid: CoarseGrid, thin: qd.types.ndarray(), solids: SolidSet, least_open: qd.f32, unit: qd.f32,
+    searched: qd.template(), dim: qd.template(),
 ):  # fmt: skip
     """Find which room each node has for water where solids are `searched`; else the tank ends where the cells do.
 
     Sums are of whole multiples of the inverse of `unit`, so that the order of threads does not matter; 0 before. Cells
     that are free, and beside which all nodes have room, count the same at the nodes around: along one axis after the
-    other. What a step finds anew serves as memory.
+    other. What a step finds anew serves as memory. `thin` [1] counts nodes at thin walls.
     """
     if qd.static(not searched):
         for n in range(grid.nx * grid.ny * grid.nz):
@@ -233,7 +242,12 @@ def find_room(
             wall = nearest_wall(grid, solids, n)
             grid.slope_x[n], grid.slope_y[n], grid.slope_z[n], grid.lam[n] = wall.x, wall.y, wall.z, wall.w
             grid.room[n] = qd.cast(open_share(grid, n) >= least_open, qd.f32)
-            grid.rhs[n] = 1.0 - grid.room[n]
+        for n in range(grid.nx * grid.ny * grid.nz):
+            if keep_thin(grid, solids, n, kept_wall(grid, n)) == 1:
+                qd.atomic_add(thin[0], 1)
+            grid.rhs[n] = qd.cast(grid.room[n] == 0.0 or grid.thin_s[n] > 0.0, qd.f32)
+        for n in range(grid.nx * grid.ny * grid.nz):
+            mark_shut(grid, n)
         for row in range(grid.ny * grid.nz):
             largest_along(grid.depth, grid.rhs, grid, row, 0, 1)
         for row in range(grid.ny * grid.nz):

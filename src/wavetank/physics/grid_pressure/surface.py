@@ -23,6 +23,7 @@ distance of a plane that cuts them there.
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, tents
+from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3
 
 
@@ -41,8 +42,9 @@ def way_to_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
     nodes = along(grid, n, axis, side)
     total, reached, m = grid.fill[n] - 0.5, 0, n
     for _ in range(qd.min(nodes[0], 3)):
+        before = m
         m += nodes[1]
-        if grid.room[m] <= 0.0:
+        if grid.room[m] <= 0.0 or shut_towards(grid, before, m, axis) == 1:
             break
         total += qd.min(grid.fill[m], 1.0)
         reached = 1 if grid.fill[m] < 0.5 else reached
@@ -54,7 +56,7 @@ def depth_in_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
     """Depth [cells] of node `n`, in the air, if there is water at the next node; else one cell above the surface."""
     nodes = along(grid, n, axis, side)
     m = n + (nodes[1] if nodes[0] > 0 else 0)
-    next_to_water = grid.room[m] > 0.0 and grid.fill[m] >= 0.5
+    next_to_water = grid.room[m] > 0.0 and grid.fill[m] >= 0.5 and shut_towards(grid, n, m, axis) == 0
     return grid.fill[n] + qd.min(grid.fill[m], 1.0) - 1.5 if next_to_water else -1.0
 
 
@@ -79,10 +81,11 @@ def depth_at(grid: CoarseGrid, n):
 
 @qd.func
 def carried_share(grid: CoarseGrid, s, supported, fade, dim: qd.template()):
-    """Share of the grid's push at the place `s` [cells]: 1 from the depth `supported` on, 0 by `fade` above it [m]."""
+    """(share of the grid's push, fill) at the place `s` [cells]: 1 from depth `supported` on, 0 by `fade` above [m]."""
     at = corners(grid, qd.floor(s, qd.i32), dim)
     weights = tents(s - qd.floor(s), dim)
-    depth = 0.0
+    depth, fill = 0.0, 0.0
     for k in qd.static(range(2**dim)):
         depth += weights[k] * grid.depth[at[k]]
-    return qd.min(qd.max(1.0 + (depth - supported) / fade, 0.0), 1.0)
+        fill += weights[k] * grid.fill[at[k]]
+    return qd.Vector([qd.min(qd.max(1.0 + (depth - supported) / fade, 0.0), 1.0), fill])

@@ -16,6 +16,7 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.poisson import open_area
 from wavetank.physics.grid_pressure.surface import along
+from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3
 
 
@@ -36,6 +37,6 @@ def flow_out(grid: CoarseGrid, n, way):
                 nodes = along(grid, n, axis, side)
                 if nodes[0] > 0:
                     m = n + nodes[1]
-                    if qd.min(grid.room[n], grid.room[m]) > 0.0:
+                    if qd.min(grid.room[n], grid.room[m]) > 0.0 and shut_towards(grid, n, m, axis) == 0:
                         total += side * open_area(grid, n, m) * way[axis] / edges[axis]
     return total

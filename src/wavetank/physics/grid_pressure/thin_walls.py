@@ -1,0 +1,108 @@
+"""Walls so thin that a node is reached from both of their sides: a cup, a tub, a partition.
+
+A wall thinner than two cells may lie between nodes, or between a particle and its nodes. Water on one side then counted
+on the other too, seemed half empty here and was a film there, and its pressure ended in the air behind the wall.
+
+Each node near such a wall therefore keeps the plane of the wall's surface on its own side. Particles and free places
+behind that plane do not count at it, faces between nodes of which one lies behind the plane of the other are shut, and
+a node inside of the wall is closed, as it is on neither side. It is one plane a node: in a corner that two thin walls
+make, one of them is felt.
+"""
+
+from wavetank.device.compiler import qd
+from wavetank.device.state import CoarseGrid
+from wavetank.physics.grid_pressure.coarse_grid import coordinates, nearest
+from wavetank.solids.distance import SolidSet, signed_distance, vec3
+
+
+@qd.func
+def near():
+    """Edges of a cell up to which a wall is near a node."""
+    return 1.75
+
+
+@qd.func
+def thickest():
+    """Edges of a cell: a wall that is thicker is no thin one."""
+    return 1.6
+
+
+@qd.func
+def is_free(solids: SolidSet, at):
+    """Say whether the place `at` is in no solid, the tank's walls left aside."""
+    free = 1
+    for k in range(solids.tank_count, solids.count):
+        if free == 1 and (at - solids.position[k]).norm() < solids.reach[k]:
+            free = qd.cast(signed_distance(solids, k, at).w > 0.0, qd.i32)
+    return free
+
+
+@qd.func
+def keep_thin(grid: CoarseGrid, solids: SolidSet, n, wall):
+    """Keep the plane of a thin `wall`, (gradient, distance [m]), that node `n` lies at; return 1 if there is one.
+
+    If the node lies inside of it, it is closed. A wall is thin where it is free beyond, straight through.
+    """
+    edge = qd.min(grid.dx, grid.dy)
+    outward = vec3(wall.x, wall.y, wall.z)
+    grid.thin_x[n], grid.thin_y[n], grid.thin_z[n], grid.thin_s[n] = 0.0, 0.0, 0.0, 0.0
+    found = 0
+    if wall.w < near() * edge and wall.w > -edge and outward.norm() > 0.5:
+        c = coordinates(grid, n)
+        surface = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
+        surface += vec3(grid.x0, grid.y0, grid.z0) - outward * wall.w
+        if grid.nz == 1:
+            surface.z = 0.0
+        most = thickest() * edge
+        if is_free(solids, surface - outward * most) == 1 or is_free(solids, surface - outward * (0.5 * most)) == 1:
+            found = 1
+            if wall.w <= 0.0:
+                grid.room[n] = 0.0
+            else:
+                grid.thin_x[n], grid.thin_y[n], grid.thin_z[n] = outward.x, outward.y, outward.z
+                grid.thin_s[n] = wall.w
+    return found
+
+
+@qd.func
+def way_from(grid: CoarseGrid, low, k: qd.template(), s):
+    """Way [m] to the place `s` [cells] from corner `k` of the cell from the whole coordinates `low` on."""
+    x = qd.min(qd.max(low[0] + (k & 1), 0), grid.nx - 1)
+    y = qd.min(qd.max(low[1] + (k >> 1 & 1), 0), grid.ny - 1)
+    z = qd.min(qd.max(low[2] + (k >> 2), 0), grid.nz - 1)
+    return vec3((s.x - x) * grid.dx, (s.y - y) * grid.dy, (s.z - z) * grid.dz)
+
+
+@qd.func
+def mark_shut(grid: CoarseGrid, n):
+    """Find in which faces of node `n` to the next nodes a thin wall lies."""
+    edges = vec3(grid.dx, grid.dy, grid.dz)
+    bits = 0
+    for axis in qd.static(range(3)):
+        ahead = coordinates(grid, n)
+        ahead[axis] += 1
+        m = nearest(grid, ahead)
+        way = vec3(0.0, 0.0, 0.0)
+        way[axis] = edges[axis]
+        if m != n and (behind(grid, n, way) or behind(grid, m, -way)):
+            bits |= 1 << axis
+    grid.shut[n] = bits
+
+
+@qd.func
+def behind(grid: CoarseGrid, n, way):
+    """Say whether the place that is a `way` [m] from node `n` lies behind a thin wall, seen from there."""
+    ahead = way.dot(vec3(grid.thin_x[n], grid.thin_y[n], grid.thin_z[n])) + grid.thin_s[n]
+    return ahead < -0.15 * qd.min(grid.dx, grid.dy)
+
+
+@qd.func
+def is_shut(grid: CoarseGrid, n, axis: qd.template()):
+    """Say whether a thin wall lies between node `n` and the next along an axis."""
+    return (qd.cast(grid.shut[n], qd.i32) >> axis) & 1
+
+
+@qd.func
+def shut_towards(grid: CoarseGrid, n, m, axis: qd.template()):
+    """The same for two nodes that are neighbours along an axis."""
+    return is_shut(grid, qd.min(n, m), axis)
