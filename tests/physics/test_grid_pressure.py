@@ -299,7 +299,7 @@ def test_the_room_that_solids_leave_follows_them():
         level = sim.world.levels[0]
         kept = level.room.to_numpy()
         args = coarse_pressure.LEAST_OPEN, coarse_pressure.UNIT, int(sim.world.has_solids), 3
-        coarse_pressure.find_room(level, sim.world.solids, *args)
+        coarse_pressure.find_room(level, sim.world.thin_walls, sim.world.solids, *args)
         np.testing.assert_array_equal(level.room.to_numpy(), kept)
         return kept
 
