@@ -13,7 +13,7 @@ import wavetank as wt
 from wavetank.device.compiler import download, qd, upload
 from wavetank.view.film import denoise, field, light, paths
 from wavetank.view.film.interface import bent
-from wavetank.view.film.medium import Medium, is_clear, medium_of
+from wavetank.view.film.medium import Medium, medium_of
 from wavetank.view.film.samples import Watch
 from wavetank.view.film.tracer import Tracer
 from wavetank.view.lens import vec2, vec3, vec4, vector
@@ -55,7 +55,16 @@ def clear_medium(*absorption):
     """Water that adds nothing and absorbs so much [1/m]."""
     black = vector(0.0, 0.0, 0.0)
     nothing = [qd.ndarray(vec3, shape=(1,)) for _ in range(2)]
-    return Medium(vector(*absorption) if absorption else black, 0.0, black, *nothing, 0)
+    return Medium(
+        vector(*absorption) if absorption else black,
+        0.0,
+        black,
+        *nothing,
+        0,
+        qd.ndarray(vec4, shape=(1,)),
+        qd.ndarray(vec3, shape=(1,)),
+        0,
+    )
 
 
 def mean_radiance(shot, renderer, medium, samples=256):
@@ -107,7 +116,6 @@ def test_a_layer_of_dye_dims_as_beer_and_lambert_say():
         )
     )  # fmt: skip
     renderer, shot = shot_of(sim.frame(), eye=(0.8, 0.4, 3.0), target=(0.8, 0.4, 0.3))
-    assert is_clear(shot)
     shot = dataclasses.replace(shot, look=in_white(shot.look))
     shot = dataclasses.replace(
         shot, scattering=0.0, look=dataclasses.replace(shot.look, glow=vector(0.0, 0.0, 0.0)), usual=0.6
@@ -130,17 +138,78 @@ def test_no_water_and_one_drop_have_pictures(tank):
         assert image.shape == (1, 9, 3) and image.max() > 0
 
 
-def test_fluids_that_are_not_clear_are_averaged():
+def stuff(clarity, *, size=(2.0, 1.6, 2.0), **more):
+    """A tank of a pale yellow that is not clear, seen from above."""
     scene = wt.Scene(
-        spacing=0.1, tank=wt.Tank(size=(1.0, 1.0, 0.6)), materials=[{"name": "milk", "clarity": "cloudy"}],
-        fluids=[wt.Block(lower=(0, 0, 0), upper=(0.5, 0.8, 0.6), material="milk")],
+        spacing=0.1, tank=wt.Tank(size=size), materials=[{"name": "m", "color": "#e8e6a0", "clarity": clarity, **more}],
+        fluids=[wt.Block(lower=(0, 0, 0), upper=(size[0], 1.4, size[2]), material="m")],
     )  # fmt: skip
-    frame = wt.Simulation(scene).frame()
-    _, shot = shot_of(frame)
-    assert not is_clear(shot)
-    np.testing.assert_array_equal(
-        wt.render(frame, 24, 16, quality="film", samples=2), wt.render(frame, 24, 16, quality="high", samples=2)
+    return shot_of(wt.Simulation(scene).frame(), eye=(1.0, 6.0, 1.0), target=(1.0, 1.4, 1.0))
+
+
+def color_of_stuff():
+    return ((np.array([232, 230, 160]) / 255 + 0.055) / 1.055) ** 2.4
+
+
+@pytest.mark.parametrize("clarity", ["cloudy", "opaque"])
+def test_what_is_not_clear_has_its_color_under_even_light(clarity):
+    """Saunderson's equation and Chiang's inverse: an endless depth shows the colour, and the surface 2 % more."""
+    renderer, shot = stuff(clarity)
+    shot = dataclasses.replace(shot, look=in_white(shot.look))
+    tracer = Tracer(renderer.buffers)
+    medium = medium_of(shot, tracer._world(shot, 0.0, 0.0).field.grid)
+    if clarity == "cloudy":  # ten free ways deep
+        murk = download(medium.murk)
+        upload(medium.murk, (murk * 7.0 / murk[:, 3:].max()).astype(np.float32))
+    mirror = ((ETA - 1.0) / (ETA + 1.0)) ** 2
+    seen = mean_radiance(shot, renderer, medium).mean(axis=(0, 1))
+    np.testing.assert_allclose(seen, mirror + (1.0 - mirror) * color_of_stuff(), atol=0.05)
+
+
+def test_light_that_is_scattered_is_neither_lost_nor_made():
+    """The white furnace. Paths of more than 40 events lose a half, and each event a thousandth (inverse of 1)."""
+    renderer, shot = stuff("cloudy")
+    shot = dataclasses.replace(shot, look=in_white(shot.look))
+    tracer = Tracer(renderer.buffers)
+    medium = medium_of(shot, tracer._world(shot, 0.0, 0.0).field.grid)
+    murk = download(medium.murk)
+    upload(medium.murk, np.repeat(1.0 * (murk[:, 3:] > 0.0), 4, axis=1).astype(np.float32))
+    assert 0.95 < mean_radiance(shot, renderer, medium).mean() < 1.002
+
+
+def test_a_floor_in_the_sun_is_darker_under_water():
+    """(1 - F)^2 rho / n^2 / (1 - rho F_i): light is spread where it leaves, and F_i = 0.472 of it comes back down."""
+    scene = wt.Scene(
+        spacing=0.1, tank=wt.Tank(size=(4.0, 0.6, 4.0)), fluids=[wt.Block(lower=(0, 0, 0), upper=(4.0, 0.4, 4.0))]
     )
+    frame = wt.Simulation(scene).frame()
+    renderer, shot = shot_of(frame, (64, 64), (2.0, 6.0, 2.0), (2.0, 0.4, 2.0), sun="0,89.5", environment="studio")
+    white, black = vector(1.0, 1.0, 1.0), vector(0.0, 0.0, 0.0)
+    look = dataclasses.replace(
+        in_white(shot.look), sun=white, sky=black, horizon=black, zenith=black, below=black, sparkle=0.0, sun_size=1e-3,
+        floor=vector(0.3, 0.3, 0.3),
+    )  # fmt: skip
+    seen = mean_radiance(dataclasses.replace(shot, look=look), renderer, clear_medium(), 64).mean()
+    mirror = ((ETA - 1.0) / (ETA + 1.0)) ** 2
+    assert seen == pytest.approx((1.0 - mirror) ** 2 * 0.3 / ETA**2 / (1.0 - 0.472 * 0.3), rel=0.03)
+
+
+def test_lava_shines_on_what_is_beside_it():
+    scene = wt.Scene(
+        spacing=0.1, tank=wt.Tank(size=(1.0, 1.0, 1.0)),
+        materials=[{"name": "m", "color": "#ff4a08", "clarity": "opaque", "glow": 2.0}],
+        fluids=[wt.Block(lower=(0, 0, 0), upper=(1.0, 0.8, 1.0), material="m")],
+    )  # fmt: skip
+    renderer, shot = shot_of(wt.Simulation(scene).frame(), (16, 16), (0.5, 3.0, 1.4), (0.5, 0.0, 1.4))
+    black = vector(0.0, 0.0, 0.0)
+    look = dataclasses.replace(in_white(shot.look), sky=black, horizon=black, zenith=black, below=black)
+    shot = dataclasses.replace(shot, look=look)
+    tracer = Tracer(renderer.buffers)
+    medium = medium_of(shot, tracer._world(shot, 0.0, 0.0).field.grid)
+    seen = mean_radiance(shot, renderer, medium).mean(axis=(0, 1))
+    # The floor at `a` before a wall of the height `h` sees it by (1 - a / sqrt(a^2 + h^2)) / 2, were it endless.
+    most = 0.5 * (1.0 - 0.4 / math.hypot(0.4, 0.8)) * 2.0
+    assert 0.5 * most < seen[0] < most and seen[1] < 0.2 * seen[0]
 
 
 def test_water_and_drops_in_a_white_world_cannot_be_seen():
@@ -253,7 +322,11 @@ def test_samples_of_another_picture_are_begun_anew(tmp_path):
 PICTURE = """
 import hashlib, wavetank as wt
 scene = wt.Scene(
-    spacing=0.1, tank=wt.Tank(size=(1.2, 0.8, 0.6)), fluids=[wt.Block(lower=(0, 0, 0), upper=(0.5, 0.6, 0.6))],
+    spacing=0.1, tank=wt.Tank(size=(1.2, 0.8, 0.6)), fluids=[
+        wt.Block(lower=(0, 0, 0), upper=(0.5, 0.3, 0.6)),
+        wt.Block(lower=(0, 0.3, 0), upper=(0.5, 0.6, 0.6), material="m"),
+    ],
+    materials=[{"name": "m", "clarity": "cloudy", "color": "#e8e6a0"}],
     solids=[wt.Sphere(center=(0.8, 0.2, 0.3), radius=0.15)],
 )
 sim = wt.Simulation(scene)

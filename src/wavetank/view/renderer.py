@@ -17,7 +17,6 @@ from wavetank.view.buffers import allocate
 from wavetank.view.camera import Camera
 from wavetank.view.colormaps import ENTRIES, table
 from wavetank.view.extent import Extent, extent_of
-from wavetank.view.film.medium import is_clear
 from wavetank.view.film.samples import Watch
 from wavetank.view.film.tracer import Tracer
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
@@ -70,7 +69,7 @@ class Renderer:
         """
         style = Style.of(options)
         shot = self.shot(frame, camera, style)
-        if style.traced and style.kind.name == "water" and frame.dim == 3 and is_clear(shot):
+        if style.traced and style.kind.name == "water" and frame.dim == 3:
             began = time.perf_counter()
             self._tracer = self._tracer or Tracer(self.buffers)
             self._tracer.draw(shot, style, watch or Watch())

@@ -40,7 +40,7 @@ class Style:
     floor: str | None = None  # one of FLOORS
     hasty: bool = False  # leave out what movement hides: smooth outlines, every second look of the sun and ray
     samples: int = 1  # pictures, each from a slightly other eye and sun, that are averaged; or samples that are traced
-    traced: bool = False  # follow paths of light through clear fluids of a world in space; other pictures are averaged
+    traced: bool = False  # follow paths of light in a world in space; other pictures are averaged
     aperture: float = 0.0  # m: radius of the lens of a traced picture
     focus: float | None = None  # m: distance that is sharp in it, that of the world's middle unless told
     shutter: float = 0.0  # s: for which it sees the water move

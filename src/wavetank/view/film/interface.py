@@ -35,3 +35,12 @@ def bent(ahead, n, eta):
 def mirrored(ahead, n):
     """Direction of the reflected ray."""
     return (ahead - 2.0 * ahead.dot(n) * n).normalized(1e-12)
+
+
+@qd.func
+def through_drop(ball, at, n, inner, ahead):
+    """(where a ray leaves a ball of water that it entered at `at` along `inner`, and its way in it; its direction)."""
+    chord = -2.0 * ball.w * inner.dot(n)
+    out = (2.0 * inner.dot(ahead) * inner - ahead).normalized(1e-12)
+    p = at + chord * inner + 1e-4 * ball.w * out
+    return vec4(p.x, p.y, p.z, chord), out

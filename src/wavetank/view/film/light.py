@@ -14,10 +14,11 @@ shadow rays see to it. All sums are whole numbers.
 import dataclasses
 
 from wavetank.device.compiler import qd
-from wavetank.view.film.grid import Grid
-from wavetank.view.film.interface import bent, index_of_water, mirrored
+from wavetank.view.film.grid import Field, Grid, outward_at, value_at
+from wavetank.view.film.interface import bent, index_of_water, mirrored, through_drop
 from wavetank.view.film.march import World, first_hit
 from wavetank.view.film.medium import Medium, absorbed_at, through_water
+from wavetank.view.film.murk import albedo_of, any_way, color_of, is_matte, murk_at
 from wavetank.view.film.sampling import pair, towards
 from wavetank.view.lens import vec3
 from wavetank.view.look import Look
@@ -60,12 +61,16 @@ def shine(photons: Photons, world: World, look: Look, medium: Medium, round: qd.
             hit, what, which, was_wet = first_hit(world, p, ahead, wet, 1)
             n = vec3(hit.x, hit.y, hit.z)
             at = p + hit.w * ahead
-            if crossed > 0 and photons.has_flow == 1:
-                leave_in_cells(photons, world.field.grid, p, ahead, qd.min(hit.w, 1e3), weight, medium, was_wet)
+            chance, reached = pair(seed, round, 2 + 2 * bounce), qd.min(hit.w, 1e3)
+            left = vec3(1.0, 1.0, 1.0)
             if was_wet == 1:
-                left, _added = through_water(medium, world.field.grid, p, ahead, qd.min(hit.w, 1e3))
-                weight *= left
-            chance = pair(seed, round, 2 + bounce)
+                patience = -qd.log(qd.max(1.0 - chance.y, 1e-7))
+                left, _added, reached = through_water(medium, world.field.grid, p, ahead, reached, patience)
+                if reached < qd.min(hit.w, 1e3):
+                    what, at = 6, p + reached * ahead
+            if crossed > 0 and photons.has_flow == 1:
+                leave_in_cells(photons, world.field.grid, p, ahead, reached, weight, medium, was_wet)
+            weight *= left
             if what == 3:
                 inward = qd.select(n.dot(ahead) > 0.0, -n, n)
                 eta = index_of_water()
@@ -90,17 +95,22 @@ def shine(photons: Photons, world: World, look: Look, medium: Medium, round: qd.
                     p = at + 1e-4 * ball.w * n
                 else:
                     inner = vec3(through.x, through.y, through.z)
-                    chord = -2.0 * ball.w * inner.dot(n)
-                    p = at + chord * inner
-                    ahead = (2.0 * inner.dot(ahead) * inner - ahead).normalized(1e-12)
-                    p += 1e-4 * ball.w * ahead
-                    weight *= qd.exp(-chord * absorbed_at(medium, world.field.grid, at))
+                    out, ahead = through_drop(ball, at, n, inner, ahead)
+                    p = vec3(out.x, out.y, out.z)
+                    weight *= qd.exp(-out.w * absorbed_at(medium, world.field.grid, at))
+            elif what == 6:
+                here = murk_at(medium.murk, world.field.grid, at)
+                weight *= albedo_of(color_of(here))
+                p, ahead, wet = at, any_way(pair(seed, round, 3 + 2 * bounce)), 1
+                crossed = 1
+                if is_matte(here, world.field.grid) == 1:
+                    going = 0
             else:
                 if what == 1 and crossed > 0:
                     arrive(photons, at, weight)
                 going = 0
             bounce += 1
-            if bounce >= 12:
+            if bounce >= 12 + 60 * medium.murky or weight.max() < 0.01:
                 going = 0
 
 
@@ -188,6 +198,18 @@ def flow_at(photons: Photons, grid: Grid, x):
             vector[c] += share * photons.flow[at, c]
             colors[c] += share * photons.flow[at, 3 + c]
     return vector, colors
+
+
+@qd.func
+def light_within(photons: Photons, field: Field, at):
+    """Mean over all directions of the sun's light at a point in murk, per colour, over that of the bare sun."""
+    # A cell of its depth off the surface: those at it lie half in the air.
+    cell, depth = 2.0 * field.grid.step.x, value_at(field.level, field.grid, at)
+    x = at
+    if depth < cell:
+        x -= (cell - depth) * outward_at(field.level, field.grid, at)
+    _vector, colors = flow_at(photons, field.grid, x)
+    return 0.25 * colors
 
 
 @qd.func

@@ -3,8 +3,11 @@
 code      symbol   meaning                                                            unit
 swallow   sigma_a  absorption in every cell, per colour                               1/m
 shine              radiance of light that comes back out of deep water there          1
+murk      sigma_t  scattering of fluids that are not clear, see `murk.py`             1/m
+ember              radiance of what shines by itself                                  1
 left      T        share of the light that a way leaves, per colour                   1
 added              what the way adds, but for what is absorbed of it                  1
+patience           optical depth of murk at which a way ends                          1
 """
 
 import dataclasses
@@ -13,10 +16,13 @@ import numpy as np
 
 from wavetank.device.compiler import download, qd, upload
 from wavetank.view.film.grid import Grid
-from wavetank.view.lens import vec3, vector
+from wavetank.view.film.murk import murk_at
+from wavetank.view.lens import vec3, vec4, vector
 from wavetank.view.matter import matter_of
 from wavetank.view.shot import Shot
 
+COLUMNS = 13  # of what is known of a particle
+OFTEN = 2.0  # light is scattered as often as other pictures have it hidden: it takes some events to get the colour
 STRONG = 2.5  # layers as thick as is usual hold so much of a fluid's colour, as in `optics/mixture.py`
 
 
@@ -30,70 +36,83 @@ class Medium:
     swallow: qd.types.ndarray()  # vec3 [cells], 1/m; [1] where all of it is the same
     shine: qd.types.ndarray()  # vec3 [cells], likewise
     varied: qd.i32  # 1 where it is not
+    murk: qd.types.ndarray()  # vec4 [cells]: colour times murk, murk [1/m]; [1] where all is clear
+    ember: qd.types.ndarray()  # vec3 [cells], likewise
+    murky: qd.i32  # 1 where some is not clear
 
 
 def medium_of(shot: Shot, grid: Grid) -> Medium:
     """Return what the water of a picture does to light, cell by cell where there are several fluids, or dye."""
     glow = np.asarray(shot.look.glow * shot.tint, float)
     plain, varied = np.concatenate([np.asarray(shot.absorption, float), glow]), _particles(shot)
-    cells = np.zeros((0, 6)) if varied is None else _in_cells(shot, grid, varied, plain)
-    arrays = [qd.ndarray(vec3, shape=(max(len(cells), 1),)) for _ in range(2)]
-    for array, part in zip(arrays, (cells[:, :3], cells[:, 3:]), strict=True):
+    cells = np.zeros((0, COLUMNS)) if varied is None else _in_cells(shot, grid, varied, plain)
+    murky = bool(np.any(cells[:, 9] > 0.0))
+    cells[:, 10:] /= np.maximum(cells[:, 9:10], 1e-9)  # what shines does so as far as it is there
+    parts = [(cells[:, :3], vec3), (cells[:, 3:6], vec3)]
+    parts += [(part if murky else part[:0], kind) for part, kind in ((cells[:, 6:10], vec4), (cells[:, 10:], vec3))]
+    arrays = [qd.ndarray(kind, shape=(max(len(part), 1),)) for part, kind in parts]
+    for array, (part, _) in zip(arrays, parts, strict=True):
         upload(array, part.astype(np.float32))
+    swallow, shine, murk, ember = arrays
     return Medium(
-        absorption=shot.absorption, scattering=shot.scattering, glow=vector(*glow), swallow=arrays[0],
-        shine=arrays[1], varied=int(varied is not None),
+        absorption=shot.absorption, scattering=shot.scattering, glow=vector(*glow), swallow=swallow, shine=shine,
+        varied=int(varied is not None), murk=murk, ember=ember, murky=int(murky),
     )  # fmt: skip
 
 
-def is_clear(shot: Shot) -> bool:
-    """Say whether all fluids of a picture are clear: none is cloudy, opaque, ice, or shines."""
-    table = matter_of(shot.frame, shot.extent)
-    return not len(table) or not bool(np.any(table[:, 3:] > 0.0))
-
-
 def _particles(shot: Shot) -> np.ndarray | None:
-    """Return absorption [1/m] and shine of every particle, float64 [count, 6], or None where all agree."""
+    """Return absorption [1/m], shine, colour times murk, murk [1/m] and ember times murk of every particle, float64
+    [count, COLUMNS], or None where all agree.
+    """
     frame, usual = shot.frame, shot.usual
-    table = matter_of(frame, shot.extent)
+    table = matter_of(frame, shot.extent).astype(float)
     dye = download(frame.dye)[: frame.count].astype(np.int64)
     if not len(table) and not dye.any():
         return None
     glow = np.asarray(shot.look.glow, float)
     plain = np.concatenate([np.asarray(shot.absorption, float), glow * np.asarray(shot.tint, float)])
-    found = np.tile(plain, (frame.count, 1))
-    if len(table):
-        kind = download(frame.material)[: frame.count]
-        for number, row in enumerate(table.astype(float)):
-            if row[0] >= 0.0:
-                found[kind == number] = np.concatenate([-np.log(row[:3]) * STRONG / usual, glow * row[:3] ** 0.6])
+    found = np.zeros((frame.count, COLUMNS))
+    found[:, :6] = plain
+    kind = download(frame.material)[: frame.count] if len(table) else np.zeros(frame.count, np.int32)
+    for number, (*color, murk, red, green, blue) in enumerate(table):
+        mine, own, ember = kind == number, np.array(color), np.array([red, green, blue])
+        if murk > 0.0:
+            murk *= OFTEN
+            # What shines of itself is dark in the light of others, as in `optics/mixture.py`.
+            dark = own.clip(0.02, 0.98) / (1.0 + 2.0 * ember.max())
+            found[mine] = np.concatenate([np.zeros(6), murk * dark, [murk], murk * ember])
+        elif own[0] >= 0.0:
+            found[mine, :6] = np.concatenate([-np.log(own) * STRONG / usual, glow * own**0.6])
     stained = np.flatnonzero(dye)
     own = dye[stained]
     color = (np.stack([own >> 16 & 255, own >> 8 & 255, own & 255], axis=1) / 255.0) ** 2.2
     color, share = color.clip(0.02, 0.98), ((own >> 24 & 127) / 127.0)[:, None]
-    target = np.concatenate([-np.log(color) * STRONG / usual, glow * color**0.6], axis=1)
-    found[stained] += share * (target - found[stained])
+    murk = found[stained, 9:10]
+    clear = np.concatenate([-np.log(color) * STRONG / usual, glow * color**0.6], axis=1)
+    target = np.concatenate([np.where(murk > 0.0, 0.0, clear), murk * color], axis=1)
+    found[stained, :9] += share * (target - found[stained, :9])
     return found
 
 
 def _in_cells(shot: Shot, grid: Grid, found: np.ndarray, plain: np.ndarray) -> np.ndarray:
-    """Return the means of the particles in and next to every cell, float64 [cells, 6]."""
+    """Return the means of the particles in and next to every cell, float64 [cells, COLUMNS]."""
     counts = (grid.nz // 2, grid.ny // 2, grid.nx // 2)
     place = (download(shot.frame.x)[: shot.frame.count] - grid.lower) / (2.0 * np.asarray(grid.step))
     at = np.floor(place).astype(int).clip(0, np.array(counts[::-1]) - 1)
     number = at[:, 0] + counts[2] * (at[:, 1] + counts[1] * at[:, 2])
     total = int(np.prod(counts))
     weights = [None, *found.T]
-    sums = np.stack([np.bincount(number, weight, total) for weight in weights], axis=1).reshape(*counts, 7)
+    sums = np.stack([np.bincount(number, weight, total) for weight in weights], axis=1).reshape(*counts, COLUMNS + 1)
     near = sums.copy()
     for axis in range(3):
         padded = np.pad(near, [(1, 1) if k == axis else (0, 0) for k in range(4)])
         before, after = (np.take(padded, range(k, k + counts[axis]), axis) for k in (0, 2))
         near = near + 0.5 * (before + after)
     # A cell of its own particles and a little of those beside it; without any it is as those beside it.
-    mixed = (sums + 0.15 * near).reshape(-1, 7)
+    mixed = (sums + 0.15 * near).reshape(-1, COLUMNS + 1)
     there = mixed[:, 0] > 0.0
-    result = np.tile(plain, (total, 1))
+    result = np.zeros((total, COLUMNS))
+    result[:, :6] = plain
     result[there] = mixed[there, 1:] / mixed[there, :1]
     return result
 
@@ -117,17 +136,27 @@ def absorbed_at(medium: Medium, grid: Grid, x):
 
 
 @qd.func
-def through_water(medium: Medium, grid: Grid, p, ahead, far):
-    """(share of the light that a straight way through the water leaves, radiance that it adds), each a vec3."""
-    left, added = qd.exp(-far * medium.absorption), (1.0 - qd.exp(-far * medium.scattering)) * medium.glow
+def through_water(medium: Medium, grid: Grid, p, ahead, far, patience):
+    """(share of the light that a straight way through the water leaves, radiance that it adds), each a vec3, and its
+    end [m]: `far`, or before it where murk has become as much as `patience`.
+    """
+    left, added, end = qd.exp(-far * medium.absorption), (1.0 - qd.exp(-far * medium.scattering)) * medium.glow, far
     if medium.varied == 1:
         left, added = vec3(1.0, 1.0, 1.0), vec3(0.0, 0.0, 0.0)
         count = qd.min(qd.cast(far / (2.0 * grid.step.x), qd.i32) + 1, 256)
-        pace, clear = far / count, 1.0
-        per = qd.exp(-pace * medium.scattering)
-        for part in range(count):
-            cell = cell_near(grid, p + (part + 0.5) * pace * ahead)
+        pace, clear, rest, part = far / count, 1.0, patience, 0
+        while part < count:
+            x, length = p + (part + 0.5) * pace * ahead, pace
+            if medium.murky == 1:
+                depth = pace * murk_at(medium.murk, grid, x)[3]
+                if depth > rest:
+                    length = pace * rest / depth
+                    end, part = part * pace + length, count
+                rest -= depth
+            cell = cell_near(grid, x)
+            per = qd.exp(-length * medium.scattering)
             added += clear * (1.0 - per) * medium.shine[cell]
             clear *= per
-            left *= qd.exp(-pace * medium.swallow[cell])
-    return left, added
+            left *= qd.exp(-length * medium.swallow[cell])
+            part += 1
+    return left, added, end

@@ -1,14 +1,22 @@
 """The paths of light, followed from the eye: J. T. Kajiya, "The rendering equation" (1986).
 
 A path ends at the sky or after three matte surfaces. At smooth surfaces of water it goes one way, by chance as Fresnel
-has it; within the water it is dimmed (Beer-Lambert). At a matte surface the sun is looked for by one shadow ray, and
-what light the water brings there is taken from the photons; the path goes on in a direction by its cosine. One loop
-follows both paths and shadow rays, so that what meets rays is compiled once.
+has it; within the water it is dimmed (Beer-Lambert), and scattered where that is not clear (`murk.py`). At a matte
+surface the sun is looked for by one shadow ray, and what light the water brings there is taken from the photons; the
+path goes on in a direction by its cosine. One loop follows both paths and shadow rays, so that what meets rays is
+compiled once.
+
+What is carried along a path is radiance over the square of the refractive index, which surfaces leave as it is
+(E. Veach, "Robust Monte Carlo methods for light transport simulation" (1997), 5.2); photons carry power, so that what
+they bring is divided by that square where it is seen in the water.
 
     code      symbol   meaning                                                        unit
     value     T        share of the light at the end of the path that the eye gets    1
     radiance  L        light found so far                                             1
     matte              matte surfaces on the path so far                              1
+    dull               whether it has met one, or was scattered                       1
+    within             whether it was scattered since the last matte surface          1
+    gate               where the path came into the water                             m
     smooth             whether the eye sees this place by smooth surfaces alone       1
     waits              light that a shadow ray decides on                             1
 """
@@ -16,10 +24,11 @@ follows both paths and shadow rays, so that what meets rays is compiled once.
 import dataclasses
 
 from wavetank.device.compiler import qd
-from wavetank.view.film.interface import bent, index_of_water, mirrored
-from wavetank.view.film.light import Photons, floor_light, solid_light
+from wavetank.view.film.interface import bent, index_of_water, mirrored, through_drop
+from wavetank.view.film.light import Photons, floor_light, light_within, solid_light
 from wavetank.view.film.march import World, first_hit
-from wavetank.view.film.medium import Medium, absorbed_at, through_water
+from wavetank.view.film.medium import Medium, absorbed_at, cell_near, through_water
+from wavetank.view.film.murk import albedo_of, any_way, color_of, is_matte, murk_at, thinning
 from wavetank.view.film.sampling import around, disc, pair, towards
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, view_ray
 from wavetank.view.look import Look
@@ -100,6 +109,8 @@ def follow(
     after, after_wet = direction, 0  # how the path goes on behind a shadow ray
     bounce, matte, glossy, shadow, going, way = 0, 0, 0, 0, 1, 0.0
     guided = 0
+    gate, gate_normal, fresh = begin, -direction, 0  # where the path came into the water, and whether just now
+    dull, within, scattered = 0, 0, 0
     while going == 1:
         hit, what, which, was_wet = first_hit(world, p, ahead, wet, 1)
         n = vec3(hit.x, hit.y, hit.z)
@@ -108,23 +119,45 @@ def follow(
                 light += waits
             ahead, wet, shadow = after, after_wet, 0
         else:
-            at = p + hit.w * ahead
+            at, reached = p + hit.w * ahead, qd.min(hit.w, 1e6)
             chance = pair(seed, sample, 2 + 3 * bounce)
-            if matte == 0:
-                cover = line_on_way(setting, p, ahead, hit.w)
+            color, ember = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+            left, added = vec3(1.0, 1.0, 1.0), vec3(0.0, 0.0, 0.0)
+            if was_wet == 1:
+                patience = -qd.log(qd.max(1.0 - chance.y, 1e-7))
+                reached = qd.min(hit.w, 1e3)
+                left, added, reached = through_water(medium, world.field.grid, p, ahead, reached, patience)
+                if reached < qd.min(hit.w, 1e3):
+                    what, at = 7, p + reached * ahead
+            elif what == 4 and medium.murky == 1:
+                if chance.x >= bent(ahead, n, 1.0 / index_of_water()).w:
+                    murk = murk_at(medium.murk, world.field.grid, at)[3]
+                    if chance.y > qd.exp(-1.33 * world.motes.ball[which].w * murk):
+                        what = 6
+            if what >= 6:
+                here = murk_at(medium.murk, world.field.grid, at)
+                color, ember = color_of(here), medium.ember[cell_near(world.field.grid, at)]
+                if what == 7 and is_matte(here, world.field.grid) == 1:
+                    # At the surface where the path came in, or at the border to a clear fluid.
+                    what = 6
+                    if fresh == 1 and reached < 2.5 * world.field.grid.spacing:
+                        at, n, was_wet = gate, gate_normal, 0
+                    else:
+                        n = thinning(medium.murk, world.field.grid, at)
+                        if n.norm() < 0.5:
+                            n = -ahead
+            light += value * added
+            value *= left
+            if dull == 0:
+                cover = line_on_way(setting, p, ahead, reached)
                 if cover > 0.0:
                     light += value * look.line_strength * cover * look.line
                     albedo += value.max() * look.line_strength * cover * look.line
                     value *= 1.0 - look.line_strength * cover
-            if was_wet == 1:
-                far = qd.min(hit.w, 1e3)
-                left, added = through_water(medium, world.field.grid, p, ahead, far)
-                light += value * added
-                value *= left
-            way += qd.min(hit.w, 1e6)
+            way += reached
             if guided == 0:
                 guided = 1
-                shape = qd.Vector([n.x, n.y, n.z, setting.size / (setting.size + qd.min(hit.w, 1e6))])
+                shape = qd.Vector([n.x, n.y, n.z, setting.size / (setting.size + reached)])
             far = 0.0
             if what == 1:
                 far = smoothstep(((at - setting.middle).norm() * (1.0 / setting.size) - 1.5) * 0.2)
@@ -132,7 +165,7 @@ def follow(
                 sky = background(look, ahead)
                 if ahead.y < 0.0 and what == 0:
                     sky = look.below
-                if matte > 0:
+                if dull == 1:
                     sky *= setting.fill
                 else:
                     if what == 0 and glossy == 0:
@@ -141,7 +174,7 @@ def follow(
                         sky += lamp(look, ahead)
                 share = qd.select(what == 0, 1.0, far)
                 light += value * share * sky
-                if matte == 0:
+                if dull == 0:
                     albedo += share * value.max() * vec3(1.0, 1.0, 1.0)
                 value *= 1.0 - share
                 if what == 0 or far > 0.999:
@@ -153,6 +186,7 @@ def follow(
                     eta = 1.0 / eta
                 through = bent(ahead, inward, eta)
                 glossy += 1
+                entered = 0
                 if chance.x < through.w:
                     ahead = mirrored(ahead, inward)
                     p = at + 1e-3 * world.field.grid.step.x * inward
@@ -161,6 +195,8 @@ def follow(
                     ahead = vec3(through.x, through.y, through.z)
                     p = at - 1e-3 * world.field.grid.step.x * inward
                     wet = 1 - was_wet
+                    gate, gate_normal, entered = at, inward, wet
+                fresh = entered
             elif going == 1 and what == 4:
                 ball = world.motes.ball[which]
                 through = bent(ahead, n, 1.0 / index_of_water())
@@ -170,29 +206,44 @@ def follow(
                     p = at + 1e-4 * ball.w * n
                 else:
                     inner = vec3(through.x, through.y, through.z)
-                    chord = -2.0 * ball.w * inner.dot(n)
-                    p = at + chord * inner
-                    ahead = (2.0 * inner.dot(ahead) * inner - ahead).normalized(1e-12)
-                    p += 1e-4 * ball.w * ahead
-                    value *= qd.exp(-chord * absorbed_at(medium, world.field.grid, at))
+                    out, ahead = through_drop(ball, at, n, inner, ahead)
+                    p = vec3(out.x, out.y, out.z)
+                    value *= qd.exp(-out.w * absorbed_at(medium, world.field.grid, at))
                 wet = 0
+            elif going == 1 and what == 7:
+                if dull == 0:
+                    albedo += value.max() * color
+                if within == 0:  # the photons have been through all that lies behind the first event
+                    brought = light_within(photons, world.field, at) / index_of_water() ** 2
+                    light += value * (ember + albedo_of(color) * look.sun * brought)
+                value *= albedo_of(color)
+                p, ahead, wet = at, any_way(pair(seed, sample, 3 + 3 * bounce)), 1
+                dull, within, fresh = 1, 1, 0
+                scattered += 1
+                if scattered > 40:
+                    light += 0.5 * value * look.sky
+                    going = 0
             elif going == 1:
-                color = vec3(0.92, 0.93, 0.94)  # froth
+                if what == 5:
+                    color = vec3(0.92, 0.93, 0.94)  # froth
                 brought = vec3(0.0, 0.0, 0.0)
                 if n.dot(ahead) > 0.0:
                     n = -n
                 if what == 1:
-                    color = floor_albedo(look, at, way * lens.pixel, -ahead.y, matte)
+                    color = floor_albedo(look, at, way * lens.pixel, -ahead.y, dull)
                     brought = floor_light(photons, at)
                 else:
                     if what == 2:
                         color = world.paints[which]
                     brought = solid_light(photons, world.field.grid, at, n)
-                if matte == 0:
+                if was_wet == 1:
+                    brought /= index_of_water() ** 2
+                if dull == 0:
                     albedo += value.max() * color
-                light += value * color * look.sun * brought
+                light += value * (ember + color * look.sun * brought)
                 value *= color
                 matte += 1
+                dull, within, fresh = 1, 0, 0
                 p = at + 2e-4 * setting.size * n
                 spread = pair(seed, sample, 3 + 3 * bounce)
                 after, after_wet, wet = around(n, spread), was_wet, was_wet
@@ -212,9 +263,9 @@ def follow(
                         going = 0
                     value = vec3(0.0, 0.0, 0.0)
             bounce += 1
-        if bounce >= 24 or (shadow == 0 and value.max() < 1e-3):
+        if bounce >= 24 + 60 * medium.murky or (shadow == 0 and value.max() < 1e-3):
             going = 0
-    return light, albedo, shape, glossy + matte
+    return light, albedo, shape, glossy + dull
 
 
 @qd.func
@@ -227,10 +278,10 @@ def lamp(look: Look, ahead):
 
 
 @qd.func
-def floor_albedo(look: Look, at, wide, steep, matte):
+def floor_albedo(look: Look, at, wide, steep, dull):
     """Albedo of the floor at a point seen by a ray that is `wide` there; plain where the eye does not see it."""
     share = 1.0
-    if matte == 0 and look.tile > 0.0:
+    if dull == 0 and look.tile > 0.0:
         per = 1.0 / look.tile
         grain = 0.5 * per * wide / qd.sqrt(qd.max(steep, 1e-3))
         place = vec2(at.x, at.z) * per

@@ -13,9 +13,10 @@ from wavetank.device.compiler import download, upload
 from wavetank.foundation.replacing import replacing
 from wavetank.foundation.version import VERSION
 from wavetank.view.film.paths import Film
+from wavetank.view.matter import matter_of
 
 NAMES = ("mean", "half", "albedo", "shape")
-FORMAT = 1  # of what the samples mean; another one is begun anew
+FORMAT = 2  # of what the samples mean; another one is begun anew
 
 
 @dataclasses.dataclass
@@ -42,6 +43,7 @@ def digest_of(shot: Any, options: tuple[Any, ...]) -> str:
     for of in (shot.lens, shot.look):
         arrays += [np.asarray(getattr(of, field.name)) for field in dataclasses.fields(of)]
     arrays += [np.asarray(shot.absorption), np.asarray(shot.tint), np.asarray(shot.scattering)]
+    arrays.append(matter_of(frame, shot.extent))
     for array in arrays:
         found.update(np.ascontiguousarray(array).tobytes())
     found.update("".join(solid.color or "-" for solid in frame.scene.solids).encode())

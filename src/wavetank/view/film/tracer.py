@@ -171,8 +171,9 @@ class Tracer:
         size = upper[[0, 2]] - lower[[0, 2]] + 2.0 * margin
         texel = max(d / TEXELS_A_SPACING, float(size.max()) / MOST_TEXELS)
         texels = [math.ceil(length / texel) for length in size]
-        has_solids = shot.frame.solids.count > shot.frame.solids.tank_count or int(world.motes.list.shape[0]) > 1
-        cells = grid.nx * grid.ny * grid.nz // 8 if has_solids else 1
+        solid = shot.frame.solids.count > shot.frame.solids.tank_count
+        has_flow = bool(medium.murky) or solid or int(world.motes.list.shape[0]) > 1
+        cells = grid.nx * grid.ny * grid.nz // 8 if has_flow else 1
         shapes = ((texels[1], texels[0], 3), (cells, 6))
         kept = self._photons
         if kept is None or (tuple(kept.floor.shape), tuple(kept.flow.shape)) != shapes:
@@ -184,7 +185,7 @@ class Tracer:
         photons = light.Photons(
             floor=floor, flow=flow, corner=vector(lower[0] - margin, texel, lower[2] - margin),
             begin=vector(*begin), right=vector(*(side * wide)), up=vector(*(top * tall)), across=across, rows=rows,
-            power=wide * tall / (across * rows * rounds), has_flow=int(has_solids),
+            power=wide * tall / (across * rows * rounds), has_flow=int(has_flow),
         )  # fmt: skip
         self._photons = photons
         if float(np.max(look.sun)) > 0.0:
