@@ -82,6 +82,12 @@ def look_of(
     return under_sky(look if look.to_sun is plain.to_sun else _lit_by_the_sun(look), turbidity)
 
 
+@functools.lru_cache(maxsize=64)
+def without_edges(look: Look) -> Look:
+    """Return a look in which the edges of a tank are not seen."""
+    return dataclasses.replace(look, line_strength=0.0)
+
+
 def _paved(look: Look, floor: str | None) -> Look:
     if floor is None:
         return look

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.device.compiler import current_backend, qd, synchronize, upload
+from wavetank.device.compiler import current_backend, download, qd, synchronize, upload
 from wavetank.device.state import remembered
 from wavetank.foundation.errors import WavetankError
 from wavetank.simulation.frame import Frame
@@ -19,6 +19,7 @@ from wavetank.view.colormaps import ENTRIES, table
 from wavetank.view.extent import Extent, extent_of
 from wavetank.view.film.samples import Watch
 from wavetank.view.film.tracer import Tracer
+from wavetank.view.glare import add_glare, excess_of
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
 from wavetank.view.look import fluid_optics, usual_depth
 from wavetank.view.optics.dyes import ICE, lay_ice
@@ -73,6 +74,8 @@ class Renderer:
             began = time.perf_counter()
             self._tracer = self._tracer or Tracer(self.buffers)
             self._tracer.draw(shot, style, watch or Watch())
+            if style.glare:
+                add_glare(self.buffers.pixels.color, excess_of(download(self.buffers.pixels.color)), shot.lens)
             tonemap.draw(shot, self.buffers)
             if timings is not None:
                 timings["film"] = 1e3 * (time.perf_counter() - began)
@@ -174,9 +177,14 @@ class Renderer:
         """Take many pictures, each moved by less than a pixel and lit by another point of the sun, and average them."""
         if self._total is None:
             self._total = qd.ndarray(vec3, shape=(self.buffers.rows, self.buffers.columns))
+        glaring, excess = style.glare and shot.frame.dim == 3 and style.kind.name == "water", np.zeros(3)
         for number in range(style.samples):
             self._take(style.kind, self._moved(shot, number), lit, timings)
             tonemap.collect(self.buffers.pixels.color, self._total, 1.0 / (number + 1))
+            if glaring:
+                excess = excess + excess_of(download(self.buffers.pixels.color)) / style.samples
+        if glaring:
+            add_glare(self._total, excess, shot.lens, room=1.0)
         tonemap.draw_collected(self._total, self.buffers)
 
     def _moved(self, shot: Shot, number: int) -> Shot:

@@ -10,7 +10,7 @@ import numpy as np
 from wavetank.foundation.errors import WavetankError
 from wavetank.simulation.frame import Frame
 from wavetank.view.colormaps import ENTRIES, bands, rgb_of, table, to_linear
-from wavetank.view.environments import chosen_light, look_of, usual_environment
+from wavetank.view.environments import chosen_light, look_of, usual_environment, without_edges
 from wavetank.view.extent import Extent
 from wavetank.view.look import Look
 from wavetank.view.quantities import QUANTITIES, key_of, usual
@@ -21,6 +21,7 @@ RADIUS = {2: 0.62, 3: 0.55}
 MOST_SAMPLES = 4096
 #: name -> samples a pixel has in each direction, and pictures that are averaged; of a film, samples of a path tracer
 QUALITIES: dict[str, tuple[int, int]] = {"draft": (1, 1), "standard": (2, 1), "high": (1, 64), "film": (1, 64)}
+GLARING = ("high", "film")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,6 +39,8 @@ class Style:
     environment: str | None = None  # one of ENVIRONMENTS; None is the scene's, or what is usual for the view
     sun: str | None = None  # azimuth and elevation [deg], as "40,25"
     floor: str | None = None  # one of FLOORS
+    glare: bool = False  # spread what is much brighter than white as an eye does, in worlds in space; film and high
+    edges: bool = True  # whether the edges of the tank are drawn
     hasty: bool = False  # leave out what movement hides: smooth outlines, every second look of the sun and ray
     samples: int = 1  # pictures, each from a slightly other eye and sun, that are averaged; or samples that are traced
     traced: bool = False  # follow paths of light in a world in space; other pictures are averaged
@@ -102,7 +105,8 @@ class Style:
         """Light and colours: what is asked for, else the scene's, else what is usual for the view."""
         light = chosen_light(frame.scene.light, self.environment, self.sun, self.floor)
         environment = light.environment or usual_environment(frame.dim, self.kind.coloured)
-        return look_of(environment, light.azimuth, light.elevation, light.floor, frame.dim)
+        look = look_of(environment, light.azimuth, light.elevation, light.floor, frame.dim)
+        return look if self.edges else without_edges(look)
 
     def particle_radius(self, extent: Extent) -> float:
         """Radius of a drawn particle [m]."""
@@ -159,4 +163,8 @@ def quality_named(name: str) -> str:
 def quality_options(name: str, samples: int | None = None) -> tuple[int, dict[str, Any]]:
     """Return the samples a pixel has in each direction, and the options of a quality, with other `samples` if told."""
     supersample, usual = QUALITIES[quality_named(name)]
-    return supersample, {"samples": usual if samples is None else samples, "traced": name == "film"}
+    return supersample, {
+        "samples": usual if samples is None else samples,
+        "traced": name == "film",
+        "glare": name in GLARING,
+    }
