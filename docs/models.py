@@ -95,6 +95,32 @@ def vase(around: int = 96) -> tuple[np.ndarray, np.ndarray, str]:
     return turned([(float(a), float(a), float(b), 2.0) for a, b in zip(r, y, strict=True)], around, formula)
 
 
+def jug(around: int = 48) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return a jug with walls of an eighth of its foot's radius, and a spout towards +x."""
+    outer = [(0.055, 0.0), (0.062, 0.006), (0.078, 0.04), (0.086, 0.075), (0.084, 0.105), (0.07, 0.145), (0.06, 0.172),
+             (0.058, 0.19), (0.064, 0.21), (0.072, 0.222)]  # fmt: skip
+    inner = [(0.066, 0.222), (0.057, 0.209), (0.05, 0.19), (0.052, 0.171), (0.062, 0.144), (0.076, 0.105),
+             (0.078, 0.076), (0.07, 0.042), (0.055, 0.012)]  # fmt: skip
+    t = 2.0 * np.pi * np.arange(around) / around
+    spout = np.maximum(np.cos(t), 0.0) ** 12
+    points, faces = [np.zeros((1, 3))], []
+    for r, y in [*outer, *inner]:
+        out = r + 0.03 * spout * max(0.0, (y - 0.175) / 0.047)
+        up = y + 0.008 * spout * max(0.0, (y - 0.2) / 0.022)
+        points.append(np.column_stack([out * np.cos(t), up + 0.0 * t, r * np.sin(t)]))
+    points.append(np.array([[0.0, 0.01, 0.0]]))
+    last = 1 + around * len([*outer, *inner])
+    for j in range(around):
+        k = (j + 1) % around
+        faces.append((0, 1 + j, 1 + k))
+        for first in range(1, last - around, around):
+            a, b, c, d = first + j, first + k, first + around + j, first + around + k
+            faces += [(a, c, b), (b, c, d)]
+        faces.append((last - around + j, last, last - around + k))
+    formula = "a profile, turned on a lathe, its lip drawn out by 0.12 cos^12(t): a jug with a spout towards +x"
+    return 4.0 * np.concatenate(points), np.array(faces), formula
+
+
 def valley(columns: int = 161, rows: int = 121) -> np.ndarray:
     """Return heights from 0 to 1 [rows, columns]: a basin behind a gap, a valley that winds down from there."""
     x, z = np.meshgrid(np.linspace(0.0, 4.0, columns), np.linspace(-1.5, 1.5, rows))
@@ -131,4 +157,5 @@ if __name__ == "__main__":
     write("bathtub", *bathtub())
     write("boat", *boat())
     write("vase", *vase())
+    write("jug", *jug())
     write_heights("valley", valley())

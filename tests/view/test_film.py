@@ -212,6 +212,60 @@ def test_lava_shines_on_what_is_beside_it():
     assert 0.5 * most < seen[0] < most and seen[1] < 0.2 * seen[0]
 
 
+def furnace_of(**solid):
+    """A wall before a white world: what is seen of it, and what it is made of."""
+    wall = wt.Box(center=(0.5, 9.0, 1.5), size=(2.0, 2.0, 0.1), color="#c98a4b", **solid)
+    scene = wt.Scene(
+        spacing=0.1, tank=wt.Tank(size=(1.0, 1.0, 1.0)), fluids=[wt.Points(positions=[[0.5, 0.5, 0.5]])], solids=[wall]
+    )
+    renderer, shot = shot_of(wt.Simulation(scene).frame(), eye=(0.5, 9.0, 4.0), target=(0.5, 9.0, 1.5))
+    shot = dataclasses.replace(shot, look=in_white(shot.look))
+    return mean_radiance(shot, renderer, clear_medium(), 512).mean(axis=(0, 1))
+
+
+BRONZE = ((np.array([201, 138, 75]) / 255 + 0.055) / 1.055) ** 2.4
+
+
+def test_metal_mirrors_a_white_world_in_its_color():
+    """Schlick's mirror seen straight on is the colour; of facets of that slope a 32nd mirrors into the metal (GGX)."""
+    seen = furnace_of(finish="metal") / BRONZE
+    assert np.all(seen > 0.94) and np.all(seen < 1.0)
+
+
+def test_glass_mirrors_as_a_pane_and_lets_its_color_through():
+    """2 F / (1 + F) of a pane (n = 1.5), and the colour of the rest."""
+    pane = 2.0 * 0.04 / 1.04
+    np.testing.assert_allclose(furnace_of(finish="glass"), pane + (1.0 - pane) * BRONZE, atol=0.01)
+
+
+def test_metal_shows_the_sun_where_it_mirrors_it():
+    """The lobe in the direction of the mirror over all: its sum over the sphere is what a white world shows."""
+    ball = wt.Sphere(center=(0.5, 0.5, 0.5), radius=0.4, color="#808080", finish="metal")
+    scene = wt.Scene(spacing=0.1, fluids=[wt.Points(positions=[[0.5, 2.5, 0.5]])], solids=[ball])
+    frame = wt.Simulation(scene).frame()
+    camera = wt.Camera(eye=(0.5, 0.5, 5.0), target=(0.5, 0.5, 0.5), field_of_view=math.radians(14.0))
+    options = {"quality": "film", "samples": 8, "camera": camera, "sun": "60,20", "environment": "studio"}
+    image = wt.render(frame, 64, 64, **options).astype(int).sum(axis=2)
+    row, column = np.unravel_index(image.argmax(), image.shape)
+    # Half way between eye and sun: 30 degrees to the right of the middle (10 up).
+    assert abs(column - (32 + 64 * 0.4 * math.sin(math.radians(30.0)) / (2 * 4.5 * math.tan(math.radians(7.0))))) < 4
+    assert row < 32
+
+
+def test_glass_is_left_away_by_drafts():
+    tank, water = wt.Tank(size=(1.0, 1.0, 1.0)), wt.Block(lower=(0, 0, 0), upper=(1, 0.3, 1))
+    ball = {"center": (0.5, 0.7, 0.5), "radius": 0.2}
+    bare, glass, matte = (
+        wt.render(
+            wt.Simulation(wt.Scene(spacing=0.1, tank=tank, fluids=[water], solids=solids)).frame(), 64, 48,
+            quality="draft",
+        )
+        for solids in ([], [wt.Sphere(**ball, finish="glass")], [wt.Sphere(**ball)])
+    )  # fmt: skip
+    # Light from the floor and in the water still knows of it.
+    assert np.abs(glass.astype(int) - bare).mean() < 0.2 * np.abs(matte.astype(int) - bare).mean()
+
+
 def test_water_and_drops_in_a_white_world_cannot_be_seen():
     """The white furnace: what loses no light, white floor included, is as bright as what is around it."""
     rng = np.random.default_rng(3)

@@ -156,6 +156,7 @@ def _frames(
             if style["traced"]:
                 shutter = now.shutter * now.speed / order.fps
                 options |= {"aperture": now.aperture, "focus": now.focus or camera.distance, "shutter": shutter}
+            options["edges"] = order.edges
             image = renderer.render(sim.frame(), camera, watch=watch, legend=False, **options)
             if not watch.whole:
                 _store(sim, folder, number)

@@ -40,6 +40,8 @@ class Film(Timed):
     focus: Annotated[Number | None, Field(ge=1e-3), METRES] = None  # m from the eye; the distance of the target
     shutter: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.5  # of the time between frames for which it is open
 
+    edges: bool = True  # whether the edges of the tank are drawn
+
     @model_validator(mode="after")
     def _lasting(self) -> "Film":
         for name in LASTING:

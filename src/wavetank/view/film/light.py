@@ -16,7 +16,7 @@ import dataclasses
 from wavetank.device.compiler import qd
 from wavetank.view.film.grid import Field, Grid, outward_at, value_at
 from wavetank.view.film.interface import bent, index_of_water, mirrored, through_drop
-from wavetank.view.film.march import World, first_hit
+from wavetank.view.film.march import World, first_hit, past
 from wavetank.view.film.medium import Medium, absorbed_at, through_water
 from wavetank.view.film.murk import albedo_of, any_way, color_of, is_matte, murk_at
 from wavetank.view.film.sampling import pair, towards
@@ -98,6 +98,12 @@ def shine(photons: Photons, world: World, look: Look, medium: Medium, round: qd.
                     out, ahead = through_drop(ball, at, n, inner, ahead)
                     p = vec3(out.x, out.y, out.z)
                     weight *= qd.exp(-out.w * absorbed_at(medium, world.field.grid, at))
+            elif what == 2 and world.finish[which] == 2:
+                mirror = bent(ahead, qd.select(n.dot(ahead) > 0.0, -n, n), 0.667).w
+                if was_wet == 0:
+                    weight *= 1.0 - 2.0 * mirror / (1.0 + mirror)
+                weight *= world.paints[which]
+                p, wet = at + past(hit.w, n, ahead) * ahead, was_wet
             elif what == 6:
                 here = murk_at(medium.murk, world.field.grid, at)
                 weight *= albedo_of(color_of(here))

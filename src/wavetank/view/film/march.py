@@ -26,11 +26,12 @@ class World:
     motes: Motes
     solids: SolidSet
     window: Window
-    paints: qd.types.ndarray()  # vec3 [solids]: albedo
+    paints: qd.types.ndarray()  # vec3 [solids]: albedo, of glass what it lets through
+    finish: qd.types.ndarray()  # i32 [solids]: place in `paints.FINISHES`
 
 
 @qd.func
-def first_solid(solids: SolidSet, window: Window, p, ahead, far):
+def first_solid(solids: SolidSet, window: Window, finish: qd.template(), p, ahead, far):
     """(normal, way) of the first solid nearer than `far`, a way of -1 where there is none; and its number."""
     best, which, last = vec4(0.0, 0.0, 0.0, -1.0), 0, qd.min(far, 1e4)
     for k in range(solids.tank_count, solids.count):
@@ -42,7 +43,8 @@ def first_solid(solids: SolidSet, window: Window, p, ahead, far):
                 inside = box_interval(p, ahead, window.endless)
             first, end = qd.max(first, inside[0]), qd.min(end, inside[1])
         if first <= end:
-            hit = meet(solids, k, p, ahead, first, end, 0.0)
+            # A ray that begins in glass leaves it unseen.
+            hit = meet(solids, k, p, ahead, first, end, qd.select(finish[k] == 2, -1.0, 0.0))
             if hit.w >= 0.0:
                 best, which, last = hit, k, hit.w
     return best, which
@@ -180,6 +182,12 @@ def face(grid: Grid, x, ahead, side):
 
 
 @qd.func
+def past(way, n, ahead):
+    """How far [m] behind the place where it met a solid a ray is surely in it: `meet` stops before the surface."""
+    return (2e-4 * way + 2e-5) / qd.max(qd.abs(n.dot(ahead)), 0.1)
+
+
+@qd.func
 def first_hit(world: World, p, ahead, wet, seen):
     """(normal, way) of the first thing on a ray, what it is (0 sky, 1 floor, 2 solid, 3 water, 4 drop, 5 froth), the
     number of the solid or ball, and whether the ray was wet on its way.
@@ -189,7 +197,7 @@ def first_hit(world: World, p, ahead, wet, seen):
     if p.y > 0.0 and ahead.y < -1e-6:
         far, what = -p.y / ahead.y, 1
         result.w = far
-    solid, number = first_solid(world.solids, world.window, p, ahead, far)
+    solid, number = first_solid(world.solids, world.window, world.finish, p, ahead, far)
     if solid.w >= 0.0:
         result, far, what, which = solid, solid.w, 2, number
     # A floor below a pane is met before the pane.

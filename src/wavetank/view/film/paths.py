@@ -14,7 +14,7 @@ they bring is divided by that square where it is seen in the water.
     value     T        share of the light at the end of the path that the eye gets    1
     radiance  L        light found so far                                             1
     matte              matte surfaces on the path so far                              1
-    dull               whether it has met one, or was scattered                       1
+    dull               1 from one on, or from where it was scattered; 2 from metal on    1
     within             whether it was scattered since the last matte surface          1
     gate               where the path came into the water                             m
     smooth             whether the eye sees this place by smooth surfaces alone       1
@@ -26,8 +26,9 @@ import dataclasses
 from wavetank.device.compiler import qd
 from wavetank.view.film.interface import bent, index_of_water, mirrored, through_drop
 from wavetank.view.film.light import Photons, floor_light, light_within, solid_light
-from wavetank.view.film.march import World, first_hit
+from wavetank.view.film.march import World, first_hit, past
 from wavetank.view.film.medium import Medium, absorbed_at, cell_near, through_water
+from wavetank.view.film.metal import facet, mirror_of, towards_lamp, unhidden
 from wavetank.view.film.murk import albedo_of, any_way, color_of, is_matte, murk_at, thinning
 from wavetank.view.film.sampling import around, disc, pair, towards
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, view_ray
@@ -110,14 +111,21 @@ def follow(
     bounce, matte, glossy, shadow, going, way = 0, 0, 0, 0, 1, 0.0
     guided = 0
     gate, gate_normal, fresh = begin, -direction, 0  # where the path came into the water, and whether just now
-    dull, within, scattered = 0, 0, 0
+    dull, within, scattered, glazed, begun = 0, 0, 0, 0, begin
     while going == 1:
         hit, what, which, was_wet = first_hit(world, p, ahead, wet, 1)
         n = vec3(hit.x, hit.y, hit.z)
         if shadow == 1:
-            if what == 0 or (what == 1 and hit.w > 1e6):
-                light += waits
-            ahead, wet, shadow = after, after_wet, 0
+            if what == 2 and world.finish[which] == 2:
+                waits *= through_glass(world.paints[which], n, ahead)
+                p += (hit.w + past(hit.w, n, ahead)) * ahead
+                glazed += 1
+            else:
+                if what == 0 or (what == 1 and hit.w > 1e6):
+                    light += waits
+                ahead, wet, shadow, p = after, after_wet, 0, begun
+            if glazed > 16:
+                going = 0
         else:
             at, reached = p + hit.w * ahead, qd.min(hit.w, 1e6)
             chance = pair(seed, sample, 2 + 3 * bounce)
@@ -167,7 +175,7 @@ def follow(
                     sky = look.below
                 if dull == 1:
                     sky *= setting.fill
-                else:
+                elif dull == 0:
                     if what == 0 and glossy == 0:
                         sky += sun_disc(look, ahead)
                     if what == 0 and glossy > 0:
@@ -210,6 +218,18 @@ def follow(
                     p = vec3(out.x, out.y, out.z)
                     value *= qd.exp(-out.w * absorbed_at(medium, world.field.grid, at))
                 wet = 0
+            elif going == 1 and what == 2 and world.finish[which] == 2:
+                if n.dot(ahead) > 0.0:
+                    n = -n
+                mirror = bent(ahead, n, 0.667).w
+                if was_wet == 0 and chance.x < 2.0 * mirror / (1.0 + mirror):
+                    ahead = mirrored(ahead, n)
+                    p = at + 1e-4 * world.field.grid.spacing * n
+                    glossy += 1
+                else:
+                    value *= through_glass(world.paints[which], n, ahead)
+                    p = at + past(hit.w, n, ahead) * ahead
+                wet, fresh = was_wet, 0
             elif going == 1 and what == 7:
                 if dull == 0:
                     albedo += value.max() * color
@@ -241,16 +261,26 @@ def follow(
                 if dull == 0:
                     albedo += value.max() * color
                 light += value * (ember + color * look.sun * brought)
+                before, metal = value, 0
                 value *= color
                 matte += 1
                 dull, within, fresh = 1, 0, 0
                 p = at + 2e-4 * setting.size * n
                 spread = pair(seed, sample, 3 + 3 * bounce)
-                after, after_wet, wet = around(n, spread), was_wet, was_wet
+                after, after_wet, wet, begun = around(n, spread), was_wet, was_wet, p
+                if what == 2 and world.finish[which] == 1:
+                    metal, dull = 1, 2
+                    h = facet(n, -ahead, spread)
+                    after = mirrored(ahead, h)
+                    value = before * mirror_of(color, -h.dot(ahead)) * unhidden(after.dot(n))
+                    if after.dot(n) <= 0.0:
+                        value = vec3(0.0, 0.0, 0.0)
                 facing = n.dot(look.to_sun)
                 if was_wet == 0 and facing > -look.sun_size:
                     to_lamp = towards(look.to_sun, look.sun_size, pair(seed, sample, 4 + 3 * bounce))
-                    waits = value * look.sun * qd.max(n.dot(to_lamp), 0.0)
+                    waits = before * color * look.sun * qd.max(n.dot(to_lamp), 0.0)
+                    if metal == 1:
+                        waits = before * look.sun * towards_lamp(color, n, -ahead, to_lamp)
                     if n.dot(to_lamp) > 0.0:
                         shadow = 1
                         ahead = to_lamp
@@ -269,6 +299,12 @@ def follow(
 
 
 @qd.func
+def through_glass(color, n, ahead):
+    """Share of the light that a wall of glass lets through, per colour: less where it is crossed aslant."""
+    return color ** (1.0 / qd.max(qd.abs(n.dot(ahead)), 0.25))
+
+
+@qd.func
 def lamp(look: Look, ahead):
     """Radiance of the sun as smooth surfaces show it: as wide as it is when it casts shadows, in a studio too."""
     wide = qd.max(look.sun_size, 0.02)
@@ -281,7 +317,7 @@ def lamp(look: Look, ahead):
 def floor_albedo(look: Look, at, wide, steep, dull):
     """Albedo of the floor at a point seen by a ray that is `wide` there; plain where the eye does not see it."""
     share = 1.0
-    if dull == 0 and look.tile > 0.0:
+    if dull != 1 and look.tile > 0.0:
         per = 1.0 / look.tile
         grain = 0.5 * per * wide / qd.sqrt(qd.max(steep, 1e-3))
         place = vec2(at.x, at.z) * per

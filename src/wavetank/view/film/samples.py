@@ -46,7 +46,7 @@ def digest_of(shot: Any, options: tuple[Any, ...]) -> str:
     arrays.append(matter_of(frame, shot.extent))
     for array in arrays:
         found.update(np.ascontiguousarray(array).tobytes())
-    found.update("".join(solid.color or "-" for solid in frame.scene.solids).encode())
+    found.update("".join(solid.finish + (solid.color or "-") for solid in frame.scene.solids).encode())
     return found.hexdigest()
 
 

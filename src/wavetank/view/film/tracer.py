@@ -17,7 +17,7 @@ from wavetank.view.film.samples import Watch, digest_of, load, store
 from wavetank.view.lens import vec2, vec3, vec4, vector
 from wavetank.view.look import Look
 from wavetank.view.optics.radiance import background
-from wavetank.view.paints import colors_of
+from wavetank.view.paints import finishes_of, traced_colors
 from wavetank.view.passes import ellipsoids, solids
 from wavetank.view.shot import Shot
 from wavetank.view.style import Style
@@ -145,10 +145,12 @@ class Tracer:
             self._room = field.room_for(grid)
         motes, touched = balls.motes_of(shot, water, grid, moved)
         upload(self._room.near, touched)
-        paints = self.buffers.paints.of(colors_of(shot))
+        paints = self.buffers.paints.of(traced_colors(shot))
+        finish = qd.ndarray(qd.i32, shape=(max(shot.frame.solids.count, 1),))
+        upload(finish, finishes_of(shot))
         return World(
             field=field.build(self._room, water, shot), motes=motes, solids=shot.frame.solids,
-            window=solids.window(shot), paints=paints,
+            window=solids.window(shot), paints=paints, finish=finish,
         )  # fmt: skip
 
     def _lit(self, shot: Shot, world: World, medium: Medium, slice: int, slices: int) -> light.Photons:

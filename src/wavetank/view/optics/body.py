@@ -178,11 +178,11 @@ def wall_ahead(walls: Box, p, ahead):
 
 
 @qd.func
-def solid_ahead(solids: SolidSet, p, ahead, far, coarse):
+def solid_ahead(solids: SolidSet, paints: qd.template(), p, ahead, far, coarse):
     """(normal, way [m], number) of the first solid that a ray meets within `far` [m]; a way of -1 where it meets none.
 
-    Solids are met to within `coarse` [m], and what a ray begins in is left first. All distances are asked for in one
-    place, because every copy of that code takes seconds to compile.
+    Solids are met to within `coarse` [m], and what a ray begins in is left first; glass is not met. All distances are
+    asked for in one place, because every copy of that code takes seconds to compile.
     """
     hit, which, last = vec4(0.0, 0.0, 0.0, -1.0), -1, far
     for k in range(solids.tank_count, solids.count):
@@ -196,6 +196,8 @@ def solid_ahead(solids: SolidSet, p, ahead, far, coarse):
             t, end = qd.max(along - half, 0.0), qd.min(last, along + half)
             if miss > reach * reach:
                 end = -1.0
+        if paints[k].x < 0.0:
+            end = -1.0
         steps, outside = 0, 0
         while steps < 40 and t <= end:
             value = signed_distance(solids, k, p + t * ahead)
@@ -274,7 +276,7 @@ def through_body(
                     n = texel_normal(sun, first, p + s * ahead, optics.spacing)
             met = 0
             if qd.static(solid):
-                hit, k = solid_ahead(inside.solids, p, ahead, s, 0.1 * optics.spacing)
+                hit, k = solid_ahead(inside.solids, inside.paints, p, ahead, s, 0.1 * optics.spacing)
                 if k >= 0:
                     met, place = 1, p + hit.w * ahead
                     normal = vec3(hit.x, hit.y, hit.z)

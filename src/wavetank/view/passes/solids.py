@@ -86,13 +86,16 @@ def ball_interval(origin, direction, center, r):
 def meet(solids: SolidSet, k, origin, direction, first, last, bevel):
     """(normal, depth) where a ray meets solid `k` between two depths; depth -1 where it does not.
 
-    The cut face is rounded off towards its rim over `bevel` [m]. The slope of a grid jumps from cell to cell: there the
+    The cut face is rounded off towards its rim over `bevel` [m]; where that is negative there is none, and a ray that
+    begins in the solid leaves it first. The slope of a grid jumps from cell to cell: there the
     normal is that between six places around the hit. All distances are asked for in one place, because every copy of
     that code takes seconds to compile.
     """
     pace, reach = direction.norm(), grain(solids, k)
     t, inner, steps, probe = first, first, 0, -1  # probe: which of the six places is asked for, -1 on the way there
     hit, n = vec4(0.0, 0.0, 0.0, -1.0), vec3(0.0, 0.0, 0.0)
+    # Of a ray that begins in the solid, and leaves it until it is surely out of it.
+    leaving = qd.select(bevel < 0.0 and first < 1e-4, 1.0, 0.0)
     is_going = True
     while is_going:
         side = vec3(0.0, 0.0, 0.0)
@@ -108,7 +111,7 @@ def meet(solids: SolidSet, k, origin, direction, first, last, bevel):
                 n = n.normalized(1e-9)
                 hit = vec4(n.x, n.y, n.z, t)
                 is_going = False
-        elif t == inner and value.w <= 0.0 and solids.reach[k] >= around():
+        elif t == inner and value.w <= leaving * (2e-4 * t + 2e-6) and (solids.reach[k] >= around() or leaving > 0.0):
             # The near side of a container is left away, so that what it holds is seen.
             t += qd.max(-value.w, 1e-4 * t + 1e-6) / pace
             inner = t
@@ -132,8 +135,11 @@ def meet(solids: SolidSet, k, origin, direction, first, last, bevel):
 
 
 @qd.func
-def nearest_solid(solids: SolidSet, window: Window, lens: Lens, row, column, far):
-    """(normal, depth, number) of the first solid in a pixel nearer than `far`; depth -1 where there is none."""
+def nearest_solid(solids: SolidSet, window: Window, lens: Lens, paints: qd.template(), row, column, far):
+    """(normal, depth, number) of the first solid in a pixel nearer than `far`; depth -1 where there is none.
+
+    What has a negative paint is left away: glass.
+    """
     ray = view_ray(lens, row, column)
     origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
     best, which = vec4(0.0, 0.0, 0.0, -1.0), 0
@@ -141,12 +147,12 @@ def nearest_solid(solids: SolidSet, window: Window, lens: Lens, row, column, far
     for k in range(solids.tank_count, solids.count):
         bound = ball_interval(origin, direction, solids.position[k], 1.001 * solids.reach[k] + 1e-4)
         first, end = qd.max(lens.near + window.raised, bound[0]), qd.min(last, bound[1])
-        if first <= end:
+        if first <= end and paints[k].x >= 0.0:
             inside = box_interval(origin, direction, window.inside)
             if solids.reach[k] > 1e4:
                 inside = box_interval(origin, direction, window.endless)
             first, end = qd.max(first, inside[0]), qd.min(end, inside[1])
-        if first <= end:
+        if first <= end and paints[k].x >= 0.0:
             hit = meet(solids, k, origin, direction, first, end, window.raised)
             if hit.w >= 0.0:
                 best, which = hit, k
@@ -192,7 +198,7 @@ def trace(
         row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
         for column in range(first, last):
             if in_box(box, row, column):
-                hit = nearest_solid(solids, window, lens, row, column, qd.bit_cast(depth[row, column], qd.f32))
+                hit = nearest_solid(solids, window, lens, paints, row, column, qd.bit_cast(depth[row, column], qd.f32))
                 if hit[3] > 0.0:
                     depth[row, column] = qd.bit_cast(hit[3], qd.i32)
                     if is_seen == 1:
