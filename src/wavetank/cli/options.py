@@ -26,7 +26,9 @@ Quality = Annotated[
 ColorBy = Annotated[str | None, typer.Option(help="speed, density, material, foam, or a colour such as #3f99da.")]
 Environment = Annotated[
     str | None,
-    typer.Option(help="studio, pool, paper, sky, evening or overcast; the scene's, or the view's, unless told."),
+    typer.Option(
+        help="studio, pool, paper, sky, evening, overcast or a picture (.hdr); the scene's or the view's unless told."
+    ),
 ]
 Sun = Annotated[str | None, typer.Option(help="Where the sun stands [deg]: azimuth,elevation, as 40,25.")]
 Floor = Annotated[str | None, typer.Option(help="plain, tiles, stone, sand or table.")]

@@ -20,6 +20,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.scene.light import HIGHEST, LOWEST, Environment, Floor, Light
 from wavetank.view.lens import vector
 from wavetank.view.look import Look, linear, lit_floor, paper, pool, studio, under_sky
+from wavetank.view.panorama import is_picture, panorama
 
 ENVIRONMENTS: tuple[str, ...] = get_args(Environment)
 FLOORS: tuple[str, ...] = get_args(Floor)
@@ -46,7 +47,15 @@ def chosen_light(own: Light | None, environment: str | None, sun: str | None, fl
     """Return the light of a scene with what a picture chose instead; raises `WavetankError`."""
     light = own or Light()
     changes: dict[str, object] = {}
-    if environment is not None:
+    if is_picture(environment):
+        if sun is not None:
+            raise WavetankError(
+                f"render: sun = {sun!r} does not go with environment = {environment!r}: the sun of a picture stands "
+                "where it shows it; leave one of them out."
+            )
+        panorama(str(environment))
+        changes |= {"environment": environment, "azimuth": None, "elevation": None}
+    elif environment is not None:
         changes["environment"] = _named("environment", environment, ENVIRONMENTS)
     if floor is not None:
         changes["floor"] = _named("floor", floor, FLOORS)
@@ -55,12 +64,24 @@ def chosen_light(own: Light | None, environment: str | None, sun: str | None, fl
     return light.model_copy(update=changes) if changes else light
 
 
-@functools.lru_cache(maxsize=64)
 def look_of(
     environment: str, azimuth: float | None = None, elevation: float | None = None, floor: str | None = None,
     dim: int = 3,
 ) -> Look:  # fmt: skip
-    """Return a look by the name of its environment; the same object for the same light."""
+    """Return a look by the name of its environment, or of a file; the same object for the same light."""
+    if is_picture(environment):
+        return _paved_once(panorama(environment).look, floor)
+    return _look_of(environment, azimuth, elevation, floor, dim)
+
+
+@functools.lru_cache(maxsize=16)
+def _paved_once(look: Look, floor: str | None) -> Look:
+    paved = _paved(look, floor)
+    return dataclasses.replace(paved, below=lit_floor(paved))
+
+
+@functools.lru_cache(maxsize=64)
+def _look_of(environment: str, azimuth: float | None, elevation: float | None, floor: str | None, dim: int) -> Look:
     own = OWN_SUNS.get(environment)
     if own is not None:
         azimuth, elevation = own[0] if azimuth is None else azimuth, own[1] if elevation is None else elevation
@@ -141,7 +162,8 @@ def _white_room() -> Look:
 
 def _named(kind: str, name: str, known: tuple[str, ...]) -> str:
     if name not in known:
-        raise WavetankError(f"render: {kind} = {name!r} is not known; use one of {', '.join(known)}.")
+        also = ", or a picture of one (.hdr)" if kind == "environment" else ""
+        raise WavetankError(f"render: {kind} = {name!r} is not known; use one of {', '.join(known)}{also}.")
     return name
 
 

@@ -13,6 +13,7 @@ from wavetank.view.colormaps import ENTRIES, bands, rgb_of, table, to_linear
 from wavetank.view.environments import chosen_light, look_of, usual_environment, without_edges
 from wavetank.view.extent import Extent
 from wavetank.view.look import Look
+from wavetank.view.panorama import is_picture, panorama
 from wavetank.view.quantities import QUANTITIES, key_of, usual
 from wavetank.view.views import VIEWS, View
 
@@ -36,7 +37,7 @@ class Style:
     cut: str | None = None  # where a slice lies: an axis, as "z", or an axis and a place in m, as "z=0.35"
     legend: bool = True
     lit: int | None = None  # number of a solid that shines, as under a pointer
-    environment: str | None = None  # one of ENVIRONMENTS; None is the scene's, or what is usual for the view
+    environment: str | None = None  # one of ENVIRONMENTS; or a file (.hdr); None is the scene's, or the view's
     sun: str | None = None  # azimuth and elevation [deg], as "40,25"
     floor: str | None = None  # one of FLOORS
     glare: bool = False  # spread what is much brighter than white as an eye does, in worlds in space; film and high
@@ -107,6 +108,10 @@ class Style:
         environment = light.environment or usual_environment(frame.dim, self.kind.coloured)
         look = look_of(environment, light.azimuth, light.elevation, light.floor, frame.dim)
         return look if self.edges else without_edges(look)
+
+    def sky(self) -> np.ndarray | None:
+        """Return the picture that the sky of a traced picture is, float32 [rows, columns, 3], or None."""
+        return panorama(str(self.environment)).sky if is_picture(self.environment) else None
 
     def particle_radius(self, extent: Extent) -> float:
         """Radius of a drawn particle [m]."""

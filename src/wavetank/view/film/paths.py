@@ -62,6 +62,10 @@ class Setting:
     focus: qd.f32  # m: depth that is sharp
     under: qd.i32  # 1 where the eye is in the water
     brightest: qd.f32  # radiance that a sample is bent to, so that none stands out
+    sky: (
+        qd.types.ndarray()
+    )  # vec3 [rows, columns]: a picture in the place of the sky, see `panorama.py`; [1, 1] without
+    hung: qd.i32  # 1 where there is one
 
 
 @qd.kernel(fastcache=True)
@@ -170,7 +174,7 @@ def follow(
             if what == 1:
                 far = smoothstep(((at - setting.middle).norm() * (1.0 / setting.size) - 1.5) * 0.2)
             if what == 0 or far > 0.0:
-                sky = background(look, ahead)
+                sky = sky_at(look, setting, ahead)
                 if ahead.y < 0.0 and what == 0:
                     sky = look.below
                 if dull == 1:
@@ -296,6 +300,25 @@ def follow(
         if bounce >= 24 + 60 * medium.murky or (shadow == 0 and value.max() < 1e-3):
             going = 0
     return light, albedo, shape, glossy + dull
+
+
+@qd.func
+def sky_at(look: Look, setting: Setting, ahead):
+    """Radiance of the sky in a direction, between four pixels where it is a picture."""
+    result = vec3(0.0, 0.0, 0.0)
+    if setting.hung == 0:
+        result = background(look, ahead)
+    else:
+        rows, columns = setting.sky.shape[0], setting.sky.shape[1]
+        x = (qd.atan2(ahead.x, -ahead.z) * 0.159154943 + 0.5) * columns - 0.5
+        y = (0.5 - qd.asin(qd.min(qd.max(ahead.y, -1.0), 1.0)) * 0.318309886) * rows - 0.5
+        left, top = qd.floor(x), qd.floor(y)
+        for k in range(4):
+            share = (1.0 - qd.abs(left + k % 2 - x)) * (1.0 - qd.abs(top + k // 2 - y))
+            column = (qd.cast(left, qd.i32) + k % 2 + columns) % columns
+            row = qd.min(qd.max(qd.cast(top, qd.i32) + k // 2, 0), rows - 1)
+            result += share * setting.sky[row, column]
+    return result
 
 
 @qd.func

@@ -1,6 +1,7 @@
 """A path-traced picture: instants of the open shutter, photons and samples for each, until all samples are there."""
 
 import dataclasses
+import hashlib
 import math
 from collections.abc import Callable
 from typing import Any
@@ -40,6 +41,8 @@ class Tracer:
             mean=qd.ndarray(vec3, shape=shape), half=qd.ndarray(vec3, shape=shape),
             albedo=qd.ndarray(vec3, shape=shape), shape=qd.ndarray(vec4, shape=shape),
         )  # fmt: skip
+        self._sky: Any = qd.ndarray(vec3, shape=(1, 1))
+        self._seen = ""  # digest of what is in it; empty where there is no picture
         self._room: field.FieldRoom | None = None
         self._photons: light.Photons | None = None
         self._spare: tuple[Any, Any, Any] | None = None
@@ -47,7 +50,9 @@ class Tracer:
     def draw(self, shot: Shot, style: Style, watch: Watch) -> None:
         """Fill `color` with the picture of a style; stopped, with what there is of it."""
         options = (style.samples, style.aperture, style.focus, style.shutter)
-        digest = digest_of(shot, (*options, self.buffers.rows, self.buffers.columns)) if watch.path else ""
+        self._hang(style.sky())
+        about = (*options, self.buffers.rows, self.buffers.columns, self._seen)
+        digest = digest_of(shot, about) if watch.path else ""
         watch.begun = watch.done = load(watch.path, self.film, digest) if watch.path else 0
 
         def tell(done: int) -> bool:
@@ -67,6 +72,15 @@ class Tracer:
             shape = (self.buffers.rows, self.buffers.columns)
             self._spare = (qd.ndarray(vec3, shape=shape), qd.ndarray(vec3, shape=shape), qd.ndarray(vec2, shape=shape))
         self.buffers.pixels.color.copy_from(denoise.clean(self.film, self._spare))
+
+    def _hang(self, sky: np.ndarray | None) -> None:
+        """Put a picture in the place of the sky, or take it away."""
+        seen = "" if sky is None else hashlib.sha256(sky.tobytes()).hexdigest()
+        if seen == self._seen:
+            return
+        self._sky, self._seen = qd.ndarray(vec3, shape=(1, 1) if sky is None else sky.shape[:2]), seen
+        if sky is not None:
+            upload(self._sky, sky)
 
     def trace(
         self, shot: Shot, samples: int, *, aperture: float = 0.0, focus: float | None = None, shutter: float = 0.0,
@@ -119,10 +133,11 @@ class Tracer:
         distance = max(float(np.linalg.norm(extent.middle - lens.eye)), 0.2 * extent.radius)
         pixels = self.buffers.rows / self.buffers.supersample
         edge = 0.5 * max(1.0, pixels / 420.0) * distance / float(lens.focal) if shot.frame.scene.tank else 0.0
+        fill = vector(1.0, 1.0, 1.0) if self._seen else filled(shot.look)
         return paths.Setting(
-            fill=filled(shot.look), middle=vector(extent.middle[0], 0.0, extent.middle[2]), size=extent.radius,
-            tank=shot.walls, edge=float(edge), aperture=float(aperture), focus=max(float(depth), 1e-3), under=0,
-            brightest=BRIGHTEST,
+            fill=fill, middle=vector(extent.middle[0], 0.0, extent.middle[2]), size=extent.radius, tank=shot.walls,
+            edge=float(edge), aperture=float(aperture), focus=max(float(depth), 1e-3), under=0, brightest=BRIGHTEST,
+            sky=self._sky, hung=int(bool(self._seen)),
         )  # fmt: skip
 
     def _moved(self, shot: Shot, moved: float) -> Shot:
