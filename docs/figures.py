@@ -25,7 +25,7 @@ from wavetank.lab.validate import bounds_text, number_text, validate
 from wavetank.view.camera import Camera
 from wavetank.view.extent import extent_of_water
 from wavetank.view.renderer import Renderer
-from wavetank.view.style import QUALITIES
+from wavetank.view.style import quality_options
 
 DOCS = Path(__file__).parent
 VALIDATION = DOCS.parent / "validation"
@@ -58,6 +58,7 @@ SHOTS: dict[str, tuple[wt.Scene, float, dict[str, Any]]] = {
     "weightless-drop": (wt.Scene.load("weightless-drop"), 0.5, {}),
 }
 WHOLE_LAYERS = {"still-tank": 0.025, "still-tank-2d": 0.01}  # m: with others there is a gap, and the water sloshes
+TRACED = {"rain": 32, "jug": 32}  # samples of those whose metal and glass only paths of light show
 #: the finest spacing of a picture of the gallery, in m per m of the tank's diagonal
 GALLERY_SPACING = {2: 0.005, 3: 0.0125}
 #: The report's Figure 1, without and with foam, and what the diffuse particles make of the same moment.
@@ -80,11 +81,11 @@ def foam_figures() -> None:
 
 def picture(sim: wt.Simulation, path: Path, width: int, height: int, quality: str = "high", **options: Any) -> None:
     """Write a JPG of a world."""
-    supersample, samples = QUALITIES[quality]
+    supersample, chosen = quality_options(quality, options.pop("samples", None))
     renderer = Renderer(width, height, supersample)
     frame = sim.frame()
     camera = options.pop("camera", None) or Camera.framing_extent(extent_of_water(frame), width / height)
-    image = renderer.render(frame, camera, samples=samples, legend="view" in options, **options)
+    image = renderer.render(frame, camera, legend="view" in options, **chosen, **options)
     Image.fromarray(image).save(path, quality=86, optimize=True, progressive=True)
 
 
@@ -116,19 +117,22 @@ def gallery(names: list[str]) -> None:
         fine = WHOLE_LAYERS.get(name, round(GALLERY_SPACING[scene.dim] * size, 4))
         scene = scene.changed(spacing=min(scene.spacing, fine))
         moment, count = SHOWN_AT.get(name, USUAL_TIME), len(scene.particles()[0])
-        if any(fluid.shape == "filled" for fluid in scene.fluids):  # what is in the way is known to a simulation
+        # What is in the way of fluids is known to a simulation.
+        if name in TRACED or any(fluid.shape == "filled" for fluid in scene.fluids):
             count = wt.Simulation(scene).count
         if name in names or not names:
             sim = wt.Simulation(scene)
             sim.advance(moment)
             usual = Camera.framing_extent(extent_of_water(sim.frame()), 16 / 9)
             camera = dataclasses.replace(usual, eye=SEEN_FROM.get(name, usual.eye))
-            picture(sim, folder / f"{name}.jpg", 960, 540, camera=camera)
+            how = {"quality": "film", "samples": TRACED[name]} if name in TRACED else {}
+            picture(sim, folder / f"{name}.jpg", 960, 540, camera=camera, **how)
             print(name, count, flush=True)
         eye = f" --eye {','.join(map(str, SEEN_FROM[name]))}" if name in SEEN_FROM else ""
+        quality = f"film --samples {TRACED[name]}" if name in TRACED else "high"
         rows.append(
             f"## {scene.title}\n\n![{scene.title}](gallery/{name}.jpg)\n\n"
-            f"`wavetank render {name} --at {moment:g} --set spacing={scene.spacing:g}{eye} --quality high`"
+            f"`wavetank render {name} --at {moment:g} --set spacing={scene.spacing:g}{eye} --quality {quality}`"
             f" ({count:,} particles)\n"
         )
     head = "# Gallery\n\nEvery bundled scene, drawn by the command below its picture; made by `make gallery`.\n\n"

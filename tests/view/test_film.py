@@ -373,6 +373,36 @@ def test_samples_of_another_picture_are_begun_anew(tmp_path):
     assert watch.begun == 0
 
 
+def moving(velocity, motion):
+    ball = {"center": (0.5, 0.5, 0.5), "radius": 0.2, "color": "#d02020"}
+    body = wt.Sphere(name="ball", **ball, density=500.0, velocity=velocity)
+    carried = wt.Sphere(name="ball", **(ball | {"center": ("0.5 + 2*t", 0.5, 0.5)}))
+    scene = wt.Scene(
+        spacing=0.1, gravity=(0, 0, 0), fluids=[wt.Points(positions=[[0.5, 2.5, 0.5]])],
+        solids=[carried if motion else body],
+    )  # fmt: skip
+    camera = wt.Camera(eye=(0.5, 0.5, 5.0), target=(0.5, 0.5, 0.5), field_of_view=math.radians(20.0))
+    frame = wt.Simulation(scene).frame()
+    return [
+        wt.render(frame, 96, 64, quality="film", samples=16, camera=camera, shutter=shutter).astype(int)[32]
+        for shutter in (0.0, 0.1)
+    ]
+
+
+@pytest.mark.parametrize("motion", [True, False])
+def test_solids_move_while_the_shutter_is_open(motion):
+    """At 2 m/s and 0.1 s a ball is smeared over 0.2 m, half of them to each side, and no farther."""
+    still, open_for = (row[:, 0] - row[:, 1] for row in moving((2.0, 0.0, 0.0), motion))
+    pixel = 2.0 * 4.5 * math.tan(math.radians(10.0)) / 64
+    wide = [np.flatnonzero(red > 40) for red in (still, open_for)]
+    sharp = wide[0][-1] - wide[0][0]
+    assert sharp == pytest.approx(0.4 / pixel, abs=2.5)
+    smeared = np.flatnonzero(open_for > 5)  # its ends are there in one of eight instants
+    assert smeared[-1] - smeared[0] == pytest.approx((0.4 + 7 / 8 * 0.2) / pixel, abs=4.0)
+    assert smeared[-1] - smeared[0] > sharp + 4
+    assert abs((smeared[-1] + smeared[0]) - (wide[0][-1] + wide[0][0])) <= 3  # about where it is
+
+
 PICTURE = """
 import hashlib, wavetank as wt
 scene = wt.Scene(

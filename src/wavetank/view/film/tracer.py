@@ -15,6 +15,7 @@ from wavetank.view.film import balls, denoise, field, light, paths
 from wavetank.view.film.march import World
 from wavetank.view.film.medium import Medium, medium_of
 from wavetank.view.film.samples import Watch, digest_of, load, store
+from wavetank.view.film.shifted import shifted
 from wavetank.view.lens import vec2, vec3, vec4, vector
 from wavetank.view.look import Look
 from wavetank.view.optics.radiance import background
@@ -98,7 +99,7 @@ class Tracer:
             end = samples * (number + 1) // len(slices)
             if done >= end:
                 continue
-            now = self._moved(shot, moved)
+            now = shot if moved == 0.0 else dataclasses.replace(shot, frame=shifted(shot.frame, moved))
             world = self._world(now, shutter, moved)
             medium = medium_of(now, world.field.grid)
             photons = self._lit(now, world, medium, number, len(slices))
@@ -139,15 +140,6 @@ class Tracer:
             edge=float(edge), aperture=float(aperture), focus=max(float(depth), 1e-3), under=0, brightest=BRIGHTEST,
             sky=self._sky, hung=int(bool(self._seen)),
         )  # fmt: skip
-
-    def _moved(self, shot: Shot, moved: float) -> Shot:
-        """Return the shot of an instant, with the particles where they have gone to."""
-        if moved == 0.0 or not shot.frame.count:
-            return shot
-        frame = shot.frame
-        x = qd.ndarray(vec3, shape=frame.x.shape)
-        upload(x, download(frame.x) + np.float32(moved) * download(frame.v))
-        return dataclasses.replace(shot, frame=dataclasses.replace(frame, x=x))
 
     def _world(self, shot: Shot, shutter: float, moved: float) -> World:
         """Return all that rays may meet at an instant."""
