@@ -28,9 +28,11 @@ class Strips:
     run: qd.i32  # rows of each
 
 
-def strips_of(array: Any, together: int = 1) -> Strips:
-    """Return the strips of a device array [rows, columns, ...]; so many columns share something and stay together."""
-    return _strips(int(array.shape[0]), int(array.shape[1]), threads(), together)
+def strips_of(array: Any, together: int = 1, tall: int = 1) -> Strips:
+    """Return the strips of a device array [rows, columns, ...]; so many columns share something and stay together, and
+    a strip is that many rows `tall`.
+    """
+    return _strips(int(array.shape[0]) // tall, int(array.shape[1]), threads(), together)
 
 
 @functools.lru_cache(maxsize=64)

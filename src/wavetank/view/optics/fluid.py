@@ -26,17 +26,18 @@ class Optics:
     spacing: qd.f32  # m
     disc: qd.f32  # m: radius of a particle's disc in a plane
     slack: qd.f32  # m: depth by which an edge of the tank wins
-    samples: qd.i32  # computed pixels beside each other that see the same through a body of water
+    samples: qd.i32  # computed pixels beside each other that see the same through a body of water,
+    tall: qd.i32  # and rows of them
     under: qd.i32  # 1 where the eye is in the water
 
 
-def optics_of(shot: Shot, under: int = 0, samples: int = 1) -> Optics:
+def optics_of(shot: Shot, under: int = 0, samples: int = 1, tall: int = 1) -> Optics:
     """Return what the fluid of a picture does to light."""
     return remembered(Optics(
         absorption=shot.absorption, scattering=shot.scattering, glow=vector(*(shot.look.glow * shot.tint)),
         usual=shot.usual, coarse=float(coarseness(shot)), fine=float(fineness(shot)), unit=shot.extent.spacing / UNIT,
         spacing=shot.extent.spacing, disc=DISC[2] * shot.extent.spacing,
-        slack=2.0 * shot.radius, under=under, samples=samples,
+        slack=2.0 * shot.radius, under=under, samples=samples, tall=tall,
     ))  # fmt: skip
 
 

@@ -66,8 +66,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water)
     lay(
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit,
-        strips_of(pixels.depth, together), shot.lens, shot.water_sun, shot.look,
-        optics_of(shot, under_water(shot, buffers), together), inside,
+        strips_of(pixels.depth, together, buffers.supersample), shot.lens, shot.water_sun, shot.look,
+        optics_of(shot, under_water(shot, buffers), together, buffers.supersample), inside,
         10 * int(water.thickness.fluids > 0) + world,
     )  # fmt: skip
 
@@ -130,93 +130,100 @@ def lay(
     with several fluids.
     """
     for task in range(strips.count):
-        row, begin, end = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
-        # What is seen through a body of water is found once for what lies beside each other in a pixel, or in two.
+        band, begin, end = strip(strips, task, pixels.depth.shape[0] // optics.tall, pixels.depth.shape[1])
+        beside, block = optics.samples, optics.samples * optics.tall
+        # What is seen through a body of water is found once for all samples of a pixel, or of two: one after the other.
         kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
         kept_above, kept_whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
-        for column in range(begin, end):
-            result = backdrop.behind[row, column]
-            z, back = qd.bit_cast(surface.depth[row, column], qd.f32), qd.bit_cast(pixels.depth[row, column], qd.f32)
-            front = 1.7e38
-            if optics.under == 1:
-                result = from_within(thickness.water, lens, optics, row, column, back, result)
-            elif z < 1e30:
-                ray = view_ray(lens, row, column)
-                origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
-                ends, turns, wall = tank_interval(lens, origin, direction, inside.walls)
-                front = qd.max(z, ends[0])
-                if ends[0] <= ends[1] and front < back:
-                    # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
-                    wet, there, cover, edge, rise = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0)
-                    if qd.static(world % 10 >= 3):
-                        at_pane = ends[0] > lens.near and wall.y == 0.0  # not through the open top
-                        if at_pane and z < ends[0] - optics.spacing:
-                            wet = 1.0
-                        else:
-                            rise = rise_at(row, column, z, 3.0 * optics.spacing, surface.depth)
-                            if at_pane and z < ends[0] + optics.spacing:
-                                wet = 1.0 - share_behind(z, ends[0], rise, vec2(turns.x, turns.y))
-                            if z > ends[1] - optics.spacing:
-                                there = 1.0 - share_behind(z, ends[1], rise, vec2(turns.z, turns.w))
-                    rim = surface.rim[row, column]
-                    if rim > 0:
-                        edge = qd.bit_cast(rim_key(rim), qd.f32)
-                        cover = rim_cover(rim)
-                        if edge + optics.spacing > z:
-                            there *= qd.select(wet < 1.0, cover, 1.0)
-                            cover = 0.0
-                        else:
-                            stands = qd.min((z - edge) / optics.spacing - 1.0, 1.0)
-                            cover *= qd.select(edge > ends[0], stands, 0.0)
-                    first, second = there * (1.0 - cover) * wet, there * (1.0 - cover) * (1.0 - wet)
-                    result *= 1.0 - (first + second + cover)
-                    for layer in range(3):
-                        share, n, at = first, wall, front
-                        if layer == 1:
-                            share = second
-                            if qd.static(world % 10 >= 3):
-                                n = normal_of(lens, row, column, z, rise)
-                        elif layer == 2:
-                            share, at = cover, edge
-                            if qd.static(world % 10 >= 3):
-                                if share > 0.0:
-                                    n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
-                        if share > 0.0:
-                            body = vec4(0.0, 0.0, 0.0, -1.0)
-                            above, whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
-                            if qd.static(world % 10 >= 3):
-                                # A tank, and without bent rays to meet them no solid in it.
-                                wide = back > 0.999 * ends[1]
-                                if qd.static(world % 10 == 4):
-                                    wide = True
-                                if inside.walls.upper.x < 1e5 and wide:
-                                    pixel = column // optics.samples
-                                    near = qd.abs(at - kept_z) < 0.3 * optics.spacing
-                                    if pixel != kept_pixel or layer != kept_layer or not near:
-                                        ahead = direction.normalized()
-                                        cosi = qd.max(-n.dot(ahead), 0.05)
-                                        kept, kept_above, kept_whole = through_body(
-                                            pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
-                                            inside, at, origin + at * direction, refracted(ahead, n, cosi),
-                                            qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0),
-                                            qd.static(world % 10 == 4),
-                                        )  # fmt: skip
-                                        kept_z, kept_layer, kept_pixel = at, layer, pixel
-                                    body, above, whole = kept, kept_above, kept_whole
-                            result += share * shine(
-                                pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside, row, column,
-                                at, n, origin, direction, body, above, whole, qd.static(world % 10),
-                                qd.static(world >= 10),
-                            )  # fmt: skip
-                    line = line_cover(pixels.lines[row, column], front, optics.slack)
-                    result += look.line_strength * there * line * (look.line - result)
-                    if there < 0.5:
+        for index in range((end - begin + beside - 1) // beside * block):
+            part = index % block
+            row, column = band * optics.tall + part // beside, begin + index // block * beside + part % beside
+            if column < end:
+                result = backdrop.behind[row, column]
+                z, back = (
+                    qd.bit_cast(surface.depth[row, column], qd.f32),
+                    qd.bit_cast(pixels.depth[row, column], qd.f32),
+                )
+                front = 1.7e38
+                if optics.under == 1:
+                    result = from_within(thickness.water, lens, optics, row, column, back, result)
+                elif z < 1e30:
+                    ray = view_ray(lens, row, column)
+                    origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
+                    ends, turns, wall = tank_interval(lens, origin, direction, inside.walls)
+                    front = qd.max(z, ends[0])
+                    if ends[0] <= ends[1] and front < back:
+                        # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
+                        wet, there, cover, edge, rise = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0)
+                        if qd.static(world % 10 >= 3):
+                            at_pane = ends[0] > lens.near and wall.y == 0.0  # not through the open top
+                            if at_pane and z < ends[0] - optics.spacing:
+                                wet = 1.0
+                            else:
+                                rise = rise_at(row, column, z, 3.0 * optics.spacing, surface.depth)
+                                if at_pane and z < ends[0] + optics.spacing:
+                                    wet = 1.0 - share_behind(z, ends[0], rise, vec2(turns.x, turns.y))
+                                if z > ends[1] - optics.spacing:
+                                    there = 1.0 - share_behind(z, ends[1], rise, vec2(turns.z, turns.w))
+                        rim = surface.rim[row, column]
+                        if rim > 0:
+                            edge = qd.bit_cast(rim_key(rim), qd.f32)
+                            cover = rim_cover(rim)
+                            if edge + optics.spacing > z:
+                                there *= qd.select(wet < 1.0, cover, 1.0)
+                                cover = 0.0
+                            else:
+                                stands = qd.min((z - edge) / optics.spacing - 1.0, 1.0)
+                                cover *= qd.select(edge > ends[0], stands, 0.0)
+                        first, second = there * (1.0 - cover) * wet, there * (1.0 - cover) * (1.0 - wet)
+                        result *= 1.0 - (first + second + cover)
+                        for layer in range(3):
+                            share, n, at = first, wall, front
+                            if layer == 1:
+                                share = second
+                                if qd.static(world % 10 >= 3):
+                                    n = normal_of(lens, row, column, z, rise)
+                            elif layer == 2:
+                                share, at = cover, edge
+                                if qd.static(world % 10 >= 3):
+                                    if share > 0.0:
+                                        n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
+                            if share > 0.0:
+                                body = vec4(0.0, 0.0, 0.0, -1.0)
+                                above, whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
+                                if qd.static(world % 10 >= 3):
+                                    # A tank, and without bent rays to meet them no solid in it.
+                                    wide = back > 0.999 * ends[1]
+                                    if qd.static(world % 10 == 4):
+                                        wide = True
+                                    if inside.walls.upper.x < 1e5 and wide:
+                                        pixel = column // optics.samples
+                                        near = qd.abs(at - kept_z) < 0.3 * optics.spacing
+                                        if pixel != kept_pixel or layer != kept_layer or not near:
+                                            ahead = direction.normalized()
+                                            cosi = qd.max(-n.dot(ahead), 0.05)
+                                            kept, kept_above, kept_whole = through_body(
+                                                pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
+                                                inside, at, origin + at * direction, refracted(ahead, n, cosi),
+                                                qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0),
+                                                qd.static(world % 10 == 4),
+                                            )  # fmt: skip
+                                            kept_z, kept_layer, kept_pixel = at, layer, pixel
+                                        body, above, whole = kept, kept_above, kept_whole
+                                result += share * shine(
+                                    pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside, row, column,
+                                    at, n, origin, direction, body, above, whole, qd.static(world % 10),
+                                    qd.static(world >= 10),
+                                )  # fmt: skip
+                        line = line_cover(pixels.lines[row, column], front, optics.slack)
+                        result += look.line_strength * there * line * (look.line - result)
+                        if there < 0.5:
+                            front = 1.7e38
+                    else:
                         front = 1.7e38
-                else:
-                    front = 1.7e38
-            pixels.color[row, column] = result
-            key = qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
-            surface.nearest[row, column] = qd.min(key, pixels.depth[row, column])
+                pixels.color[row, column] = result
+                key = qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
+                surface.nearest[row, column] = qd.min(key, pixels.depth[row, column])
 
 
 @qd.func
