@@ -23,7 +23,7 @@ from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
 from wavetank.simulation.acting import Acting
-from wavetank.simulation.added_mass import added_mass
+from wavetank.simulation.added_mass import ALONG, added_mass, grip
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
 from wavetank.simulation.coupling import Coupling
@@ -36,7 +36,6 @@ from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
 MOST_TRIES = 4  # of a step
-FAR = 0.3  # of a spacing: bodies that yield by more begin the step anew
 FEWEST = 6.0  # pieces across a body
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
 
@@ -79,7 +78,11 @@ class Bodies(Mapping[str, Body]):
         for joint in self.joints.values():
             joint.ask(functools.partial(given, self.members, self.joints))
         self._weigh_all(numbers)
-        solids.feel({body.number: (body.dry.center, body.unit) for body in self.members})
+        far, along = scene.support * scene.spacing, ALONG * self.coupling.added
+        solids.feel({
+            body.number: (body.dry.center, body.unit, grip(self.dim, body.dry, body.wet, along[body.row], far))
+            for body in self.members
+        })  # fmt: skip
         self.numbers = np.array([body.number for body in self.members])
         self.units = np.array([body.unit for body in self.members])  # 1/m
         self.wet_masses = np.array([body.wet.mass for body in self.members])  # kg
@@ -228,7 +231,7 @@ class Bodies(Mapping[str, Body]):
     def step(self, world: World, scene: Scene, dt: float, fastest: float, part: tuple[float, float]) -> None:
         """Let the water take a step of `dt` [s], which is that `part` of a frame.
 
-        Where bodies are pushed harder than they were, they yield, and the water follows; where that is far, the step
+        Where bodies are pushed harder than they were, they yield, and the water follows; where one was hit, the step
         is taken again.
         """
         if not self.members:
@@ -240,13 +243,15 @@ class Bodies(Mapping[str, Body]):
         def settle() -> bool | None:
             nonlocal tries
             self.feel(world, dt)
+            self.coupling.expect()
             if tries == MOST_TRIES or not self.yielded(dt, part[1]):
                 return False
-            tries += 1
             # The room that bodies leave for water is what it was, but for what they yielded by.
             world.solids_version = world.room_version = self.solids.move_to(*part)
-            far = self.coupling.is_hit or self.coupling.yielded_by * dt > FAR * scene.spacing
-            return None if far else True
+            if self.coupling.is_hit:
+                tries += 1
+                return None
+            return True
 
         while True:
             upload(world.solids.reaction, self.nothing)
@@ -254,6 +259,7 @@ class Bodies(Mapping[str, Body]):
                 break
             self.retry.restore(world.particles, world.count)
         self.feel(world, dt)
+        self.coupling.end()
 
     def feel(self, world: World, dt: float) -> None:
         """Take what the water did to the bodies in a step of `dt` [s]."""
