@@ -43,6 +43,7 @@ from wavetank.foundation.rotations import matrix_of
 
 TOLERANCE = 0.2  # of sqrt(g d), or of its speed: a body's wrong velocity, times k / m, by which it yields in a step
 HARD = 0.5  # the same, in motion alone, where water was pushed aside that must not have been: the step begins anew
+LIGHT = 2.0  # water that goes along, over a body's mass, from which on: heavier ones are not thrown up again
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
 AT_ONCE = 0.2  # of what is owed: more would ring
 STAYS = 0.9  # share that is left after a step of what was seen of how much water goes along
@@ -165,7 +166,7 @@ class Coupling:
         speeds = np.linalg.norm(self.velocity[:, :3], axis=1)
         wrong /= np.maximum(np.maximum(slow, speeds), 1e-30)[:, None]
         yielding = wrong.max(axis=1) > TOLERANCE
-        self.is_hit = bool((wrong[:, 0] > HARD).any())
+        self.is_hit = bool(((wrong[:, 0] > HARD) & (heavier[:, 0] > LIGHT)).any())
         self.along = np.where(yielding[:, None], self.along, before)
         step = np.where(yielding[:, None], self.solved(rotations, asked), 0.0)
         self.wanted, self._given_way = self.wanted + step, self._given_way + step
