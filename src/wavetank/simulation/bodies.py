@@ -36,7 +36,7 @@ from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
 MOST_TRIES = 4  # of a step
-FEWEST = 6.0  # pieces across a body
+FEWEST = 4.0  # pieces across a body
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
 
 
