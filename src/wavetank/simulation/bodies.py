@@ -36,6 +36,7 @@ from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
 MOST_TRIES = 4  # of a step
+FAR = 0.3  # of a spacing: bodies that yield by more begin the step anew
 FEWEST = 4.0  # pieces across a body
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
 
@@ -282,7 +283,7 @@ class Bodies(Mapping[str, Body]):
         The step of `dt` [s] is then to be taken again: the water pushed as if the body could not give way.
         """
         slow = float(np.linalg.norm(self.gravity) * self.scene.spacing) ** 0.5
-        if not self.coupling.yields(self._rotations(), slow):
+        if not self.coupling.yields(self._rotations(), slow, FAR * self.scene.spacing):
             return False
         for handle, position in self.begun:
             self.world.rigid_bodies[handle].position = position

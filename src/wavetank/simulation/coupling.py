@@ -43,6 +43,7 @@ from wavetank.foundation.rotations import matrix_of
 
 TOLERANCE = 0.2  # of sqrt(g d), or of its speed: a body's wrong velocity, times k / m, by which it yields in a step
 HARD = 0.5  # the same, in motion alone, where water was pushed aside that must not have been: the step begins anew
+JAMMING = 6.0  # by how much less a body may yield towards the water than away from it within a step
 LIGHT = 2.0  # water that goes along, over a body's mass, from which on: heavier ones are not thrown up again
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
 AT_ONCE = 0.2  # of what is owed: more would ring
@@ -150,11 +151,12 @@ class Coupling:
         least = np.maximum(self.immersed, AFLOAT * carried)
         return np.clip(along, least[:, None] * self.added, MOST * self.added)
 
-    def yields(self, rotations: np.ndarray, slow: float) -> bool:
+    def yields(self, rotations: np.ndarray, slow: float, farthest: float) -> bool:
         """Let bodies want other velocities where theirs turned out to be wrong; say whether any does.
 
         Those are wrong that are so by more than the water can make up for later: too much of `slow` [m/s], or of their
-        own, the more the heavier the water is that goes along.
+        own, the more the heavier the water is that goes along. One that yields by more than `farthest` [m], or that is
+        so light that it would be thrown up, `is_hit`: what pushed it pushed a place where it was not to be.
         """
         before = self.along
         self.along = self._bounded(before)
@@ -166,9 +168,13 @@ class Coupling:
         speeds = np.linalg.norm(self.velocity[:, :3], axis=1)
         wrong /= np.maximum(np.maximum(slow, speeds), 1e-30)[:, None]
         yielding = wrong.max(axis=1) > TOLERANCE
-        self.is_hit = bool(((wrong[:, 0] > HARD) & (heavier[:, 0] > LIGHT)).any())
         self.along = np.where(yielding[:, None], self.along, before)
         step = np.where(yielding[:, None], self.solved(rotations, asked), 0.0)
+        ways = np.stack([np.linalg.norm(step[:, block], axis=1) for block in BLOCKS], axis=1) * self.lasted
+        is_thrown = (wrong[:, 0] > HARD) & (heavier[:, 0] > LIGHT)
+        # One that yields towards the water may jam particles that are where they are by its other way.
+        ways[:, 0] *= np.where((step[:, :3] * self.impulse[:, :3]).sum(axis=1) < 0.0, JAMMING, 1.0)
+        self.is_hit = bool((is_thrown | (ways[:, 0] + self.reaches * ways[:, 1] > farthest)).any())
         self.wanted, self._given_way = self.wanted + step, self._given_way + step
         return bool(yielding.any())
 
