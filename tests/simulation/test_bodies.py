@@ -324,3 +324,16 @@ def test_friction_does_not_turn_small_bodies_back_and_forth():
             torques.append([body.torque / (9.81 * body.mass * body.solid.reach()) for body in sim.bodies.values()])
     changes = np.linalg.norm(np.diff(torques, axis=0), axis=-1)
     assert np.sqrt(np.mean(changes**2, axis=0)).max() < 0.05  # of weight times reach; 0.27 where all slip is taken
+
+
+def test_a_heavy_box_comes_down_on_the_floor_of_a_plane_and_is_not_thrown_up_again():
+    """It weighs a fifth of the water's push more than that: what is caught below it must not throw it."""
+    box = wt.Box(name="box", center=(0.4, 0.25), size=(0.3, 0.2), density=1200)
+    block = wt.Block(lower=(0, 0), upper=(0.8, 0.4))
+    scene = wt.Scene(spacing=0.02, tank=wt.Tank(size=(0.8, 0.8)), fluids=[block], solids=[box], foam=0.0)
+    sim, fastest = wt.Simulation(scene), 0.0
+    for _ in range(300):
+        sim.step()
+        fastest = max(fastest, float(np.linalg.norm(sim.bodies["box"].velocity)))
+    assert fastest < 1.0
+    assert sim.bodies["box"].position[1] == pytest.approx(0.1, abs=0.02)
