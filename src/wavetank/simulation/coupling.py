@@ -41,7 +41,7 @@ import numpy as np
 
 from wavetank.foundation.rotations import matrix_of
 
-TOLERANCE = 0.2  # of sqrt(g d), or of its speed: a body's wrong velocity, times k / m, by which it yields in a step
+TOLERANCE = np.array([0.05, 0.2])  # of sqrt(g d), or of its speed: a body's wrong motion and turn, times k / m
 HARD = 0.5  # the same, in motion alone, where water was pushed aside that must not have been: the step begins anew
 JAMMING = 6.0  # by how much less a body may yield towards the water than away from it within a step
 LIGHT = 2.0  # water that goes along, over a body's mass, from which on: heavier ones are not thrown up again
@@ -167,7 +167,7 @@ class Coupling:
         wrong[:, 1] *= self.reaches
         speeds = np.linalg.norm(self.velocity[:, :3], axis=1)
         wrong /= np.maximum(np.maximum(slow, speeds), 1e-30)[:, None]
-        yielding = wrong.max(axis=1) > TOLERANCE
+        yielding = (wrong > TOLERANCE).any(axis=1)
         self.along = np.where(yielding[:, None], self.along, before)
         step = np.where(yielding[:, None], self.solved(rotations, asked), 0.0)
         ways = np.stack([np.linalg.norm(step[:, block], axis=1) for block in BLOCKS], axis=1) * self.lasted
