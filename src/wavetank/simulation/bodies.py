@@ -87,6 +87,7 @@ class Bodies(Mapping[str, Body]):
         self.numbers = np.array([body.number for body in self.members])
         self.units = np.array([body.unit for body in self.members])  # 1/m
         self.wet_masses = np.array([body.wet.mass for body in self.members])  # kg
+        self.coupling.sinks = self.coupling.masses > self.wet_masses
         self.pieces = self._pieces()
         self.nothing = np.zeros(PARTS * len(solids.members), np.int32)
 

@@ -81,6 +81,7 @@ class Coupling:
         self._inertias = np.stack([masses, np.linalg.norm(tensors, 2, axis=(1, 2))], axis=1)  # kg, kg m^2
         self._given_way = np.zeros((count, 6))  # m/s, rad/s, by how much they have yielded in this step
         self._so_far, self._to_come = np.zeros((count, 6)), np.zeros((count, 6))  # of `impulse`, in this step
+        self.sinks = np.zeros(count, bool)  # denser than water: what is caught below it on a floor must not throw it
         self.is_hit = False  # whether one was so hard that the step has to begin anew
 
     @property
@@ -171,7 +172,7 @@ class Coupling:
         self.along = np.where(yielding[:, None], self.along, before)
         step = np.where(yielding[:, None], self.solved(rotations, asked), 0.0)
         ways = np.stack([np.linalg.norm(step[:, block], axis=1) for block in BLOCKS], axis=1) * self.lasted
-        is_thrown = (wrong[:, 0] > HARD) & (heavier[:, 0] > LIGHT)
+        is_thrown = (wrong[:, 0] > HARD) & (heavier[:, 0] > LIGHT) | self.sinks & (wrong.max(axis=1) > HARD)
         # One that yields towards the water may jam particles that are where they are by its other way.
         ways[:, 0] *= np.where((step[:, :3] * self.impulse[:, :3]).sum(axis=1) < 0.0, JAMMING, 1.0)
         self.is_hit = bool((is_thrown | (ways[:, 0] + self.reaches * ways[:, 1] > farthest)).any())
