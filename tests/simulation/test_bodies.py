@@ -306,3 +306,34 @@ def test_a_cup_rests_on_the_walls_of_the_tank(dim):
     sim.advance(2.0)
     assert sim.bodies["cup"].position[:2].tolist() == pytest.approx([0.15, 0.15], abs=0.05)
     assert np.linalg.norm(sim.bodies["cup"].velocity) < 0.15
+
+
+def test_friction_does_not_turn_small_bodies_back_and_forth():
+    """A body and the water at it slide together at one speed at most: the water within reach is the heavier."""
+    places = [(0.16 + 0.32 * (k % 2), 0.32, 0.16 + 0.32 * (k // 2)) for k in range(4)]
+    boxes = [
+        wt.Box(center=place, size=(0.14, 0.11, 0.15), density=density, rotation=(1.0, 0.1 * k, 0.0, 0.2))
+        for k, (place, density) in enumerate(zip(places, (300.0, 500.0, 700.0, 500.0), strict=True))
+    ]
+    block = wt.Block(lower=(0, 0, 0), upper=(0.64, 0.32, 0.64))
+    sim = wt.Simulation(wt.Scene(spacing=0.04, tank=wt.Tank(size=(0.64, 0.8, 0.64)), fluids=[block], solids=boxes))
+    torques = []
+    for frame in range(180):
+        sim.step()
+        if frame >= 150:
+            torques.append([body.torque / (9.81 * body.mass * body.solid.reach()) for body in sim.bodies.values()])
+    changes = np.linalg.norm(np.diff(torques, axis=0), axis=-1)
+    assert np.sqrt(np.mean(changes**2, axis=0)).max() < 0.05  # of weight times reach; 0.27 where all slip is taken
+
+
+def test_a_heavy_box_comes_down_on_the_floor_of_a_plane_and_is_not_thrown_up_again():
+    """It weighs a fifth of the water's push more than that: what is caught below it must not throw it."""
+    box = wt.Box(name="box", center=(0.4, 0.25), size=(0.3, 0.2), density=1200)
+    block = wt.Block(lower=(0, 0), upper=(0.8, 0.4))
+    scene = wt.Scene(spacing=0.02, tank=wt.Tank(size=(0.8, 0.8)), fluids=[block], solids=[box], foam=0.0)
+    sim, fastest = wt.Simulation(scene), 0.0
+    for _ in range(300):
+        sim.step()
+        fastest = max(fastest, float(np.linalg.norm(sim.bodies["box"].velocity)))
+    assert fastest < 1.0
+    assert sim.bodies["box"].position[1] == pytest.approx(0.1, abs=0.02)

@@ -76,7 +76,7 @@ def apply_friction(
                         if solids.unit[k] > 0.0:  # a body that is on its way is not held up
                             calming *= qd.max(free(), 1.0 - moving.norm_sqr() * resting() * c.slow_at_solids)
                         share += calming
-                    change = slip * qd.min(1.0, share)
+                    change = slip * qd.min(solids.grip[k], share)
                     v -= change
                     if solids.unit[k] > 0.0:
                         scratch.push[at] -= change * (c.dt / scratch.weight[i])

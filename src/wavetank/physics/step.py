@@ -42,7 +42,7 @@ def step(
     """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s].
 
     `settle` lets bodies yield to what the water has done to them so far. True: they have, and the water is to follow.
-    None: they have gone so far that the step is to be taken again; it ends here, and returns False.
+    None: one was hit so hard that the step is to be taken again; it ends here, and returns False.
     """
     plan = plan_step(world, params, dt)
     c = coefficients(params, dt, speed_limit, carries=plan.carried, parts=plan.parts, held=plan.held)
@@ -62,13 +62,13 @@ def step(
     if plan.on_grid:
         correct_on_grid(world, plan, params, c)
 
-    for number, (relaxation, momentum) in enumerate(relaxations(params, plan.kinds.density_ratio)):  # 8-19
+    sweeps = relaxations(params, plan.kinds.density_ratio)
+    for number, (relaxation, momentum) in enumerate(sweeps):  # 8-19
+        if settle and number == max(0, len(sweeps) - SETTLING) and not settle_bodies(world, c, settle):
+            return False
         c = in_iteration(c, relaxation, momentum)
         find_multipliers(world, plan, c, first=number == 0)  # 9-11
         apply_corrections(world, plan, c, first=number == 0)  # 12-18
-
-    if settle and not settle_bodies(world, plan, params, c, settle):
-        return False
 
     if plan.is_thick:
         carry_on(world, plan.kinds, params, c)
@@ -84,16 +84,12 @@ def step(
     return True
 
 
-def settle_bodies(world: World, plan: Plan, params: Parameters, c: Coefficients, settle: Settle) -> bool:
-    """Let bodies yield and the water follow, until neither is to; return False where the step is to be taken again."""
+def settle_bodies(world: World, c: Coefficients, settle: Settle) -> bool:
+    """Let bodies yield, and the water follow in the iterations to come; return False where the step begins anew."""
     hand_over_pushes(world.scratch, world.particles, world.solids, world.count)
-    while (yielded := settle()) is True:
+    yielded = settle()
+    if yielded:
         look_at_solids(world.scratch, world.particles, world.solids, c, world.count)
-        for relaxation, momentum in relaxations(params, plan.kinds.density_ratio)[:SETTLING]:
-            c = in_iteration(c, relaxation, momentum)
-            find_multipliers(world, plan, c, first=False)
-            apply_corrections(world, plan, c, first=False)
-        hand_over_pushes(world.scratch, world.particles, world.solids, world.count)
     return yielded is not None
 
 

@@ -11,7 +11,10 @@ import functools
 
 import numpy as np
 
+from wavetank.solids.mass import Inertia
+
 THINNEST = 0.05  # of the longest axis: what is flatter is taken for this
+ALONG = 0.7  # of that of an immersed body: the water that goes along with one that floats is 0.4 to 1 of it
 
 
 @functools.lru_cache(maxsize=64)
@@ -37,3 +40,16 @@ def added_mass(axes: tuple[float, ...]) -> tuple[float, float]:
         lower = 2.0 * (b - c) + (b + c) * (beta - gamma)
         turning.append(0.2 * (b - c) ** 2 * (gamma - beta) / lower if abs(b - c) > 1e-9 * scale else 0.0)
     return float(np.max(alpha / (2.0 - alpha))), float(max(turning) / scale)
+
+
+def grip(dim: int, dry: Inertia, wet: Inertia, along: np.ndarray, far: float) -> float:
+    """Return the share of sliding after which a body and the water up to `far` [m] from it are equally fast.
+
+    What goes `along` [2] [kg, kg m^2] counts as part of the body. Friction slows all of that water: where it is
+    heavier, what a body gets by more than this share turns it back and forth from step to step.
+    """
+    axes = wet.axes[3 - dim :]
+    larger, outside = float(np.prod((axes + far) / axes)), float(np.sum((axes + far) ** 2))
+    around = wet.mass * np.array([larger - 1.0, (larger * outside - float(np.sum(axes**2))) / (dim + 2)])
+    own = along + np.array([dry.mass, 0.5 * np.trace(dry.tensor) if dim == 3 else dry.tensor[2, 2]])
+    return float((own / (own + around)).min())

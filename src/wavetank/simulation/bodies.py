@@ -23,7 +23,7 @@ from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
 from wavetank.simulation.acting import Acting
-from wavetank.simulation.added_mass import added_mass
+from wavetank.simulation.added_mass import ALONG, added_mass, grip
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
 from wavetank.simulation.coupling import Coupling
@@ -37,7 +37,7 @@ from wavetank.solids.solid import Solid
 
 MOST_TRIES = 4  # of a step
 FAR = 0.3  # of a spacing: bodies that yield by more begin the step anew
-FEWEST = 6.0  # pieces across a body
+FEWEST = 4.0  # pieces across a body
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
 
 
@@ -79,10 +79,15 @@ class Bodies(Mapping[str, Body]):
         for joint in self.joints.values():
             joint.ask(functools.partial(given, self.members, self.joints))
         self._weigh_all(numbers)
-        solids.feel({body.number: (body.dry.center, body.unit) for body in self.members})
+        far, along = scene.support * scene.spacing, ALONG * self.coupling.added
+        solids.feel({
+            body.number: (body.dry.center, body.unit, grip(self.dim, body.dry, body.wet, along[body.row], far))
+            for body in self.members
+        })  # fmt: skip
         self.numbers = np.array([body.number for body in self.members])
         self.units = np.array([body.unit for body in self.members])  # 1/m
         self.wet_masses = np.array([body.wet.mass for body in self.members])  # kg
+        self.coupling.sinks = self.coupling.masses > self.wet_masses
         self.pieces = self._pieces()
         self.nothing = np.zeros(PARTS * len(solids.members), np.int32)
 
@@ -228,7 +233,7 @@ class Bodies(Mapping[str, Body]):
     def step(self, world: World, scene: Scene, dt: float, fastest: float, part: tuple[float, float]) -> None:
         """Let the water take a step of `dt` [s], which is that `part` of a frame.
 
-        Where bodies are pushed harder than they were, they yield, and the water follows; where that is far, the step
+        Where bodies are pushed harder than they were, they yield, and the water follows; where one was hit, the step
         is taken again.
         """
         if not self.members:
@@ -240,13 +245,15 @@ class Bodies(Mapping[str, Body]):
         def settle() -> bool | None:
             nonlocal tries
             self.feel(world, dt)
+            self.coupling.expect()
             if tries == MOST_TRIES or not self.yielded(dt, part[1]):
                 return False
-            tries += 1
             # The room that bodies leave for water is what it was, but for what they yielded by.
             world.solids_version = world.room_version = self.solids.move_to(*part)
-            far = self.coupling.is_hit or self.coupling.yielded_by * dt > FAR * scene.spacing
-            return None if far else True
+            if self.coupling.is_hit:
+                tries += 1
+                return None
+            return True
 
         while True:
             upload(world.solids.reaction, self.nothing)
@@ -254,6 +261,7 @@ class Bodies(Mapping[str, Body]):
                 break
             self.retry.restore(world.particles, world.count)
         self.feel(world, dt)
+        self.coupling.end()
 
     def feel(self, world: World, dt: float) -> None:
         """Take what the water did to the bodies in a step of `dt` [s]."""
@@ -276,7 +284,7 @@ class Bodies(Mapping[str, Body]):
         The step of `dt` [s] is then to be taken again: the water pushed as if the body could not give way.
         """
         slow = float(np.linalg.norm(self.gravity) * self.scene.spacing) ** 0.5
-        if not self.coupling.yields(self._rotations(), slow):
+        if not self.coupling.yields(self._rotations(), slow, FAR * self.scene.spacing):
             return False
         for handle, position in self.begun:
             self.world.rigid_bodies[handle].position = position

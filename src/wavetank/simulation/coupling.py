@@ -12,10 +12,12 @@ for one that falls as the body gives way, P = P_before - k (dv - dv_before), whe
     (m + k) dv = P_before + k dv_before + m g dt + O
 
 What turns out to be wrong of it, O = the right-hand side of the first equation less the left, is made up for in the
-steps that follow; no momentum is lost, whatever k is. Where it is by far wrong, as where a light body hits the water,
-the body is to be faster by O / (m + k), and engine and water take the step again from where it began, so that contact
-and joints hold for what bodies yield as well. Two answers of the water say what k is (their secant), which the next
-tries go by; deep in the water it is that of an ellipsoid (`added_mass.py`).
+steps that follow; no momentum is lost, whatever k is. Where it is by far wrong the body yields within the step: some
+iterations before its end what P will be is told by what it is so far and by what came later in the step before, the
+body is to be faster by O / (m + k), the engine takes its step again, so that contact and joints hold for what bodies
+yield as well, and the iterations that are left see the body there. Where a light body hits the water so hard that this
+is too late, engine and water take the whole step again. How k answers is seen from step to step; deep in the water it
+is that of an ellipsoid (`added_mass.py`).
 
 The engine's impulse in contact and joints, (m + k) dv_c, leaves k dv_c to the water, and what the water does not take
 throws the body back: one that is out of the water would bounce with a restitution of k / m, more than one where it is
@@ -31,6 +33,7 @@ light. So no more is taken to go along with a body that is hardly wet than as fa
     wanted                  that with which the engine begins                                m/s, rad/s
     seen_push  P            of the step before, and
     seen_gain  dv           what a body's velocity has changed by in it: from step to step they say what k is by
+    later                   of P, what came after bodies might have yielded                  kg m/s, kg m^2/s
     sums                    least squares: sums of -dP ddv and of ddv^2, motion and turn, that fade by `STAYS`
 """
 
@@ -38,17 +41,17 @@ import numpy as np
 
 from wavetank.foundation.rotations import matrix_of
 
-TOLERANCE = 0.05  # of sqrt(g d), or of its speed: a body's wrong velocity, times k / m, that is worth a second step
-LATER = 1.0  # the same for a third step and more
-HARD = 0.5  # the same where water was pushed aside so hard that it must not have been: the step begins anew
+TOLERANCE = np.array([0.05, 0.2])  # of sqrt(g d), or of its speed: a body's wrong motion and turn, times k / m
+HARD = 0.5  # the same, in motion alone, where water was pushed aside that must not have been: the step begins anew
 JAMMING = 6.0  # by how much less a body may yield towards the water than away from it within a step
+LIGHT = 2.0  # water that goes along, over a body's mass, from which on: heavier ones are not thrown up again
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
 AT_ONCE = 0.2  # of what is owed: more would ring
 STAYS = 0.9  # share that is left after a step of what was seen of how much water goes along
 MOST = 4.0  # of the water that goes along with an immersed body: most that is believed
 BLOCKS = (slice(0, 3), slice(3, 6))  # motion and turn, columns of a row
 ROWS = (
-    "impulse", "due", "given", "change", "carried", "by_grid", "velocity", "before", "seen_push", "seen_gain",
+    "impulse", "due", "given", "change", "carried", "by_grid", "velocity", "before", "seen_push", "seen_gain", "later",
 )  # fmt: skip
 REMEMBERED = len(ROWS) + 2  # rows of `Coupling.memory`
 
@@ -72,15 +75,14 @@ class Coupling:
         self._heavy = np.zeros(count)  # N
         self.held = np.zeros(count, bool)  # they have no momentum of their own
         self.lasted = 0.0  # s, of the last step
+        self.later = np.zeros((count, 6))  # kg m/s, kg m^2/s
         self.wanted = np.zeros((count, 6))  # m/s, rad/s, but for contact
         self.pulled = np.zeros((count, 6))  # kg m/s, kg m^2/s: by contact and joints
         self._inertias = np.stack([masses, np.linalg.norm(tensors, 2, axis=(1, 2))], axis=1)  # kg, kg m^2
-        self._moved = np.zeros((count, 6))  # m/s, rad/s, from the try before to this one
-        self._pushed = np.zeros((count, 6))  # `impulse` of the try before
-        self._given_way = np.zeros((count, 6))  # m/s, rad/s, by how much they have yielded in this step,
-        self._yielded = np.zeros(count, bool)  # and whether they have
+        self._given_way = np.zeros((count, 6))  # m/s, rad/s, by how much they have yielded in this step
+        self._so_far, self._to_come = np.zeros((count, 6)), np.zeros((count, 6))  # of `impulse`, in this step
+        self.sinks = np.zeros(count, bool)  # denser than water: what is caught below it on a floor must not throw it
         self.is_hit = False  # whether one was so hard that the step has to begin anew
-        self.yielded_by = 0.0  # m/s, the most that any place of one has yielded by in the last try
 
     @property
     def owed(self) -> np.ndarray:
@@ -106,14 +108,22 @@ class Coupling:
         wanted = AT_ONCE * owed + weight + ratio * (self.impulse + np.repeat(self.along, 3, axis=1) * self.change)
         self.wanted = self.velocity + self.solved(rotations, wanted)
         self.carried = self.by_grid
-        self._given_way, self._yielded = np.zeros_like(owed), np.zeros(len(owed), bool)
+        self._given_way, self._to_come = np.zeros_like(owed), ratio * self.later
+
+    def expect(self) -> None:
+        """Take for what is still to come of a step what came in the step before: last iterations and friction."""
+        self._so_far = self.impulse
+        self.impulse = self.impulse + self._to_come
+
+    def end(self) -> None:
+        """See what has come since `expect`."""
+        self.later = self.impulse - self._so_far
 
     def start(self, rotations: np.ndarray, begun: np.ndarray, velocity: np.ndarray, dt: float) -> None:
         """Take a step of `dt` [s] with these velocities [n, 6]; `begun` they were before contact and joints.
 
         What makes `begun` less than `wanted`, the speed limit, takes momentum for good.
         """
-        self._moved = velocity - self.velocity
         self.velocity, self.change = velocity, velocity - self.before - self._given_way
         self.given = self.weighed(rotations, self.wanted - self.before)
         pulled, along = velocity - begun, np.repeat(self.along, 3, axis=1)
@@ -142,18 +152,15 @@ class Coupling:
         least = np.maximum(self.immersed, AFLOAT * carried)
         return np.clip(along, least[:, None] * self.added, MOST * self.added)
 
-    def yields(self, rotations: np.ndarray, slow: float) -> bool:
+    def yields(self, rotations: np.ndarray, slow: float, farthest: float) -> bool:
         """Let bodies want other velocities where theirs turned out to be wrong; say whether any does.
 
         Those are wrong that are so by more than the water can make up for later: too much of `slow` [m/s], or of their
-        own, the more the heavier the water is that goes along.
+        own, the more the heavier the water is that goes along. One that yields by more than `farthest` [m], or that is
+        so light that it would be thrown up, `is_hit`: what pushed it pushed a place where it was not to be.
         """
-        known = self._yielded & self._moved.any(axis=1)
-        less = (self._pushed - self.impulse) * self._moved
-        found = np.stack([less[:, block].sum(axis=1) for block in BLOCKS], axis=1)
-        ways = np.stack([(self._moved[:, block] ** 2).sum(axis=1) for block in BLOCKS], axis=1)
         before = self.along
-        self.along = self._bounded(np.where(known[:, None], found / np.maximum(ways, 1e-30), self.along))
+        self.along = self._bounded(before)
         asked = self.owed
         alone = self.solved(rotations, asked, 0.0)
         heavier = np.minimum(self.along, self.added) / self._inertias
@@ -161,16 +168,15 @@ class Coupling:
         wrong[:, 1] *= self.reaches
         speeds = np.linalg.norm(self.velocity[:, :3], axis=1)
         wrong /= np.maximum(np.maximum(slow, speeds), 1e-30)[:, None]
-        yielding = wrong.max(axis=1) > np.where(self._yielded, LATER, TOLERANCE)
-        self.is_hit = bool((wrong > HARD).any())
+        yielding = (wrong > TOLERANCE).any(axis=1)
         self.along = np.where(yielding[:, None], self.along, before)
         step = np.where(yielding[:, None], self.solved(rotations, asked), 0.0)
-        turns = self.reaches * np.linalg.norm(step[:, 3:], axis=1)
-        # One that yields towards what pushes it may jam particles that are where they are by its other way.
-        jams = np.where((step[:, :3] * self.impulse[:, :3]).sum(axis=1) < 0.0, JAMMING, 1.0)
-        self.yielded_by = float((jams * np.linalg.norm(step[:, :3], axis=1) + turns).max())
+        ways = np.stack([np.linalg.norm(step[:, block], axis=1) for block in BLOCKS], axis=1) * self.lasted
+        is_thrown = (wrong[:, 0] > HARD) & (heavier[:, 0] > LIGHT) | self.sinks & (wrong.max(axis=1) > HARD)
+        # One that yields towards the water may jam particles that are where they are by its other way.
+        ways[:, 0] *= np.where((step[:, :3] * self.impulse[:, :3]).sum(axis=1) < 0.0, JAMMING, 1.0)
+        self.is_hit = bool((is_thrown | (ways[:, 0] + self.reaches * ways[:, 1] > farthest)).any())
         self.wanted, self._given_way = self.wanted + step, self._given_way + step
-        self._pushed, self._yielded = self.impulse, self._yielded | yielding
         return bool(yielding.any())
 
     def solved(self, rotations: np.ndarray, impulse: np.ndarray, share: float = 1.0) -> np.ndarray:

@@ -43,7 +43,7 @@ class MovingSolids:
         self.targets: dict[int, Pose] = {}  # at the end of the next frame
         self.growing: dict[int, tuple[float, float]] = {}  # age and time to grow [s]
         self.passing: dict[int, tuple[Pose, Pose]] = {}  # begin and end of a time step, of bodies
-        self.feeling: dict[int, tuple[np.ndarray, float]] = {}  # centre of mass [m] and `SolidSet.unit`, of bodies
+        self.feeling: dict[int, tuple[np.ndarray, float, float]] = {}  # of bodies, see `feel`
         self.version = 0  # of what is on the device
         self._stand, self._tank = b"", np.zeros((0, 4))  # how the tank stands, and its planes then
         self.rebuild()
@@ -62,13 +62,17 @@ class MovingSolids:
         self._resize()
         self._upload(0.0, 0.0)
 
-    def feel(self, feeling: dict[int, tuple[np.ndarray, float]]) -> None:
-        """Let bodies feel what the water does to them: centre of mass [m] and `SolidSet.unit`, by number."""
+    def feel(self, feeling: dict[int, tuple[np.ndarray, float, float]]) -> None:
+        """Let bodies feel what the water does to them.
+
+        By number: centre of mass [m], `SolidSet.unit` [1/m] and `SolidSet.grip`.
+        """
         self.feeling = feeling
-        units = np.zeros(len(self.members), np.float32)
-        for number, (_, unit) in feeling.items():
-            units[number] = unit
+        units, grips = np.zeros(len(self.members), np.float32), np.ones(len(self.members), np.float32)
+        for number, (_, unit, grip) in feeling.items():
+            units[number], grips[number] = unit, grip
         upload(self.device.unit, units)
+        upload(self.device.grip, grips)
         self._upload(0.0, 0.0)
 
     def add(self, solid: Solid, grow: float) -> str:
@@ -257,7 +261,7 @@ class MovingSolids:
         centers = positions.copy()
         if self.feeling:
             numbers = [*self.feeling]
-            own = np.array([center for center, _ in self.feeling.values()])
+            own = np.array([center for center, *_ in self.feeling.values()])
             centers[numbers] += (matrix_of(rotations[numbers]) @ own[..., None])[..., 0]
         return centers
 

@@ -309,6 +309,7 @@ def build(solids: Sequence[Solid], tank_count: int, friction: float, spacing: fl
         sweep=array([], vec2, count),
         center=array(position, vec3, count),
         unit=array([], qd.f32, count),
+        grip=array(np.ones(count), qd.f32, count),
         reaction=array([], qd.i32, PARTS * count),
         grid=grid,
         samples=samples,
