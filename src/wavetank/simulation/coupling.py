@@ -56,6 +56,13 @@ ROWS = (
 REMEMBERED = len(ROWS) + 2  # rows of `Coupling.memory`
 
 
+def with_all_rows(memory: np.ndarray) -> np.ndarray:
+    """Return what `Coupling.memory` returned; earlier versions had no row `later`, the last of `ROWS`: 0."""
+    if memory.ndim != 3 or memory.shape[1] != REMEMBERED - 1:
+        return memory
+    return np.insert(memory, len(ROWS) - 1, 0.0, axis=1)
+
+
 class Coupling:
     """What bodies have got from the water and what they are still to get; rows are motion and turn."""
 
@@ -195,14 +202,14 @@ class Coupling:
     # --- states ---
 
     def memory(self) -> np.ndarray:
-        """Return all that it remembers, float64 [n, 12, 6]."""
+        """Return all that it remembers, float64 [n, 13, 6]."""
         rest = np.zeros_like(self.impulse)
         rest[:, 0], rest[:, 1], rest[:, 2:4], rest[:, 4] = self.immersed, self.lasted, self.along, self.held
         sums = np.pad(self.sums.reshape(-1, 4), ((0, 0), (0, 2)))
         return np.stack([*(getattr(self, name) for name in ROWS), rest, sums], axis=1)
 
     def recall(self, number: int, memory: np.ndarray) -> None:
-        """Let body `number` remember a row [12, 6] of what `memory` returned."""
+        """Let body `number` remember a row [13, 6] of what `memory` returned."""
         for name, row in zip(ROWS, memory, strict=False):
             getattr(self, name)[number] = row
         rest = memory[len(ROWS)]
