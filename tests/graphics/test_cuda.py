@@ -14,8 +14,8 @@ import pytest
 FRAMES = {
     "obstacle-tank": {"steps": 1, "launch": 83, "wait": 4},
     "obstacle-tank-2d": {"steps": 1, "launch": 85, "wait": 4},
-    "honey": {"steps": 2, "launch": 207, "wait": 10},
-    "oil-and-water": {"steps": 1, "launch": 88, "wait": 4},
+    "honey": {"steps": 2, "launch": 211, "wait": 10},
+    "oil-and-water": {"steps": 1, "launch": 90, "wait": 4},
 }
 
 
