@@ -28,13 +28,46 @@ def thickest():
 
 
 @qd.func
-def is_free(solids: SolidSet, at):
-    """Say whether the place `at` is in no solid, the tank's walls left aside."""
-    free = 1
+def depth_in_solids(solids: SolidSet, at):
+    """Depth [m] of the place `at` in the solid that it is in, 0 outside; the tank's walls are left aside."""
+    depth = 0.0
     for k in range(solids.tank_count, solids.count):
-        if free == 1 and (at - solids.position[k]).norm() < solids.reach[k]:
-            free = qd.cast(signed_distance(solids, k, at).w > 0.0, qd.i32)
-    return free
+        if (at - solids.position[k]).norm() < solids.reach[k]:
+            depth = qd.max(depth, -signed_distance(solids, k, at).w)
+    return depth
+
+
+@qd.func
+def ahead(solids: SolidSet, middle, way, outward):
+    """Return 1 where a solid goes on from its `middle` by a `way` along it, or bends up or down from there."""
+    goes = 0
+    for k in range(-3, 4):  # thin walls are met by a step of a sixteenth of a turn
+        angle = qd.math.pi / 8.0 * k
+        if goes == 0 and depth_in_solids(solids, middle + way * qd.cos(angle) - outward * qd.sin(angle)) > 0.0:
+            goes = 1
+    return goes
+
+
+@qd.func
+def goes_on(grid: CoarseGrid, solids: SolidSet, surface, outward, edge):
+    """Say whether what is thin behind the place `surface` goes on to its sides: a wall, perhaps its rim, no bar."""
+    middle, deepest = surface, 0.0
+    for k in qd.static(range(4)):
+        at = surface - outward * (0.1 * 2.0**k * edge)
+        depth = depth_in_solids(solids, at)
+        if depth > deepest:
+            middle, deepest = at, depth
+    # Two directions along the wall; a world in a plane goes on along z.
+    aside = vec3(0.0, 0.0, 1.0)
+    if grid.nz > 1 and qd.abs(outward.z) > 0.7:
+        aside = vec3(1.0, 0.0, 0.0)
+    first = outward.cross(aside).normalized()
+    second = outward.cross(first) if grid.nz > 1 else vec3(0.0, 0.0, 0.0)
+    inside = 0
+    for side in qd.static((-1, 1)):
+        inside += ahead(solids, middle, first * (0.75 * side * edge), outward * (0.75 * edge))
+        inside += ahead(solids, middle, second * (0.75 * side * edge), outward * (0.75 * edge))
+    return inside >= 3
 
 
 @qd.func
@@ -54,7 +87,9 @@ def keep_thin(grid: CoarseGrid, solids: SolidSet, n, wall):
         if grid.nz == 1:
             surface.z = 0.0
         most = thickest() * edge
-        if is_free(solids, surface - outward * most) == 1 or is_free(solids, surface - outward * (0.5 * most)) == 1:
+        is_thin = depth_in_solids(solids, surface - outward * most) == 0.0
+        is_thin = is_thin or depth_in_solids(solids, surface - outward * (0.5 * most)) == 0.0
+        if is_thin and goes_on(grid, solids, surface, outward, edge):
             found = 1
             if wall.w <= 0.0:
                 grid.room[n] = 0.0
