@@ -67,12 +67,9 @@ def apply_friction(
                         share = solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12)
                     if k < solids.tank_count:
                         if qd.static(on_grid):
-                            bearing = -n.dot(down(c))
-                            if bearing > 0.0 and slip.norm_sqr() * c.slow_at_solids < 1.0:
-                                calming = c.calming_at_solids * (1.0 - slip.norm_sqr() * c.slow_at_solids)
-                                share += calming * bearing * scratch.puddle[i]
+                            share += calmed(slip.norm_sqr(), c) * qd.max(0.0, -n.dot(down(c))) * scratch.puddle[i]
                     else:
-                        calming = c.calming_at_solids * qd.max(0.0, 1.0 - slip.norm_sqr() * c.slow_at_solids)
+                        calming = calmed(slip.norm_sqr(), c)
                         if solids.unit[k] > 0.0:  # a body that is on its way is not held up
                             calming *= qd.max(free(), 1.0 - moving.norm_sqr() * resting() * c.slow_at_solids)
                         share += calming
@@ -100,10 +97,15 @@ def layer():
 
 
 @qd.func
+def calmed(squared, c: Coefficients):
+    """Share of a speed, `squared` [m^2/s^2], that solids take because it is slow."""
+    return c.calming_at_solids * qd.max(0.0, 1.0 - squared * c.slow_at_solids)
+
+
+@qd.func
 def settled(n, towards, c: Coefficients):
     """Share of a speed [m/s] along the normal `n` of a solid that it takes; what hangs from a ceiling is left alone."""
-    hanging = qd.max(0.0, n.dot(down(c)))
-    return c.calming_at_solids * (1.0 - hanging) * qd.max(0.0, 1.0 - towards * towards * c.slow_at_solids)
+    return calmed(towards * towards, c) * (1.0 - qd.max(0.0, n.dot(down(c))))
 
 
 @qd.func

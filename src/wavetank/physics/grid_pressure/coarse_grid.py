@@ -29,6 +29,17 @@ def coordinates(grid: CoarseGrid, n):
 
 
 @qd.func
+def center_of(grid: CoarseGrid, n):
+    """Place of node `n` [m], the centre of its cell; on z = 0 in a plane."""
+    c = coordinates(grid, n)
+    center = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
+    center += vec3(grid.x0, grid.y0, grid.z0)
+    if grid.nz == 1:
+        center.z = 0.0
+    return center
+
+
+@qd.func
 def in_cells(grid: CoarseGrid, p: qd.template()):
     """The place `p` [m] in cells, whole at nodes; 0 along an axis that the world does not have."""
     point = lift(p) - vec3(grid.x0, grid.y0, grid.z0)

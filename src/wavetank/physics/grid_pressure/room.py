@@ -2,7 +2,7 @@
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients
-from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, nearest, tents
+from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, corners, nearest, tents
 from wavetank.physics.grid_pressure.thin_walls import behind, keep_thin, mark_shut, way_from
 from wavetank.solids.distance import SolidSet, signed_distance, vec3, vec4
 
@@ -100,12 +100,8 @@ def close_slit(grid: CoarseGrid, n, surely, full):
 @qd.func
 def nearest_wall(grid: CoarseGrid, solids: SolidSet, n):
     """(gradient, distance [m]) of the solid nearest to node `n`; far away where none is near its cell."""
-    c = coordinates(grid, n)
-    center = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
-    center += vec3(grid.x0, grid.y0, grid.z0)
+    center = center_of(grid, n)
     edge = longest_edge(grid)
-    if grid.nz == 1:
-        center.z = 0.0
     nearest = vec4(0.0, 1.0, 0.0, 4.0 * edge)
     for k in range(solids.tank_count, solids.count):
         way, reach = center - solids.position[k], solids.reach[k]
@@ -242,8 +238,7 @@ def find_room(
             wall = nearest_wall(grid, solids, n)
             grid.slope_x[n], grid.slope_y[n], grid.slope_z[n], grid.lam[n] = wall.x, wall.y, wall.z, wall.w
             grid.room[n] = qd.cast(open_share(grid, n) >= least_open, qd.f32)
-        for n in range(grid.nx * grid.ny * grid.nz):
-            if keep_thin(grid, solids, n, kept_wall(grid, n)) == 1:
+            if keep_thin(grid, solids, n, wall) == 1:
                 qd.atomic_add(thin[0], 1)
             grid.rhs[n] = qd.cast(grid.room[n] == 0.0 or grid.thin_s[n] > 0.0, qd.f32)
         for n in range(grid.nx * grid.ny * grid.nz):

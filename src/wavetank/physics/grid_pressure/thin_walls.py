@@ -11,7 +11,7 @@ make, one of them is felt.
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import coordinates, nearest
+from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, nearest
 from wavetank.solids.distance import SolidSet, signed_distance, vec3
 
 
@@ -81,11 +81,7 @@ def keep_thin(grid: CoarseGrid, solids: SolidSet, n, wall):
     grid.thin_x[n], grid.thin_y[n], grid.thin_z[n], grid.thin_s[n] = 0.0, 0.0, 0.0, 0.0
     found = 0
     if wall.w < near() * edge and wall.w > -edge and outward.norm() > 0.5:
-        c = coordinates(grid, n)
-        surface = vec3((c[0] + 0.5) * grid.dx, (c[1] + 0.5) * grid.dy, (c[2] + 0.5) * grid.dz)
-        surface += vec3(grid.x0, grid.y0, grid.z0) - outward * wall.w
-        if grid.nz == 1:
-            surface.z = 0.0
+        surface = center_of(grid, n) - outward * wall.w
         most = thickest() * edge
         is_thin = depth_in_solids(solids, surface - outward * most) == 0.0
         is_thin = is_thin or depth_in_solids(solids, surface - outward * (0.5 * most)) == 0.0
