@@ -70,15 +70,21 @@ def value_at(values: qd.template(), grid: Grid, x):
 
 
 @qd.func
-def outward_at(level: qd.template(), grid: Grid, x):
-    """Unit normal of the surface out of the water at a point."""
+def downhill(sample: qd.template(), values: qd.template(), grid: Grid, x, reach):
+    """Unit vector to where `sample` of a field is less, told from `reach` nodes on each side; nought where even."""
     n = vec3(0.0, 0.0, 0.0)
     for axis in range(3):  # one copy of the code to compile
         side = vec3(0.0, 0.0, 0.0)
         for k in qd.static(range(3)):
-            side[k] = qd.select(axis == k, grid.step[k], 0.0)
-        fall = value_at(level, grid, x - side) - value_at(level, grid, x + side)
+            side[k] = qd.select(axis == k, reach * grid.step[k], 0.0)
+        fall = sample(values, grid, x - side) - sample(values, grid, x + side)
         for k in qd.static(range(3)):
             if axis == k:
                 n[k] = fall / grid.step[k]
     return n.normalized(1e-12)
+
+
+@qd.func
+def outward_at(level: qd.template(), grid: Grid, x):
+    """Unit normal of the surface out of the water at a point."""
+    return downhill(value_at, level, grid, x, 1.0)

@@ -14,7 +14,7 @@ would tell what happens in it, and a fluid counts as matte.
 """
 
 from wavetank.device.compiler import qd
-from wavetank.view.film.grid import Grid
+from wavetank.view.film.grid import Grid, downhill
 from wavetank.view.lens import vec3, vec4
 
 
@@ -55,18 +55,15 @@ def albedo_of(color):
 
 
 @qd.func
+def murk_alone(murk: qd.template(), grid: Grid, x):
+    """The murk [1/m] at a point."""
+    return murk_at(murk, grid, x)[3]
+
+
+@qd.func
 def thinning(murk: qd.template(), grid: Grid, x):
     """Unit vector to where there is less murk; nought where it is the same all around."""
-    n = vec3(0.0, 0.0, 0.0)
-    for axis in range(3):  # one copy of the code to compile
-        side = vec3(0.0, 0.0, 0.0)
-        for k in qd.static(range(3)):
-            side[k] = qd.select(axis == k, 2.0 * grid.step[k], 0.0)
-        fall = murk_at(murk, grid, x - side)[3] - murk_at(murk, grid, x + side)[3]
-        for k in qd.static(range(3)):
-            if axis == k:
-                n[k] = fall / grid.step[k]
-    return n.normalized(1e-12)
+    return downhill(murk_alone, murk, grid, x, 2.0)
 
 
 @qd.func
