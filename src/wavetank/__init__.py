@@ -29,6 +29,8 @@ from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace
 
 if TYPE_CHECKING:
     from wavetank.formats.dualsphysics import load_dualsphysics
+    from wavetank.formats.mjcf import load_mjcf
+    from wavetank.formats.robot import load_robot
     from wavetank.formats.splishsplash import load_splishsplash
     from wavetank.formats.urdf import load_urdf
     from wavetank.front.notebook.show import show
@@ -46,7 +48,8 @@ __all__ = [
     "Drain", "Emitter", "Filled", "Gauge", "HalfSpace", "HeightField", "Hinge", "Intersection", "Keyframe", "Mesh",
     "Motion", "Points", "Polygon", "Recording", "Rope", "Scene", "Session", "Simulation", "Slider", "Sphere",
     "Spring", "Tank", "Union", "WavetankError", "Weld", "__version__", "bundled_scenes", "commands",
-    "load_dualsphysics", "load_splishsplash", "load_urdf", "render", "replay", "sampled", "show",
+    "load_dualsphysics", "load_mjcf", "load_robot", "load_splishsplash", "load_urdf", "render", "replay", "sampled",
+    "show",
 ]  # fmt: skip
 
 #: what needs the kernels' sources is imported when it is first used: data alone should load fast
@@ -58,6 +61,8 @@ LATER = {
     "commands": "wavetank.session.commands",
     "load_dualsphysics": "wavetank.formats.dualsphysics",
     "load_splishsplash": "wavetank.formats.splishsplash",
+    "load_mjcf": "wavetank.formats.mjcf",
+    "load_robot": "wavetank.formats.robot",
     "load_urdf": "wavetank.formats.urdf",
     "render": "wavetank.view.renderer",
     "replay": "wavetank.session.recording",

@@ -42,7 +42,10 @@ def export(
 def import_scene(
     file: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help="SCENE.json of SPlisHSPlasH, CASE_Def.xml of DualSPHysics, or ROBOT.urdf."),
+        typer.Argument(
+            metavar="FILE",
+            help="SCENE.json of SPlisHSPlasH, CASE_Def.xml of DualSPHysics, ROBOT.urdf or ROBOT.xml (MJCF).",
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The scene file to be written, TOML.")],
     spacing: Annotated[float | None, typer.Option(help="Distance of particles [m] in place of its own.")] = None,
@@ -51,10 +54,10 @@ def import_scene(
     as_json: Json = False,
 ) -> None:
     """Read a scene of SPlisHSPlasH or DualSPHysics, or a robot; write a scene, and say what has no counterpart."""
-    if file.suffix.lower() == ".urdf":
-        from wavetank.formats.urdf import load_urdf
+    from wavetank.formats.robot import is_mjcf, load_robot
 
-        robot = load_urdf(file, _place(at))
+    if file.suffix.lower() == ".urdf" or (file.suffix.lower() in (".xml", ".mjcf") and is_mjcf(file)):
+        robot = load_robot(file, _place(at))
         scene, notes = robot.joined(configured(into, [f"spacing={spacing}"] if spacing else [])), robot.notes
     else:
         from wavetank import load_dualsphysics, load_splishsplash

@@ -5,7 +5,6 @@ become part of the one that they hang on. Their shapes are those for collisions,
 none. What has no counterpart is told, one sentence each.
 """
 
-import dataclasses
 import math
 from pathlib import Path
 from typing import Any
@@ -13,62 +12,41 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from wavetank.foundation.door import guarded, named, one_line, parse_xml, read_text
+from wavetank.formats.robot import (
+    HERE,
+    MOST_LINKS,
+    MOST_SHAPES,
+    Robot,
+    carried,
+    hex_of,
+    load_robot,
+    mesh_at,
+    numbers,
+    then,
+    tiny,
+    weight_of,
+    whole,
+)  # fmt: skip
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import product, turned, unit_quaternion
 from wavetank.scene.joints import Hinge, Joint, Slider
-from wavetank.solids.meshes.files import SUFFIXES
-from wavetank.solids.meshes.mesh import Mesh
 from wavetank.solids.motion import Pose
-from wavetank.solids.shapes import Box, Cylinder, Sphere, Union, moved
+from wavetank.solids.shapes import Box, Cylinder, Sphere
 from wavetank.solids.solid import Solid
 
-LARGEST = 20_000_000  # characters
-MOST_LINKS = 300  # and joints
-MOST_SHAPES = 1000  # of a link
-STANDING = unit_quaternion([math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0])  # z to y
-TINY = 0.01  # m, radius of a link that has a mass and no shape
 MOVING = {"revolute": Hinge, "continuous": Hinge, "prismatic": Slider}
-
-
-@dataclasses.dataclass(frozen=True)
-class Robot:
-    """The solids and joints of a robot, to be put into a scene, and what of the file they do not have."""
-
-    name: str
-    solids: tuple[Solid, ...]
-    joints: tuple[Joint, ...]
-    notes: tuple[str, ...]
-
-    def joined(self, scene: Any) -> Any:
-        """Return a scene with this robot in it. Raises `WavetankError` where names are taken."""
-        taken = {solid.name for solid in scene.solids} & {solid.name for solid in self.solids}
-        if taken:
-            raise WavetankError(f"the scene has solids named {', '.join(sorted(taken))} already; give prefix another.")
-        return scene.changed(solids=[*scene.solids, *self.solids], joints=[*scene.joints, *self.joints])
 
 
 def load_urdf(
     path: str | Path, position: Any = (0.0, 0.0, 0.0), angle: float = 0.0, prefix: str = "", held: bool = True
 ) -> Robot:
-    """Read a URDF file as a robot at rest, all its joints at 0, their motors holding them there.
+    """Read a robot as `load_robot` does; `held` is false for one that is not fixed to the ground."""
+    return load_robot(path, position, angle, prefix, held)
 
-    Its root stands at `position` [m], shape [3], turned by `angle` [rad] about the upright axis; `held` is false for a
-    robot that is not fixed to the ground. `prefix` comes before all names. Raises `WavetankError`.
-    """
-    origin = named(path)
-    upright = unit_quaternion([math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0])
-    place = np.array(position, float), product(upright, STANDING)
-    with guarded(origin, "robot"):
-        text = read_text(path, "URDF file", LARGEST)
-        root = parse_xml(text, origin, "a URDF file")
-        if root.tag != "robot":
-            raise WavetankError(f"{origin}: a URDF file has a robot at its top; this one has <{root.tag[:60]}>.")
-        try:
-            return _Reader(root, Path(path), prefix, held).read(place)
-        except (WavetankError, LookupError, ValueError, TypeError, AttributeError, OverflowError, OSError) as error:
-            reason = f"{type(error).__name__} {error}" if not isinstance(error, WavetankError) else str(error)
-            raise WavetankError(f"{origin}: the robot cannot be read: {one_line(reason)}.") from None
+
+def read_urdf(root: ElementTree.Element, path: Path, place: Pose, prefix: str, held: bool | None) -> Robot:
+    """Return the robot of the top element of a URDF file, its root at that pose."""
+    return _Reader(root, path, prefix, held is not False).read(place)
 
 
 class _Reader:
@@ -111,7 +89,7 @@ class _Reader:
     def _add(self, name: str, place: Pose, before: str) -> str:
         """Add a link at that pose with all that is fixed to it, then what moves on it; return the solid's name."""
         mass, parts, color, moving = 0.0, [], "", []
-        waiting: list[tuple[str, Pose]] = [(name, (np.zeros(3), unit_quaternion(0.0)))]
+        waiting: list[tuple[str, Pose]] = [(name, HERE)]
         while waiting:
             link, at = waiting.pop()
             if link in self.reached:
@@ -119,21 +97,21 @@ class _Reader:
             self.reached.add(link)
             own, shapes, paint = self._link(link)
             mass, color = mass + own, color or paint
-            parts += [_carried(shape, at) for shape in shapes]
+            parts += [carried(shape, at) for shape in shapes]
             for joint in self.joints:
                 if _end(joint, "parent") == link:
-                    pose = _then(at, _origin(joint))
+                    pose = then(at, _origin(joint))
                     if joint.get("type") == "fixed":
                         waiting.append((_end(joint, "child"), pose))
                     else:
                         moving.append((joint, pose))
-        whole = self.prefix + name
-        solid = self._solid(whole, place, (parts, mass, color), is_root=not before)
+        title = self.prefix + name
+        solid = self._solid(title, place, (parts, mass, color), is_root=not before)
         if solid is not None:
             self.solids.append(solid)
         for joint, pose in moving:
-            self._join(joint, _then(place, pose), whole if solid is not None else "")
-        return whole if solid is not None else ""
+            self._join(joint, then(place, pose), title if solid is not None else "")
+        return title if solid is not None else ""
 
     def _solid(self, name: str, place: Pose, about: tuple[list[Solid], float, str], is_root: bool) -> Solid | None:
         parts, mass, color = about
@@ -141,19 +119,13 @@ class _Reader:
         if not parts:
             if not is_body or (is_root and not mass):
                 return None
-            self.notes.append(f"link {name} has no shape; it is a ball of {TINY:g} m here.")
-            parts = [Sphere(center=(0.0, 0.0, 0.0), radius=TINY)]
+            parts = [tiny(name, self.notes)]
         fields: dict[str, Any] = {"name": name, "color": color}
-        if is_body and mass > 0.0:
-            fields["mass"] = mass
+        if is_body:
+            fields |= weight_of(name, mass, self.notes)
+        if "mass" in fields:
             self.notes.append("moments of inertia follow from the shapes and masses of links, not from <inertia>.")
-        elif is_body:
-            fields["density"] = 1000.0
-            self.notes.append(f"link {name} has no mass; it is as heavy as water.")
-        position, rotation = (tuple(map(float, row)) for row in place)
-        if len(parts) == 1:
-            return _carried(parts[0], place, **fields)
-        return Union(parts=parts, center=position, rotation=rotation, **fields)
+        return whole(parts, place, fields)
 
     def _join(self, row: ElementTree.Element, place: Pose, before: str) -> None:
         """Add what a joint leads to, and the joint, which is at that pose."""
@@ -165,7 +137,7 @@ class _Reader:
             if kind != "floating":
                 self.notes.append(f"joint {name} is {kind}, which is not there; both links are free.")
             return
-        axis = turned(place[1], np.array(_numbers(row.find("axis"), "xyz", (1.0, 0.0, 0.0))))
+        axis = turned(place[1], np.array(numbers(row.find("axis"), "xyz", (1.0, 0.0, 0.0))))
         fields: dict[str, Any] = {
             "name": name, "first": child, "second": before, "at": tuple(map(float, place[0])),
             "axis": tuple(map(float, np.round(axis, 12))), "target": 0.0,
@@ -201,7 +173,7 @@ class _Reader:
         position, rotation = _origin(row)
         center, turn = tuple(map(float, position)), tuple(map(float, rotation))
         if kind.tag == "box":
-            return Box(center=center, size=tuple(_numbers(kind, "size", ())), rotation=turn)
+            return Box(center=center, size=tuple(numbers(kind, "size", ())), rotation=turn)
         if kind.tag == "sphere":
             return Sphere(center=center, radius=float(kind.attrib["radius"]))
         if kind.tag in ("cylinder", "capsule"):
@@ -218,22 +190,7 @@ class _Reader:
         folders = [self.path.parent, *self.path.parent.parents[:3]]
         tails = [Path(*plain.parts[k:]) for k in range(len(plain.parts))]
         found = next((folder / tail for folder in folders for tail in tails if (folder / tail).is_file()), None)
-        if found is None:
-            raise WavetankError(f"link {link}: there is no file {name} beside it or in the folders around.")
-        if found.suffix.lower() not in SUFFIXES:
-            raise WavetankError(
-                f"link {link}: {found.name} is not read; meshes are {', '.join(SUFFIXES)} files: convert it."
-            )
-        from wavetank.formats.splishsplash_solids import arrays_of
-
-        vertices, faces = arrays_of(found)
-        vertices = vertices * np.array(_numbers(row, "scale", (1.0, 1.0, 1.0)))
-        lower, upper = vertices.min(axis=0), vertices.max(axis=0)
-        middle = place[0] + turned(place[1], 0.5 * (lower + upper))
-        size = tuple(map(float, np.maximum(upper - lower, 1e-6)))
-        return Mesh.of(
-            vertices, faces, center=tuple(map(float, middle)), size=size, rotation=tuple(map(float, place[1]))
-        )  # fmt: skip
+        return mesh_at(link, found, name, numbers(row, "scale", (1.0, 1.0, 1.0)), place)
 
 
 def _end(joint: ElementTree.Element, which: str) -> str:
@@ -243,42 +200,18 @@ def _end(joint: ElementTree.Element, which: str) -> str:
     return str(found.attrib["link"])
 
 
-def _numbers(row: ElementTree.Element | None, key: str, otherwise: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the numbers of an attribute: as many as `otherwise` has, three where that is empty."""
-    if row is None or row.get(key) is None:
-        return otherwise
-    numbers = tuple(float(word) for word in str(row.get(key)).split())
-    if len(numbers) < (len(otherwise) or 3) or not all(map(math.isfinite, numbers)):
-        raise WavetankError(f"<{row.tag[:60]} {key}={str(row.get(key))[:60]!r}> is not {len(otherwise) or 3} numbers.")
-    return numbers
-
-
 def _origin(row: ElementTree.Element) -> Pose:
     """Return the pose of <origin>; roll, pitch and yaw are about the fixed x, then y, then z."""
     found = row.find("origin")
-    place = np.array(_numbers(found, "xyz", (0.0, 0.0, 0.0)))
+    place = np.array(numbers(found, "xyz", (0.0, 0.0, 0.0)))
     turn = unit_quaternion(0.0)
-    for axis, angle in enumerate(_numbers(found, "rpy", (0.0, 0.0, 0.0))):
+    for axis, angle in enumerate(numbers(found, "rpy", (0.0, 0.0, 0.0))):
         vector = np.zeros(3)
         vector[axis] = math.sin(0.5 * angle)
         turn = product(np.array([math.cos(0.5 * angle), *vector]), turn)
     return place, turn
 
 
-def _then(first: Pose, second: Pose) -> Pose:
-    """Return the pose `second`, which is in the frame of `first`."""
-    return first[0] + turned(first[1], second[0]), product(first[1], second[1])
-
-
-def _carried(shape: Solid, pose: Pose, **fields: Any) -> Solid:
-    """Return a shape of a frame that has that pose, in the world; `fields` change it."""
-    place, turn = _then(pose, (shape.origin, shape.quaternion))
-    there = moved(shape, place, turn)
-    return type(there).model_validate(vars(there) | fields) if fields else there
-
-
 def _color(row: ElementTree.Element) -> str:
     found = row.find("color")
-    if found is None:
-        return ""
-    return "#" + "".join(f"{round(255 * min(max(part, 0.0), 1.0)):02x}" for part in _numbers(found, "rgba", ())[:3])
+    return "" if found is None else hex_of(numbers(found, "rgba", ()))

@@ -129,12 +129,15 @@ class LiveJoint:
 
     def follow(self, target: float, speed: float) -> None:
         """Let the motor move it to `target`, which moves at that `speed`."""
-        rate = SETTLED / self.response
+        rate, strength = SETTLED / self.response, self.strength
         self._data().set_motor(self._axis, target, speed, rate * rate, 2.0 * rate)
+        self._data().set_motor_max_force(self._axis, strength)
 
     def run(self, speed: float) -> None:
         """Let the motor move it at that `speed`."""
+        strength = self.strength
         self._data().set_motor(self._axis, 0.0, speed, 0.0, STOPS)
+        self._data().set_motor_max_force(self._axis, strength)
 
     def take_over(self, other: "LiveJoint") -> None:
         """Let its motor do what that of `other` did."""
