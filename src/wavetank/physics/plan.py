@@ -7,7 +7,13 @@ import numpy as np
 
 from wavetank.foundation.params import Parameters
 from wavetank.physics.coefficients import correction_number, method_number
-from wavetank.physics.dynamic_viscosity.implicit_viscosity import carried_share, is_thick, is_viscous, thick_share
+from wavetank.physics.dynamic_viscosity.implicit_viscosity import (
+    carried_share,
+    is_thick,
+    is_viscous,
+    steps_with_bodies,
+    thick_share,
+)  # fmt: skip
 from wavetank.physics.grid_pressure.correction import carried
 from wavetank.physics.mixture import Blend, blend
 from wavetank.physics.tension import substeps_for
@@ -43,7 +49,7 @@ class Plan:
 def plan_step(world: World, params: Parameters, dt: float) -> Plan:
     """Plan a step of `dt` [s]."""
     kinds, on_grid = blend(world.materials, params), has_grid_pressure(world, params)
-    thick, correction = is_thick(kinds, params), correction_number(params)
+    thick, correction = carries_on(world, params), correction_number(params)
     return Plan(
         kinds=kinds,
         method=method_number(params),
@@ -56,7 +62,7 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         is_tense=kinds.surface_tension > 0.0,
         is_viscous=is_viscous(kinds, params, dt),
         is_thick=thick,
-        held=thick_share(kinds, params),
+        held=thick_share(kinds, params) if thick else 0.0,
         is_rubbed=world.has_friction or params.calming > 0.0,
         is_smoothed=params.viscosity > 0.0 or params.calming > 0.0,
         is_central=not (world.levels or kinds.mixed),
@@ -78,7 +84,13 @@ def has_grid_pressure(world: World, params: Parameters) -> bool:
         return False
     kinds, h = blend(world.materials, params), params.support * params.spacing
     weight = kinds.largest_density * math.hypot(*params.gravity) * h**2  # of water as high as a cell, per length
-    return weight >= kinds.surface_tension and not is_thick(kinds, params)
+    return weight >= kinds.surface_tension and not carries_on(world, params)
+
+
+def carries_on(world: World, params: Parameters) -> bool:
+    """Whether fluids are so thick that they carry on what pressed them: not where bodies, in a tank, need the grid."""
+    with_grid = params.grid_pressure > 0.0 and world.levels and not world.frozen
+    return is_thick(blend(world.materials, params), params) and not (world.pieces and with_grid)
 
 
 def steps_in(
@@ -91,15 +103,18 @@ def steps_in(
     """
     on_grid, kinds = has_grid_pressure(world, params), blend(world.materials, params)
     depth = 0.0 if on_grid else pool_depth(world.particles, world.count, params.gravity, *box)
-    carried_on = carried_share(kinds, params)
+    carried_on = carried_share(kinds, params) if carries_on(world, params) else 0.0
     needed = steps_needed(params, duration, speed, depth, on_grid=on_grid, forced=forced, carried=carried_on)
+    if world.pieces:
+        needed = max(needed, min(steps_with_bodies(kinds, params, duration), params.largest_substeps))
     capillary = substeps_for(kinds, params.dim, params.support, params.spacing, duration)
     return max(needed, min(capillary, params.largest_substeps))
 
 
 def pace_of_solids(world: World, params: Parameters) -> float:
     """Return how many times as fast solids count for the time step as they are, where thick fluids are in their way."""
-    return 1.0 + (SOLIDS_IN_THICK - 1.0) * thick_share(blend(world.materials, params), params)
+    share = thick_share(blend(world.materials, params), params) if carries_on(world, params) else 0.0
+    return 1.0 + (SOLIDS_IN_THICK - 1.0) * share
 
 
 def capillary_speed(world: World, params: Parameters) -> float:

@@ -9,7 +9,7 @@ can press on it allows (`simulation/bodies.py`).
     code      meaning                                                                unit
     push      way that a particle was moved by, times its mass                       m, heaviest particle's mass
     reaction  sums for each solid, `PARTS` numbers: push, turn, the grid's push      1/unit
-              and turn, and the share of the solid that is under water
+              and turn, the share of the solid that is under water, and how viscous fluids hold it
 """
 
 from wavetank.device.compiler import qd
@@ -28,7 +28,13 @@ def immersion():
     return 12
 
 
-OF_GRID, IMMERSION = (number.fn() for number in (of_grid, immersion))
+@qd.func
+def rubbing():
+    """Where the damper of viscous fluids is: the sum of the shares of particles in the drag table, times a spacing."""
+    return 13
+
+
+OF_GRID, IMMERSION, RUBBING = (number.fn() for number in (of_grid, immersion, rubbing))
 
 
 @qd.func
@@ -46,3 +52,9 @@ def push_back(solids: SolidSet, k, at, push):
     """Let solid `k` feel the opposite of what pushed a particle at `at`, if it is a body."""
     if solids.unit[k] > 0.0:
         add_to_body(solids, k, 0, at, -push)
+
+
+@qd.func
+def add_damper(solids: SolidSet, k, share):
+    """Let body `k` know that a fluid holds it by that share, times a spacing [m]."""
+    qd.atomic_add(solids.reaction[parts() * k + rubbing()], qd.cast(qd.round(solids.unit[k] * share), qd.i32))

@@ -15,9 +15,10 @@ from typing_extensions import override
 from wavetank.device.compiler import download, upload
 from wavetank.foundation.errors import WavetankError
 from wavetank.physics.bodies import Pieces, Retry, new_pieces
+from wavetank.physics.dynamic_viscosity.implicit_viscosity import hold_on_bodies
 from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED, carried
 from wavetank.physics.mixture import blend
-from wavetank.physics.reactions import IMMERSION, OF_GRID
+from wavetank.physics.reactions import IMMERSION, OF_GRID, RUBBING
 from wavetank.physics.step import step as take_step
 from wavetank.physics.world import World
 from wavetank.scene.forces import Force
@@ -60,7 +61,7 @@ class Bodies(Mapping[str, Body]):
         self.members: list[Body] = []
         self.fastest = 0.0  # m/s
         self.retry = Retry()
-        self.gravity = np.zeros(3)  # m/s^2, of the present step
+        self.gravity = np.array([*scene.gravity, 0.0][:3])  # m/s^2, of the present step
         self.pieces: Pieces | None = None  # of all bodies, on the device
         self.joints = Joints()
         self.acting: Acting | None = None  # made when forces first act
@@ -87,6 +88,8 @@ class Bodies(Mapping[str, Body]):
         self.numbers = np.array([body.number for body in self.members])
         self.units = np.array([body.unit for body in self.members])  # 1/m
         self.wet_masses = np.array([body.wet.mass for body in self.members])  # kg
+        displaced = self.wet_masses / self.density
+        self.radii = np.cbrt(0.75 / np.pi * displaced) if self.dim == 3 else np.sqrt(displaced / np.pi)  # m
         self.coupling.sinks = self.coupling.masses > self.wet_masses
         self.pieces = self._pieces()
         self.nothing = np.zeros(PARTS * len(solids.members), np.int32)
@@ -158,7 +161,7 @@ class Bodies(Mapping[str, Body]):
         unit = 2.0**31 / (4.0 * (wet.mass / (self.density * spacing**self.dim) + around) * spacing)
         body = Body(
             self.solids.names[number], number, solid, lambda: self.world.rigid_bodies[handle],
-            lambda: self.solids.poses[number], self.dim, dry, wet, unit, self.coupling, row,
+            lambda: self.solids.poses[number], lambda: self.gravity, self.dim, dry, wet, unit, self.coupling, row,
         )  # fmt: skip
         self.members.append(body)
         self._weigh(body, body.rigid())
@@ -170,7 +173,7 @@ class Bodies(Mapping[str, Body]):
 
     def _weigh(self, body: Body, rigid: Any) -> None:
         """Tell the engine the mass of a body and of the water that goes along."""
-        along = tuple(self.coupling.along[body.row].tolist())
+        along = tuple(self.coupling.held_by[body.row].tolist())
         if self._told.get(body.row) == along:
             return
         self._told[body.row], (mass, inertia) = along, along
@@ -277,6 +280,9 @@ class Bodies(Mapping[str, Body]):
         coupling.impulse = rows[:, :6] * scale + force * dt
         cell = world.levels[0].dy if world.levels else 1.0
         coupling.immersed = np.minimum(1.0, rows[:, IMMERSION] * particle / (wet * cell))
+        if world.remembers_viscosity:
+            each, spread = hold_on_bodies(blend(world.materials, self.scene), self.scene, dt)
+            coupling.hold(rows[:, RUBBING] / self.scene.spacing * each, self.radii, self.scene.spacing, spread)
 
     def yielded(self, dt: float, share: float) -> bool:
         """Let bodies yield that were pushed by far more than in the step before; say whether any was.

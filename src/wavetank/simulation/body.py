@@ -23,6 +23,7 @@ class Body:
     solid: Solid
     rigid: Callable[[], Any]  # the engine's view of it
     pose: Callable[[], Pose]
+    gravity: Callable[[], np.ndarray]  # m/s^2, [3]
     dim: int
     dry: Inertia
     wet: Inertia  # of the water that it displaces
@@ -73,6 +74,17 @@ class Body:
     def force(self) -> np.ndarray:
         """What the water pushed it with in the last step [N], shape [dim]."""
         return self.coupling.impulse[self.row][: self.dim] / (self.coupling.lasted or 1.0)
+
+    @property
+    def buoyancy(self) -> np.ndarray:
+        """What of `force` water at rest would push with [N], shape [dim]: the weight of what it displaces."""
+        lifted: np.ndarray = -self.wet.mass * self.immersed * self.gravity()[: self.dim]
+        return lifted
+
+    @property
+    def drag(self) -> np.ndarray:
+        """The rest of `force` [N], shape [dim]: what motion gives, drag, lift, slams and the water that goes along."""
+        return self.force - self.buoyancy
 
     @property
     def torque(self) -> np.ndarray:

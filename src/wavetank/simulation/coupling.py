@@ -23,10 +23,16 @@ The engine's impulse in contact and joints, (m + k) dv_c, leaves k dv_c to the w
 throws the body back: one that is out of the water would bounce with a restitution of k / m, more than one where it is
 light. So no more is taken to go along with a body that is hardly wet than as far as water carries it.
 
+A viscous fluid answers the velocity itself: P = P_before - k_v dv besides, so that (m + k + k_v) dv stands on the left.
+Taken as it was in the step before, what holds a light body in honey would throw it to and fro. k_v is that of a ball
+which is suddenly moved, after a step: mu A dt (3 / (2 R) + 1 / sqrt(pi nu dt)) (Basset 1888; Landau and Lifshitz 1987,
+Sec. 24), with the wet surface A that the dampers of the walls tell: the nearest layer, at d / 2, has mu / (d / 2).
+
     code       symbol       meaning                                                          unit
     impulse    P            what the water gave in a step                                    kg m/s, kg m^2/s
     change     dv_before    change of velocity in the step before, without how it yielded    m/s, rad/s
     along      k            mass and moment of inertia of the water that goes along          kg, kg m^2
+    rubbed     k_v          mass that a viscous fluid seems to add, and moment of inertia    kg, kg m^2
     due        m g dt + O   what a body gets by this step but for P,                         kg m/s, kg m^2/s
     given      m dv         and what it has got; of the engine's (m + k) dv_c that is but m dv_c
     before     v            velocity at the end of the step before
@@ -75,6 +81,7 @@ class Coupling:
         self.by_grid = np.zeros((count, 6))  # N, N m: by the pressure of the grid
         self.velocity, self.change = np.zeros((count, 6)), np.zeros((count, 6))  # m/s, rad/s
         self.along = np.zeros((count, 2))  # kg, kg m^2
+        self.rubbed = np.zeros((count, 2))  # kg, kg m^2
         self.before, self.seen_gain = np.zeros((count, 6)), np.zeros((count, 6))  # m/s, rad/s
         self.seen_push = np.zeros((count, 6))  # kg m/s, kg m^2/s
         self.sums = np.zeros((count, 2, 2))
@@ -95,6 +102,19 @@ class Coupling:
     def owed(self) -> np.ndarray:
         """Momentum [n, 6] that bodies are still to get."""
         return np.where(self.held[:, None], 0.0, self.due + self.impulse - self.given)
+
+    @property
+    def held_by(self) -> np.ndarray:
+        """Mass and moment of inertia [n, 2] that the fluid adds to bodies within a step."""
+        return self.along + self.rubbed
+
+    def hold(self, dampers: np.ndarray, radii: np.ndarray, spacing: float, spread: float) -> None:
+        """See how a viscous fluid holds bodies: dampers [n] [kg] of walls, in a fluid with so large a nu dt [m^2]."""
+        thin = 0.5 * spacing * (1.5 / radii + 1.0 / np.sqrt(np.pi * max(spread, 1e-30)))
+        self._rub(dampers * np.minimum(1.0, thin))
+
+    def _rub(self, mass: np.ndarray) -> None:
+        self.rubbed = np.stack([mass, mass * self.reaches**2], axis=1)
 
     def begin(
         self, rotations: np.ndarray, gravity: np.ndarray, dt: float, pushes: np.ndarray | None = None
@@ -133,7 +153,7 @@ class Coupling:
         """
         self.velocity, self.change = velocity, velocity - self.before - self._given_way
         self.given = self.weighed(rotations, self.wanted - self.before)
-        pulled, along = velocity - begun, np.repeat(self.along, 3, axis=1)
+        pulled, along = velocity - begun, np.repeat(self.held_by, 3, axis=1)
         self.pulled = self.weighed(rotations, pulled) + along * pulled
         self.given -= along * pulled
         self.lasted = dt
@@ -188,7 +208,7 @@ class Coupling:
 
     def solved(self, rotations: np.ndarray, impulse: np.ndarray, share: float = 1.0) -> np.ndarray:
         """Return the change of velocity [n, 6] by an impulse [n, 6] of bodies and a `share` of the water along."""
-        turn, along = matrix_of(rotations), share * self.along
+        turn, along = matrix_of(rotations), share * self.held_by
         tensors = turn @ self.tensors @ turn.transpose(0, 2, 1) + along[:, 1, None, None] * np.eye(3)
         spin = np.linalg.solve(tensors, impulse[:, 3:, None])[..., 0]
         return np.concatenate([impulse[:, :3] / (self.masses + along[:, 0])[:, None], spin], axis=1)
@@ -205,6 +225,7 @@ class Coupling:
         """Return all that it remembers, float64 [n, 13, 6]."""
         rest = np.zeros_like(self.impulse)
         rest[:, 0], rest[:, 1], rest[:, 2:4], rest[:, 4] = self.immersed, self.lasted, self.along, self.held
+        rest[:, 5] = self.rubbed[:, 0]
         sums = np.pad(self.sums.reshape(-1, 4), ((0, 0), (0, 2)))
         return np.stack([*(getattr(self, name) for name in ROWS), rest, sums], axis=1)
 
@@ -215,4 +236,7 @@ class Coupling:
         rest = memory[len(ROWS)]
         self.immersed[number], self.lasted = rest[0], float(rest[1])
         self.along[number], self.held[number] = rest[2:4], bool(rest[4])
+        mass = self.rubbed[:, 0].copy()
+        mass[number] = rest[5]
+        self._rub(mass)
         self.sums[number] = memory[-1][:4].reshape(2, 2)

@@ -64,7 +64,7 @@ def grids():
 @qd.func
 def parts():
     """Numbers that each solid has in `SolidSet.reaction`."""
-    return 13
+    return 14
 
 
 @qd.func

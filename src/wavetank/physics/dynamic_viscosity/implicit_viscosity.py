@@ -36,6 +36,10 @@ Where we differ, and why:
   what pressed it in the last one, and only the change comes afterwards: the incremental projection of Goda 1979
   (10.1016/0021-9991(79)90088-3; Guermond et al. 2006, 10.1016/j.cma.2005.10.010). w = `CARRIED` k / (`HALF` + k) of the
   `thickness` k: thin water carries nothing here, it would keep its noise. docs/notebook/viscosity.md has the figures.
+- Bodies feel the opposite of their part of the drag. Where there are any, the grid carries thick fluids as it carries
+  thin ones, in steps of a `thickness` of `WITH_BODIES` at most: between particles alone, in steps so short, a ball of
+  three spacings does not sink through fluid of two thirds of its density, not even through water (docs/bodies.md).
+  Walls hold what pressure is still to act on as if it had: fluid that begins its step falling pulled bodies down.
 - At rest nearly all of it is carried on (`CALM`). With a fifth left out, honey began each step falling; as walls hold
   that back, they bore a third of its weight: it crept up them, and down between them, for ever.
 """
@@ -47,11 +51,11 @@ import math
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import Coefficients, Grid, Particles, remembered, scalars
+from wavetank.device.state import Coefficients, Grid, Particles, Scratch, remembered, scalars
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import is_near
-from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE, Damping, solve
+from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE, Damping, along_walls, solve
 from wavetank.physics.dynamic_viscosity.rigid_guess import FORGET, RIGID, SHEARED, STIFF, rotate_guess
 from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate, free_motion
@@ -59,6 +63,7 @@ from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import MAX_ENTRIES
 from wavetank.physics.pairs import keep_pairs
 from wavetank.physics.predicted_positions import predict_at, predicted
+from wavetank.physics.reactions import add_damper, push_back
 from wavetank.physics.smoothing import TABLE_SIZE, interpolated, rest_points
 from wavetank.physics.teams import end_team, first_team, turns
 from wavetank.physics.world import World
@@ -73,6 +78,7 @@ LARGEST = 5.0  # of gravity, that is carried on
 AGAIN = 6.0  # times the push of the same step, that is carried on; at rest it is `CARRIED` / (1 - `CARRIED`) = 4.9
 TOUCHING = 0.5  # d: closer to a wall than at rest, what strikes it is held back along the normal as well
 SLIPS = 1e-9  # least share of the drag along a wall, where there should be none
+WITH_BODIES = 4.0  # `thickness` in a step, at most, where bodies are in the fluid
 CALM = 0.9  # share of what is not carried on that is, where nothing moves
 NEAREST = 0.25  # d: closer to a wall than this its drag grows no further
 
@@ -120,20 +126,36 @@ def damper(square, a, b, c: Coefficients):
     return mu * f / qd.max(square, 1e-24)
 
 
+@dataclasses.dataclass(frozen=True)
+class Holding:
+    """How walls hold fluids."""
+
+    no_slip: qd.f32  # share of the drag along a wall
+    most: qd.f32  # Pa s: the largest viscosity
+    touching: qd.f32  # m: closer than this, what strikes a wall is held along its normal, too
+    to_come: qd.f32  # s: times what pressed a particle in the last step, the velocity that pressure will give it
+
+
+@qd.func
+def wall_velocity(solids: SolidSet, k, i, p, particles: Particles, holding: Holding, c: Coefficients):
+    """Velocity [m/s] of a wall as a particle sees it that pressure is still to act on."""
+    return surface_velocity(solids, k, p, c.dt) - lift(particles.a[i]) * holding.to_come
+
+
 @qd.kernel(fastcache=True)
 def find_drag(
     packed: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles,
-    rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients,
-    no_slip: qd.f32, most: qd.f32, touching: qd.f32, count: qd.i32,
+    rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, holding: Holding,
+    count: qd.i32,
 ):  # fmt: skip
-    """Pack velocities and viscosities [Pa s], `most` at most, and find how fast the walls hold every particle back.
+    """Pack velocities and viscosities [Pa s], and find how fast the walls hold every particle back.
 
-    That is over B dt / rho, with the normal along which they do not, unless it strikes, closer than `touching` [m]:
-    what stands behind the normal is the share of the pull there, over `no_slip`, which is the share along the wall.
+    That is over B dt / rho, with the normal along which they do not, unless it strikes: what stands behind the normal
+    is the share of the pull there, over that along the wall.
     """
     for i in range(count):
         own = lift(particles.v[i])
-        row = vec4(own.x, own.y, own.z, qd.min(rows[particles.material[i]][1], most))
+        row = vec4(own.x, own.y, own.z, qd.min(rows[particles.material[i]][1], holding.most))
         packed[i] = row
         near = particles.near[i]
         pull = vec4(0.0, 0.0, 0.0, 0.0)
@@ -147,18 +169,52 @@ def find_drag(
                     value = signed_distance(solids, k, p)
                     if value.w < c.h:
                         share = interpolated(table, value.w / c.h)
-                        moving = surface_velocity(solids, k, p, c.dt)
+                        moving = wall_velocity(solids, k, i, p, particles, holding, c)
                         v = moving * share
                         pull += vec4(v.x, v.y, v.z, share)
                         free = vec4(value.x, value.y, value.z, 0.0)
-                        if value.w < touching and (own - moving).dot(vec3(value.x, value.y, value.z)) < -fast:
-                            free[3] = 1.0 / no_slip
+                        if value.w < holding.touching and (own - moving).dot(vec3(value.x, value.y, value.z)) < -fast:
+                            free[3] = 1.0 / holding.no_slip
                         walls += 1
             if walls > 1:  # in a corner the fluid is held in every direction
                 free = vec4(0.0, 0.0, 0.0, 0.0)
-            pull *= no_slip * row.w
+            pull *= holding.no_slip * row.w
         drag[i] = pull
         normal[i] = free
+
+
+@qd.kernel(fastcache=True)
+def drag_bodies(
+    packed: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles, scratch: Scratch, solids: SolidSet,
+    table: qd.types.ndarray(), c: Coefficients, holding: Holding, rate: qd.f32, per_damper: qd.f32, count: qd.i32,
+):  # fmt: skip
+    """Let bodies feel the opposite of their part of the drag, with the velocities that were found for the fluid.
+
+    What strikes one was stopped there when it was predicted, which they felt: it is taken back, as `take_velocities` does.
+    How stiffly it holds them is told as well, `per_damper`, a spacing over the thickest fluid [m/(Pa s)].
+    """
+    for i in range(count):
+        near = particles.near[i]
+        if near >> solids.tank_count != 0 and particles.frozen[i] == 0:
+            p = lift(predicted(particles, i))
+            own = vec3(packed[i].x, packed[i].y, packed[i].z)
+            mu = holding.no_slip * packed[i].w
+            for k in range(solids.tank_count, solids.count):
+                if solids.unit[k] > 0.0 and is_near(near, k, solids) == 1:
+                    value = signed_distance(solids, k, p)
+                    if value.w < c.h:
+                        share = mu * interpolated(table, value.w / c.h)
+                        moving = wall_velocity(solids, k, i, p, particles, holding, c)
+                        pull = along_walls((moving - own) * share, normal[i])
+                        push_back(solids, k, p, pull * (rate * c.dt))
+                        add_damper(solids, k, share * per_damper)
+                        if normal[i].w > 0.0:
+                            v = particles.v[i]
+                            for axis in qd.static(range(v.n)):
+                                v[axis] = packed[i][axis]
+                            freed = lift(free_motion(particles.x[i], v, c) - predicted(particles, i))
+                            freed -= lift(v - particles.v[i]) * c.dt
+                            push_back(solids, k, p, freed / scratch.weight[i])
 
 
 @qd.kernel(fastcache=True)
@@ -272,10 +328,12 @@ def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficie
         )
     packed, drag, normal = (fluids.array(name) for name in ("packed", "drag", "normal"))
     dampers = fluids.pairs(grid)
-    find_drag(
-        packed, drag, normal, particles, fluids.rows, world.solids, fluids.arrays["drag table"], c,
-        max(params.no_slip, SLIPS), largest, TOUCHING * params.spacing, count,
-    )  # fmt: skip
+    table = fluids.arrays["drag table"]
+    holding = remembered(Holding(
+        no_slip=max(params.no_slip, SLIPS), most=largest, touching=TOUCHING * params.spacing,
+        to_come=(1.0 - c.carried) * c.dt if world.pieces else 0.0,
+    ))  # fmt: skip
+    find_drag(packed, drag, normal, particles, fluids.rows, world.solids, table, c, holding, count)
     find_dampers(dampers, packed, particles, grid, c, count)
     guess_velocities(packed, particles, c, count)
     if stiffest > STIFF:
@@ -284,8 +342,28 @@ def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficie
         guess_velocities(packed, particles, c, count)
     damping = fluids.together(Damping, dampers, drag, normal)
     number = solve(world, damping, packed, c, rate, iterations(min(stiffest, STIFFEST), most))
+    if world.pieces:
+        per_damper = params.spacing / min(largest, largest_viscosity(kinds))
+        drag_bodies(packed, normal, particles, world.scratch, world.solids, table, c, holding, rate, per_damper, count)
     take_velocities(particles, packed, normal, c, count)
     return number
+
+
+def largest_viscosity(kinds: Blend) -> float:
+    """Return the viscosity [Pa s] of the thickest fluid."""
+    return max(fluid.viscosity for fluid in kinds.fluids.values())
+
+
+def hold_on_bodies(kinds: Blend, params: Parameters, dt: float) -> tuple[float, float]:
+    """Return what the dampers of a body are [kg] in a step of `dt` [s], over their sum in spacings, and nu dt [m^2]."""
+    d, thickest, density = params.spacing, largest_viscosity(kinds), kinds.largest_density
+    stiff = dt * damper_scale(params.dim, params.support, d) / density * thickest
+    return stiff * density * d**params.dim, dt * thickest / density
+
+
+def steps_with_bodies(kinds: Blend, params: Parameters, duration: float) -> float:
+    """Return how many steps `duration` [s] has at least where bodies are in the fluids."""
+    return thickness(kinds.kinematic_viscosity, params, duration) / WITH_BODIES
 
 
 def carry_on(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
