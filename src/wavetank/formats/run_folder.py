@@ -4,10 +4,12 @@ run.toml       what was ordered, and the version of this layout
 scene.toml     the scene with all that was set; meshes and heights are inside of it
 stats.jsonl    a line of figures for each frame, the first one at the start
 stats.json     the figures of the whole run, once it has ended
+stats.csv      those of all frames as a table, likewise
 states/        checkpoints: whole states, from which the run goes on to the last bit
 NAME*          pictures, films and files of frames
 """
 
+import csv
 import json
 import math
 from collections.abc import Iterator, Mapping
@@ -27,8 +29,9 @@ from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import Instant
 
 FILE, SCENE, STATS, SUMMARY, STATES = "run.toml", "scene.toml", "stats.jsonl", "stats.json", "states"
+TABLE = "stats.csv"
 LARGEST_STATS = 4_000_000_000  # bytes: a day of water at 60 frames per second
-LONGEST_ROW = 20_000  # characters
+LONGEST_ROW = 400_000  # characters
 
 
 class Run(Model):
@@ -63,7 +66,7 @@ class RunFolder:
         """Begin a run in a folder, with what it needs to be repeated."""
         folder = cls(make_folder(path), run, scene)
         scene.save(folder.path / SCENE)
-        for stale in (STATS, SUMMARY):
+        for stale in (STATS, SUMMARY, TABLE):
             (folder.path / stale).unlink(missing_ok=True)
         with replacing(folder.path / FILE) as partial:
             partial.write_text(tomli_w.dumps(run.model_dump()), encoding="utf-8")
@@ -113,6 +116,16 @@ class RunFolder:
             return []
         *lines, _ = read_text(path, "figures", LARGEST_STATS).split("\n")  # the last one was not finished, or is empty
         return [_row(line, f"{named(path)}, line {number}") for number, line in enumerate(lines, 1)]
+
+    def write_table(self) -> Path:
+        """Write the figures of all frames as a table of text, a column each, and return its path."""
+        rows = self.stats()
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        with replacing(self.path / TABLE) as partial, partial.open("w", encoding="utf-8", newline="") as file:
+            table = csv.DictWriter(file, names, restval="", lineterminator="\n")
+            table.writeheader()
+            table.writerows({name: "" if math.isnan(value) else value for name, value in row.items()} for row in rows)
+        return self.path / TABLE
 
     def keep_stats(self, count: int) -> None:
         """Drop the figures of all but the first `count` frames, before a run goes on from there."""

@@ -60,6 +60,8 @@ def world(session: Session) -> dict[str, Any]:
         "painted": painted(session),
         "legend": legend(session),
         "cut": session.cut,
+        "forces": session.shows_forces,
+        "bodies": len(session.sim.bodies),
         "undo": session.former.scene.title if session.former else None,
         "game": session.game is not None,
     }

@@ -26,6 +26,7 @@ from wavetank.front.signals import Asked, asked_to_end
 from wavetank.scene.scene import Scene
 from wavetank.simulation.cost import check_time
 from wavetank.simulation.frame import Frame
+from wavetank.simulation.loads import powers
 from wavetank.simulation.simulation import Simulation
 from wavetank.view.camera import Camera
 from wavetank.view.extent import extent_of
@@ -151,7 +152,7 @@ def record(
             )  # fmt: skip
             sinks[str(still)] = lambda number, frame, image: None
         stats = order.out / SUMMARY
-        files = [*sinks, *work.outputs.files, str(stats)]
+        files = [*sinks, *work.outputs.files, str(work.folder.write_table()), str(stats)]
         figures = summary.figures() | {"files": files, "waited_for_files": work.outputs.waited, "exit_code": asked.code}
         with replacing(stats) as partial:
             partial.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
@@ -343,7 +344,9 @@ class _Summary:
         self._sums: dict[str, float] = {"frames": 0, "error": 0.0, "milliseconds": 0.0, "begin": sim.time}
         self._sums |= {f"worst {name}": 0.0 for name in WORST} | {"rise": 0.0}
         for name, value in (before or {}).items():
-            if name in (*self._sums, "energy_start", "energy") and isinstance(value, int | float):
+            if (name in (*self._sums, "energy_start", "energy") or name.startswith("power ")) and isinstance(
+                value, int | float
+            ):
                 self._sums[name] = value
 
     def plain(self) -> dict[str, float]:
@@ -361,6 +364,8 @@ class _Summary:
             sums["energy_start"] = energy
         for name in WORST:
             sums[f"worst {name}"] = max(sums[f"worst {name}"], row[name])
+        for name, power in powers(self.sim.bodies).items():
+            sums[f"power {name}"] = sums.get(f"power {name}", 0.0) + (power if math.isfinite(power) else 0.0)
         sums["error"] += row["density_error_mean"]
         sums["frames"], sums["energy"], self.last = sums["frames"] + 1, energy, row
 
@@ -369,6 +374,7 @@ class _Summary:
         if not self.last and self.broken is None:
             self.add()
         sums, frames = self._sums, int(self._sums["frames"])
+        joints = {name.removeprefix("power "): total for name, total in sums.items() if name.startswith("power ")}
         return {
             "scene": self.sim.scene.title,
             "arch": self.sim.arch,
@@ -381,6 +387,7 @@ class _Summary:
             "mean": {
                 "density_error_mean": sums["error"] / max(frames, 1),
                 "milliseconds_per_frame": sums["milliseconds"] / (frames - 1) if frames > 1 else None,
+                **({"power": {name: total / max(frames - 1, 1) for name, total in joints.items()}} if joints else {}),
             },
             "last": self.last,
             **({} if self.broken is not None else {"digest": self.sim.digest()}),

@@ -12,7 +12,11 @@ from wavetank.session.game import Game
 from wavetank.session.scores import keep_score, key_of, scores
 from wavetank.session.session import Session
 from wavetank.simulation.jets import outlines
+from wavetank.simulation.loads import powers
 
+LONGEST = 0.2  # of the picture's height: the arrow of the heaviest body's weight
+MOST = 2.0  # of that: no arrow is longer
+NEWEST = 0.15  # share of a new frame in the means that are shown
 Place = list[float]  # u, v: shares of a picture's width and height
 
 
@@ -23,6 +27,7 @@ class Hud:
         self.session = session
         self.scores = scores()
         self._game: Game | None = None
+        self._means: dict[tuple[str, str], tuple[int, np.ndarray]] = {}
         self._level, self._is_best, self._kept = "", False, False
 
     def status(self) -> dict[str, Any] | None:
@@ -71,7 +76,7 @@ class Hud:
     def regions(self, size: tuple[int, int]) -> list[dict[str, Any]]:
         """Return the corners and the outline of each region, as shares of a picture of `size` [px].
 
-        Behind those of the game come the mouths of emitters and drains, which have a `mark` and no corners.
+        Behind those of the game come the mouths of emitters and drains, which have a `mark` and no corners, and forces.
         """
         game = self.session.game
         places = [] if game is None else [self._corners(aim.lower, aim.upper, size) for aim in game.goal.aims]
@@ -80,7 +85,48 @@ class Hud:
             seen = self._in_picture(points, size)
             if seen:
                 regions.append({"corners": [], "outline": seen, "mark": mark})
-        return regions
+        return regions + self._forces(size) if self.session.shows_forces else regions
+
+    def _forces(self, size: tuple[int, int]) -> list[dict[str, Any]]:
+        """Return arrows, with a `label`, of what the water does to bodies, and the power of joints that have motors.
+
+        The heaviest body's weight is an arrow `LONGEST` of the picture's height long. They are means of some frames:
+        what the water does in a single step jumps.
+        """
+        sim, shown = self.session.sim, []
+        weight = max((body.mass for body in sim.bodies.values()), default=0.0) * math.hypot(*sim.gravity)
+        scale = LONGEST * self.session.camera.visible_height / (weight or 1.0)  # m/N
+        for name, body in sim.bodies.items():
+            for mark, force in (("buoyancy", body.buoyancy), ("drag", body.drag)):
+                mean = self._mean((name, mark), force)
+                start, way = body.center, np.zeros(3)
+                way[: len(mean)] = scale * mean
+                way *= min(
+                    1.0, MOST * LONGEST * self.session.camera.visible_height / max(float(np.linalg.norm(way)), 1e-30)
+                )
+                places = self._in_picture(np.array([start, start + way]), size)
+                if places:
+                    told = f"{three(float(np.linalg.norm(mean)))} N"
+                    shown.append({"corners": [], "outline": places, "mark": mark, "label": told})
+        for name, power in powers(sim.bodies).items():
+            if math.isfinite(power):
+                (mean,) = self._mean((name, "power"), np.array([power]))
+                at = np.array([*sim.joints[name].joint.at, 0.0][:3])
+                told = f"{name}: {three(float(mean))} W"
+                shown.append(
+                    {"corners": [], "outline": self._in_picture(at[None], size), "mark": "power", "label": told}
+                )
+        return [row for row in shown if row["outline"]]
+
+    def _mean(self, what: tuple[str, str], value: np.ndarray) -> np.ndarray:
+        """Return the mean of a vector over the last frames, the more the newer they are."""
+        ticks, before, mean = self.session.ticks, *self._means.get(what, (-1, value))
+        if len(mean) != len(value) or ticks < before:
+            mean = value
+        elif ticks > before:
+            mean = mean + (1.0 - (1.0 - NEWEST) ** (ticks - before)) * (value - mean)
+        self._means[what] = (ticks, mean)
+        return mean
 
     def _corners(self, lower: Any, upper: Any, size: tuple[int, int]) -> list[Place]:
         flat = len(lower) == 2
@@ -94,6 +140,13 @@ class Hud:
         places = self.session.sight.project(points, *size)[:, :2] / size
         seen = all(math.isfinite(part) for part in places.reshape(-1))
         return [[round(float(u), 5), round(float(v), 5)] for u, v in places] if seen else []
+
+
+def three(value: float) -> str:
+    """Return a number with three digits that count, and no more: 0.00 where there is next to nothing."""
+    if abs(value) < 0.005:
+        return "0.00"
+    return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}"
 
 
 def _label(aim: dict[str, Any]) -> str:

@@ -36,6 +36,7 @@ KEYS = (
     Key("ArrowRight", command={"do": "orbit", "azimuth": 0.12}),
     Key("ArrowUp", command={"do": "orbit", "elevation": 0.08}),
     Key("ArrowDown", command={"do": "orbit", "elevation": -0.08}),
+    Key("n", "N", "Forces on bodies: buoyancy, drag, power", "forces"),
     Key("?", "?", "This list", "help"),
 )
 

@@ -6,6 +6,7 @@ TEXT, SOFT = "#e3ebf0", "#8fa3b0"
 ACCENT, ACCENT_BRIGHT, ACCENT_GROUND = "#59c8ff", "#86d8ff", "#123447"
 WARM, WARM_GROUND = "#ffb866", "#3a2a14"
 GOOD, GOLD, UNLIT = "#3fcf7f", "#ffd257", "#4a5a66"  # what is done; stars
+BUOYANCY, DRAG, POWER = "#2f7de1", "#e0702a", "#6a4bc4"  # arrows and numbers over the picture
 WANTED, MET, FORBIDDEN = "#e0930f", "#1f9d57", "#d8434e"  # regions of a level
 WATER_FRONT, WATER_TOP, WATER_SIDE = "#2a92d4", "#6cc7f6", "#1d70a8"  # of the drawings of scenes
 SOLID_FRONT, SOLID_TOP, SOLID_SIDE, EDGE = "#c99a73", "#e6c19f", "#a27852", "#7d93a1"
@@ -13,6 +14,9 @@ DYE = "#2f9fe8"  # offered first where a tool colours water
 
 #: all of these, as the page calls them: accent-ground and so on
 COLORS = {name.lower().replace("_", "-"): value for name, value in list(globals().items()) if name.isupper()}
+
+#: colours of forces, by their marks
+FORCES = {"buoyancy": BUOYANCY, "drag": DRAG, "power": POWER}
 
 #: what particles may be coloured besides by a quantity
 PAINTS = (("#3f99da", "Blue"), ("#e8eef2", "Milk"))

@@ -268,7 +268,7 @@ class Home(Command):
 
 
 class SetView(Command):
-    """Choose what is drawn: a view of the renderer, what particles are coloured by, where a slice lies."""
+    """Choose what is drawn: a view of the renderer, what particles are coloured by, where a slice lies, forces."""
 
     do: Literal["view"] = "view"
     fusible: ClassVar = ("do",)
@@ -276,6 +276,7 @@ class SetView(Command):
     color_by: Name = ""
     axis: Literal["", "x", "y", "z"] = ""  # across which a slice lies
     place: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = None  # of it along that, 0 to 1
+    forces: bool | None = None  # whether what the water does to bodies is shown, as arrows and numbers
 
     def after(self, earlier: Command) -> Command:
         """What is not said again stays as it was said."""
@@ -283,6 +284,7 @@ class SetView(Command):
         return SetView.model_construct(
             view=self.view or earlier.view, color_by=self.color_by or earlier.color_by,
             axis=self.axis or earlier.axis, place=earlier.place if self.place is None else self.place,
+            forces=earlier.forces if self.forces is None else self.forces,
         )  # fmt: skip
 
 

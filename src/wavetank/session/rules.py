@@ -219,6 +219,7 @@ def view(state: SessionState, command: c.SetView) -> None:
     if command.axis or command.place is not None:
         axis, place = state.cut
         state.cut = (command.axis or axis, place if command.place is None else command.place)
+    state.shows_forces = state.shows_forces if command.forces is None else command.forces
 
 
 def _is_color(value: str) -> bool:

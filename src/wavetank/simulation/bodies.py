@@ -14,6 +14,7 @@ from typing_extensions import override
 
 from wavetank.device.compiler import download, upload
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.rotations import quaternion_of
 from wavetank.physics.bodies import Pieces, Retry, new_pieces
 from wavetank.physics.dynamic_viscosity.implicit_viscosity import hold_on_bodies
 from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED, carried
@@ -39,6 +40,8 @@ from wavetank.solids.solid import Solid
 MOST_TRIES = 4  # of a step
 FAR = 0.3  # of a spacing: bodies that yield by more begin the step anew
 FEWEST = 4.0  # pieces across a body
+DENSITY = 4  # where the density is in the last row of what is remembered
+IN_JOINTS = 16  # inner iterations of the engine where there are joints: with 1 a motor sagged by 0.3 rad/s under a load
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
 
 
@@ -56,7 +59,8 @@ def import_engine() -> Any:
 class Bodies(Mapping[str, Body]):
     """All bodies of a world by name, and the engine that moves them; empty where no solid is a body."""
 
-    def __init__(self, scene: Scene, solids: MovingSolids) -> None:
+    def __init__(self, scene: Scene, solids: MovingSolids, density: float = 0.0) -> None:
+        """Begin among these solids, in fluids of at most that `density` [kg/m^3]; those of the scene where it is 0."""
         self.scene, self.solids, self.dim = scene, solids, scene.dim
         self.members: list[Body] = []
         self.fastest = 0.0  # m/s
@@ -67,11 +71,12 @@ class Bodies(Mapping[str, Body]):
         self.acting: Acting | None = None  # made when forces first act
         self.pushes: np.ndarray | None = None  # kg m/s, kg m^2/s: by forces, in the next step
         self._told: dict[int, tuple[float, ...]] = {}  # water that goes along with each body, as the engine knows it
+        self.density = density
         solids.feeling, solids.passing = {}, {}
         numbers = [number for number, solid in enumerate(solids.members) if solid.is_body]
         if not numbers:
             return
-        self.density = blend(scene.materials_of(scene.kinds()), scene).largest_density
+        self.density = density or blend(scene.materials_of(scene.kinds()), scene).largest_density
         self.engine = import_engine()
         self.world = self.engine.PhysicsWorld(gravity=(0.0, 0.0, 0.0))
         self.world.integration_parameters.length_unit = max(10.0 * scene.spacing, 1e-3)
@@ -150,7 +155,7 @@ class Bodies(Mapping[str, Body]):
         self.coupling = Coupling(masses, tensors, np.array(reaches), np.array(added))
         self.moments, frames = np.linalg.eigh(tensors)
         frames[np.linalg.det(frames) < 0.0, :, 0] *= -1.0
-        self.frames = [self.engine.Rotation3(*_quaternion(matrix)) for matrix in frames]
+        self.frames = [self.engine.Rotation3(*quaternion_of(matrix)) for matrix in frames]
         for row, number in enumerate(numbers):
             self._put(row, number, *inertias[row])
 
@@ -227,6 +232,7 @@ class Bodies(Mapping[str, Body]):
             pose = self._isometry(*self.solids.between(number, share))
             self.world.rigid_bodies[self.handles[number]].set_next_kinematic_position(pose)
         self.world.integration_parameters.dt = dt
+        self.world.integration_parameters.num_internal_pgs_iterations = IN_JOINTS if self.joints else 1
         self.world.step()
         rotations = np.array([self.begins[body.number][1] for body in self.members])
         self.coupling.start(rotations, begun, self._velocities(rigid), dt)
@@ -341,9 +347,9 @@ class Bodies(Mapping[str, Body]):
 
     # --- states ---
 
-    def renewed(self, scene: Scene, solids: MovingSolids) -> "Bodies":
-        """Return the bodies among these solids; those that there were go on as they did."""
-        bodies = Bodies(scene, solids)
+    def renewed(self, scene: Scene, solids: MovingSolids, density: float = 0.0) -> "Bodies":
+        """Return the bodies among these solids; those that there were go on as they did, in fluids of that density."""
+        bodies = Bodies(scene, solids, density or self.density)
         memories: Any = self.coupling.memory() if self.members else []
         for name, joint in bodies.joints.items():
             if name in self.joints:
@@ -360,7 +366,9 @@ class Bodies(Mapping[str, Body]):
         if not self.members:
             return {}
         engine = np.frombuffer(self.world.snapshot(), np.uint8).copy()
-        return {"bodies_memory": self.coupling.memory(), "bodies_engine": engine}
+        memory = self.coupling.memory()
+        memory[:, -1, DENSITY] = self.density  # a state knows no fluids, only particles
+        return {"bodies_memory": memory, "bodies_engine": engine}
 
     def resume(self, arrays: dict[str, np.ndarray]) -> None:
         """Go on from what `arrays` returned, with the same solids."""
@@ -388,18 +396,12 @@ class Bodies(Mapping[str, Body]):
                 raise WavetankError(f"the engine's state of the body {body.name!r} is not that of the solid.")
 
 
+def density_in(arrays: dict[str, np.ndarray]) -> float:
+    """Return the density of the fluids [kg/m^3] that the bodies of a snapshot were in; 0 where it does not say."""
+    memory = arrays.get("bodies_memory", np.zeros((0, 1, 6)))
+    density = float(memory[0, -1, DENSITY]) if len(memory) else 0.0
+    return density if 0.0 < density < 1e6 else 0.0
+
+
 def _three(v: Any) -> tuple[float, float, float]:
     return (v.x, v.y, v.z)
-
-
-def _quaternion(matrix: np.ndarray) -> tuple[float, ...]:
-    """Return (w, x, y, z) of a rotation matrix (Bar-Itzhack 2000, 10.2514/2.4654)."""
-    m = matrix
-    whole = np.array([
-        [m[0, 0] - m[1, 1] - m[2, 2], 0.0, 0.0, 0.0],
-        [m[1, 0] + m[0, 1], m[1, 1] - m[0, 0] - m[2, 2], 0.0, 0.0],
-        [m[2, 0] + m[0, 2], m[2, 1] + m[1, 2], m[2, 2] - m[0, 0] - m[1, 1], 0.0],
-        [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], np.trace(m)],
-    ])  # fmt: skip
-    x, y, z, w = np.linalg.eigh(whole / 3.0)[1][:, -1]
-    return (float(w), float(x), float(y), float(z))

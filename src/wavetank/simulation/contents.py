@@ -9,6 +9,7 @@ from wavetank.physics import measure, population
 from wavetank.physics.measure import neighbor_numbers, update_densities
 from wavetank.physics.world import World
 from wavetank.scene.scene import Scene
+from wavetank.simulation import loads
 from wavetank.simulation.arrays import check_crowd, check_rows, largest_norm, put_by_id
 from wavetank.simulation.bodies import Bodies
 from wavetank.simulation.frame import Frame
@@ -132,7 +133,10 @@ class Contents:
         return tuple(found)
 
     def stats(self) -> dict[str, float]:
-        """Measure this instant; see `physics.measure.statistics` for the keys, and foam in numbers of particles."""
+        """Measure this instant; see `physics.measure.statistics` and `simulation.loads` for the keys.
+
+        Foam is in numbers of particles.
+        """
         frame = self.frame()
         numbers = neighbor_numbers(self.world, self.scene)
         figures = measure.statistics(
@@ -145,6 +149,7 @@ class Contents:
             **{KINDS[kind]: int(np.sum(frame.foam_kinds == kind)) for kind in (1, 2, 3)},
             "foaming": int(frame.foaming.sum()),
             **(self.sources.figures() if self.sources else {}),
+            **loads.figures(self.bodies),
             "substeps": self.time_steps,
             "milliseconds_per_frame": 1e3 * self.seconds_per_frame,
         }

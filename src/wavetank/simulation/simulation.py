@@ -258,8 +258,8 @@ class Simulation(States):
         self.solids.remove(number + self.solids.tank_count)
         self._renew_solids()
 
-    def _renew_solids(self) -> None:
-        self.bodies = self.bodies.renewed(self.scene, self.solids)
+    def _renew_solids(self, density: float = 0.0) -> None:
+        self.bodies = self.bodies.renewed(self.scene, self.solids, density)
         self.world.pieces = self.bodies.pieces
         self.world.solids, self.world.has_friction = self.solids.device, self.solids.has_friction
         self._outdated = True

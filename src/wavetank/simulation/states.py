@@ -11,7 +11,7 @@ from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
 from wavetank.scene.schedule import with_gravity
 from wavetank.simulation import snapshot as snapshots
-from wavetank.simulation.bodies import Bodies
+from wavetank.simulation.bodies import Bodies, density_in
 from wavetank.simulation.contents import Contents
 from wavetank.simulation.cost import check_cost
 from wavetank.simulation.moving_solids import MovingSolids
@@ -50,7 +50,7 @@ class States(Contents, ABC):
         """Return the solids that the tank is."""
 
     @abstractmethod
-    def _renew_solids(self) -> None:
+    def _renew_solids(self, density: float = 0.0) -> None:
         """Put the solids as they are now on the device."""
 
     def become(self, other: Self) -> None:
@@ -70,7 +70,7 @@ class States(Contents, ABC):
         self.solids = snapshots.restore_solids(self.scene, self._walls(), snapshot)
         if snapshot.ledger.capacity > self.ledger.capacity:
             self._fill(snapshot.ledger.capacity)
-        self._renew_solids()
+        self._renew_solids(density_in(snapshot.arrays))
         before, self.ledger, self.pushed = self.ledger, snapshot.ledger.copy(), []
         self.ledger.capacity = before.capacity
         self.ledger.next_id = max(self.ledger.next_id, before.next_id)

@@ -5,7 +5,7 @@ from typing import Any
 
 from imgui_bundle import ImVec2, imgui
 
-from wavetank.front.theme import FORBIDDEN, GOLD, GOOD, MET, RAISED, SOFT, TEXT, UNLIT, WANTED, WARM
+from wavetank.front.theme import FORBIDDEN, FORCES, GOLD, GOOD, MET, RAISED, SOFT, TEXT, UNLIT, WANTED, WARM
 from wavetank.front.window import keys
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.look import button, draw_star, floating, heading, ink, rgba
@@ -20,6 +20,7 @@ Box = tuple[float, float, float, float]  # x, y, width, height [px]
 def draw_game(desk: Desk, box: Box) -> None:
     """Draw the mouths of emitters and drains, and what there is of a game, over the picture."""
     _mouths(desk, box)
+    _forces(desk, box)
     game = desk.game
     if game is None:
         return
@@ -71,10 +72,47 @@ def _mouths(desk: Desk, box: Box) -> None:
     for region in desk.shown.regions:
         points = [ImVec2(x + u * width, y + v * height) for u, v in region["outline"]]
         dashed = region.get("mark") == "drain"
-        for number, (a, b) in enumerate(itertools.pairwise(points) if "mark" in region else ()):
+        for number, (a, b) in enumerate(
+            itertools.pairwise(points) if "mark" in region and "label" not in region else ()
+        ):
             if not (dashed and number % 2):
                 draw.add_line(a, b, ink(TEXT, 0.7), 1.5)
     draw.pop_clip_rect()
+
+
+def _forces(desk: Desk, box: Box) -> None:
+    """Draw what the water does to bodies as arrows with their numbers, and the power of joints as numbers."""
+    draw, em, (x, y, width, height) = imgui.get_window_draw_list(), imgui.get_font_size(), box
+    draw.push_clip_rect(ImVec2(x, y), ImVec2(x + width, y + height), True)
+    for region in desk.shown.regions:
+        if "label" not in region:
+            continue
+        color = FORCES[region["mark"]]
+        points = [ImVec2(x + u * width, y + v * height) for u, v in region["outline"]]
+        end = points[-1]
+        if len(points) > 1:
+            _arrow(draw, points[0], end, ink(color), em)
+        size = imgui.calc_text_size(region["label"])
+        low = ImVec2(end.x + 0.6 * em, end.y - 0.5 * size.y - 2)
+        high = ImVec2(low.x + size.x + 10, low.y + size.y + 4)
+        draw.add_rect_filled(low, high, ink(color, 0.9), 5.0)
+        draw.add_text(ImVec2(low.x + 5, low.y + 2), ink("#ffffff"), region["label"])
+        desk.places[f"force.{region['mark']}"] = (low.x, low.y, high.x, high.y)
+    draw.pop_clip_rect()
+
+
+def _arrow(draw: Any, start: ImVec2, end: ImVec2, color: int, em: float) -> None:
+    dx, dy = end.x - start.x, end.y - start.y
+    length = (dx * dx + dy * dy) ** 0.5
+    if length < 2.0:
+        return
+    ux, uy, head = dx / length, dy / length, min(0.7 * em, length)
+    back = ImVec2(end.x - head * ux, end.y - head * uy)
+    draw.add_line(start, back, color, 3.0)
+    side = 0.45 * head
+    draw.add_triangle_filled(
+        end, ImVec2(back.x - side * uy, back.y + side * ux), ImVec2(back.x + side * uy, back.y - side * ux), color
+    )
 
 
 def _line(draw: Any, a: ImVec2, b: ImVec2, color: int, *, dashed: bool) -> None:

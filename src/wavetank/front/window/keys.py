@@ -8,7 +8,7 @@ from wavetank.front.keys import KEYS, SPEEDS, Key, nearest_speed
 from wavetank.front.theme import ACCENT, RAISED, SOFT
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.look import ink, rgba
-from wavetank.session.commands import Bookmark, Pause, Reset, Rewind, Speed, command_of
+from wavetank.session.commands import Bookmark, Pause, Reset, Rewind, SetView, Speed, command_of
 
 POINTER = (
     ("left button", "Use the tool"), ("right button", "Turn the view"), ("right, W A S D Q E", "Fly"),
@@ -54,9 +54,14 @@ def show_panel(desk: Desk) -> None:
     desk.panel = not desk.panel
 
 
+def toggle_forces(desk: Desk) -> None:
+    """Show what the water does to bodies, or hide it."""
+    desk.engine.do(SetView, forces=not desk.world["forces"])
+
+
 ACTIONS: dict[str, Callable[[Desk], None]] = {
     "pause": toggle_pause, "back": go_back, "again": begin_again, "bookmark": set_bookmark, "panel": show_panel,
-    "help": show_help,
+    "help": show_help, "forces": toggle_forces,
     "slower": lambda desk: change_pace(desk, -1), "faster": lambda desk: change_pace(desk, 1),
 }  # fmt: skip
 HERE = {key.key: key for key in KEYS if not key.page_only}

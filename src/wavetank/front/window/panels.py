@@ -152,6 +152,11 @@ def _look(desk: Desk) -> None:
     if color:
         desk.engine.do(SetView, color_by=color)
     _legend(world["legend"])
+    if world["bodies"]:
+        title("Forces on bodies")
+        shown = pills([("", "Hidden"), ("shown", "Shown")], "shown" if world["forces"] else "")
+        if shown is not None:
+            desk.engine.do(SetView, forces=bool(shown))
     title("Picture")
     detail = pills(DETAILS, desk.engine.detail)
     if detail:

@@ -7,13 +7,32 @@ const hud = find("hud"), banner = find("banner"), drawing = find("regions"), nam
 const EDGES = [[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [5, 7], [7, 6], [6, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
 let regions = [], game = null, shown = "", waits = false, lit = null;
 
+/** An arrow with its number: what the water does to a body; or a number alone, the power of a joint. */
+function drawForce(outline, mark, text) {
+  const [x, y] = outline.at(-1), label = make("span", { className: `force ${mark}`, textContent: text });
+  if (outline.length > 1) {
+    const { width, height } = drawing.getBoundingClientRect(), [u, v] = outline[0];
+    const dx = (x - u) * width, dy = (y - v) * height, long = Math.hypot(dx, dy), head = Math.min(11, long);
+    if (long > 2) {
+      const at = (along, across) => `${x - (along * dx - across * dy) / long / width},${y - (along * dy + across * dx) / long / height}`;
+      const back = at(head, 0).split(",");
+      drawing.append(svg("line", { x1: u, y1: v, x2: back[0], y2: back[1], class: `force ${mark}`, "vector-effect": "non-scaling-stroke" }));
+      drawing.append(svg("polygon", { points: [at(0, 0), at(head, 0.45 * head), at(head, -0.45 * head)].join(" "), class: `force ${mark}` }));
+    }
+  }
+  label.style.left = `${100 * x}%`;
+  label.style.top = `${100 * y}%`;
+  names.append(label);
+}
+
 let outlined = "";
 function drawRegions() {
   const now = JSON.stringify([regions, game?.aims ?? null]);
   if (now === outlined) return;
   outlined = now;
   drawing.replaceChildren(); names.replaceChildren();
-  regions.forEach(({ corners: points, outline, mark }, k) => {
+  regions.forEach(({ corners: points, outline, mark, label: text }, k) => {
+    if (text) return drawForce(outline, mark, text);
     if (mark) return drawing.append(svg("polygon", { points: outline.map((p) => p.join()).join(" "), class: mark, "vector-effect": "non-scaling-stroke" }));
     const aim = game?.aims[k];
     if (!points.length || !aim) return;

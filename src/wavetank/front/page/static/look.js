@@ -22,6 +22,7 @@ function build() {
     ...(about.views.length > 1 ? pills("View", about.views.map((v) => [v, words(v)]), about.view, (view) => send({ do: "view", view })) : []),
     ...(about.view === "slice" ? slice() : []),
     ...pills("Colour by", colours, about.painted, (color_by) => send({ do: "view", color_by })),
+    ...(about.bodies ? pills("Forces on bodies", [[false, "Hidden"], [true, "Shown"]], about.forces, (forces) => send({ do: "view", forces })) : []),
     ...pills("Picture", [["auto", "Automatic"], ["full", "Sharp"], ["half", "Fast"]], detail, (value) => { detail = value; send({ do: "detail", detail }); build(); }),
     make("h3", { textContent: "Measured" }), figures,
     make("h3", { textContent: "Keep" }),
@@ -35,6 +36,9 @@ function build() {
     rows[key] = { value, canvas };
   }
 }
+
+/** Show what the water does to bodies, or hide it. */
+export const toggleForces = () => send({ do: "view", forces: !about.forces });
 
 /** Where the slice lies. */
 function slice() {
@@ -95,9 +99,9 @@ setInterval(() => {
 on("hello", (hello) => { about = hello; build(); legend(); });
 on("status", (status) => {
   if (status.world) {
-    const before = JSON.stringify([about.view, about.painted, about.cut?.[0], about.dim]);
+    const before = JSON.stringify([about.view, about.painted, about.cut?.[0], about.dim, about.forces, about.bodies > 0]);
     about = { ...about, ...status.world };
-    if (JSON.stringify([about.view, about.painted, about.cut[0], about.dim]) !== before) build(); // a slider that is moved stays
+    if (JSON.stringify([about.view, about.painted, about.cut[0], about.dim, about.forces, about.bodies > 0]) !== before) build(); // a slider that is moved stays
     legend();
   }
   plot("error", status.density_error_mean ?? 0, `${(100 * (status.density_error_mean ?? 0)).toFixed(2)} %`);

@@ -7,7 +7,7 @@ import { time } from "./timeline.js";
 import "./stage.js";
 import "./water.js";
 import "./scenes.js";
-import "./look.js";
+import { toggleForces } from "./look.js";
 import "./hud.js";
 import { arrow, enter, keys as aim, leave } from "./aim.js";
 
@@ -46,7 +46,7 @@ on("chosen", () => { if (narrow.matches) panel(false); find("picture").focus({ p
 let keys = [];
 on("hello", (hello) => { keys = hello.keys; });
 const ACTIONS = {
-  pause: time.toggle, back: time.back, again: time.reset, slower: () => time.faster(-1), faster: () => time.faster(1), bookmark: time.bookmark,
+  pause: time.toggle, back: time.back, again: time.reset, slower: () => time.faster(-1), faster: () => time.faster(1), bookmark: time.bookmark, forces: toggleForces,
   "full-screen": () => (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()),
   panel: () => panel(), help: () => help(), aim: enter,
 };

@@ -1,0 +1,121 @@
+"""What the water does to bodies and what joints give, as figures of a frame, of a run, and over pictures."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+
+import wavetank as wt
+from wavetank.front.hud import Hud, three
+from wavetank.session import commands as do
+from wavetank.simulation.loads import figures, powers
+
+pytest.importorskip("rapier3d")
+
+
+def pool(**others):
+    return wt.Scene(
+        spacing=0.05, tank=wt.Tank(size=(0.8, 0.8, 0.8)), foam=0,
+        fluids=[wt.Block(lower=(0, 0, 0), upper=(0.8, 0.4, 0.8))], **others,
+    )  # fmt: skip
+
+
+def arm(**motor):
+    """A bar of 2 kg that is 0.4 m long, on a hinge at its end, above the water."""
+    return pool(
+        solids=[wt.Box(name="bar", center=(0.4, 0.65, 0.4), size=(0.4, 0.06, 0.06), mass=2)],
+        joints=[wt.Hinge(name="hip", first="bar", at=(0.2, 0.65, 0.4), axis=(0, 0, 1), **motor)],
+    )  # fmt: skip
+
+
+def test_a_motor_that_lifts_takes_the_weight_times_its_speed():
+    """P = m g v of the centre of mass, cos of the angle times the lever; a motor that lets down gets it back."""
+    for speed in (0.5, -0.5):
+        sim = wt.Simulation(arm(speed=speed))
+        sim.advance(0.2)
+        row = sim.stats()
+        angle = row["joints.hip.position"]
+        assert row["joints.hip.velocity"] == pytest.approx(speed, abs=0.03), "it sagged by 0.34 rad/s"
+        weight = 2 * 9.81 * 0.2 * math.cos(angle)
+        assert row["joints.hip.power"] == pytest.approx(weight * row["joints.hip.velocity"], rel=0.02)
+        assert row["joints.hip.power"] == pytest.approx(row["joints.hip.effort"] * row["joints.hip.velocity"])
+        assert powers(sim.bodies) == {"hip": pytest.approx(row["joints.hip.power"])}
+
+
+def test_a_hinge_without_a_motor_has_no_power_to_be_shown():
+    sim = wt.Simulation(arm())
+    sim.advance(0.1)
+    assert powers(sim.bodies) == {} and abs(sim.stats()["joints.hip.effort"]) < 0.1
+
+
+def test_force_is_buoyancy_and_drag():
+    scene = pool(solids=[wt.Box(name="crate", center=(0.4, 0.2, 0.4), size=(0.2, 0.2, 0.2), density=800, held=True)])
+    sim = wt.Simulation(scene)
+    sim.advance(0.5)
+    crate, weight = sim.bodies["crate"], 1000 * 0.2**3 * 9.81
+    assert crate.buoyancy.tolist() == pytest.approx([0, weight, 0], abs=0.02 * weight)
+    assert np.linalg.norm(crate.drag) < 0.1 * weight
+    assert (crate.buoyancy + crate.drag).tolist() == pytest.approx(crate.force.tolist())
+    row = figures(sim.bodies)
+    assert row["bodies.crate.force_y"] == pytest.approx(crate.force[1])
+    assert {name.rsplit(".", 1)[1] for name in row} == {
+        "force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "immersed",
+    }  # fmt: skip
+
+
+def test_a_flat_world_has_two_parts_and_one_torque():
+    scene = wt.Scene(
+        spacing=0.05, tank=wt.Tank(size=(0.8, 0.8)), fluids=[wt.Block(lower=(0, 0), upper=(0.8, 0.4))],
+        solids=[wt.Box(name="b", center=(0.4, 0.4), size=(0.2, 0.2), density=500)],
+        joints=[wt.Hinge(name="pin", first="b", at=(0.4, 0.4), speed=0.0)],
+    )  # fmt: skip
+    sim = wt.Simulation(scene)
+    sim.step()
+    keys = {name.removeprefix("bodies.b.") for name in sim.stats() if name.startswith("bodies")}
+    assert keys == {"force_x", "force_y", "torque_z", "immersed"}
+    assert sim.bodies["b"].buoyancy.shape == sim.bodies["b"].drag.shape == (2,)
+
+
+def test_a_run_has_them_in_a_table_and_means_at_its_end(wavetank, tmp_path):
+    arm(speed=0.5).save(tmp_path / "arm.toml")
+    done = wavetank("run", str(tmp_path / "arm.toml"), "--seconds", "0.2", "--out", str(tmp_path / "out"))
+    assert done.returncode == 0, done.stderr
+    with (tmp_path / "out" / "stats.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 7 and rows[0]["milliseconds_per_frame"] == ""
+    power = [float(row["joints.hip.power"]) for row in rows]
+    told = json.loads((tmp_path / "out" / "stats.json").read_text())
+    assert told["mean"]["power"]["hip"] == pytest.approx(np.mean(power[1:]), rel=1e-6)
+    assert str(tmp_path / "out" / "stats.csv") in told["files"]
+
+
+def test_they_are_arrows_and_numbers_over_the_picture_where_asked_for():
+    scene = arm(speed=0.5)
+    session = wt.Session(
+        scene.changed(
+            solids=[*scene.solids, wt.Box(name="crate", center=(0.4, 0.2, 0.4), size=(0.2, 0.2, 0.2), density=800)]
+        )
+    )
+    hud = Hud(session)
+    session.tick()
+    assert hud.regions((640, 360)) == []
+    session.apply(do.SetView(forces=True))
+    session.apply(do.SetView(view="particles"))
+    assert session.shows_forces, "what is not said again stays"
+    session.tick()
+    shown = hud.regions((640, 360))
+    assert {row["mark"] for row in shown} == {"buoyancy", "drag", "power"}
+    (crate,) = [row for row in shown if row["mark"] == "buoyancy" and float(row["label"].split()[0]) > 20]
+    (u, v), (_, tip) = crate["outline"]
+    assert 0 < u < 1 and tip < v, "buoyancy points up"
+    assert next(row for row in shown if row["mark"] == "power")["label"].startswith("hip: ")
+    session.apply(do.SetView(forces=False))
+    assert hud.regions((640, 360)) == []
+
+
+def test_numbers_have_three_digits():
+    assert [three(value) for value in (0.0, 0.0312, -0.5, 7.0, 78.4812, 12345.6)] == [
+        "0.00", "0.0312", "-0.500", "7.00", "78.5", "12346",
+    ]  # fmt: skip
