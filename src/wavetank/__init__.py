@@ -29,10 +29,8 @@ from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace
 
 if TYPE_CHECKING:
     from wavetank.formats.dualsphysics import load_dualsphysics
-    from wavetank.formats.mjcf import load_mjcf
-    from wavetank.formats.robot import load_robot
+    from wavetank.formats.robots import load_mjcf, load_robot, load_urdf
     from wavetank.formats.splishsplash import load_splishsplash
-    from wavetank.formats.urdf import load_urdf
     from wavetank.front.notebook.show import show
     from wavetank.session import commands
     from wavetank.session.recording import Recording, replay
@@ -61,9 +59,9 @@ LATER = {
     "commands": "wavetank.session.commands",
     "load_dualsphysics": "wavetank.formats.dualsphysics",
     "load_splishsplash": "wavetank.formats.splishsplash",
-    "load_mjcf": "wavetank.formats.mjcf",
-    "load_robot": "wavetank.formats.robot",
-    "load_urdf": "wavetank.formats.urdf",
+    "load_mjcf": "wavetank.formats.robots",
+    "load_robot": "wavetank.formats.robots",
+    "load_urdf": "wavetank.formats.robots",
     "render": "wavetank.view.renderer",
     "replay": "wavetank.session.recording",
     "show": "wavetank.front.notebook.show",

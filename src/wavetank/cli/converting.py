@@ -54,7 +54,7 @@ def import_scene(
     as_json: Json = False,
 ) -> None:
     """Read a scene of SPlisHSPlasH or DualSPHysics, or a robot; write a scene, and say what has no counterpart."""
-    from wavetank.formats.robot import is_mjcf, load_robot
+    from wavetank.formats.robots import is_mjcf, load_robot
 
     if file.suffix.lower() == ".urdf" or (file.suffix.lower() in (".xml", ".mjcf") and is_mjcf(file)):
         robot = load_robot(file, _place(at))

@@ -23,7 +23,6 @@ from wavetank.formats.robot import (
     Robot,
     carried,
     hex_of,
-    load_robot,
     mesh_at,
     numbers,
     then,
@@ -45,13 +44,6 @@ LEFT_OUT = ("tendon", "contact", "deformable", "extension", "keyframe")
 UNSEEN = ("light", "camera", "site")
 UNREAD = ("composite", "flexcomp", "replicate", "attach", "plugin")
 RESISTING = ("damping", "stiffness", "frictionloss", "armature")
-
-
-def load_mjcf(
-    path: str | Path, position: Any = (0.0, 0.0, 0.0), angle: float = 0.0, prefix: str = "", held: bool | None = None
-) -> Robot:
-    """Read a robot as `load_robot` does, which is the same."""
-    return load_robot(path, position, angle, prefix, held)
 
 
 def read_mjcf(root: ElementTree.Element, path: Path, place: Pose, prefix: str, held: bool | None) -> Robot:

@@ -1,15 +1,13 @@
-"""What readers of robots share: where parts are, what they weigh, how a file is opened and refused."""
+"""What readers of robots share: where parts are, what they weigh, numbers of attributes."""
 
 import dataclasses
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
-from wavetank.foundation.door import guarded, named, one_line, parse_xml, read_text
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import product, turned, unit_quaternion
 from wavetank.scene.joints import Joint
@@ -38,46 +36,12 @@ class Robot:
 
     def joined(self, scene: Any) -> Any:
         """Return a scene with this robot in it. Raises `WavetankError` where names are taken."""
+        if scene.dim == 2:
+            raise WavetankError("a robot needs a 3-D world, and this scene is flat; put it into another one.")
         taken = {solid.name for solid in scene.solids} & {solid.name for solid in self.solids}
         if taken:
             raise WavetankError(f"the scene has solids named {', '.join(sorted(taken))} already; give prefix another.")
         return scene.changed(solids=[*scene.solids, *self.solids], joints=[*scene.joints, *self.joints])
-
-
-def load_robot(
-    path: str | Path, position: Any = (0.0, 0.0, 0.0), angle: float = 0.0, prefix: str = "", held: bool | None = None
-) -> Robot:
-    """Read a URDF file, or an MJCF file (`.xml`) of MuJoCo, as a robot as its file has it, its motors holding it there.
-
-    Its origin is at `position` [m], shape [3], turned by `angle` [rad] about the upright axis; with `held` true or
-    false its base is fixed to the ground or free, else it is as the file says, and that of a URDF file is fixed.
-    `prefix` comes before all names. Raises `WavetankError`.
-    """
-    from wavetank.formats.mjcf import read_mjcf
-    from wavetank.formats.urdf import read_urdf
-
-    upright = unit_quaternion([math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0])
-    place = np.array(position, float), product(upright, STANDING)
-    readers: dict[str, Callable[..., Robot]] = {"robot": read_urdf, "mujoco": read_mjcf}
-    origin = named(path)
-    with guarded(origin, "robot"):
-        root = parse_xml(read_text(path, "file of a robot", LARGEST), origin, "a file of a robot")
-        if root.tag not in readers:
-            raise WavetankError(
-                f"{origin}: a URDF file has a robot at its top, an MJCF file mujoco; this one has <{root.tag[:60]}>."
-            )
-        try:
-            return readers[root.tag](root, Path(path), place, prefix, held)
-        except RecursionError:
-            raise WavetankError(f"{origin}: its elements are nested too deep.") from None
-        except (WavetankError, LookupError, ValueError, TypeError, AttributeError, OverflowError, OSError) as error:
-            reason = f"{type(error).__name__} {error}" if not isinstance(error, WavetankError) else str(error)
-            raise WavetankError(f"{origin}: the robot cannot be read: {one_line(reason)}.") from None
-
-
-def is_mjcf(path: Path) -> bool:
-    """Say whether an XML file is a model of MuJoCo. Raises `WavetankError` for what is no XML."""
-    return parse_xml(read_text(path, "XML file", LARGEST), named(path), "this file").tag == "mujoco"
 
 
 def numbers(row: ElementTree.Element | dict[str, str] | None, key: str, otherwise: tuple[float, ...]) -> Any:

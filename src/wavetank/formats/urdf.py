@@ -19,7 +19,6 @@ from wavetank.formats.robot import (
     Robot,
     carried,
     hex_of,
-    load_robot,
     mesh_at,
     numbers,
     then,
@@ -35,13 +34,6 @@ from wavetank.solids.shapes import Box, Cylinder, Sphere
 from wavetank.solids.solid import Solid
 
 MOVING = {"revolute": Hinge, "continuous": Hinge, "prismatic": Slider}
-
-
-def load_urdf(
-    path: str | Path, position: Any = (0.0, 0.0, 0.0), angle: float = 0.0, prefix: str = "", held: bool = True
-) -> Robot:
-    """Read a robot as `load_robot` does; `held` is false for one that is not fixed to the ground."""
-    return load_robot(path, position, angle, prefix, held)
 
 
 def read_urdf(root: ElementTree.Element, path: Path, place: Pose, prefix: str, held: bool | None) -> Robot:

@@ -23,6 +23,25 @@ def check_numbers(values: dict[str, Any]) -> None:
             raise ValueError(f"there are {len(members):,} {name}; at most {most:,} are allowed.")
 
 
+def check_bodies(solids: Any, tank: Any, goal: Any) -> None:
+    """Raise `ValueError` for a body that begins behind a wall of the tank, and for an aim that asks for no body."""
+    for number, solid in enumerate(solids):
+        for axis, (low, high) in enumerate(zip(*tank.box(), strict=True) if tank and solid.is_body else ()):
+            at, reach = float(solid.origin[axis]), solid.reach()
+            if (at < low - reach and not tank.is_open(axis, 0)) or (at > high + reach and not tank.is_open(axis, 1)):
+                raise ValueError(
+                    f"solids[{number}], the body {solid.name!r}, begins outside of the tank: its {'xyz'[axis]} is "
+                    f"{at:g} m, and the tank goes from {low:g} to {high:g} m; move it, or open that side."
+                )
+    bodies = [solid.name for solid in solids if solid.is_body and solid.name]
+    for number, aim in enumerate(goal.aims if goal else []):
+        if getattr(aim, "body", None) not in (None, *bodies):
+            raise ValueError(
+                f"goal.aims[{number}].body = {aim.body!r} is no body of the scene; they are: "
+                f"{', '.join(bodies) or 'none'}."
+            )
+
+
 def check_scales(spacing: float, gravity: tuple[float, ...]) -> None:
     """Raise `ValueError` for a spacing [m] or a gravity [m/s^2] that single precision cannot compute with."""
     if not FINEST <= spacing <= COARSEST:

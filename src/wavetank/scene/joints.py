@@ -50,6 +50,12 @@ class _Motor(Joint):
     def _limits_in_order(self) -> "_Motor":
         if self.limits is not None and self.limits[0] > self.limits[1]:
             raise ValueError(f"limits = {self.limits} of a joint must be a lower and an upper one, in this order.")
+        target = self.target
+        if self.limits is not None and isinstance(target, int | float):
+            if not self.limits[0] <= target <= self.limits[1]:
+                raise ValueError(
+                    f"target = {target:g} of a joint is out of its limits = {self.limits}; no motor gets there."
+                )
         return self
 
 

@@ -20,7 +20,7 @@ from wavetank.foundation.model import Model, is_length, sentence
 from wavetank.foundation.params import PRESETS, QUALITIES, Parameters
 from wavetank.foundation.replacing import replacing
 from wavetank.foundation.tracks import scaled
-from wavetank.scene.bounds import check_numbers, check_scales
+from wavetank.scene.bounds import check_bodies, check_numbers, check_scales
 from wavetank.scene.filled import AnyFluid, Filled
 from wavetank.scene.film import Film
 from wavetank.scene.fluids import Points
@@ -144,10 +144,8 @@ class Scene(Timetable, Parameters):
                 continue  # what is filled says so itself, when its shape is measured
             lower, upper = fluid.bounds()
             if np.any(lower < first - slack) or np.any(upper > last + slack):
-                raise ValueError(
-                    f"fluids[{number}] reaches from {_numbers(lower)} to {_numbers(upper)}, outside the tank; "
-                    f"it must lie between {_numbers(first)} and {_numbers(last)}."
-                )
+                where = f"fluids[{number}] reaches from {_numbers(lower)} to {_numbers(upper)}, outside the tank; "
+                raise ValueError(f"{where}it must lie between {_numbers(first)} and {_numbers(last)}.")
 
     def _check_names(self) -> None:
         for kind in ("solids", "joints", "materials", "emitters", "drains"):
@@ -155,6 +153,7 @@ class Scene(Timetable, Parameters):
             twice = next((name for name in names if names.count(name) > 1), None)
             if twice is not None:
                 raise ValueError(f"{kind}: the name {twice!r} is used twice; a name must be unique.")
+        check_bodies(self.solids, self.tank, self.goal)
         check_joints(self.joints, {solid.name: solid.is_body for solid in self.solids if solid.name})
         if any(not material.name for material in self.materials):
             raise ValueError("materials: every material needs a name, so that a fluid can ask for it.")

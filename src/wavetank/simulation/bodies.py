@@ -28,7 +28,7 @@ from wavetank.simulation.acting import Acting
 from wavetank.simulation.added_mass import ALONG, added_mass, grip
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
-from wavetank.simulation.coupling import Coupling
+from wavetank.simulation.coupling import DENSITY, Coupling
 from wavetank.simulation.effort import given
 from wavetank.simulation.joints import Joints, put_joints
 from wavetank.simulation.moving_solids import MovingSolids
@@ -40,7 +40,6 @@ from wavetank.solids.solid import Solid
 MOST_TRIES = 4  # of a step
 FAR = 0.3  # of a spacing: bodies that yield by more begin the step anew
 FEWEST = 4.0  # pieces across a body
-DENSITY = 4  # where the density is in the last row of what is remembered
 IN_JOINTS = 16  # inner iterations of the engine where there are joints: with 1 a motor sagged by 0.3 rad/s under a load
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
 
@@ -394,13 +393,6 @@ class Bodies(Mapping[str, Body]):
             )
             if not np.abs(off).max() <= 1e-3 * (1.0 + np.abs(place).max()):
                 raise WavetankError(f"the engine's state of the body {body.name!r} is not that of the solid.")
-
-
-def density_in(arrays: dict[str, np.ndarray]) -> float:
-    """Return the density of the fluids [kg/m^3] that the bodies of a snapshot were in; 0 where it does not say."""
-    memory = arrays.get("bodies_memory", np.zeros((0, 1, 6)))
-    density = float(memory[0, -1, DENSITY]) if len(memory) else 0.0
-    return density if 0.0 < density < 1e6 else 0.0
 
 
 def _three(v: Any) -> tuple[float, float, float]:

@@ -59,6 +59,7 @@ BLOCKS = (slice(0, 3), slice(3, 6))  # motion and turn, columns of a row
 ROWS = (
     "impulse", "due", "given", "change", "carried", "by_grid", "velocity", "before", "seen_push", "seen_gain", "later",
 )  # fmt: skip
+DENSITY = 4  # where the density is in the last row of what is remembered
 REMEMBERED = len(ROWS) + 2  # rows of `Coupling.memory`
 
 
@@ -67,6 +68,13 @@ def with_all_rows(memory: np.ndarray) -> np.ndarray:
     if memory.ndim != 3 or memory.shape[1] != REMEMBERED - 1:
         return memory
     return np.insert(memory, len(ROWS) - 1, 0.0, axis=1)
+
+
+def density_in(arrays: dict[str, np.ndarray]) -> float:
+    """Return the density of the fluids [kg/m^3] that the bodies of a snapshot were in; 0 where it does not say."""
+    memory = arrays.get("bodies_memory", np.zeros((0, 1, 6)))
+    density = float(memory[0, -1, DENSITY]) if len(memory) else 0.0
+    return density if 0.0 < density < 1e6 else 0.0
 
 
 class Coupling:

@@ -26,6 +26,7 @@ GAP = 0.8  # d: room that new particles have from others
 PRESSED = 0.45  # d: the same for those that water under pressure has kept waiting, more than a row
 PATIENCE = 0.5  # s: flow of so long is owed at most; the rest is given up, and said
 MOST_DUE = 5_000_000  # particles of an emitter in a frame
+SPARSE = 50.0  # d: a mouth whose particles come farther apart is refused
 REACH = 4.0  # radii: how far the suction of a drain is felt
 
 
@@ -239,6 +240,11 @@ def check_places(sim: Water) -> None:
         now = emitter.at(scene.start_time)
         mouth = now.mouth(scene.spacing)
         x, _ = flown(scene, emitter, mouth, row(mouth), scene.start_time, _step(sim))
+        if mouth.pitch > SPARSE * scene.spacing:
+            raise WavetankError(
+                f"emitters[{number}] has a mouth so small that its particles are {mouth.pitch:.3g} m apart; make it "
+                f"larger, not much less than spacing = {scene.spacing:g} m, or the spacing smaller."
+            )
         lower, upper = scene.tank.box() if scene.tank else (-np.inf, np.inf)
         inside = np.all((x >= lower) & (x <= upper), axis=1)
         if not (sim.free_places(x, 0.0, scene.wall_gap * scene.spacing) & inside).any():

@@ -11,9 +11,10 @@ from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
 from wavetank.scene.schedule import with_gravity
 from wavetank.simulation import snapshot as snapshots
-from wavetank.simulation.bodies import Bodies, density_in
+from wavetank.simulation.bodies import Bodies
 from wavetank.simulation.contents import Contents
 from wavetank.simulation.cost import check_cost
+from wavetank.simulation.coupling import density_in
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.simulation.saved import read_snapshot, write_snapshot
 from wavetank.simulation.snapshot import Snapshot

@@ -52,23 +52,20 @@ import math
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import Coefficients, Grid, Particles, Scratch, remembered, scalars
+from wavetank.device.state import Coefficients, Grid, Particles, remembered, scalars
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import Parameters
-from wavetank.physics.boundary import is_near
-from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE, Damping, along_walls, solve
+from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE, Damping, solve
+from wavetank.physics.dynamic_viscosity.drag import Holding, drag_bodies, drag_table, find_drag
 from wavetank.physics.dynamic_viscosity.rigid_guess import FORGET, RIGID, SHEARED, STIFF, rotate_guess
-from wavetank.physics.friction import surface_velocity
 from wavetank.physics.integrate import accelerate, free_motion
 from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import MAX_ENTRIES
 from wavetank.physics.pairs import keep_pairs
 from wavetank.physics.predicted_positions import predict_at, predicted
-from wavetank.physics.reactions import add_damper, push_back
-from wavetank.physics.smoothing import TABLE_SIZE, interpolated, rest_points
+from wavetank.physics.smoothing import TABLE_SIZE, rest_points
 from wavetank.physics.teams import end_team, first_team, turns
 from wavetank.physics.world import World
-from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3, vec4
 
 ANY = 1e9  # m/s
 STIFFER = 3.0  # times as stiff as the rest lattice: water in motion, and the drag of walls
@@ -82,7 +79,6 @@ TOUCHING = 0.5  # d: closer to a wall than at rest, what strikes it is held back
 SLIPS = 1e-9  # least share of the drag along a wall, where there should be none
 WITH_BODIES = 4.0  # `thickness` in a step, at most, where bodies are in the fluid
 CALM = 0.9  # share of what is not carried on that is, where nothing moves
-NEAREST = 0.25  # d: closer to a wall than this its drag grows no further
 PUSHED = 0.1  # of its own speed and of sqrt(2 g h): the speed that a push gives where solids move through
 
 
@@ -103,121 +99,12 @@ def stiffness(dim: int, ratio: float) -> float:
     return float(2.0 * np.sum(1.0 - distance / ratio) / dim)
 
 
-@functools.cache
-def drag_table(dim: int, ratio: float) -> np.ndarray:
-    """Sample T d^2 / (B d^2) of a flat wall at s / h from 0 to 1, float32 [TABLE_SIZE + 1].
-
-    T = sum f(q) (t^2 / r^2) (1 + depth / s) over half a lattice behind the wall, t along it, depth below its surface.
-    """
-    s = np.linspace(0.0, 1.0, TABLE_SIZE + 1) * ratio
-    depth = np.arange(int(ratio) + 2) + 0.5
-    plane = rest_points(dim, ratio)
-    plane = plane[np.abs(plane[:, 0]) < 1e-12][:, 1:]
-    along = np.sum(plane**2, axis=1)
-    square = (s[:, None, None] + depth[:, None]) ** 2 + along
-    f = np.maximum(1.0 - np.sqrt(square) / ratio, 0.0)
-    extrapolation = 1.0 + depth[:, None] / np.maximum(s, NEAREST)[:, None, None]
-    table: np.ndarray = np.sum(f * along / (dim - 1) / square * extrapolation, axis=(1, 2)).astype(np.float32)
-    return table
-
-
 @qd.func
 def damper(square, a, b, c: Coefficients):
     """Return mu_ij f(q) / r^2, which does not change while the velocities are solved for."""
     f = qd.max(1.0 - qd.sqrt(square) * c.inverse_h, 0.0)
     mu = 2.0 * a[3] * b[3] / qd.max(a[3] + b[3], 1e-20)
     return mu * f / qd.max(square, 1e-24)
-
-
-@dataclasses.dataclass(frozen=True)
-class Holding:
-    """How walls hold fluids."""
-
-    no_slip: qd.f32  # share of the drag along a wall
-    most: qd.f32  # Pa s: the largest viscosity
-    touching: qd.f32  # m: closer than this, what strikes a wall is held along its normal, too
-    to_come: qd.f32  # s: times what pressed a particle in the last step, the velocity that pressure will give it
-
-
-@qd.func
-def wall_velocity(solids: SolidSet, k, i, p, particles: Particles, holding: Holding, c: Coefficients):
-    """Velocity [m/s] of a wall as a particle sees it that pressure is still to act on."""
-    return surface_velocity(solids, k, p, c.dt) - lift(particles.a[i]) * holding.to_come
-
-
-@qd.kernel(fastcache=True)
-def find_drag(
-    packed: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles,
-    rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, holding: Holding,
-    count: qd.i32,
-):  # fmt: skip
-    """Pack velocities and viscosities [Pa s], and find how fast the walls hold every particle back.
-
-    That is over B dt / rho, with the normal along which they do not, unless it strikes: what stands behind the normal
-    is the share of the pull there, over that along the wall.
-    """
-    for i in range(count):
-        own = lift(particles.v[i])
-        row = vec4(own.x, own.y, own.z, qd.min(rows[particles.material[i]][1], holding.most))
-        packed[i] = row
-        near = particles.near[i]
-        pull = vec4(0.0, 0.0, 0.0, 0.0)
-        free = vec4(0.0, 0.0, 0.0, 0.0)
-        if near != 0:
-            p = lift(predicted(particles, i))
-            fast = qd.sqrt(vec3(c.gravity_x, c.gravity_y, c.gravity_z).norm() * c.h)
-            walls = 0
-            for k in range(solids.count):
-                if is_near(near, k, solids) == 1:
-                    value = signed_distance(solids, k, p)
-                    if value.w < c.h:
-                        share = interpolated(table, value.w / c.h)
-                        moving = wall_velocity(solids, k, i, p, particles, holding, c)
-                        v = moving * share
-                        pull += vec4(v.x, v.y, v.z, share)
-                        free = vec4(value.x, value.y, value.z, 0.0)
-                        if value.w < holding.touching and (own - moving).dot(vec3(value.x, value.y, value.z)) < -fast:
-                            free[3] = 1.0 / holding.no_slip
-                        walls += 1
-            if walls > 1:  # in a corner the fluid is held in every direction
-                free = vec4(0.0, 0.0, 0.0, 0.0)
-            pull *= holding.no_slip * row.w
-        drag[i] = pull
-        normal[i] = free
-
-
-@qd.kernel(fastcache=True)
-def drag_bodies(
-    packed: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles, scratch: Scratch, solids: SolidSet,
-    table: qd.types.ndarray(), c: Coefficients, holding: Holding, rate: qd.f32, per_damper: qd.f32, count: qd.i32,
-):  # fmt: skip
-    """Let bodies feel the opposite of their part of the drag, with the velocities that were found for the fluid.
-
-    What strikes one was stopped there when it was predicted, which they felt: that is taken back, as the stop is.
-    How stiffly it holds them is told as well, `per_damper`, a spacing over the thickest fluid [m/(Pa s)].
-    """
-    for i in range(count):
-        near = particles.near[i]
-        if near >> solids.tank_count != 0 and particles.frozen[i] == 0:
-            p = lift(predicted(particles, i))
-            own = vec3(packed[i].x, packed[i].y, packed[i].z)
-            mu = holding.no_slip * packed[i].w
-            for k in range(solids.tank_count, solids.count):
-                if solids.unit[k] > 0.0 and is_near(near, k, solids) == 1:
-                    value = signed_distance(solids, k, p)
-                    if value.w < c.h:
-                        share = mu * interpolated(table, value.w / c.h)
-                        moving = wall_velocity(solids, k, i, p, particles, holding, c)
-                        pull = along_walls((moving - own) * share, normal[i])
-                        push_back(solids, k, p, pull * (rate * c.dt))
-                        add_damper(solids, k, share * per_damper)
-                        if normal[i].w > 0.0:
-                            v = particles.v[i]
-                            for axis in qd.static(range(v.n)):
-                                v[axis] = packed[i][axis]
-                            freed = lift(free_motion(particles.x[i], v, c) - predicted(particles, i))
-                            freed -= lift(v - particles.v[i]) * c.dt
-                            push_back(solids, k, p, freed / scratch.weight[i])
 
 
 @qd.kernel(fastcache=True)
