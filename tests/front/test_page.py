@@ -234,3 +234,20 @@ def test_a_first_start_says_that_it_compiles_and_then_shows_water(browser, tmp_p
         finally:
             server.terminate()
             browser.open("about:blank")
+
+
+def test_forces_on_bodies_are_shown_by_a_key(open_page, browser):
+    """Two arrows for a body, each with its newtons; the same key, and the switch under Look, take them away."""
+    pytest.importorskip("rapier3d")
+    crate = wt.Box(name="crate", center=(0.3, 0.4, 0.2), size=(0.2, 0.2, 0.2), density=500)
+    open_page(BASIN.changed(solids=[crate]))
+    assert browser.run("document.querySelectorAll('#region-names .force').length") == 0
+    browser.key("n")
+    browser.wait_for("document.querySelectorAll('#region-names .force').length === 2")
+    assert browser.run("document.querySelector('#region-names .buoyancy').textContent").endswith(" N")
+    browser.wait_for("document.querySelectorAll('#regions line.force.buoyancy').length === 1")
+    pressed = "[...document.querySelectorAll('#look button')].find((b) => b.textContent === 'Shown')"
+    browser.wait_for(f"{pressed}?.getAttribute('aria-pressed') === 'true'")
+    browser.key("n")
+    browser.wait_for("document.querySelectorAll('#region-names .force').length === 0")
+    assert browser.complaints() == []

@@ -245,6 +245,20 @@ def test_buttons_wheel_and_keys_move_the_camera(person):
     person.until(lambda: person.session.camera.distance < 0.95 * distance)
 
 
+def test_a_key_shows_what_the_water_does_to_bodies(person):
+    pytest.importorskip("rapier3d")
+    crate = wt.Box(name="crate", center=(0.3, 0.4, 0.2), size=(0.2, 0.2, 0.2), density=500)
+    person.window.engine.ask(lambda: person.session.sim.add_solid(crate)).result(LONGEST)
+    assert "force.buoyancy" not in person.desk.places
+    person.key("n")
+    person.until(lambda: "force.buoyancy" in person.desk.places and "force.drag" in person.desk.places)
+    left, top, right, bottom = person.desk.places["force.buoyancy"]
+    assert right > left + 10 and bottom > top + 5, "a number in a box"
+    person.key("n")
+    person.until(lambda: not person.session.shows_forces)
+    person.window.engine.ask(lambda: person.session.sim.remove_solid("crate")).result(LONGEST)
+
+
 def test_pages_curves_scenes_and_files(person, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     person.until(lambda: len(person.desk.curves.get("density_error_mean", ())) > 1)

@@ -16,6 +16,7 @@ from wavetank.simulation.loads import powers
 
 LONGEST = 0.2  # of the picture's height: the arrow of the heaviest body's weight
 MOST = 2.0  # of that: no arrow is longer
+LEAST = 0.02  # of the heaviest body's weight: what is less is not shown
 NEWEST = 0.15  # share of a new frame in the means that are shown
 Place = list[float]  # u, v: shares of a picture's width and height
 
@@ -105,13 +106,13 @@ class Hud:
                     1.0, MOST * LONGEST * self.session.camera.visible_height / max(float(np.linalg.norm(way)), 1e-30)
                 )
                 places = self._in_picture(np.array([start, start + way]), size)
-                if places:
+                if places and float(np.linalg.norm(mean)) > LEAST * weight:
                     told = f"{three(float(np.linalg.norm(mean)))} N"
                     shown.append({"corners": [], "outline": places, "mark": mark, "label": told})
         for name, power in powers(sim.bodies).items():
             if math.isfinite(power):
                 (mean,) = self._mean((name, "power"), np.array([power]))
-                at = np.array([*sim.joints[name].joint.at, 0.0][:3])
+                at = sim.joints[name].place
                 told = f"{name}: {three(float(mean))} W"
                 shown.append(
                     {"corners": [], "outline": self._in_picture(at[None], size), "mark": "power", "label": told}

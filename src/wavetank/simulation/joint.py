@@ -44,6 +44,11 @@ class LiveJoint:
         return f"<{self.joint.kind} {self.name!r} of {self.joint.first!r}>"  # type: ignore[attr-defined]
 
     @property
+    def place(self) -> np.ndarray:
+        """Where it is now, on its second solid [m], shape [3]."""
+        return self._carried(self._poses())[1][0]
+
+    @property
     def position(self) -> float:
         """Angle [rad], -pi to pi, or way [m] from where it began. Raises `WavetankError` for one that has none."""
         first, second = self._frames(self._poses())
