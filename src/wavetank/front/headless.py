@@ -320,7 +320,7 @@ def replay_session(
             session.aspect = size[0] / size[1]
             if film is not None:
                 renderer = renderer or Renderer(*size)
-                look = options(session.view, session.color_by)
+                look = options(session.view, session.color_by) | session.light
                 film.write(
                     renderer.render(session.sim.frame(), session.sight, shutter=session.sim.scene.frame_time, **look)
                 )

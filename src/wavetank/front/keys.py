@@ -36,6 +36,10 @@ KEYS = (
     Key("ArrowRight", command={"do": "orbit", "azimuth": 0.12}),
     Key("ArrowUp", command={"do": "orbit", "elevation": 0.08}),
     Key("ArrowDown", command={"do": "orbit", "elevation": -0.08}),
+    Key("<", "< >", "Turn the sun", command={"do": "light", "turn": -10}),
+    Key(">", command={"do": "light", "turn": 10}),
+    Key("{", "{ }", "Lower, higher sun", command={"do": "light", "rise": -4}),
+    Key("}", command={"do": "light", "rise": 4}),
     Key("?", "?", "This list", "help"),
 )
 

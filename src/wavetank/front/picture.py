@@ -58,7 +58,7 @@ class Painter:
 
     def _options(self) -> dict[str, Any]:
         session = self.session
-        chosen = options(session.view, session.color_by)
+        chosen = options(session.view, session.color_by) | session.light
         if session.lit in session.sim.solids.names:
             chosen["lit"] = session.sim.solids.find(session.lit)
         if chosen["view"] == "slice":
