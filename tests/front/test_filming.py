@@ -57,7 +57,9 @@ def test_frames_are_of_their_time_and_seen_from_their_place(scene, tmp_path):
     from PIL import Image
 
     camera = filming.camera_at(scene.film, scene, 0.5, sim.time)
-    by_hand = wt.render(sim, 64, 36, quality="draft", camera=camera, legend=False)
+    order = scene.film.at(0.5)
+    shutter = order.shutter * order.speed / scene.film.fps
+    by_hand = wt.render(sim, 64, 36, quality="draft", camera=camera, legend=False, shutter=shutter)
     kept = np.asarray(Image.open(tmp_path / "x.gif.frames" / "frame-00002.png"))
     np.testing.assert_array_equal(kept, by_hand)
 

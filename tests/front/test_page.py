@@ -101,6 +101,21 @@ def test_a_person_plays(open_page, browser):
     browser.call("Input.dispatchMouseEvent", type="mouseWheel", x=water[0], y=water[1], deltaX=0, deltaY=300)
     until(lambda: session.camera.distance > 1.1 * distance)
 
+    # The light: an environment, and a sun that is turned by a slider and by a key.
+    browser.click("[data-tab=look]")
+    browser.run("[...document.querySelectorAll('#look button')].find((b) => b.textContent === 'Evening').click()")
+    until(lambda: session.light == {"environment": "evening"})
+    browser.wait_for("document.querySelector(\"[aria-label='Sun, around'][type=range]\")?.value > 0.6")  # 235 of 360
+    browser.run(
+        "(() => { const s = document.querySelector(\"[aria-label='Sun, around'][type=range]\");"
+        "s.value = 0.25; s.oninput() })()"
+    )
+    until(lambda: session.light.get("sun") == "90,9")
+    browser.run("document.activeElement.blur()")
+    browser.key(">")
+    until(lambda: session.light.get("sun") == "100,9")
+    browser.click("[data-tab=water]")
+
     # The timeline.
     until(lambda: session.sim.time > 0.6)
     browser.click("#bookmark")

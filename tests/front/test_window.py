@@ -259,6 +259,18 @@ def test_a_key_shows_what_the_water_does_to_bodies(person):
     person.window.engine.ask(lambda: person.session.sim.remove_solid("crate")).result(LONGEST)
 
 
+def test_the_sun_is_turned_by_a_slider_and_by_keys(person):
+    person.click("page.Look")
+    person.until(lambda: "sun.azimuth" in person.desk.places)
+    person.click("sun.azimuth", 0.25)
+    person.until(lambda: "sun" in person.session.light)
+    azimuth, elevation = map(float, person.session.light["sun"].split(","))
+    assert abs(azimuth - 90.0) < 12.0 and abs(elevation - 54.1) < 0.1, "its height stays"
+    person.key("greater")
+    person.until(lambda: float(person.session.light["sun"].split(",")[0]) > azimuth + 9.0)
+    person.click("page.Water")
+
+
 def test_pages_curves_scenes_and_files(person, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     person.until(lambda: len(person.desk.curves.get("density_error_mean", ())) > 1)

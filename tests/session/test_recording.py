@@ -33,6 +33,7 @@ EXAMPLES = [
     c.Step(frames=3), c.Speed(factor=0.25), c.FrameLength(parts=2, filled=True), c.Rewind(time=0.3),
     c.Bookmark(name="here", action="go"), c.SetCamera(eye=(1, 2, 3), target=(0, 0, 0)), c.Orbit(azimuth=0.1),
     c.Pan(right=0.2), c.Zoom(factor=0.9), c.Home(), c.SetView(color_by="density"),
+    c.SetLight(environment="evening"), c.SetLight(azimuth=40.0, elevation=12.0), c.SetLight(turn=-10.0),
 ]  # fmt: skip
 
 

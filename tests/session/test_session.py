@@ -92,6 +92,7 @@ class Monkey:
             lambda: {"do": "orbit", "azimuth": number}, lambda: {"do": "pan", "right": number},
             lambda: {"do": "zoom", "factor": number}, lambda: {"do": "home"},
             lambda: {"do": "view", "color_by": r.choice(("speed", "density", "#123456", "taste"))},
+            lambda: {"do": "light", "environment": r.choice(("", "evening", "disco")), "rise": number},
             lambda: {"do": "fly"}, lambda: {"do": ["set"]}, lambda: {"don't": 1},
         ))()  # fmt: skip
 

@@ -118,6 +118,23 @@ def test_who_asks_for_a_colour_sees_it():
     assert (waiting.view, waiting.color_by) == ("particles", "speed"), "none of two that wait is lost"
 
 
+def test_the_sun_is_turned_and_stays_above_the_horizon():
+    session = ticked(POOL, 0)
+    session.apply(do.SetLight(environment="evening"))
+    assert session.light == {"environment": "evening"}
+    session.apply(do.SetLight(turn=10.0, rise=-2.0))
+    assert session.light["sun"] == "245,7", "from where the evening's own sun stands: -125, 9"
+    session.apply(do.SetLight(rise=-300.0))
+    session.apply(do.SetLight(azimuth=40.0))
+    assert session.light == {"environment": "evening", "sun": "40,3"}
+    waiting = do.SetLight(turn=5.0, rise=1.0).after(do.SetLight(azimuth=90.0, turn=5.0))
+    assert (waiting.azimuth, waiting.turn, waiting.rise) == (90.0, 10.0, 1.0), "none of two that wait is lost"
+    session.apply(do.SetLight(environment="sky"))
+    assert session.light == {"environment": "sky"}, "with a sun of its own"
+    with pytest.raises(WavetankError, match="one of studio, pool"):
+        session.apply(do.SetLight(environment="disco"))
+
+
 def test_messages_name_the_command_once_and_the_file():
     with pytest.raises(WavetankError) as told:
         command_of({"do": "load"})

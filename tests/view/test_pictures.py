@@ -75,7 +75,7 @@ def looks_like(image, kept):
 
 def picture(dim, view):
     frame, camera = world(dim), UNDER if view == "under" else None
-    return Renderer(*SIZE).render(frame, camera, view="water" if camera else view, legend=False)
+    return Renderer(*SIZE).render(frame, camera, view="water" if camera else view, legend=False, shutter=0.1)
 
 
 def kept_picture(dim, view):

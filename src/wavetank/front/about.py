@@ -14,12 +14,14 @@ from wavetank.front.picture import Painter
 from wavetank.front.theme import PAINTS
 from wavetank.front.units import readable, units
 from wavetank.scene.fluids import Points
+from wavetank.scene.light import HIGHEST, LOWEST
 from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
 from wavetank.scene.summary import bundled_counts, bundled_title
 from wavetank.session.session import Session
 from wavetank.session.tools import TOOLS, describe
-from wavetank.view.choices import colorings, options, views
+from wavetank.view.choices import colorings, options, standing, views
 from wavetank.view.colormaps import ENTRIES, table, to_srgb
+from wavetank.view.environments import ENVIRONMENTS
 from wavetank.view.extent import ENDLESS, extent_of
 from wavetank.view.quantities import QUANTITIES
 from wavetank.view.views import VIEWS
@@ -38,6 +40,8 @@ def everything(session: Session) -> dict[str, Any]:
         "views": views(),
         "colorings": colorings(),
         "paints": PAINTS,
+        "environments": list(ENVIRONMENTS),
+        "sun": {"lowest": LOWEST, "highest": HIGHEST},
         "keys": [dataclasses.asdict(key) for key in KEYS],
         "speeds": SPEEDS,
         **world(session),
@@ -62,6 +66,7 @@ def world(session: Session) -> dict[str, Any]:
         "cut": session.cut,
         "forces": session.shows_forces,
         "bodies": len(session.sim.bodies),
+        "light": dataclasses.asdict(standing(scene, session.view, session.light)),
         "undo": session.former.scene.title if session.former else None,
         "game": session.game is not None,
     }

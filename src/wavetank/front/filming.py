@@ -152,11 +152,9 @@ def _frames(
                 return not asked
 
             watch.tell = tell
-            options = dict(style)
+            options = style | {"shutter": now.shutter * now.speed / order.fps, "edges": order.edges}
             if style["traced"]:
-                shutter = now.shutter * now.speed / order.fps
-                options |= {"aperture": now.aperture, "focus": now.focus or camera.distance, "shutter": shutter}
-            options["edges"] = order.edges
+                options |= {"aperture": now.aperture, "focus": now.focus or camera.distance}
             image = renderer.render(sim.frame(), camera, watch=watch, legend=False, **options)
             if not watch.whole:
                 _store(sim, folder, number)

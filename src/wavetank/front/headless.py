@@ -264,6 +264,7 @@ def _run(work: _Work, renderer: Renderer | None, sinks: Sequence[Sink], console:
     """Let the water move and every sink have each frame, with its picture where there is a renderer."""
     sim, order = work.sim, work.order
     summary = _Summary(sim, work.begun.checkpoint.figures if work.begun else None)
+    moving = order.style | {"shutter": min(sim.scene.frame_time, 1.0 / order.fps)}
     progress = Progress(
         TextColumn("{task.description}"), BarColumn(), _Figures(), TimeRemainingColumn(),
         console=console or Console(stderr=True), transient=False,
@@ -275,7 +276,7 @@ def _run(work: _Work, renderer: Renderer | None, sinks: Sequence[Sink], console:
         try:
             for number, frame in sim.numbered_frames(order.seconds, order.fps, work.start, work.done):
                 frame.check_finite()
-                image = renderer.render(frame, **order.style) if renderer is not None else None
+                image = renderer.render(frame, **moving) if renderer is not None else None
                 for sink in sinks:
                     sink(number, frame, image)
                 summary.add()
@@ -320,8 +321,10 @@ def replay_session(
             session.aspect = size[0] / size[1]
             if film is not None:
                 renderer = renderer or Renderer(*size)
-                look = options(session.view, session.color_by)
-                film.write(renderer.render(session.sim.frame(), session.sight, **look))
+                look = options(session.view, session.color_by) | session.light
+                film.write(
+                    renderer.render(session.sim.frame(), session.sight, shutter=session.sim.scene.frame_time, **look)
+                )
             progress.update(task, completed=session.ticks)
             if asked:
                 break

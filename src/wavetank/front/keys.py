@@ -37,6 +37,10 @@ KEYS = (
     Key("ArrowUp", command={"do": "orbit", "elevation": 0.08}),
     Key("ArrowDown", command={"do": "orbit", "elevation": -0.08}),
     Key("n", "N", "Forces on bodies: buoyancy, drag, power", "forces"),
+    Key("<", "< >", "Turn the sun", command={"do": "light", "turn": -10}),
+    Key(">", command={"do": "light", "turn": 10}),
+    Key("{", "{ }", "Lower, higher sun", command={"do": "light", "rise": -4}),
+    Key("}", command={"do": "light", "rise": 4}),
     Key("?", "?", "This list", "help"),
 )
 

@@ -58,7 +58,7 @@ class Painter:
 
     def _options(self) -> dict[str, Any]:
         session = self.session
-        chosen = options(session.view, session.color_by)
+        chosen = options(session.view, session.color_by) | session.light
         if session.lit in session.sim.solids.names:
             chosen["lit"] = session.sim.solids.find(session.lit)
         if chosen["view"] == "slice":
@@ -91,10 +91,11 @@ class Painter:
         width, height = (max(SMALLEST, int(side * share) // STEP * STEP) for side in self.wanted)
         is_first = (width, height) not in self._renderers
         self.last_size = (width, height)
-        began = time.perf_counter()
+        began, session = time.perf_counter(), self.session
         image = self._renderer(width, height).render(
-            self.session.sim.frame(measured=self._needs_densities), self.session.sight, legend=False,
-            hasty=share < 1.0, **self._options(),
+            session.sim.frame(measured=self._needs_densities), session.sight, legend=False,
+            hasty=share < 1.0, shutter=0.0 if sharp or session.paused else session.sim.scene.frame_time,
+            **self._options(),
         )  # fmt: skip
         self.seconds = time.perf_counter() - began
         self.session.picture_seconds += 0.2 * (self.seconds - self.session.picture_seconds)

@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, model_vali
 from wavetank.foundation.door import check_plain
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import Model, Quaternion, Vector, sentence
+from wavetank.scene.light import HIGHEST, LOWEST
 from wavetank.solids.shapes import AnySolid
 
 FARTHEST = 1e5  # m: no place of interest is farther out
@@ -22,6 +23,7 @@ Length = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST, allow_inf_nan=False)]
 Point = tuple[Length, Length, Length]
 Share = Annotated[float, Field(ge=-2, le=3, allow_inf_nan=False)]
 Angle = Annotated[float, Field(ge=-1e4, le=1e4, allow_inf_nan=False)]  # rad
+Degrees = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
 Name = Annotated[str, Field(max_length=80)]
 Pointer = Annotated[int, Field(ge=0, le=9)]
 Value = bool | int | Annotated[float, Field(allow_inf_nan=False)] | Annotated[str, Field(max_length=80)] | Vector
@@ -288,9 +290,37 @@ class SetView(Command):
         )  # fmt: skip
 
 
+class SetLight(Command):
+    """Choose an environment, and where its sun stands [deg]; `turn` and `rise` move the sun from there.
+
+    Another environment begins with a sun of its own.
+    """
+
+    do: Literal["light"] = "light"
+    fusible: ClassVar = ("do",)
+    environment: Name = ""
+    azimuth: Degrees | None = None  # from +z towards +x
+    elevation: Annotated[float, Field(ge=LOWEST, le=HIGHEST, allow_inf_nan=False)] | None = None
+    turn: Degrees = 0.0
+    rise: Degrees = 0.0
+
+    def after(self, earlier: Command) -> Command:
+        """Turns add up, but for those before a sun that was put somewhere."""
+        assert isinstance(earlier, SetLight)
+        if self.environment:
+            return self
+        placed, raised = self.azimuth is not None, self.elevation is not None
+        return SetLight.model_construct(
+            environment=earlier.environment, azimuth=self.azimuth if placed else earlier.azimuth,
+            elevation=self.elevation if raised else earlier.elevation,
+            turn=self.turn if placed else (self.turn + earlier.turn) % 360.0,
+            rise=self.rise if raised else min(360.0, max(-360.0, self.rise + earlier.rise)),
+        )  # fmt: skip
+
+
 COMMANDS: tuple[type[Command], ...] = (
     SetParameter, Reset, LoadScene, Undo, ToolBegin, ToolMove, ToolEnd, ToolStop, MoveSolid, AddSolid, RemoveSolid,
-    Pause, Step, Speed, FrameLength, Rewind, Bookmark, SetCamera, Orbit, Pan, Zoom, Home, SetView,
+    Pause, Step, Speed, FrameLength, Rewind, Bookmark, SetCamera, Orbit, Pan, Zoom, Home, SetView, SetLight,
 )  # fmt: skip
 _BY_NAME: dict[str, type[Command]] = {kind.model_fields["do"].default: kind for kind in COMMANDS}
 _TABLE: TypeAdapter[dict[str, Any]] = TypeAdapter(dict[str, Any])

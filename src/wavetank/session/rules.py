@@ -6,6 +6,7 @@ from typing import Any
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import LIVE, Parameters
+from wavetank.scene.light import HIGHEST, LOWEST
 from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes, with_particles
 from wavetank.session import commands as c
 from wavetank.session.history import BOOKMARKS
@@ -222,6 +223,24 @@ def view(state: SessionState, command: c.SetView) -> None:
     state.shows_forces = state.shows_forces if command.forces is None else command.forces
 
 
+def light(state: SessionState, command: c.SetLight) -> None:
+    """Choose an environment, and where its sun stands."""
+    from wavetank.view.choices import standing
+    from wavetank.view.environments import ENVIRONMENTS
+
+    name = command.environment
+    if name and name not in ENVIRONMENTS:
+        raise WavetankError(f"environment = {name!r} is not known; it must be one of {', '.join(ENVIRONMENTS)}.")
+    if name:
+        state.light = {"environment": name}
+    if command.azimuth is not None or command.elevation is not None or command.turn or command.rise:
+        now = standing(state.sim.scene, state.view, state.light)
+        azimuth = now.azimuth if command.azimuth is None else command.azimuth
+        elevation = now.elevation if command.elevation is None else command.elevation
+        height = min(HIGHEST, max(LOWEST, elevation + command.rise))
+        state.light = state.light | {"sun": f"{(azimuth + command.turn) % 360.0:.6g},{height:.6g}"}
+
+
 def _is_color(value: str) -> bool:
     return len(value) == 7 and value[0] == "#" and all(digit in "0123456789abcdefABCDEF" for digit in value[1:])
 
@@ -232,5 +251,5 @@ RULES: dict[type[c.Command], Rule] = {
     c.ToolMove: tool_move, c.ToolEnd: tool_end, c.ToolStop: tool_stop, c.MoveSolid: move_solid,
     c.AddSolid: add_solid, c.RemoveSolid: remove_solid, c.Pause: pause, c.Step: step, c.Speed: speed,
     c.FrameLength: frame_length, c.Rewind: rewind, c.Bookmark: bookmark, c.SetCamera: camera, c.Orbit: orbit,
-    c.Pan: pan, c.Zoom: zoom, c.Home: home, c.SetView: view,
+    c.Pan: pan, c.Zoom: zoom, c.Home: home, c.SetView: view, c.SetLight: light,
 }  # fmt: skip

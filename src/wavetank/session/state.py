@@ -60,6 +60,7 @@ class SessionState:
         self.view, self.color_by = "", "speed"
         self.cut = ("z", 0.5)  # of a slice: the axis across it, and where along that, 0 to 1
         self.shows_forces = False  # that the water puts on bodies, over the picture
+        self.light: dict[str, str] = {}  # of the renderer's options: environment and sun, as far as they were chosen
         self.former: World | None = None  # what the last reset or scene left
         self.lit = ""  # name of the solid that a hand would take
         self.upright: tuple[float, ...] | None = None  # gravity [m/s^2] before a hand tilted the tank

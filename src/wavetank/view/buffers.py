@@ -48,6 +48,14 @@ class FoamMaps:
     light: qd.types.ndarray()  # vec2 [texels]: share of the sun and of the sky that its slopes get
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Motion:
+    """Where what the picture shows goes, over texels of at least four pixels, on the device."""
+
+    sums: qd.types.ndarray()  # i32 [texels, 3]: points, and their ways to the right and down in 1/64 px
+    way: qd.types.ndarray()  # vec2 [texels], px: the mean around
+
+
 class Paints:
     """Albedos of solids on the device, written anew when they change."""
 
@@ -72,6 +80,7 @@ class Buffers:
     pixels: Pixels
     light: Light | None  # on every pixel; see `with_light`
     foam: FoamMaps
+    motion: Motion
     sun_depth: Any  # i32 [texels, texels]: bits of the depth [m] of what the sun sees first
     solid_box: Any  # i32 [4]: first and last column, first and last row that may show a solid
     paints: Paints  # of solids
@@ -114,6 +123,7 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
     shape = (height * supersample, width * supersample)
     # As fine as the picture, within what a shadow needs and a device likes.
     coarse = (height // 2 + 2, width // 2 + 2)
+    coarser = (height // 4 + 2, width // 4 + 2)
     texels = min(2048, max(256, shape[0]))
     curve = qd.ndarray(qd.i32, shape=(CURVE_ENTRIES,))
     upload(curve, (255.0 * to_srgb(np.linspace(0.0, 1.0, CURVE_ENTRIES)) + 0.5).astype(np.int32))
@@ -131,6 +141,7 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
             relief=qd.ndarray(qd.i32, shape=coarse),
             light=qd.ndarray(vec2, shape=coarse),
         ),
+        motion=Motion(sums=qd.ndarray(qd.i32, shape=(*coarser, 3)), way=qd.ndarray(vec2, shape=coarser)),
         sun_depth=qd.ndarray(qd.i32, shape=(texels, texels)),
         solid_box=qd.ndarray(qd.i32, shape=(4,)),
         paints=Paints(),

@@ -1,7 +1,11 @@
 """What a person can choose between when looking at a world."""
 
+import dataclasses
+import math
 from typing import Any
 
+from wavetank.scene.scene import Scene
+from wavetank.view.environments import chosen_light, look_of, usual_environment
 from wavetank.view.quantities import QUANTITIES
 from wavetank.view.views import VIEWS
 
@@ -31,3 +35,20 @@ def options(view: str, color_by: str) -> dict[str, Any]:
     kind = VIEWS[view or USUAL]
     takes_color = kind.coloured or color_by.startswith("#")
     return {"view": kind.name, **({"color_by": color_by} if takes_color else {})}
+
+
+@dataclasses.dataclass(frozen=True)
+class SkyLight:
+    """Under which sky a person sees a world, and where its sun stands."""
+
+    environment: str
+    azimuth: float  # deg, 0 to 360
+    elevation: float  # deg
+
+
+def standing(scene: Scene, view: str, chosen: dict[str, str]) -> SkyLight:
+    """Return the light of a scene in a view, with the renderer's options that were chosen."""
+    light = chosen_light(scene.light, chosen.get("environment"), chosen.get("sun"), None)
+    name = light.environment or usual_environment(scene.dim, VIEWS[view or USUAL].coloured)
+    x, y, z = (float(part) for part in look_of(name, light.azimuth, light.elevation, None, scene.dim).to_sun)
+    return SkyLight(name, math.degrees(math.atan2(x, z)) % 360.0, math.degrees(math.asin(max(-1.0, min(1.0, y)))))

@@ -124,6 +124,7 @@ class Renderer:
             plane=style.plane(extent, frame.scene.tank is not None),
             lit=-1 if style.lit is None else style.lit,
             hasty=style.hasty,
+            shutter=float(style.shutter),
         )
 
     def _with_ice(self, frame: Frame, style: Style) -> Frame:

@@ -31,6 +31,7 @@ class Shot:
     usual: float  # m: water that gives its colour to what is behind it
     lit: int  # number of a solid that shines, -1 for none
     hasty: bool  # whether outlines stay rough
+    shutter: float  # s: for which what moves is smeared
     plane: tuple[Any, float]  # of a cut: unit normal [3], and the distance [m] of the plane from the origin along it
 
     @property

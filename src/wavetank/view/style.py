@@ -47,7 +47,7 @@ class Style:
     traced: bool = False  # follow paths of light in a world in space; other pictures are averaged
     aperture: float = 0.0  # m: radius of the lens of a traced picture
     focus: float | None = None  # m: distance that is sharp in it, that of the world's middle unless told
-    shutter: float = 0.0  # s: for which it sees the water move
+    shutter: float = 0.0  # s: for which it sees the water move, in other pictures of water in space as well
 
     @classmethod
     def of(cls, options: dict[str, Any]) -> "Style":

@@ -19,6 +19,7 @@ from wavetank.view.passes import (
     occlusion,
     shade,
     shadow,
+    shutter,
     smooth,
     solids,
     spheres,
@@ -65,7 +66,7 @@ VIEWS: dict[str, View] = {
         ),
         passes=(
             backdrop.draw, surface.draw, flatten.draw, thickness.draw, water.draw, below.draw,
-            drops.draw, foam.draw_over_water,
+            drops.draw, foam.draw_over_water, shutter.draw,
         ),
     ),
     "particles": View(

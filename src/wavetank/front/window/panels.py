@@ -16,7 +16,7 @@ from wavetank.front.window import keys, scenes
 from wavetank.front.window.controls import control, words
 from wavetank.front.window.desk import Desk
 from wavetank.front.window.look import button, hint, ink, pills, rgba, title
-from wavetank.session.commands import SetView
+from wavetank.session.commands import SetLight, SetView
 from wavetank.session.recording import Recording
 
 DETAILS = (("auto", "Automatic"), ("full", "Sharp"), ("half", "Fast"))
@@ -157,6 +157,8 @@ def _look(desk: Desk) -> None:
         shown = pills([("", "Hidden"), ("shown", "Shown")], "shown" if world["forces"] else "")
         if shown is not None:
             desk.engine.do(SetView, forces=bool(shown))
+    if world["dim"] == 3:
+        _light(desk)
     title("Picture")
     detail = pills(DETAILS, desk.engine.detail)
     if detail:
@@ -164,6 +166,25 @@ def _look(desk: Desk) -> None:
         desk.engine.ask(lambda: setattr(desk.engine.session, "changes", desk.engine.session.changes + 1))
     width, height = desk.engine.painter.last_size
     imgui.text_colored(rgba(SOFT), f"{width} × {height} pixels in {desk.status['picture_ms']:.0f} ms")
+
+
+def _light(desk: Desk) -> None:
+    """Environments by name, and a sun that can be turned."""
+    light, about = desk.world["light"], desk.declared
+    title("Light")
+    name = pills([(name, words(name)) for name in about["environments"]], light["environment"])
+    if name:
+        desk.engine.do(SetLight, environment=name)
+    limits = about["sun"]
+    for key, text, low, high in (
+        ("azimuth", "Sun from %.0f°", 0.0, 360.0), ("elevation", "Sun at %.0f°", limits["lowest"], limits["highest"]),
+    ):  # fmt: skip
+        imgui.set_next_item_width(-1)
+        changed, value = imgui.slider_float(f"##{key}", light[key], low, high, text)
+        low_corner, high_corner = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        desk.places[f"sun.{key}"] = (low_corner.x, low_corner.y, high_corner.x, high_corner.y)
+        if changed:
+            desk.engine.do(SetLight, **{key: min(high, max(low, value))})
 
 
 def _legend(legend: dict[str, Any] | None) -> None:

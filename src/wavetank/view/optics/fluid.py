@@ -56,6 +56,15 @@ def fineness(shot: Shot) -> int:
     return coarseness(shot) if shot.extent.dim == 3 else max(2, coarseness(shot) // 4)
 
 
+def grain_of(shot: Shot, samples: int) -> int:
+    """Return the pixels of a texel of coarse maps: about a spacing in the middle of the world, at least 2."""
+    lens, extent = shot.lens, shot.extent
+    scale = float(lens.focal) / samples
+    if float(lens.perspective) > 0.5:
+        scale /= max(float((extent.middle - lens.eye) @ lens.forward), 0.5 * extent.radius)
+    return max(2, min(64, round(scale * extent.spacing)))
+
+
 @qd.func
 def refracted(ahead, n, cosi):
     """Direction in the water of a ray from the air, which comes in at an angle of that cosine with the normal `n`."""

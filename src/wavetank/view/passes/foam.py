@@ -35,6 +35,7 @@ from wavetank.view.colormaps import rgb_of, to_linear
 from wavetank.view.lens import Lens, from_view, pixels_per_metre, to_pixel, to_view, vec2, vec3, vector
 from wavetank.view.look import Look
 from wavetank.view.optics.chance import bits_of, scrambled
+from wavetank.view.optics.fluid import grain_of
 from wavetank.view.optics.glass import line_cover, slack
 from wavetank.view.optics.maps import corners, gap_at
 from wavetank.view.optics.rays import Box
@@ -112,17 +113,8 @@ def froth_of(shot: Shot, buffers: Buffers, sunk: float) -> Froth:
         largest=max(LARGEST * height, 1.0), shutter=SHUTTER * frame.scene.frame_time, in_sun=in_sun, in_sky=in_sky,
         in_air=PALE, swallow=vector(*(0.5 * d * shot.absorption * (not flat))),
         line_strength=look.line_strength if frame.scene.tank else 0.0, slack=slack(shot), samples=buffers.supersample,
-        grain=grain_of(shot, buffers), parts=PARTS, most_parts=MOST_PARTS, flat=int(flat),
+        grain=grain_of(shot, buffers.supersample), parts=PARTS, most_parts=MOST_PARTS, flat=int(flat),
     ))  # fmt: skip
-
-
-def grain_of(shot: Shot, buffers: Buffers) -> int:
-    """Return the pixels of a texel of the relief: about a spacing in the middle of the world, at least 2."""
-    lens = shot.lens
-    scale = float(lens.focal) / buffers.supersample
-    if float(lens.perspective) > 0.5:
-        scale /= max(float((shot.extent.middle - lens.eye) @ lens.forward), 0.5 * shot.extent.radius)
-    return max(2, min(64, round(scale * shot.extent.spacing)))
 
 
 @qd.kernel(fastcache=True)

@@ -57,7 +57,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         thick = vector(0.0, 0.0, 10.0 * shot.extent.spacing)
         walls = box(walls.lower - thick, walls.upper + thick)
     solids = shot.frame.solids
-    together = buffers.supersample * (2 if shot.hasty else 1)
+    together = max(buffers.supersample, 2)
     # Solids are met by bent rays in a tank only: in the open there is no body of water.
     world, among = shot.frame.dim, solids.count > solids.tank_count
     if among and (world == 2 or shot.frame.scene.tank):

@@ -7,6 +7,8 @@ import { seen } from "./stage.js";
 
 const rows = {};
 const past = {};
+const suns = {};
+let touched = 0; // when a sun was last moved here: what comes back late must not pull the slider
 let about = { views: [], colorings: [], paints: [] };
 
 function pills(title, choices, current, act) {
@@ -23,6 +25,7 @@ function build() {
     ...(about.view === "slice" ? slice() : []),
     ...pills("Colour by", colours, about.painted, (color_by) => send({ do: "view", color_by })),
     ...(about.bodies ? pills("Forces on bodies", [[false, "Hidden"], [true, "Shown"]], about.forces, (forces) => send({ do: "view", forces })) : []),
+    ...(about.dim === 3 ? light() : []),
     ...pills("Picture", [["auto", "Automatic"], ["full", "Sharp"], ["half", "Fast"]], detail, (value) => { detail = value; send({ do: "detail", detail }); build(); }),
     make("h3", { textContent: "Measured" }), figures,
     make("h3", { textContent: "Keep" }),
@@ -47,6 +50,18 @@ function slice() {
     (value) => send({ do: "view", place: value / 100 }));
   return [...(about.dim === 3 ? pills("Slice across", ["x", "y", "z"].map((name) => [name, name]), axis, (name) => send({ do: "view", axis: name })) : []),
     ...(about.dim === 3 ? [move.element] : [])];
+}
+
+/** Environments by name, and a sun that can be turned. */
+function light() {
+  const { environment, azimuth, elevation } = about.light, { lowest, highest } = about.sun;
+  const slider = (name, label, low, high, sentence, value) => {
+    suns[name] = control({ name, label, low, high, unit: "°", straight: true, sentence }, value, (v) => { touched = performance.now(); send({ do: "light", [name]: v }); });
+    return suns[name].element;
+  };
+  return [...pills("Light", about.environments.map((name) => [name, words(name)]), environment, (name) => send({ do: "light", environment: name })),
+    slider("azimuth", "Sun, around", 0, 360, "Where the sun stands, from the front over the right.", azimuth),
+    slider("elevation", "Sun, height", lowest, highest, "How high the sun stands above the horizon.", elevation)];
 }
 
 /** What the colours mean, over the picture. */
@@ -99,9 +114,13 @@ setInterval(() => {
 on("hello", (hello) => { about = hello; build(); legend(); });
 on("status", (status) => {
   if (status.world) {
-    const before = JSON.stringify([about.view, about.painted, about.cut?.[0], about.dim, about.forces, about.bodies > 0]);
+    const shape = () => JSON.stringify([
+      about.view, about.painted, about.cut?.[0], about.dim, about.forces, about.bodies > 0, about.light?.environment,
+    ]);
+    const before = shape();
     about = { ...about, ...status.world };
-    if (JSON.stringify([about.view, about.painted, about.cut[0], about.dim, about.forces, about.bodies > 0]) !== before) build(); // a slider that is moved stays
+    if (shape() !== before) build(); // a slider that is moved stays
+    if (performance.now() - touched > 600) for (const name in suns) suns[name].show(about.light[name]);
     legend();
   }
   plot("error", status.density_error_mean ?? 0, `${(100 * (status.density_error_mean ?? 0)).toFixed(2)} %`);

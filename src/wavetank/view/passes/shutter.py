@@ -1,0 +1,228 @@
+"""What moves while the shutter is open is smeared along its way, as a camera sees it.
+
+A picture of an instant shows what flies past a pixel in one picture and not in the next: broken water boils. A camera
+does not, because its shutter is open for a part of the time between two pictures. After M. McGuire, P. Hennessy,
+M. Bukowski, B. Osman, "A reconstruction filter for plausible motion blur" (2012): every pixel becomes the mean of
+those along the way that is dominant around it. Here that way comes from what is there, the velocities of the particles
+that the eye sees, as means over texels of about a spacing: nothing of the picture before is used, so that a picture
+belongs to its frame.
+
+    code      symbol   meaning                                                        unit
+    way                where what a texel shows goes while the shutter is open        px
+    cuts               pixels that are averaged for one                               1
+    wet                whether a pixel shows water                                    1
+
+Where they differ from the paper: ways are means, not the largest ones, because particles tell them more evenly than
+pixels; instead of two depths per pixel, what stands still takes light only from water before it, and edges of the tank
+neither give nor take.
+"""
+
+import dataclasses
+
+from wavetank.device.compiler import qd
+from wavetank.device.state import remembered
+from wavetank.solids.distance import lift
+from wavetank.view.buffers import Buffers, Motion, Pixels
+from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec2, vec3, view_ray
+from wavetank.view.look import Look
+from wavetank.view.optics.fluid import grain_of
+from wavetank.view.optics.glass import line_cover, slack
+from wavetank.view.optics.rays import Box
+from wavetank.view.shot import Shot
+from wavetank.view.water_buffers import WaterSurface, water_of
+from wavetank.view.weights import under_water
+
+VISIBLE = 1.5  # d: how far behind the surface a particle still counts as what is seen
+LONGEST = 0.08  # of the picture's height: way that is not exceeded
+LEAST = 1.0  # px: ways that are not worth it
+CUTS = 8  # at most
+WHITE = 1.1  # radiance that counts at most
+UNIT = 64.0  # steps of a pixel
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Shutter:
+    """How long the shutter is open, on the device."""
+
+    open: qd.f32  # s
+    visible: qd.f32  # m
+    longest: qd.f32  # px
+    least: qd.f32  # px
+    grain: qd.i32  # px of a texel
+    samples: qd.i32  # computed pixels per pixel of the picture, in each direction
+    cuts: qd.i32
+    unit: qd.f32
+    white: qd.f32  # radiance that counts at most: a film is not whiter than white
+    slack: qd.f32  # m: depth by which an edge of the tank wins
+
+
+def draw(shot: Shot, buffers: Buffers) -> None:
+    """Smear `color` along the ways of what it shows; an eye in the water sees no motion."""
+    frame, open_for = shot.frame, shot.shutter
+    if frame.dim == 2 or open_for <= 0.0 or frame.count == 0 or under_water(shot, buffers):
+        return
+    motion, surface = buffers.motion, water_of(buffers, shot).surface
+    grain, samples = max(4, grain_of(shot, buffers.supersample)), buffers.supersample
+    shutter = remembered(Shutter(
+        open=float(open_for), visible=VISIBLE * shot.extent.spacing, longest=LONGEST * buffers.rows / samples,
+        least=LEAST, grain=grain, samples=samples, cuts=CUTS, unit=UNIT, white=WHITE,
+        slack=slack(shot),
+    ))  # fmt: skip
+    rows, columns = (size // samples // grain + 2 for size in (buffers.rows, buffers.columns))
+    foam, count = (frame.diffuse, frame.foam_count) if frame.diffuse is not None else (None, 0)
+    begin(motion, rows, columns)
+    gather(motion, surface.nearest, frame.x, frame.v, shot.lens, shutter, frame.count)
+    if foam is not None and count > 0:
+        gather(motion, surface.nearest, foam.x, foam.v, shot.lens, shutter, count)
+    settle(motion, shutter, rows, columns)
+    smear(buffers.pixels, surface, motion, shot.lens, shot.look, shot.walls, shutter, rows, columns)
+
+
+@qd.kernel(fastcache=True)
+def begin(motion: Motion, rows: qd.i32, columns: qd.i32):
+    """Nothing moves."""
+    for row, column in qd.ndrange(rows, columns):
+        for k in qd.static(range(3)):
+            motion.sums[row, column, k] = 0
+
+
+@qd.kernel(fastcache=True)
+def gather(
+    motion: Motion, nearest: qd.types.ndarray(), x: qd.types.ndarray(), v: qd.types.ndarray(), lens: Lens,
+    shutter: Shutter, count: qd.i32,
+):  # fmt: skip
+    """Add up the ways of all points that the eye sees."""
+    for i in range(count):
+        c = to_view(lens, lift(x[i]))
+        if c.z > lens.near:
+            here = to_pixel(lens, c)
+            if here.x > 0.0 and here.y > 0.0 and here.x < nearest.shape[1] and here.y < nearest.shape[0]:
+                seen = qd.bit_cast(nearest[qd.cast(here.y, qd.i32), qd.cast(here.x, qd.i32)], qd.f32)
+                later = to_view(lens, lift(x[i]) + shutter.open * lift(v[i]))
+                if c.z < seen + shutter.visible and later.z > lens.near:
+                    way = (to_pixel(lens, later) - here) / shutter.samples
+                    way *= qd.min(1.0, shutter.longest / qd.max(way.norm(), 1e-6))
+                    wide = shutter.grain * shutter.samples
+                    row, column = qd.cast(here.y, qd.i32) // wide, qd.cast(here.x, qd.i32) // wide
+                    qd.atomic_add(motion.sums[row, column, 0], 1)
+                    for k in qd.static(range(2)):
+                        qd.atomic_add(motion.sums[row, column, k + 1], qd.cast(qd.round(way[k] * shutter.unit), qd.i32))
+
+
+@qd.kernel(fastcache=True)
+def settle(motion: Motion, shutter: Shutter, rows: qd.i32, columns: qd.i32):
+    """Find the mean way around every texel."""
+    for row, column in qd.ndrange(rows, columns):
+        total, weight = vec2(0.0, 0.0), 0.0
+        for n in qd.static(range(9)):
+            r = qd.min(qd.max(row + qd.static(n // 3 - 1), 0), rows - 1)
+            c = qd.min(qd.max(column + qd.static(n % 3 - 1), 0), columns - 1)
+            share = qd.static((1.0, 2.0, 1.0, 2.0, 4.0, 2.0, 1.0, 2.0, 1.0)[n])
+            weight += share * motion.sums[r, c, 0]
+            total += share * vec2(motion.sums[r, c, 1], motion.sums[r, c, 2])
+        motion.way[row, column] = total / (qd.max(weight, 1.0) * shutter.unit)
+
+
+@qd.func
+def way_at(way: qd.template(), row, column, grain):
+    """Way at a pixel, between the four nearest texels."""
+    x, y = (column + 0.5) / grain - 0.5, (row + 0.5) / grain - 0.5
+    c, r = qd.max(qd.cast(qd.floor(x), qd.i32), 0), qd.max(qd.cast(qd.floor(y), qd.i32), 0)
+    u, v = qd.max(x - c, 0.0), qd.max(y - r, 0.0)
+    top = way[r, c] + u * (way[r, c + 1] - way[r, c])
+    low = way[r + 1, c] + u * (way[r + 1, c + 1] - way[r + 1, c])
+    return top + v * (low - top)
+
+
+@qd.func
+def pixel_along(row, column, way, high, wide):
+    """Row and column of the pixel that lies so far from another, within the picture."""
+    r = qd.min(qd.max(qd.cast(row + 0.5 + way.y, qd.i32), 0), high - 1)
+    return r, qd.min(qd.max(qd.cast(column + 0.5 + way.x, qd.i32), 0), wide - 1)
+
+
+@qd.func
+def at_pane(lens: Lens, walls: Box, row, column, here, slack):
+    """Whether a pixel shows water through a pane: what is seen there is what stands behind, however the water moves."""
+    ray, z = view_ray(lens, row, column), qd.bit_cast(here, qd.f32)
+    at = ray_origin(lens, ray) + z * ray_direction(lens, ray)
+    gap = qd.min(at.x - walls.lower.x, walls.upper.x - at.x, at.z - walls.lower.z, walls.upper.z - at.z)
+    return z < 1e30 and qd.abs(gap) < 0.1 * slack
+
+
+@qd.func
+def moves(way: qd.template(), row, column, rows, columns, least):
+    """Whether anything in a texel goes farther than `least` [px]."""
+    most = 0.0
+    for n in qd.static(range(9)):
+        r = qd.min(qd.max(row + qd.static(n // 3 - 1), 0), rows - 1)
+        c = qd.min(qd.max(column + qd.static(n % 3 - 1), 0), columns - 1)
+        most = qd.max(most, way[r, c].dot(way[r, c]))
+    return most > least * least
+
+
+@qd.kernel(fastcache=True)
+def smear(
+    pixels: Pixels, surface: WaterSurface, motion: Motion, lens: Lens, look: Look, walls: Box, shutter: Shutter,
+    rows: qd.i32, columns: qd.i32,
+):  # fmt: skip
+    """Average along the ways; `pixels.normal` and `surface.rim` hold what is new meanwhile."""
+    samples, grain = shutter.samples, shutter.grain
+    high, wide = pixels.depth.shape[0] // samples, pixels.depth.shape[1] // samples
+    for texel_row, texel_column in qd.ndrange(rows, columns):
+        if moves(motion.way, texel_row, texel_column, rows, columns, shutter.least):
+            for row in range(texel_row * grain, qd.min((texel_row + 1) * grain, high)):
+                for column in range(texel_column * grain, qd.min((texel_column + 1) * grain, wide)):
+                    way, mark = 2.0 * way_at(motion.way, row, column, grain), 0
+                    length = way.norm()
+                    down, across = row * samples, column * samples
+                    moving = length > 2.0 * shutter.least
+                    if moving and at_pane(lens, walls, down, across, surface.nearest[down, across], shutter.visible):
+                        moving = False
+                        for side in range(2):
+                            r, c = pixel_along(row, column, (side - 0.5) * way, high, wide)
+                            r, c = r * samples, c * samples
+                            if not at_pane(lens, walls, r, c, surface.nearest[r, c], shutter.visible):
+                                moving = True
+                    if moving:
+                        total, weight, cover = vec3(0.0, 0.0, 0.0), 0.0, 0.0
+                        cuts = qd.min(qd.max(qd.cast(0.4 * length, qd.i32) + 3, samples * samples), shutter.cuts)
+                        for k in range(cuts):
+                            # The samples of a pixel take turns.
+                            i, j = k // samples % samples, k % samples
+                            own_r, own_c = down + i, across + j
+                            share = (k + 0.5) / cuts - 0.5
+                            r, c = pixel_along(row, column, share * way, high, wide)
+                            r, c = r * samples + i, c * samples + j
+                            here, there = surface.nearest[own_r, own_c], surface.nearest[r, c]
+                            # Of what stands still, and of what hides the water, a pixel beside them shows nothing.
+                            gives = there < pixels.depth[r, c]
+                            if here < pixels.depth[own_r, own_c]:
+                                gives = gives or there > here
+                            elif gives:
+                                gives = there < here
+                            open = 0.5 - qd.abs(share)
+                            line = pixels.lines[own_r, own_c]
+                            if gives:
+                                if pixels.lines[r, c] == 0:
+                                    total += open * qd.min(pixels.color[r, c], shutter.white)
+                                    weight += open
+                            elif line == 0:
+                                total += open * pixels.color[own_r, own_c]
+                                weight += open
+                            if line != 0:
+                                cover += line_cover(line, qd.bit_cast(here, qd.f32), shutter.slack) / cuts
+                        if weight > 0.0:
+                            mark = 1
+                            total /= weight
+                            pixels.normal[down, across] = total + look.line_strength * cover * (look.line - total)
+                    surface.rim[down, across] = mark
+    for texel_row, texel_column in qd.ndrange(rows, columns):
+        if moves(motion.way, texel_row, texel_column, rows, columns, shutter.least):
+            for row in range(texel_row * grain, qd.min((texel_row + 1) * grain, high)):
+                for column in range(texel_column * grain, qd.min((texel_column + 1) * grain, wide)):
+                    if surface.rim[row * samples, column * samples] == 1:
+                        for k in range(samples * samples):
+                            pixels.color[row * samples + k // samples, column * samples + k % samples] = pixels.normal[
+                                row * samples, column * samples
+                            ]
