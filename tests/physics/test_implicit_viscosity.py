@@ -290,22 +290,25 @@ def test_dough_that_falls_does_not_bounce(viscosity, dim):
     assert sim.positions[:, 1].min() > 0.2 * d
 
 
-@pytest.mark.parametrize("viscosity", [1e4, 1e6])
-def test_a_paddle_does_not_fling_dough(viscosity):
-    """Nothing drives the dough but the paddle: it was flung at five times its speed, as fast as the tank allows."""
-    d, speed, x = 0.02, 1.0, 0.3
+@pytest.mark.parametrize(("viscosity", "d", "speed"), [(1e4, 0.02, 1.0), (1e6, 0.02, 2.0), (1e6, 0.0125, 1.0)])
+def test_a_paddle_neither_flings_dough_nor_presses_it_together(viscosity, d, speed):
+    """Nothing drives the dough but the paddle, and it has nowhere to go but up: a flow without divergence.
+
+    It was flung at 1.4 to 1.9 times the paddle's speed, and pressed to 1.3 to 2 of its density.
+    """
+    x, frames = 0.3, round(0.33 * 60 / speed)
     paddle = wt.Box(name="paddle", center=(x, 0.25), size=(0.04, 0.5))
     sim = Simulation(
         wt.Scene(spacing=d, gravity=(0, -9.81), rest_density=1400, dynamic_viscosity=viscosity,
                  tank=wt.Tank(size=(1.0, 0.6)), solids=[paddle], fluids=[wt.Block(lower=(0, 0), upper=(1.0, 0.2))])
     )  # fmt: skip
     sim.advance(0.2)
-    for _ in range(20):
+    for _ in range(frames):
         x += speed / 60
         sim.move("paddle", position=(x, 0.25))
         sim.advance(1 / 60)
-        assert np.linalg.norm(sim.velocities, axis=1).max() < 1.9 * speed
-    assert np.percentile(sim.densities, 99) < 1.6 * 1400
+        assert np.linalg.norm(sim.velocities, axis=1).max() < 1.25 * speed
+        assert np.percentile(sim.densities, 99) < 1.2 * 1400
 
 
 def test_without_no_slip_a_body_still_stops_on_the_floor_and_slides():

@@ -25,24 +25,26 @@ CALM = 0.1  # of sqrt(g / h), the rate of the shortest waves: water that turns s
 
 def coefficients(
     params: Parameters, dt: float, speed_limit: float = math.inf, *, carries: float = 0.0, parts: int = 0,
-    held: float = 0.0,
+    held: float = 0.0, iterations: int = 0,
 ) -> Coefficients:  # fmt: skip
     """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here.
 
     Artificial pressure comes in so many `parts`, one an iteration where 0. Pushes of thick fluids are `held` back.
+    `iterations` are those of `params` where 0.
     """
     h, gravity = params.support * params.spacing, (*params.gravity, 0.0)
+    iterations = iterations or params.iterations
     rest = rest_lattice(params.kernel, params.dim, params.support)
     s_0 = rest.squared_gradients / h**2
     w_dq = float(kernel_shape(NAMES[params.kernel][0], np.array(params.tensile_distance))[0])
-    tensile = params.tensile_strength / s_0 / (parts or params.iterations) / w_dq**params.tensile_exponent
+    tensile = params.tensile_strength / s_0 / (parts or iterations) / w_dq**params.tensile_exponent
     # Packings need it that gravity presses; without gravity it would blow them up (docs/notebook/calm.md). It is the
     # same force in steps of any length.
     tensile *= (dt / params.frame_time) ** 2 * min(1.0, math.hypot(*params.gravity) / EARTH)
     viscosity = min(1.0, params.viscosity * REFERENCE_RATE * dt)
     calming = 1.0 - (1.0 - params.calming) ** (dt / params.frame_time)
     # Of what an iteration may move a particle by: as fast as it goes, and as it falls past a neighbour.
-    pace = dt / params.iterations / held if held > 0.0 else 0.0
+    pace = dt / iterations / held if held > 0.0 else 0.0
     # Without gravity nothing is slow: there is no speed to compare with.
     slow = 1.0 / max(math.hypot(*params.gravity) * params.spacing, 1e-30)
     return remembered(
@@ -62,7 +64,7 @@ def coefficients(
             attraction=params.attraction,
             tensile=tensile,
             tensile_exponent=params.tensile_exponent,
-            largest_correction=h / params.iterations,
+            largest_correction=h / iterations,
             held_push=pace * math.sqrt(2.0 * math.hypot(*params.gravity) * h),
             held_time=pace,
             viscosity=viscosity,
@@ -88,11 +90,11 @@ def in_iteration(c: Coefficients, relaxation: float, momentum: float) -> Coeffic
     return dataclasses.replace(c, relaxation=relaxation, momentum=momentum)
 
 
-def relaxations(params: Parameters, density_ratio: float = 1.0) -> list[tuple[float, float]]:
+def relaxations(params: Parameters, density_ratio: float = 1.0, iterations: int = 0) -> list[tuple[float, float]]:
     """Return (relaxation, momentum) of each iteration; fewer iterations have to damp a narrower range of modes."""
-    rest = rest_lattice(params.kernel, params.dim, params.support)
+    rest, iterations = rest_lattice(params.kernel, params.dim, params.support), iterations or params.iterations
     stiffest = (rest.stiffest_mode + DISORDER[params.dim] + stiffening(density_ratio)) / params.relaxation
-    return schedule(params.iterations, 4.0 * params.slowest_mode / params.iterations, stiffest)
+    return schedule(iterations, 4.0 * params.slowest_mode / iterations, stiffest)
 
 
 @functools.lru_cache(maxsize=256)

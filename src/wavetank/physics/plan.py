@@ -15,6 +15,8 @@ from wavetank.physics.time_step import pool_depth, steps_needed
 from wavetank.physics.world import World
 
 SOLIDS_IN_THICK = 3.0  # the constraint alone makes way for them, a few spacings far; docs/notebook/viscosity.md
+STIRRED = 0.02  # d: way of a solid in a step from which on
+FARTHER = 4.0  # times as many iterations make way
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,7 +33,9 @@ class Plan:
     is_tense: bool  # fluids have surface tension
     is_viscous: bool  # fluids have viscosity that matters
     is_thick: bool  # so much that they carry on what pressed them
+    is_stirred: bool  # and solids move through it
     held: float  # how far it holds pushes back, from 0 to 1
+    iterations: int
     is_rubbed: bool  # walls or solids hold sliding back
     is_smoothed: bool  # velocities are drawn to each other
     is_central: bool  # along the line between particles, which in the open leaves angular momentum alone
@@ -43,7 +47,8 @@ class Plan:
 def plan_step(world: World, params: Parameters, dt: float) -> Plan:
     """Plan a step of `dt` [s]."""
     kinds, on_grid = blend(world.materials, params), has_grid_pressure(world, params)
-    thick, correction = is_thick(kinds, params), correction_number(params)
+    thick, correction, share = is_thick(kinds, params), correction_number(params), thick_share(kinds, params)
+    stirred = thick and world.solid_speed * dt > STIRRED * params.spacing
     return Plan(
         kinds=kinds,
         method=method_number(params),
@@ -56,7 +61,9 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         is_tense=kinds.surface_tension > 0.0,
         is_viscous=is_viscous(kinds, params, dt),
         is_thick=thick,
-        held=thick_share(kinds, params),
+        is_stirred=stirred,
+        held=0.0 if stirred else share,  # it takes the speed then, not the way: `implicit_viscosity.carry_on`
+        iterations=round(params.iterations * (1.0 + (FARTHER - 1.0) * share)) if stirred else params.iterations,
         is_rubbed=world.has_friction or params.calming > 0.0,
         is_smoothed=params.viscosity > 0.0 or params.calming > 0.0,
         is_central=not (world.levels or kinds.mixed),

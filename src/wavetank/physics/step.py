@@ -45,7 +45,9 @@ def step(
     None: one was hit so hard that the step is to be taken again; it ends here, and returns False.
     """
     plan = plan_step(world, params, dt)
-    c = coefficients(params, dt, speed_limit, carries=plan.carried, parts=plan.parts, held=plan.held)
+    c = coefficients(
+        params, dt, speed_limit, carries=plan.carried, parts=plan.parts, held=plan.held, iterations=plan.iterations
+    )
     world.keep_viscosity(plan.is_viscous)
     world.keep_solids()
 
@@ -62,7 +64,7 @@ def step(
     if plan.on_grid:
         correct_on_grid(world, plan, params, c)
 
-    sweeps = relaxations(params, plan.kinds.density_ratio)
+    sweeps = relaxations(params, plan.kinds.density_ratio, plan.iterations)
     for number, (relaxation, momentum) in enumerate(sweeps):  # 8-19
         if settle and number == max(0, len(sweeps) - SETTLING) and not settle_bodies(world, c, settle):
             return False
@@ -71,7 +73,7 @@ def step(
         apply_corrections(world, plan, c, first=number == 0)  # 12-18
 
     if plan.is_thick:
-        carry_on(world, plan.kinds, params, c)
+        carry_on(world, plan.kinds, params, c, stirred=plan.is_stirred)
     update_velocities(world.particles, c, world.count)  # 21, 23
     if plan.is_rubbed:
         apply_friction(world.particles, world.scratch, world.solids, world.walls, c, world.count, int(plan.on_grid))

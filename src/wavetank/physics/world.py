@@ -46,6 +46,7 @@ class World:
     room_version: int = -1  # of the solids when the grid was last told which room they leave
     thin_walls: Any = dataclasses.field(default_factory=lambda: integers(1))  # i32 [1]: nodes of the grid at thin walls
     has_thin_walls: bool = False
+    solid_speed: float = 0.0  # m/s: the fastest that any solid moves in this frame
     known: dict[tuple[Any, ...], Any] = dataclasses.field(default_factory=dict)  # see `exchanged`
     pieces: Pieces | None = None  # of the bodies, where there are any
     pool: Pool | None = None  # of spray, foam and bubbles; made when the first are

@@ -26,7 +26,7 @@ def count_steps(
 ) -> float:
     """Return how many time steps make up `duration` [s], no whole number."""
     box = scene.tank.box() if scene.tank else ledger.start_box
-    solid = pace_of_solids(world, scene) * _solid_speed(scene, solids, duration)
+    solid = pace_of_solids(world, scene) * solid_speed(scene, solids, duration)
     fastest = largest_speed(world.particles, world.count)
     if not math.isfinite(fastest):
         _refuse(world, ledger)
@@ -59,7 +59,7 @@ def find_speed_limit(
     """
     if scene.tank is None:
         return math.inf
-    ledger.fastest_solid = max(ledger.fastest_solid, _solid_speed(scene, solids, duration))
+    ledger.fastest_solid = max(ledger.fastest_solid, solid_speed(scene, solids, duration))
     ledger.fastest_force = max(ledger.fastest_force, sum(force.largest_speed() for force in forces))
     start = max([ledger.fastest_start, *(_start_speed(solid) for solid in scene.solids)])
     fall = sum(2.0 * abs(g) * edge for g, edge in zip(scene.gravity, scene.tank.size, strict=True))
@@ -76,6 +76,6 @@ def _start_speed(solid: Solid) -> float:
     return math.hypot(*(solid.velocity or (0.0,))) + (spin * solid.reach() if spin else 0.0)
 
 
-def _solid_speed(scene: Scene, solids: MovingSolids, duration: float) -> float:
+def solid_speed(scene: Scene, solids: MovingSolids, duration: float) -> float:
     """Return the largest speed [m/s] at which any solid moves through the tank in this frame."""
     return solids.largest_speed(duration, scene.tank.size if scene.tank else None)

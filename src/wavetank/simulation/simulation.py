@@ -131,6 +131,7 @@ class Simulation(States):
         self.pushed += self.sources.forces(self.scene, self.time, duration)
         limit = self._speed_limit(duration)
         parts = self.time_steps = whole(self._steps_in(duration))
+        self.world.solid_speed = limits.solid_speed(self.scene, self.solids, duration)
         self.solids.grow(duration)
         for part in range(parts):
             start, dt = self.time + duration * part / parts, duration / parts

@@ -28,9 +28,10 @@ Where we differ, and why:
   10.1006/jcph.1997.5776), from a table of the distance. Across it they do as well where the fluid strikes: closer
   than it rests, faster than it falls half past a neighbour, sqrt(g h). So what is stiff stops at once on a floor.
   Pushed out of it by the constraint, a few spacings deep in each of several steps, it sprang back.
-- The constraint displaces a thick fluid without knowing its viscosity, and where a solid moves through it, which the
-  next solve takes back: particles were flung about at several times the solid's speed. In a step it may move them
-  as far as they go, and fall past a neighbour, sqrt(2 g h), over k / (`HALF` + k).
+- The constraint displaces a thick fluid without knowing its viscosity, which the next solve takes back: where a solid
+  moves through it particles were flung about at several times the solid's speed, and pressed together all the same. In
+  a step it may move them as far as they go, and fall past a neighbour, sqrt(2 g h), over k / (`HALF` + k); where a
+  solid does move, any way, in several times the iterations, but that gives them little speed (`PUSHED`).
 - Viscosity acts before the constraint, so that what pressure adds to the motion is damped in the next step only. That
   made honey flow a fifth too fast at any affordable step. A thick fluid therefore begins a step with the share w of
   what pressed it in the last one, and only the change comes afterwards: the incremental projection of Goda 1979
@@ -64,6 +65,7 @@ from wavetank.physics.teams import end_team, first_team, turns
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3, vec4
 
+ANY = 1e9  # m/s
 STIFFER = 3.0  # times as stiff as the rest lattice: water in motion, and the drag of walls
 WORTH = 1e-5  # smallest kappa - 1 on the rest lattice for which a substep solves anything
 STIFFEST = 1e7  # eigenvalue beyond which single precision cannot tell what moves as a whole
@@ -75,6 +77,7 @@ TOUCHING = 0.5  # d: closer to a wall than at rest, what strikes it is held back
 SLIPS = 1e-9  # least share of the drag along a wall, where there should be none
 CALM = 0.9  # share of what is not carried on that is, where nothing moves
 NEAREST = 0.25  # d: closer to a wall than this its drag grows no further
+PUSHED = 0.1  # of its own speed and of sqrt(2 g h): the speed that a push gives where solids move through
 
 
 def damper_scale(dim: int, ratio: float, d: float) -> float:
@@ -210,13 +213,16 @@ class Carrying:
     largest: qd.f32  # m/s^2
     calm: qd.f32  # share of what is not carried on that is, where nothing moves
     again: qd.f32  # of the push of this step: what has left the floor is not pushed any more
+    own: qd.f32  # of its own speed: that which a push gives, at most, beside
+    falling: qd.f32  # m/s
 
 
 @qd.kernel(fastcache=True)
 def carry_pressure(particles: Particles, rows: qd.types.ndarray(), c: Coefficients, carrying: Carrying, count: qd.i32):
     """Keep the share of what pressure and solids accelerated thick fluids by that the next prediction begins with.
 
-    It is called before velocities are read off.
+    It is called before velocities are read off. What a push should not give to them is taken by moving where the way
+    began.
     """
     for i in range(count):
         row = rows[particles.material[i]]
@@ -229,6 +235,9 @@ def carry_pressure(particles: Particles, rows: qd.types.ndarray(), c: Coefficien
         share *= thick / (carrying.half + thick)
         limit = qd.min(carrying.largest, carrying.again / passed * pushed.norm() / (c.dt * c.dt))
         particles.a[i] = a * (share * qd.min(1.0, limit / qd.max(a.norm(), 1e-12)))
+        most = (carrying.own * particles.v[i].norm() + carrying.falling) * (carrying.half + thick) / qd.max(thick, 1e-6)
+        if pushed.norm() > c.dt * most:
+            particles.x[i] += pushed * (1.0 - c.dt * most / pushed.norm())
 
 
 def thickness(viscosity: float, params: Parameters, dt: float) -> float:
@@ -288,10 +297,13 @@ def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficie
     return number
 
 
-def carry_on(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
-    """Let thick fluids carry on a share of what pressed them in this step."""
-    rate, largest = thickness(1.0 / kinds.largest_density, params, c.dt), LARGEST * math.hypot(*params.gravity)
-    carrying = remembered(Carrying(rate=rate, most=CARRIED, half=HALF, largest=largest, again=AGAIN, calm=CALM))
+def carry_on(world: World, kinds: Blend, params: Parameters, c: Coefficients, *, stirred: bool) -> None:
+    """Let thick fluids carry on a share of what pressed them in this step; where `stirred`, that gives little speed."""
+    rate, gravity = thickness(1.0 / kinds.largest_density, params, c.dt), math.hypot(*params.gravity)
+    own, falling = (PUSHED, PUSHED * math.sqrt(2.0 * gravity * c.h)) if stirred else (0.0, ANY)
+    carrying = remembered(Carrying(
+        rate=rate, most=CARRIED, half=HALF, largest=LARGEST * gravity, again=AGAIN, calm=CALM, own=own, falling=falling
+    ))  # fmt: skip
     carry_pressure(world.particles, world.fluids.rows, c, carrying, world.count)
 
 
