@@ -352,10 +352,10 @@ def test_a_colour_switches_the_view_and_has_a_legend_and_a_slice_moves(open_page
     until(lambda: session.view == "particles")
     browser.wait_for("document.querySelector('#legend').textContent.includes('Speed [m/s]')")
     browser.run(pill.format("Slice"))
-    browser.wait_for("document.querySelector('#look .control input[type=range]') !== null")
+    place = "document.querySelector('#look input[type=range][aria-label=\\'Where along it\\']')"
+    browser.wait_for(f"{place} !== null")
     first = browser.run("document.querySelector('#picture').toDataURL()")
-    browser.run("(() => { const e = document.querySelector('#look .control input[type=range]'); e.value = 0.9;"
-                "e.oninput() })()")  # fmt: skip
+    browser.run(f"(() => {{ const e = {place}; e.value = 0.9; e.oninput() }})()")
     until(lambda: session.cut == ("z", 0.9))
     browser.wait_for(f"document.querySelector('#picture').toDataURL() !== {first!r}")
 

@@ -84,6 +84,7 @@ class Buffers:
     sun_depth: Any  # i32 [texels, texels]: bits of the depth [m] of what the sun sees first
     solid_box: Any  # i32 [4]: first and last column, first and last row that may show a solid
     paints: Paints  # of solids
+    glass_paints: Paints  # of those of glass
     curve: Any  # i32 [entries]: sRGB byte of linear light 0 to 1, in equal steps
     picture: Any  # i32 [words]: the finished picture, three sRGB bytes a pixel, row by row
     water: Any  # WaterBuffers once a picture of water was taken
@@ -145,6 +146,7 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
         sun_depth=qd.ndarray(qd.i32, shape=(texels, texels)),
         solid_box=qd.ndarray(qd.i32, shape=(4,)),
         paints=Paints(),
+        glass_paints=Paints(),
         curve=curve,
         picture=qd.ndarray(qd.i32, shape=(3 * -(-height * width // 4),)),
         water=None,

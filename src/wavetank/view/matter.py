@@ -16,6 +16,7 @@ from wavetank.view.look import usual_depth
 #: In a plane there is no depth that would tint it, and paper behind it.
 ICE = {dim: Material(name="ice", color=color, clarity="cloudy") for dim, color in ((2, "#b6e0f8"), (3, "#d3e6f0"))}
 CLOUDY, OPAQUE = 4.0, 3.0  # murk over a usual depth, and over a spacing
+FROZEN = 4.0  # times as murky as a cloudy fluid: pieces of ice are small, and full of bubbles
 
 
 def matter_of(frame: Frame, extent: Extent) -> np.ndarray:
@@ -31,7 +32,8 @@ def matter_of(frame: Frame, extent: Extent) -> np.ndarray:
     for number, material in enumerate([*scene.palette(), ICE[extent.dim]]):
         murk = {"clear": 0.0, "cloudy": CLOUDY / usual_depth(extent), "opaque": OPAQUE / extent.spacing}
         color = np.clip(to_linear(np.array(rgb_of(str(material.color)))), 0.02, 0.98)
-        table[number] = (*color, murk[material.clarity], *(material.glow * color))
+        dense = murk[material.clarity] * (FROZEN if material is ICE[extent.dim] else 1.0)
+        table[number] = (*color, dense, *(material.glow * color))
     if not scene.materials:
         table[0, :3] = -1.0
     return table if frame.frozen_count else table[:-1]

@@ -66,7 +66,7 @@ VIEWS: dict[str, View] = {
         ),
         passes=(
             backdrop.draw, surface.draw, flatten.draw, thickness.draw, water.draw, below.draw,
-            drops.draw, foam.draw_over_water, shutter.draw,
+            drops.draw, solids.draw_glass, foam.draw_over_water, shutter.draw,
         ),
     ),
     "particles": View(

@@ -37,6 +37,7 @@ class Inside:
     solids: SolidSet
     paints: qd.types.ndarray()  # vec3 [solids]: their albedo
     column: qd.types.ndarray()  # i32 [texels, texels]: water along the sun's rays, see `Thickness`
+    shade: qd.types.ndarray()  # i32 [finer texels]: bits of the depth [m] at which they meet solids
 
 
 @qd.func

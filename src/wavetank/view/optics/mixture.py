@@ -12,11 +12,11 @@ change from one fluid to the other within half a spacing, along a line that is a
 """
 
 from wavetank.device.compiler import qd
-from wavetank.view.lens import Lens, vec2, vec3
+from wavetank.view.lens import Lens, to_pixel, to_view, vec2, vec3
 from wavetank.view.look import Look
 from wavetank.view.optics.body import depth_below
 from wavetank.view.optics.fluid import Optics
-from wavetank.view.optics.maps import corners
+from wavetank.view.optics.maps import corners, gap_at
 from wavetank.view.optics.radiance import smoothstep, surface_radiance
 from wavetank.view.water_buffers import SunlitWater, Thickness
 
@@ -106,10 +106,32 @@ def mixed(thickness: Thickness, look: Look, optics: Optics, pixel, tau, plane: q
 
 
 @qd.func
-def murky(sunlit: SunlitWater, sun: Lens, look: Look, optics: Optics, color, glow, at, n, seen, plane: qd.template()):
-    """Radiance of a fluid that one does not see into, at the point `at` of its surface, shaded by itself."""
+def past_solids(sun: Lens, first: qd.template(), shade: qd.template(), look: Look, at, slack):
+    """Share of the sun that solids leave to a point, softer the farther off they are."""
+    c = to_view(sun, at)
+    fine = qd.cast(shade.shape[0], qd.f32) / first.shape[0]  # both maps show the same
+    place = fine * to_pixel(sun, c)
+    wide = 1.5 + 0.5 * look.sun_size * fine * sun.focal * qd.min(qd.max(gap_at(shade, place, c.z), 0.0), 1e3)
+    seen = 0.0
+    for k in range(9):
+        off = vec2(qd.cast(k % 3 - 1, qd.f32), qd.cast(k // 3 - 1, qd.f32))
+        seen += qd.select(gap_at(shade, place + wide * off, c.z - slack) > 0.0, 0.0, 1.0 / 9.0)
+    return seen
+
+
+@qd.func
+def murky(
+    sunlit: SunlitWater, shade: qd.template(), sun: Lens, look: Look, optics: Optics, color, glow, at, n, seen,
+    plane: qd.template(),
+):  # fmt: skip
+    """Radiance of a fluid that one does not see into, at the point `at` of its surface, shaded by itself and by the
+    solids that the sun's map of depths `shade` holds.
+    """
     share = 1.0
     if qd.static(not plane):  # in a plane nothing casts a shadow
-        under = depth_below(sun, sunlit.depth, at + (0.5 * optics.spacing) * n)
+        above = at + (0.5 * optics.spacing) * n
+        under = depth_below(sun, sunlit.depth, above)
         share = 1.0 - smoothstep((under - 0.75 * optics.spacing) / (2.5 * optics.spacing))
+        if share > 0.0:
+            share *= past_solids(sun, sunlit.depth, shade, look, above, 0.5 * optics.spacing)
     return surface_radiance(look, color, n, seen, vec2(share, 1.0), 0.45, 0.0) + glow

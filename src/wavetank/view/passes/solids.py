@@ -7,6 +7,7 @@ particles, which are balls around that plane and would cover the rim of every so
     code         symbol   meaning                                       unit
     t                     depth along the ray                           m
     pace                  way per metre of depth, the ray's length      m/m
+    mirror       F        share of light that a wall of glass mirrors   1
     first, last           depths between which a solid may be met       m
     raised                way towards the eye that a cut is moved       m
 """
@@ -21,10 +22,13 @@ from wavetank.device.state import remembered
 from wavetank.solids.distance import SolidSet, around, grain, signed_distance
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, view_ray
+from wavetank.view.look import Look
+from wavetank.view.optics.radiance import environment, glint
 from wavetank.view.optics.rays import Box, box, box_interval
-from wavetank.view.paints import colors_of
+from wavetank.view.paints import FINISHES, colors_of, finishes_of, traced_colors
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
+from wavetank.view.water_buffers import water_of
 
 UNBOUNDED = 1e4  # m
 
@@ -47,6 +51,18 @@ def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
     """Draw the solids into the sun's depth map, likewise."""
     if shot.frame.dim == 3:
         lower_depth(shot, buffers, shot.sun, buffers.sun_depth, 0)
+
+
+def draw_glass(shot: Shot, buffers: Buffers) -> None:
+    """Lay solids of glass over the finished picture, by the depth of what it shows: thin walls that bend no light."""
+    is_glass = finishes_of(shot) == FINISHES.index("glass")
+    if shot.frame.dim == 3 and is_glass.any():
+        paints = np.where(is_glass[:, None], traced_colors(shot), np.float32(-1.0))
+        lay_glass(
+            buffers.pixels, water_of(buffers, shot).surface.nearest, buffers.solid_box,
+            strips_of(buffers.pixels.depth), shot.frame.solids, window(shot), shot.lens, shot.look,
+            buffers.glass_paints.of(paints),
+        )  # fmt: skip
 
 
 def lower_depth(shot: Shot, buffers: Buffers, lens: Lens, depth: Any, is_seen: int) -> None:
@@ -205,3 +221,35 @@ def trace(
                         pixels.surface[row, column] = -1  # SOLID
                         pixels.normal[row, column] = vec3(hit[0], hit[1], hit[2])
                         pixels.color[row, column] = paints[qd.cast(hit[4], qd.i32)]
+
+
+@qd.kernel(fastcache=True)
+def lay_glass(
+    pixels: Pixels, nearest: qd.types.ndarray(), box: qd.types.ndarray(), strips: Strips, solids: SolidSet,
+    window: Window, lens: Lens, look: Look, paints: qd.types.ndarray(),
+):  # fmt: skip
+    """Lay what has no negative paint over the picture, where nothing stands before it.
+
+    What is seen passes two faces of the wall, is coloured more where it passes aslant, and both faces mirror.
+    """
+    for _ in range(1):
+        whole = box_of_solids(solids, lens, nearest.shape[0], nearest.shape[1])
+        for k in qd.static(range(4)):
+            box[k] = whole[k]
+    for task in range(strips.count):
+        row, first, last = strip(strips, task, nearest.shape[0], nearest.shape[1])
+        for column in range(first, last):
+            if in_box(box, row, column):
+                far = qd.bit_cast(nearest[row, column], qd.f32)
+                hit = nearest_solid(solids, window, lens, paints, row, column, far)
+                if hit[3] > 0.0 and hit[3] < far:
+                    ahead = ray_direction(lens, view_ray(lens, row, column)).normalized()
+                    n = vec3(hit[0], hit[1], hit[2])
+                    cosi = qd.min(qd.max(-n.dot(ahead), 0.02), 1.0)
+                    face = 0.04 + 0.96 * (1.0 - cosi) ** 5
+                    mirror = 2.0 * face / (1.0 + face)
+                    tint = paints[qd.cast(hit[4], qd.i32)]
+                    slant = qd.min(1.0 / cosi, 4.0)
+                    shown = pixels.color[row, column] * qd.exp(slant * qd.log(qd.max(tint, 0.01)))
+                    shown += mirror * (environment(look, ahead + 2.0 * cosi * n) - shown)
+                    pixels.color[row, column] = shown + glint(look, n.dot((look.to_sun - ahead).normalized(1e-9)))

@@ -63,7 +63,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if among and (world == 2 or shot.frame.scene.tank):
         world = {2: 1, 3: 4}[world]
     paints = buffers.paints.of(colors_of(shot)) if world == 4 else buffers.paints.device
-    inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water)
+    inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water, buffers.sun_depth)
     lay(
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit,
         strips_of(pixels.depth, together, buffers.supersample), shot.lens, shot.water_sun, shot.look,
@@ -342,6 +342,7 @@ def shine(
         if hidden + cover > 0.0:
             lit = murky(
                 sunlit,
+                inside.shade,
                 sun,
                 look,
                 optics,
@@ -354,7 +355,7 @@ def shine(
             )
             result += hidden * (lit * qd.exp(-0.3 * tau * swallow) - result)
             if cover > 0.0:
-                lit = murky(sunlit, sun, look, optics, color, glow, at, n, -ahead, qd.static(world <= 2))
+                lit = murky(sunlit, inside.shade, sun, look, optics, color, glow, at, n, -ahead, qd.static(world <= 2))
                 result += cover * (lit - result)
     if qd.static(world <= 2):  # the rim of the sheet catches the light, and on paper there is nothing to mirror
         # Light comes from above left, and less of it reaches the bottom.
