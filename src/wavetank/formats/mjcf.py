@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from wavetank.formats.mjcf_values import Angles, Row, classes_of, motor_of, shape_of, volume_of
+from wavetank.formats.mjcf_values import Angles, Row, classes_of, motor_of, shape_of
 from wavetank.formats.robot import (
     HERE,
     LARGEST,
@@ -221,7 +221,7 @@ class _Reader:
         folder = self.path.parent / (self.compiler.get("meshdir") or self.compiler.get("assetdir") or "")
         found = next((place for place in (folder / file, self.path.parent / file) if place.is_file()), None)
         solid = mesh_at(owner, found, file, numbers(self._with(asset, "", "mesh"), "scale", (1.0, 1.0, 1.0)), pose)
-        return solid, volume_of(*solid.surface())
+        return solid, solid.volume()
 
     def _color(self, values: Row) -> str:
         material = self.assets.get(("material", values.get("material", "")))

@@ -11,7 +11,8 @@ import numpy as np
 
 from wavetank.formats.robot import mesh_of, numbers
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.rotations import matrix_of, product, turn_from_y, turned, unit_quaternion
+from wavetank.foundation.rotations import inverse, product, quaternion_of, turn_from_y, turned, unit_quaternion
+from wavetank.solids.meshes.triangles import volume_within
 from wavetank.solids.motion import Pose
 from wavetank.solids.shapes import Box, Capsule, Cylinder, Sphere
 from wavetank.solids.solid import Solid
@@ -76,7 +77,8 @@ class Angles:
                 raise WavetankError("xyaxes are two axes that do not lie on one line.")
             x = rows[0] / np.linalg.norm(rows[0])
             y = rows[1] - x * (rows[1] @ x)
-            return _from_axes(x, y / np.linalg.norm(y))
+            y /= np.linalg.norm(y)
+            return np.array(quaternion_of(np.column_stack([x, y, np.cross(x, y)])))
         if row.get("zaxis") is not None:
             return z_to(np.array(numbers(row, "zaxis", (0.0, 0.0, 1.0))[:3]))
         return unit_quaternion(0.0)
@@ -84,8 +86,8 @@ class Angles:
 
 def z_to(axis: np.ndarray) -> np.ndarray:
     """Return the shortest turn that takes z to the direction of `axis`."""
-    back = turned(Z_FROM_Y * (1.0, -1.0, -1.0, -1.0), axis)
-    return product(product(Z_FROM_Y, turn_from_y(back)), Z_FROM_Y * (1.0, -1.0, -1.0, -1.0))
+    back = inverse(Z_FROM_Y)
+    return product(product(Z_FROM_Y, turn_from_y(turned(back, axis))), back)
 
 
 def shape_of(row: Row, pose: Pose) -> tuple[Solid, float]:
@@ -136,16 +138,8 @@ def _ellipsoid(axes: np.ndarray, pose: Pose) -> Solid:
         for r in range(rings - 2):
             a, b = 1 + r * AROUND, 1 + (r + 1) * AROUND
             faces += [(a + k, b + k, b + n), (a + k, b + n, a + n)]
-    corners = points[np.array(faces)]
-    volume = float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6.0
-    points *= (4.0 / 3.0 * math.pi / volume) ** (1.0 / 3.0)
+    points *= (4.0 / 3.0 * math.pi / volume_within(points, np.array(faces))) ** (1.0 / 3.0)
     return mesh_of(points * axes, np.array(faces), pose)
-
-
-def volume_of(vertices: np.ndarray, faces: np.ndarray) -> float:
-    """Return the volume [m^3] of a closed mesh."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6.0
 
 
 def motor_of(kind: str, row: Row) -> dict[str, Any]:
@@ -171,11 +165,3 @@ def _about(axis: np.ndarray, angle: float) -> np.ndarray:
     if length < 1e-12:
         raise WavetankError("axisangle has no axis; its first three numbers are one of any length but zero.")
     return np.array([math.cos(0.5 * angle), *(math.sin(0.5 * angle) * axis / length)])
-
-
-def _from_axes(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the rotation whose x and y axes are these."""
-    first = product(turn_from_y(y), unit_quaternion(0.0))
-    now = matrix_of(first[None])[0][:, 0]  # where that takes x: about y it is still to be turned
-    angle = math.atan2(float(np.cross(now, x) @ y), float(now @ x))
-    return product(_about(y, angle), first)

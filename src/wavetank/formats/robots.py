@@ -55,8 +55,4 @@ def load_urdf(
     return load_robot(path, position, angle, prefix, held)
 
 
-def load_mjcf(
-    path: str | Path, position: Any = (0.0, 0.0, 0.0), angle: float = 0.0, prefix: str = "", held: bool | None = None
-) -> Robot:
-    """Read a robot as `load_robot` does, which is the same."""
-    return load_robot(path, position, angle, prefix, held)
+load_mjcf = load_robot

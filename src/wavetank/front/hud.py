@@ -96,15 +96,14 @@ class Hud:
         """
         sim, shown = self.session.sim, []
         weight = max((body.mass for body in sim.bodies.values()), default=0.0) * math.hypot(*sim.gravity)
-        scale = LONGEST * self.session.camera.visible_height / (weight or 1.0)  # m/N
+        longest = LONGEST * self.session.camera.visible_height  # m
+        scale = longest / (weight or 1.0)  # m/N
         for name, body in sim.bodies.items():
             for mark, force in (("buoyancy", body.buoyancy), ("drag", body.drag)):
                 mean = self._mean((name, mark), force)
                 start, way = body.center, np.zeros(3)
                 way[: len(mean)] = scale * mean
-                way *= min(
-                    1.0, MOST * LONGEST * self.session.camera.visible_height / max(float(np.linalg.norm(way)), 1e-30)
-                )
+                way *= min(1.0, MOST * longest / max(float(np.linalg.norm(way)), 1e-30))
                 places = self._in_picture(np.array([start, start + way]), size)
                 if places and float(np.linalg.norm(mean)) > LEAST * weight:
                     told = f"{three(float(np.linalg.norm(mean)))} N"

@@ -53,7 +53,7 @@ class Plan:
 def plan_step(world: World, params: Parameters, dt: float) -> Plan:
     """Plan a step of `dt` [s]."""
     kinds, on_grid = blend(world.materials, params), has_grid_pressure(world, params)
-    thick, correction = carries_on(world, params), correction_number(params)
+    thick, correction = carries_on(world, kinds, params), correction_number(params)
     share = thick_share(kinds, params) if thick else 0.0
     stirred = thick and world.solid_speed * dt > STIRRED * params.spacing
     return Plan(
@@ -88,17 +88,21 @@ def has_grid_pressure(world: World, params: Parameters) -> bool:
     It is gravity that needs it. Thick fluids, and water so fine that tension rules within a cell, are held by forces
     that vary from particle to particle; the grid would take what they press together for a lack of room.
     """
-    if not (params.grid_pressure > 0.0 and world.levels) or world.frozen:
+    if not has_grid(world, params):
         return False
     kinds, h = blend(world.materials, params), params.support * params.spacing
     weight = kinds.largest_density * math.hypot(*params.gravity) * h**2  # of water as high as a cell, per length
-    return weight >= kinds.surface_tension and not carries_on(world, params)
+    return weight >= kinds.surface_tension and not carries_on(world, kinds, params)
 
 
-def carries_on(world: World, params: Parameters) -> bool:
+def has_grid(world: World, params: Parameters) -> bool:
+    """Whether there is a grid to carry pressure, should the fluids need it: in a tank, and without ice."""
+    return bool(params.grid_pressure > 0.0 and world.levels and not world.frozen)
+
+
+def carries_on(world: World, kinds: Blend, params: Parameters) -> bool:
     """Whether fluids are so thick that they carry on what pressed them: not where bodies, in a tank, need the grid."""
-    with_grid = params.grid_pressure > 0.0 and world.levels and not world.frozen
-    return is_thick(blend(world.materials, params), params) and not (world.pieces and with_grid)
+    return is_thick(kinds, params) and not (world.pieces and has_grid(world, params))
 
 
 def steps_in(
@@ -111,7 +115,7 @@ def steps_in(
     """
     on_grid, kinds = has_grid_pressure(world, params), blend(world.materials, params)
     depth = 0.0 if on_grid else pool_depth(world.particles, world.count, params.gravity, *box)
-    carried_on = carried_share(kinds, params) if carries_on(world, params) else 0.0
+    carried_on = carried_share(kinds, params) if carries_on(world, kinds, params) else 0.0
     needed = steps_needed(params, duration, speed, depth, on_grid=on_grid, forced=forced, carried=carried_on)
     if world.pieces:
         needed = max(needed, min(steps_with_bodies(kinds, params, duration), params.largest_substeps))
@@ -121,7 +125,8 @@ def steps_in(
 
 def pace_of_solids(world: World, params: Parameters) -> float:
     """Return how many times as fast solids count for the time step as they are, where thick fluids are in their way."""
-    share = thick_share(blend(world.materials, params), params) if carries_on(world, params) else 0.0
+    kinds = blend(world.materials, params)
+    share = thick_share(kinds, params) if carries_on(world, kinds, params) else 0.0
     return 1.0 + (SOLIDS_IN_THICK - 1.0) * share
 
 

@@ -1,7 +1,7 @@
 """What each command does to the state of a session: one small function each, listed in `RULES`."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from wavetank.foundation.errors import WavetankError
@@ -210,9 +210,9 @@ def view(state: SessionState, command: c.SetView) -> None:
     """Choose what is drawn."""
     from wavetank.view.choices import colorings, showing, views
 
-    for what, value, allowed in (("view", command.view, views()), ("color_by", command.color_by, colorings())):
-        if value and value not in allowed and not (what == "color_by" and _is_color(value)):
-            raise WavetankError(f"{what} = {value!r} is not known; it must be one of {', '.join(allowed)}.")
+    _check_known("view", command.view, views())
+    if not _is_color(command.color_by):
+        _check_known("color_by", command.color_by, colorings())
     state.view = command.view or state.view
     state.color_by = command.color_by or state.color_by
     if command.color_by and not command.view:  # who asks for a colour wants to see it
@@ -228,17 +228,21 @@ def light(state: SessionState, command: c.SetLight) -> None:
     from wavetank.view.choices import standing
     from wavetank.view.environments import ENVIRONMENTS
 
-    name = command.environment
-    if name and name not in ENVIRONMENTS:
-        raise WavetankError(f"environment = {name!r} is not known; it must be one of {', '.join(ENVIRONMENTS)}.")
-    if name:
-        state.light = {"environment": name}
+    _check_known("environment", command.environment, ENVIRONMENTS)
+    if command.environment:
+        state.light = {"environment": command.environment}
     if command.azimuth is not None or command.elevation is not None or command.turn or command.rise:
         now = standing(state.sim.scene, state.view, state.light)
         azimuth = now.azimuth if command.azimuth is None else command.azimuth
         elevation = now.elevation if command.elevation is None else command.elevation
         height = min(HIGHEST, max(LOWEST, elevation + command.rise))
         state.light = state.light | {"sun": f"{(azimuth + command.turn) % 360.0:.6g},{height:.6g}"}
+
+
+def _check_known(what: str, value: str, allowed: Sequence[str]) -> None:
+    """Raise `WavetankError` for a name that there is not; none, "", leaves things as they are."""
+    if value and value not in allowed:
+        raise WavetankError(f"{what} = {value!r} is not known; it must be one of {', '.join(allowed)}.")
 
 
 def _is_color(value: str) -> bool:

@@ -17,10 +17,15 @@ def figures(bodies: Bodies) -> dict[str, float]:
     return {f"{what}.{name}.{key}": value for what, name, key, value in _rows(bodies)}
 
 
+def driven(bodies: Bodies) -> list[str]:
+    """Return the names of hinges and sliders that have a motor."""
+    moving = [(name, live) for name, live in bodies.joints.items() if isinstance(live.joint, Hinge | Slider)]
+    return [name for name, live in moving if live.target is not None or live.speed is not None]
+
+
 def powers(bodies: Bodies) -> dict[str, float]:
-    """Return the power [W] of each hinge and slider that has a motor: less than 0 where it brakes."""
-    moving = {name: live for name, live in bodies.joints.items() if isinstance(live.joint, Hinge | Slider)}
-    return {name: live.power for name, live in moving.items() if live.target is not None or live.speed is not None}
+    """Return the power [W] of each joint that has a motor: less than 0 where it brakes."""
+    return {name: bodies.joints[name].power for name in driven(bodies)}
 
 
 def _rows(bodies: Bodies) -> Iterator[tuple[str, str, str, float]]:

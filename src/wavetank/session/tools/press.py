@@ -13,7 +13,7 @@ import dataclasses
 
 import numpy as np
 
-from wavetank.foundation.rotations import turned
+from wavetank.foundation.rotations import inverse, turned
 from wavetank.simulation.body import Body
 from wavetank.simulation.simulation import Simulation
 
@@ -32,7 +32,7 @@ def unit_of_force(sim: Simulation, length: float) -> float:
 def point_on(body: Body, place: np.ndarray) -> np.ndarray:
     """Return a place in the world [m] in the frame of a body."""
     position = np.array([*body.position, 0.0][:3])
-    return turned(body.rotation * [1.0, -1.0, -1.0, -1.0], place - position)
+    return turned(inverse(body.rotation), place - position)
 
 
 def place_of(body: Body, point: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from wavetank.solids.distance import AROUND, GRIDS
 from wavetank.solids.meshes.files import bundled_models, read_file, read_model
 from wavetank.solids.meshes.grid import DistanceGrid, measure
 from wavetank.solids.meshes.store import grid_of
-from wavetank.solids.meshes.triangles import Triangles
+from wavetank.solids.meshes.triangles import Triangles, volume_within
 from wavetank.solids.solid import Node, Solid, all_but, point_in_space
 
 FLAT = 1e-6  # of the longest edge
@@ -120,8 +120,7 @@ class Mesh(Solid):
 
     def volume(self) -> float:
         """Return the volume that a closed mesh encloses [m^3]; parts that overlap count twice."""
-        a, b, c = (self.vertices()[corner] for corner in self._triangles().faces.T)
-        return abs(float(np.einsum("ij,ij->", a, np.cross(b, c)))) / 6.0
+        return abs(volume_within(*self.surface()))
 
     def grid(self, spacing: float) -> DistanceGrid:
         """Return the distances to this mesh for particles of that spacing [m], in its own frame.

@@ -15,6 +15,15 @@ from wavetank.foundation.errors import WavetankError
 MOST_TRIANGLES = 1_000_000
 
 
+def volume_within(vertices: np.ndarray, faces: np.ndarray) -> float:
+    """Return the volume that a closed surface encloses, by the divergence theorem; less than 0 if inside out.
+
+    Vertices [n, 3], and faces [m, 3] that are counter-clockwise from outside; parts that overlap count twice.
+    """
+    a, b, c = (vertices[faces[:, k]].astype(np.float64) for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+
 @dataclasses.dataclass(frozen=True)
 class Triangles:
     """A surface around the origin whose longest edge along an axis is 1, turned so that its signed volume is > 0."""

@@ -27,6 +27,7 @@ from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_vie
 from wavetank.view.look import Look
 from wavetank.view.optics.fluid import grain_of
 from wavetank.view.optics.glass import line_cover, slack
+from wavetank.view.optics.maps import picture_at
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import WaterSurface, water_of
@@ -124,17 +125,6 @@ def settle(motion: Motion, shutter: Shutter, rows: qd.i32, columns: qd.i32):
 
 
 @qd.func
-def way_at(way: qd.template(), row, column, grain):
-    """Way at a pixel, between the four nearest texels."""
-    x, y = (column + 0.5) / grain - 0.5, (row + 0.5) / grain - 0.5
-    c, r = qd.max(qd.cast(qd.floor(x), qd.i32), 0), qd.max(qd.cast(qd.floor(y), qd.i32), 0)
-    u, v = qd.max(x - c, 0.0), qd.max(y - r, 0.0)
-    top = way[r, c] + u * (way[r, c + 1] - way[r, c])
-    low = way[r + 1, c] + u * (way[r + 1, c + 1] - way[r + 1, c])
-    return top + v * (low - top)
-
-
-@qd.func
 def pixel_along(row, column, way, high, wide):
     """Row and column of the pixel that lies so far from another, within the picture."""
     r = qd.min(qd.max(qd.cast(row + 0.5 + way.y, qd.i32), 0), high - 1)
@@ -173,7 +163,7 @@ def smear(
         if moves(motion.way, texel_row, texel_column, rows, columns, shutter.least):
             for row in range(texel_row * grain, qd.min((texel_row + 1) * grain, high)):
                 for column in range(texel_column * grain, qd.min((texel_column + 1) * grain, wide)):
-                    way, mark = 2.0 * way_at(motion.way, row, column, grain), 0
+                    way, mark = 2.0 * picture_at(motion.way, vec2(column + 0.5, row + 0.5) / grain), 0
                     length = way.norm()
                     down, across = row * samples, column * samples
                     moving = length > 2.0 * shutter.least

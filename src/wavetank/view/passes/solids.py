@@ -183,8 +183,8 @@ def in_box(box: qd.template(), row, column):
 
 
 @qd.func
-def box_of_solids(solids: SolidSet, lens: Lens, rows, columns):
-    """Box of pixels (first and last column, first and last row) in which any solid can be."""
+def find_box(box: qd.template(), solids: SolidSet, lens: Lens, rows, columns):
+    """Write the box of pixels (first and last column, first and last row) in which any solid can be."""
     whole = qd.Vector([columns, -1, rows, -1])
     for k in range(solids.tank_count, solids.count):
         c, r = to_view(lens, solids.position[k]), 1.001 * solids.reach[k] + 1e-4
@@ -194,7 +194,8 @@ def box_of_solids(solids: SolidSet, lens: Lens, rows, columns):
         if part[0] <= part[1]:
             whole[0], whole[1] = qd.min(whole[0], part[0]), qd.max(whole[1], part[1])
             whole[2], whole[3] = qd.min(whole[2], part[2]), qd.max(whole[3], part[3])
-    return whole
+    for k in qd.static(range(4)):
+        box[k] = whole[k]
 
 
 @qd.kernel(fastcache=True)
@@ -207,9 +208,7 @@ def trace(
     One kernel for eye and sun, because tracing takes long to compile.
     """
     for _ in range(1):
-        whole = box_of_solids(solids, lens, depth.shape[0], depth.shape[1])
-        for k in qd.static(range(4)):
-            box[k] = whole[k]
+        find_box(box, solids, lens, depth.shape[0], depth.shape[1])
     for task in range(strips.count):
         row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
         for column in range(first, last):
@@ -233,9 +232,7 @@ def lay_glass(
     What is seen passes two faces of the wall, is coloured more where it passes aslant, and both faces mirror.
     """
     for _ in range(1):
-        whole = box_of_solids(solids, lens, nearest.shape[0], nearest.shape[1])
-        for k in qd.static(range(4)):
-            box[k] = whole[k]
+        find_box(box, solids, lens, nearest.shape[0], nearest.shape[1])
     for task in range(strips.count):
         row, first, last = strip(strips, task, nearest.shape[0], nearest.shape[1])
         for column in range(first, last):
