@@ -6,6 +6,7 @@ import av
 import numpy as np
 import pytest
 
+from wavetank.formats import mp4
 from wavetank.formats.mp4 import VideoWriter
 from wavetank.foundation.errors import WavetankError
 
@@ -75,6 +76,32 @@ def test_a_second_interrupt_keeps_what_the_encoder_holds_back(tmp_path):
             video.write(picture(COLORS[k], 64, 48))
     assert len(decoded(path)[1]) == 5
     assert [*tmp_path.iterdir()] == [path]
+
+
+def test_a_second_interrupt_while_the_index_is_put_first_loses_nothing(tmp_path, monkeypatch):
+    """The last step makes a file of the one that grew; where it is cut short, that one is the video."""
+    path = tmp_path / "a.mp4"
+
+    def interrupted(parts, target):
+        with mp4.replacing(target):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(mp4, "join", interrupted)
+    with pytest.raises(KeyboardInterrupt), VideoWriter(path, 64, 48, 30.0) as video:
+        for color in COLORS:
+            video.write(picture(color, 64, 48))
+    assert len(decoded(path)[1]) == len(COLORS)
+    assert [*tmp_path.iterdir()] == [path]
+
+
+def test_a_large_video_has_all_its_pictures(tmp_path):
+    """The file is made of the one that grew: were they one file, what no buffer holds would be overwritten first."""
+    path, rng = tmp_path / "a.mp4", np.random.default_rng(0)
+    with VideoWriter(path, 320, 240, 30.0) as video:
+        for _ in range(60):
+            video.write(rng.integers(0, 255, (240, 320, 3), dtype=np.uint8))
+    assert path.stat().st_size > 2_000_000
+    assert len(decoded(path)[1]) == 60
 
 
 def test_stopping_at_once_keeps_all_pictures(tmp_path):

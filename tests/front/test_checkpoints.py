@@ -225,8 +225,9 @@ def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path, 
     here = replacing._here()
     names = {
         f".a.mp4.{here}-{dead.pid}.partial": False,
+        f".a.mp4.{here}-{dead.pid}-12.partial": False,
         f".a.usdc.{here}-{dead.pid}.partial.usdc": False,
-        f".a.mp4.{here}-{os.getpid()}.partial": True,
+        f".a.mp4.{here}-{os.getpid()}-0.partial": True,
         f".a.mp4.abcdef-{dead.pid}.partial": True,  # of another machine
         f"a.mp4.{here}-{dead.pid}.partial": True,
         ".a.partial": True,

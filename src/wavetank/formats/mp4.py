@@ -69,9 +69,9 @@ class VideoWriter:
 
     def close(self) -> None:
         """Complete the file, its index first, and give it its name; without a single picture no file is left."""
-        if self._is_closed:
-            return
         try:
+            if self._is_closed:
+                return
             self._end()
             if self.count:
                 join([self._partial], self.path)

@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import hashlib
+import itertools
 import os
 import re
 import socket
@@ -11,18 +12,20 @@ from pathlib import Path
 
 from wavetank.foundation.errors import WavetankError
 
-_LEFT = re.compile(r"\..+\.([0-9a-f]{6})-(\d+)\.partial(\.\w+)?")
+_LEFT = re.compile(r"\..+\.([0-9a-f]{6})-(\d+)(-\d+)?\.partial(\.\w+)?")
+_numbers = itertools.count()
 _swept: set[Path] = set()
 
 
 def partial_path(path: str | Path) -> Path:
-    """Return the name beside `path` under which it grows; raises `WavetankError` if its folder does not exist."""
+    """Return a new name beside `path` under which it grows; raises `WavetankError` if its folder does not exist."""
     target = Path(path)
     if not target.parent.is_dir():
         raise WavetankError(f"{str(target)!r} cannot be written: there is no folder {str(target.parent)!r}.")
     sweep(target.parent)
-    # The process's number keeps two writers of one file apart, and tells later whether one is still there.
-    return target.with_name(f".{target.name[:200]}.{_here()}-{os.getpid()}.partial")
+    # The process's number tells later whether the writer is still there; with the other number no two writers of one
+    # file share a name, neither in two processes nor in one: a video is made of the file that it grew in.
+    return target.with_name(f".{target.name[:200]}.{_here()}-{os.getpid()}-{next(_numbers)}.partial")
 
 
 def sweep(folder: Path) -> None:
