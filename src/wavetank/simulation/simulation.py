@@ -25,7 +25,7 @@ from wavetank.simulation.filling import fill
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.joints import Joints
 from wavetank.simulation.ledger import Ledger
-from wavetank.simulation.moving_solids import MovingSolids
+from wavetank.simulation.moving_solids import MovingSolids, solids_of
 from wavetank.simulation.new_world import new_world
 from wavetank.simulation.sources import Sources, check_places
 from wavetank.simulation.states import States
@@ -49,7 +49,7 @@ class Simulation(States):
         check_cost(self.scene)
         start, scene = fill(self.scene, lambda scene: type(self)(scene, self.arch or "cpu")), self.scene
         positions, velocities = start.particles()
-        self.solids = MovingSolids(self._walls(), scene.solids, scene.friction, scene.spacing, scene.start_time)
+        self.solids = solids_of(scene, self._walls(), scene.solids)
         self.sources, self.notes = Sources(scene), []
         self.gravity_by_hand = None
         self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
