@@ -12,7 +12,7 @@ from wavetank.device.periods import NONE, Periods
 from wavetank.device.state import Particles
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import interpolate, matrix_of, turned, unit_quaternion
-from wavetank.physics.population import free_places
+from wavetank.physics.population import Clearance, free_places
 from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene
 from wavetank.simulation.courses import Courses
@@ -125,7 +125,7 @@ class MovingSolids:
         if not any(_touch(solid, *box) for solid in self.members[self.tank_count :] for box in boxes):
             return np.ones(len(places), bool)
         wall = scene.wall_gap * scene.spacing
-        free = free_places(places, particles, self.device, 0, 0.0, wall, self.tank_count) | scene.has_own_place()
+        free = free_places(places, particles, self.device, 0, Clearance(0.0, wall, self.tank_count)) | scene.has_own_place()
         if not free.any():
             raise WavetankError("the fluids of this scene are inside of its solids; move them, or make them larger.")
         return free

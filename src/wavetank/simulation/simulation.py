@@ -298,22 +298,27 @@ class Simulation(States):
 
         Raises `WavetankError` for what is none.
         """
-        return self._keep(~population.inside_capsule(self.world.particles, self.count, start, end, radius))
+        return self._keep(~population.inside_capsule(self.world.particles, self.count, self._capsule(start, end, radius)))
 
     def free_places(self, places: np.ndarray, gap: float, wall: float) -> np.ndarray:
         """Say which `places` [n, dim] keep the distances `gap` [m] to all particles and `wall` to all solids."""
-        return population.free_places(places, self.world.particles, self.world.solids, self.count, gap, wall)
+        clearance = population.Clearance(gap, wall, periods=self.world.grid.periods)
+        return population.free_places(places, self.world.particles, self.world.solids, self.count, clearance)
+
+    def _capsule(self, start: Any, end: Any, radius: Any) -> population.Capsule:
+        return population.capsule_of(start, end, radius, self.world.grid.periods)
 
     def paint_inside(self, start: Any, end: Any, radius: float, dye: int) -> None:
         """Dye the particles in that capsule; 0 washes them."""
         if self.count:
-            population.paint_capsule(self.world.particles, self.count, start, end, radius, dye)
+            population.dye_particles(self.world.particles, self._capsule(start, end, radius), dye, self.count)
 
     def freeze_inside(self, start: Any, end: Any, radius: float, frozen: bool = True) -> None:
         """Turn the particles in that capsule to ice that keeps its place, or back to water."""
         if self.count:
-            self.world.frozen = population.freeze_capsule(
-                self.world.particles, self.count, start, end, radius, int(frozen)
+            capsule = self._capsule(start, end, radius)
+            self.world.frozen = int(
+                population.freeze_particles(self.world.particles, capsule, int(frozen), self.count)
             )
 
     def _keep(self, keep: np.ndarray) -> int:

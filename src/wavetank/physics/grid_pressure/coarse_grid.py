@@ -111,7 +111,12 @@ def corners(grid: CoarseGrid, low, dim: qd.template()):
 @qd.func
 def nearest(grid: CoarseGrid, c):
     """Number of the node with the whole coordinates `c`, or of the nearest."""
-    return on_axis(grid, c[0], 0) + grid.nx * (on_axis(grid, c[1], 1) + grid.ny * on_axis(grid, c[2], 2))
+    x = qd.min(qd.max(c[0], 0), grid.nx - 1)
+    y = qd.min(qd.max(c[1], 0), grid.ny - 1)
+    z = qd.min(qd.max(c[2], 0), grid.nz - 1)
+    if qd.static(grid.repeats):  # `corners` says why all is said twice
+        x, y, z = on_axis(grid, c[0], 0), on_axis(grid, c[1], 1), on_axis(grid, c[2], 2)
+    return x + grid.nx * (y + grid.ny * z)
 
 
 @qd.func
