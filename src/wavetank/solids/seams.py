@@ -24,7 +24,7 @@ NEVER = 1e30  # m: a period that no difference is half of
 def seen_periods(solids: Sequence[Solid], periods: Periods, spacing: float) -> np.ndarray:
     """Return the period [m] along each axis at which a solid is seen at its nearest image, [solids, 3]."""
     return np.array([
-        [length if _is_short(solid, length, spacing) else NEVER for length in (periods.x, periods.y, periods.z)]
+        [length if is_short(solid, length, spacing) else NEVER for length in (periods.x, periods.y, periods.z)]
         for solid in solids
     ]).reshape(-1, 3)  # fmt: skip
 
@@ -35,7 +35,7 @@ def check_seams(solids: Sequence[Solid], lower: np.ndarray, upper: np.ndarray, a
     The world repeats along `axes`; its spacing is `d` [m].
     """
     for number, solid in enumerate(solids):
-        long = [axis for axis in axes if not _is_short(solid, float(upper[axis] - lower[axis]), d)]
+        long = [axis for axis in axes if not is_short(solid, float(upper[axis] - lower[axis]), d)]
         corners = bounds_of(solid) if long else (lower, upper)
         for axis in long:
             low, high = float(corners[0][axis]), float(corners[1][axis])
@@ -49,5 +49,6 @@ def check_seams(solids: Sequence[Solid], lower: np.ndarray, upper: np.ndarray, a
                 )
 
 
-def _is_short(solid: Solid, length: float, spacing: float) -> bool:
+def is_short(solid: Solid, length: float, spacing: float) -> bool:
+    """Say whether no two images of a solid are ever near a place, in a world of that `length` [m] along an axis."""
     return bool(solid.reach() + FELT * spacing <= 0.5 * length)
