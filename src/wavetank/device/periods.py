@@ -14,6 +14,8 @@ import dataclasses
 from collections.abc import Iterable
 from typing import Final
 
+import numpy as np
+
 from wavetank.device.compiler import qd
 
 
@@ -41,6 +43,18 @@ def periods_of(axes: Iterable[int], lower: Iterable[float], size: Iterable[float
         return NONE
     lengths, corner = ([*map(float, values), 1.0][:3] for values in (size, lower))
     return Periods(bits, *lengths, *corner)
+
+
+def places_within(places: np.ndarray, lower: np.ndarray, upper: np.ndarray, axes: Iterable[int]) -> np.ndarray:
+    """Return the images of `places` [m], [n, dim], between two corners along the `axes` that repeat."""
+    x = places
+    for axis in axes:
+        x = x.copy() if x is places else x
+        low, high = x.dtype.type(lower[axis]), x.dtype.type(upper[axis])
+        inside = low + np.mod(x[:, axis] - low, high - low)
+        outside = (x[:, axis] < low) | (x[:, axis] >= high)
+        x[:, axis] = np.where(outside, np.where(inside < high, inside, low), x[:, axis])
+    return x
 
 
 @qd.func
@@ -75,7 +89,7 @@ def nearest_image(difference, periods: Periods):
 
 @qd.func
 def within_along(place, axis: qd.template(), periods: Periods):
-    """The coordinate `place` [m], that of its image within the world where the axis repeats; what is no number stays."""
+    """The coordinate `place` [m], of its image within the world where the axis repeats; what is no number stays."""
     found = place
     if qd.static(periods.axes >> axis & 1):
         lower = qd.Vector([periods.x0, periods.y0, periods.z0])[axis]

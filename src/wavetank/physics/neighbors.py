@@ -276,7 +276,7 @@ def near_bits(particles: Particles, places: qd.template(), begin, length, h2, gr
 
 @qd.func
 def for_each_row_around(sums: qd.template(), visit: qd.template(), point, particles: Particles, grid: Grid, h):
-    """Call ``visit(sums, point, begin, end, particles, grid, h)`` for every row of particles in the cells around `point`.
+    """Call ``visit(sums, point, begin, end, particles, grid, h)`` for every row of particles in cells around `point`.
 
     The particles of a row are those from `begin` to `end` - 1; some of them are farther away than h.
     """

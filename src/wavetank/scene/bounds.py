@@ -46,7 +46,7 @@ def check_bodies(solids: Any, tank: Any, goal: Any) -> None:
 
 
 def check_periodic(tank: Any, spacing: float, support: float, gravity: tuple[float, ...], solids: Any) -> None:
-    """Raise `ValueError` where a tank that repeats is too short for that, falls for ever, or has a solid at its seam."""
+    """Raise `ValueError` where a tank that repeats is too short, falls for ever, or has a solid at its seam."""
     strongest = max(map(abs, gravity), default=0.0)
     for axis in tank.rings if tank else ():
         name, length, least = "xyz"[axis], tank.size[axis], LEAST_SUPPORTS * support * spacing
@@ -67,7 +67,8 @@ def check_periodic(tank: Any, spacing: float, support: float, gravity: tuple[flo
                 "seam; give it no density and no mass, or the tank walls."
             )
     if tank and tank.rings:
-        check_seams(solids, *tank.box(), tank.rings, spacing)
+        lower, upper = tank.box()
+        check_seams(solids, lower, upper, tank.rings, spacing)
 
 
 def check_scales(spacing: float, gravity: tuple[float, ...]) -> None:

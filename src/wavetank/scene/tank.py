@@ -5,7 +5,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from wavetank.device.periods import Periods, periods_of
+from wavetank.device.periods import Periods, periods_of, places_within
 from wavetank.foundation.model import Edges, Place
 from wavetank.scene.schedule import Tilted
 from wavetank.solids.shapes import HalfSpace
@@ -68,15 +68,13 @@ class Tank(Tilted):
         return periods_of(self.rings, self.box()[0], self.size)
 
     def within(self, places: np.ndarray) -> np.ndarray:
-        """Return the images of `places` [m], float32 [n, dim], in the tank along the axes that are periodic."""
-        x = places
-        for axis in self.rings:
-            low, high = (np.float32(corner[axis]) for corner in self.box())
-            x = x.copy() if x is places else x
-            inside = low + np.mod(x[:, axis] - low, high - low)
-            outside = (x[:, axis] < low) | (x[:, axis] >= high)
-            x[:, axis] = np.where(outside, np.where(inside < high, inside, low), x[:, axis])
-        return x
+        """Return the images of `places` [m], [n, dim], in the tank along the axes that are periodic."""
+        return places_within(places, *self.box(), self.rings)
+
+    def beside(self, places: np.ndarray, point: np.ndarray) -> np.ndarray:
+        """Return the images of `places` [m], [n, dim], that are nearest to a point, along axes that are periodic."""
+        half = 0.5 * np.array(self.size, float)
+        return places_within(places, point - half, point + half, self.rings)
 
     def spread(self, lattice: np.ndarray, spacing: float) -> np.ndarray:
         """Return a block's `lattice` [n, dim] [m] with even rows across the seam, where it reaches from end to end."""

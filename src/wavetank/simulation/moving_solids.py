@@ -125,7 +125,8 @@ class MovingSolids:
         if not any(_touch(solid, *box) for solid in self.members[self.tank_count :] for box in boxes):
             return np.ones(len(places), bool)
         wall = scene.wall_gap * scene.spacing
-        free = free_places(places, particles, self.device, 0, Clearance(0.0, wall, self.tank_count)) | scene.has_own_place()
+        clearance = Clearance(0.0, wall, self.tank_count)
+        free = free_places(places, particles, self.device, 0, clearance) | scene.has_own_place()
         if not free.any():
             raise WavetankError("the fluids of this scene are inside of its solids; move them, or make them larger.")
         return free

@@ -15,6 +15,7 @@ from wavetank.physics.foam.pool import pool_from, pool_rows
 from wavetank.physics.foam.update import load_kernels, update_foam
 from wavetank.physics.time_step import filled_share, whole
 from wavetank.scene.forces import Force
+from wavetank.scene.forces.images import with_images
 from wavetank.scene.scene import MAX_PARTICLES, Scene
 from wavetank.scene.schedule import changes_gravity, gravity_at
 from wavetank.simulation import limits
@@ -25,7 +26,7 @@ from wavetank.simulation.filling import fill
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.joints import Joints
 from wavetank.simulation.ledger import Ledger
-from wavetank.simulation.moving_solids import MovingSolids, solids_of
+from wavetank.simulation.moving_solids import solids_of
 from wavetank.simulation.new_world import new_world
 from wavetank.simulation.sources import Sources, check_places
 from wavetank.simulation.states import States
@@ -143,7 +144,7 @@ class Simulation(States):
                 self.bodies.advance(scene.gravity, dt, shares[1], limit, start + dt + self.scene.start_time)
             self.world.solids_version = self.solids.move_to(*shares)
             if self.count:
-                for force in acting:
+                for force in with_images(acting, scene.tank):
                     force.apply(self.world.particles, self.count, dt, start)
                 self.bodies.step(self.world, scene, dt, limit, shares)
         self.solids.passing.clear()
@@ -298,7 +299,8 @@ class Simulation(States):
 
         Raises `WavetankError` for what is none.
         """
-        return self._keep(~population.inside_capsule(self.world.particles, self.count, self._capsule(start, end, radius)))
+        capsule = self._capsule(start, end, radius)
+        return self._keep(~population.inside_capsule(self.world.particles, self.count, capsule))
 
     def free_places(self, places: np.ndarray, gap: float, wall: float) -> np.ndarray:
         """Say which `places` [n, dim] keep the distances `gap` [m] to all particles and `wall` to all solids."""

@@ -1,9 +1,9 @@
 """Solids in a world that repeats: at their nearest image where they are short, where they stand where they are long.
 
-A particle sees a solid from the image of its own place that is nearest to the solid (`distance.image_near`). That is right
-as long as the ball around the solid, and the water that it acts on, is shorter than the world: no two images of it are
-ever near. What is longer than that along an axis has no image there: it must keep away from both seams, or go on beyond
-both of them.
+A particle sees a solid from the image of its own place that is nearest to the solid (`distance.image_near`). That is
+right as long as the ball around the solid, and the water that it acts on, is shorter than the world: no two images of
+it are ever near. What is longer than that along an axis has no image there: it must keep away from both seams, or go on
+beyond both of them.
 
     code     meaning                                                     unit
     FELT     how far water feels a solid, 1.2 of the largest support     d
@@ -44,7 +44,7 @@ def check_seams(solids: Sequence[Solid], lower: np.ndarray, upper: np.ndarray, a
             if not keeps_away and not (low <= first - felt and high >= last + felt):
                 raise ValueError(
                     f"solids[{number}] goes from {'xyz'[axis]} = {low:g} to {high:g} m, over or near a seam of the "
-                    f"tank, which repeats from {first:g} to {last:g} m, and is too long to be seen on both sides of it; "
+                    f"tank, which repeats from {first:g} to {last:g} m, and is too long to be seen on both sides; "
                     f"keep it {felt:g} m away from the seams, let it go on {felt:g} m beyond both, or make it smaller."
                 )
 

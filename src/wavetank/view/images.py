@@ -48,7 +48,9 @@ class Images:
         return dataclasses.replace(frame, scene=scene, solids=solids.device, stand=lambda: shown)
 
 
-def _placed(frame: Frame, tank: Tank, standing: tuple[Standing, ...]) -> tuple[MovingSolids, tuple[Standing, ...]] | None:
+def _placed(
+    frame: Frame, tank: Tank, standing: tuple[Standing, ...]
+) -> tuple[MovingSolids, tuple[Standing, ...]] | None:  # fmt: skip
     """Return all solids where they stand, cut at the seams, with their images; None where none is at a seam."""
     crossing = [_crossed(one, tank) for one in standing]
     if not any(crossing):
