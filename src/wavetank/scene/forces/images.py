@@ -5,6 +5,7 @@ reaches over a seam is applied once more from its image: no particle is in both 
 the world. A wider one, a tube at a slant to the axis, and forces of your own act where they stand only.
 """
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Iterable, Iterator
@@ -58,6 +59,6 @@ def _region(force: Force) -> tuple[np.ndarray, float, np.ndarray] | None:
 
 def _moved(force: Force, center: np.ndarray, dim: int) -> Force:
     if isinstance(force, Jet):
-        opening = force.opening
-        return force.model_copy(update={"opening": type(opening)(**{**vars(opening), "middle": np.float32(center)})})
+        opening = dataclasses.replace(force.opening, middle=np.float32(center))
+        return force.model_copy(update={"opening": opening})
     return force.model_copy(update={"center": tuple(map(float, center[:dim]))})
