@@ -57,7 +57,7 @@ def test_a_scene_says_it_in_its_file_and_reads_it_back(tmp_path):
 
 def test_other_worlds_are_written_as_they_were():
     """Digests of what does not repeat are those of versions before there was such a thing."""
-    assert "periodic" not in wt.Scene(tank=wt.Tank(size=(1, 1))).model_dump_json()
+    assert "periodic" not in wt.Scene(spacing=0.1, tank=wt.Tank(size=(1, 1))).model_dump_json()
     assert '"periodic":["x"]' in scene().model_dump_json()
 
 
