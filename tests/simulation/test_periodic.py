@@ -144,8 +144,11 @@ def test_hands_see_over_the_seam():
     assert ((sim.positions[:, 0] >= 0) & (sim.positions[:, 0] < 1.0)).all()
 
 
-def test_a_solid_that_moves_through_the_seam_pushes_water_on_both_sides():
-    solid = wt.Box(name="paddle", center=(0.8, 0.1), size=(0.06, 0.3), motion={"position": ["0.8 + 0.5*t", "0.1"]})
+@pytest.mark.parametrize("start", [0.8, 3.8, -6.2])
+def test_a_solid_that_moves_through_the_seam_pushes_water_on_both_sides(start):
+    """However many lengths of the tank it has gone."""
+    position = [f"{start} + 0.5*t", "0.1"]
+    solid = wt.Box(name="paddle", center=(start, 0.1), size=(0.06, 0.3), motion={"position": position})
     sim = wt.Simulation(wt.Scene(spacing=D, tank=tank(), solids=[solid], **REST))
     sim.advance(0.5)  # its middle is at 1.05, 0.05 beyond the seam
     x = sim.positions

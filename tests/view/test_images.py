@@ -39,6 +39,13 @@ def test_images_are_made_anew_only_where_something_moves():
     assert moved.scene.solids[2].origin[0] > first.scene.solids[2].origin[0]
 
 
+def test_a_solid_that_has_left_by_whole_lengths_is_shown_within():
+    sim, _ = frame(motion={"position": ["1.95 + 240*t", "0.2", "0.5"]})
+    sim.step()  # by 4 m, twice the length of the tank
+    ball, _, image = Images().within(sim.frame()).scene.solids
+    np.testing.assert_allclose([ball.origin[0], image.origin[0]], [1.95, -0.05], atol=1e-5)
+
+
 def test_worlds_without_a_seam_are_shown_as_they_are():
     scene = wt.Scene.load("obstacle-tank").changed(spacing=0.05)
     plain = wt.Simulation(scene).frame()

@@ -22,7 +22,6 @@ import dataclasses
 from typing import Final
 
 from wavetank.device.compiler import qd
-from wavetank.device.periods import image_shift
 
 vec2 = qd.types.vector(2, qd.f32)
 vec3 = qd.types.vector(3, qd.f32)
@@ -319,12 +318,16 @@ def to_local(position, rotation, x):
 
 @qd.func
 def image_near(solids: SolidSet, k, x):
-    """The image of the world point `x` (vec3) that is nearest to solid `k`: it is where the solid sees it."""
+    """The image of the world point `x` (vec3) that is nearest to solid `k`: it is where the solid sees it.
+
+    What moves on and on along an axis may be many lengths of the world away.
+    """
     image = x
     if qd.static(solids.repeats):
         for axis in qd.static(range(3)):
             if qd.static(solids.repeats >> axis & 1):
-                image[axis] += image_shift(x[axis] - solids.position[k][axis], solids.period[k][axis])
+                period = solids.period[k][axis]
+                image[axis] -= period * qd.round((x[axis] - solids.position[k][axis]) / period)
     return image
 
 

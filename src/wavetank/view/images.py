@@ -6,6 +6,7 @@ that what reaches over a seam is cut at it, as the water is, and its image comes
 
 import dataclasses
 import itertools
+import math
 
 import numpy as np
 
@@ -55,9 +56,12 @@ def _placed(
     crossing = [_crossed(one, tank) for one in standing]
     if not any(crossing):
         return None
-    shown = [_cut(one, tank, np.zeros(3), axes) if axes else one for one, axes in zip(standing, crossing, strict=True)]
+    shown, others = list[Standing](), list[Standing]()
     for one, axes in zip(standing, crossing, strict=True):
-        shown += [_cut(one, tank, way, axes) for way in _ways(one, tank, axes, frame.scene.spacing)]
+        first, *ways = _ways(one, tank, axes, frame.scene.spacing)
+        shown.append(_cut(one, tank, first, axes) if axes else one)
+        others += [_cut(one, tank, way, axes) for way in ways]
+    shown += others
     scene = frame.scene
     solids = MovingSolids(tank.walls(), [one.solid for one in shown], scene.friction, scene.spacing, scene.start_time)
     for number, one in enumerate(shown, solids.tank_count):
@@ -76,13 +80,19 @@ def _crossed(one: Standing, tank: Tank) -> list[int]:
 
 
 def _ways(one: Standing, tank: Tank, axes: list[int], spacing: float) -> list[np.ndarray]:
-    """Return how far it is [m], [3], from a solid to its images that reach into the tank."""
-    steps, (lower, upper) = [[0.0], [0.0], [0.0]], tank.box()
+    """Return how far it is [m], [3], from a solid to its images that reach into the tank, first that of its middle.
+
+    A solid that has moved on for long may be whole lengths of the tank away.
+    """
+    steps, (lower, upper), reach = [[0.0], [0.0], [0.0]], tank.box(), one.solid.reach()
     for axis in axes:
         length = float(upper[axis] - lower[axis])
         if is_short(one.solid, length, spacing):
-            steps[axis].append(length if one.position[axis] - one.solid.reach() < lower[axis] else -length)
-    return [np.array(way) for way in itertools.product(*steps) if any(way)]
+            home = -length * math.floor((one.position[axis] - float(lower[axis])) / length)
+            place = one.position[axis] + home
+            beyond = {length: place - reach < lower[axis], -length: place + reach > upper[axis]}
+            steps[axis] = [home, *(home + way for way, reached in beyond.items() if reached)]
+    return [np.array(way) for way in itertools.product(*steps)]
 
 
 def _cut(one: Standing, tank: Tank, way: np.ndarray, axes: list[int]) -> Standing:
