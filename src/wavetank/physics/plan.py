@@ -113,7 +113,9 @@ def steps_in(
     the bottom of the `box` from one corner to another [m]. Surface tension needs steps of its own.
     """
     on_grid, kinds = has_grid_pressure(world, params), blend(world.materials, params)
-    depth = 0.0 if on_grid else pool_depth(world.particles, world.count, params.gravity, *box)
+    repeats = world.grid.periods.axes  # what slides along an axis without an end rests on nothing there
+    across = tuple(0.0 if repeats >> axis & 1 else g for axis, g in enumerate(params.gravity))
+    depth = 0.0 if on_grid else pool_depth(world.particles, world.count, across, *box)
     carried_on = carried_share(kinds, params) if carries_on(world, kinds, params) else 0.0
     needed = steps_needed(params, duration, speed, depth, on_grid=on_grid, forced=forced, carried=carried_on)
     if world.pieces:

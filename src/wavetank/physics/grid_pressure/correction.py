@@ -42,6 +42,7 @@ from wavetank.physics.grid_pressure.approach import approached
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import (
     add_whole,
+    beside_on,
     corners,
     in_cells,
     nearest,
@@ -322,9 +323,9 @@ def move_particles(
     """
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
-        grid.slope_x[n] = slope_across(grid, grid.wx[n], grid.dx, n, n + 1)
-        grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, n + grid.nx)
-        grid.slope_z[n] = slope_across(grid, grid.wz[n], grid.dz, n, n + grid.nx * grid.ny)
+        grid.slope_x[n] = slope_across(grid, grid.wx[n], grid.dx, n, beside_on(grid, n, 0, 1))
+        grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, beside_on(grid, n, 1, 1))
+        grid.slope_z[n] = slope_across(grid, grid.wz[n], grid.dz, n, beside_on(grid, n, 2, 1))
     for turn in range(turns(cells, count)):
         at_rest = -fall(c) / push.stiffness
         for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):

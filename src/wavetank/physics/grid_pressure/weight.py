@@ -14,8 +14,9 @@ leave it to the densities (docs/notebook/calm.md). What particles weigh among th
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
+from wavetank.physics.grid_pressure.coarse_grid import beside_on
 from wavetank.physics.grid_pressure.poisson import open_area
-from wavetank.physics.grid_pressure.surface import along
+from wavetank.physics.grid_pressure.surface import nodes_beyond
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3
 
@@ -34,9 +35,8 @@ def flow_out(grid: CoarseGrid, n, way):
     for axis in qd.static(range(3)):
         if grid.nz > 1 or axis < 2:
             for side in qd.static((-1, 1)):
-                nodes = along(grid, n, axis, side)
-                if nodes[0] > 0:
-                    m = n + nodes[1]
+                if nodes_beyond(grid, n, axis, side) > 0:
+                    m = beside_on(grid, n, axis, side)
                     if qd.min(grid.room[n], grid.room[m]) > 0.0 and shut_towards(grid, n, m, axis) == 0:
                         total += side * open_area(grid, n, m) * way[axis] / edges[axis]
     return total
