@@ -37,6 +37,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     paint(
         water.backdrop, pixels, water.sunlit, water.sun_thickness, strips_of(pixels.depth, samples, samples), shot.lens,
         shot.water_sun, shot.look, optics_of(shot, 0, samples, samples), shot.box, int(frame.scene.tank is not None), frame.dim,
+        int(samples > 1),
     )  # fmt: skip
 
 
@@ -141,25 +142,27 @@ def divide(
 def paint(
     backdrop: Backdrop, pixels: Pixels, sunlit: SunlitWater, thickness: Thickness, strips: Strips, lens: Lens,
     sun: Lens, look: Look, optics: Optics, box: Box, has_tank: qd.i32, dim: qd.template(),
+    finer: qd.template(),
 ):  # fmt: skip
     """Put sun and sky together as far as the water leaves them, and lay the tank over it.
 
     Samples of a pixel that lie within a texel of the sun's view take as much of the sun as its middle does.
     """
     for task in range(strips.count):
-        tall = optics.tall
+        across, tall = 1, 1
+        if qd.static(finer == 1):
+            across, tall = optics.samples, optics.tall
         band, first, last = strip(strips, task, pixels.depth.shape[0] // tall, pixels.depth.shape[1])
-        for pixel in range(first // optics.samples, last // optics.samples):
-            high, left = band * tall, pixel * optics.samples
-            low, far = 1e30, 0.0
-            if qd.static(dim == 3):
-                for k in range(optics.samples * tall):
-                    z = qd.bit_cast(pixels.depth[high + k // optics.samples, left + k % optics.samples], qd.f32)
-                    low, far = qd.min(low, z), qd.max(far, z)
-            together = far - low < 0.7 * sun.pixel and far < 1e30
-            shared = vec3(1.0, 1.0, 1.0)
-            for k in range(optics.samples * tall):
-                row, column = high + k // optics.samples, left + k % optics.samples
+        for pixel in range(first // across, last // across):
+            together, middle, shared = 0, 0.0, vec3(1.0, 1.0, 1.0)
+            if qd.static(finer == 1 and dim == 3):
+                low, high = 1e30, 0.0
+                for k in range(across * tall):
+                    z = qd.bit_cast(pixels.depth[band * tall + k // across, pixel * across + k % across], qd.f32)
+                    low, high = qd.min(low, z), qd.max(high, z)
+                together, middle = qd.cast(high < 1e30 and high - low < 0.7 * sun.pixel, qd.i32), 0.5 * (low + high)
+            for k in range(across * tall):
+                row, column = band * tall + k // across, pixel * across + k % across
                 ray = view_ray(lens, row, column)
                 origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
                 z = qd.bit_cast(pixels.depth[row, column], qd.f32)
@@ -167,11 +170,11 @@ def paint(
                 result = in_sun + in_sky
                 if qd.static(dim == 3):
                     if z < 1e30:
-                        if k == 0 or not together:
+                        if k == 0 or together == 0:
                             at = origin + z * direction
-                            if together:
-                                middle = view_ray(lens, row + 0.5 * (tall - 1), column + 0.5 * (optics.samples - 1))
-                                at = ray_origin(lens, middle) + 0.5 * (low + far) * ray_direction(lens, middle)
+                            if together == 1:
+                                ray = view_ray(lens, row + 0.5 * (tall - 1), column + 0.5 * (across - 1))
+                                at = ray_origin(lens, ray) + middle * ray_direction(lens, ray)
                             shared = sun_through_water(sunlit, thickness, sun, look, optics, at)
                         if shared.x != 1.0 or shared.z != 1.0:
                             # The sky comes from everywhere; water above takes some of it.
