@@ -76,7 +76,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if foam is not None and count > 0:
         gather(motion, surface.nearest, foam.x, foam.v, shot.lens, shutter, count)
     settle(motion, shutter, rows, columns)
-    smear(buffers.pixels, surface, motion, shot.lens, shot.look, shot.walls, shutter, rows, columns)
+    smear(buffers.pixels, surface, motion, shot.lens, shot.look, shot.walls, shutter, rows, columns, samples)
 
 
 @qd.kernel(fastcache=True)
@@ -154,10 +154,10 @@ def moves(way: qd.template(), row, column, rows, columns, least):
 @qd.kernel(fastcache=True)
 def smear(
     pixels: Pixels, surface: WaterSurface, motion: Motion, lens: Lens, look: Look, walls: Box, shutter: Shutter,
-    rows: qd.i32, columns: qd.i32,
+    rows: qd.i32, columns: qd.i32, samples: qd.template(),
 ):  # fmt: skip
     """Average along the ways; `pixels.normal` and `surface.rim` hold what is new meanwhile."""
-    samples, grain = shutter.samples, shutter.grain
+    grain = shutter.grain
     high, wide = pixels.depth.shape[0] // samples, pixels.depth.shape[1] // samples
     for texel_row, texel_column in qd.ndrange(rows, columns):
         if moves(motion.way, texel_row, texel_column, rows, columns, shutter.least):
@@ -179,7 +179,7 @@ def smear(
                         cuts = qd.min(qd.max(qd.cast(0.4 * length, qd.i32) + 3, samples * samples), shutter.cuts)
                         for k in range(cuts):
                             # The samples of a pixel take turns.
-                            i, j = k // samples % samples, k % samples
+                            i, j = k // qd.static(samples) % qd.static(samples), k % qd.static(samples)
                             own_r, own_c = down + i, across + j
                             share = (k + 0.5) / cuts - 0.5
                             r, c = pixel_along(row, column, share * way, high, wide)
@@ -212,7 +212,7 @@ def smear(
             for row in range(texel_row * grain, qd.min((texel_row + 1) * grain, high)):
                 for column in range(texel_column * grain, qd.min((texel_column + 1) * grain, wide)):
                     if surface.rim[row * samples, column * samples] == 1:
-                        for k in range(samples * samples):
+                        for k in range(qd.static(samples * samples)):
                             pixels.color[row * samples + k // samples, column * samples + k % samples] = pixels.normal[
                                 row * samples, column * samples
                             ]
