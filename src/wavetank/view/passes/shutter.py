@@ -176,32 +176,37 @@ def smear(
                                 moving = True
                     if moving:
                         total, weight, cover = vec3(0.0, 0.0, 0.0), 0.0, 0.0
+                        here, line, wet, own, edge = 0, 0, False, vec3(0.0, 0.0, 0.0), 0.0
                         cuts = qd.min(qd.max(qd.cast(0.4 * length, qd.i32) + 3, samples * samples), shutter.cuts)
                         for k in range(cuts):
                             # The samples of a pixel take turns.
                             i, j = k // qd.static(samples) % qd.static(samples), k % qd.static(samples)
-                            own_r, own_c = down + i, across + j
+                            if qd.static(samples > 1) or k == 0:
+                                own_r, own_c = down + i, across + j
+                                here, line = surface.nearest[own_r, own_c], pixels.lines[own_r, own_c]
+                                wet, own = here < pixels.depth[own_r, own_c], pixels.color[own_r, own_c]
+                                if line != 0:
+                                    edge = line_cover(line, qd.bit_cast(here, qd.f32), shutter.slack)
                             share = (k + 0.5) / cuts - 0.5
                             r, c = pixel_along(row, column, share * way, high, wide)
                             r, c = r * samples + i, c * samples + j
-                            here, there = surface.nearest[own_r, own_c], surface.nearest[r, c]
+                            there = surface.nearest[r, c]
                             # Of what stands still, and of what hides the water, a pixel beside them shows nothing.
                             gives = there < pixels.depth[r, c]
-                            if here < pixels.depth[own_r, own_c]:
+                            if wet:
                                 gives = gives or there > here
                             elif gives:
                                 gives = there < here
                             open = 0.5 - qd.abs(share)
-                            line = pixels.lines[own_r, own_c]
                             if gives:
                                 if pixels.lines[r, c] == 0:
                                     total += open * qd.min(pixels.color[r, c], shutter.white)
                                     weight += open
                             elif line == 0:
-                                total += open * pixels.color[own_r, own_c]
+                                total += open * own
                                 weight += open
                             if line != 0:
-                                cover += line_cover(line, qd.bit_cast(here, qd.f32), shutter.slack) / cuts
+                                cover += edge / cuts
                         if weight > 0.0:
                             mark = 1
                             total /= weight
