@@ -36,8 +36,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     samples = buffers.supersample
     paint(
         water.backdrop, pixels, water.sunlit, water.sun_thickness, strips_of(pixels.depth, samples, samples), shot.lens,
-        shot.water_sun, shot.look, optics_of(shot, 0, samples, samples), shot.box, int(frame.scene.tank is not None), frame.dim,
-        int(samples > 1),
+        shot.water_sun, shot.look, optics_of(shot, 0, samples, samples), shot.box,
+        int(frame.scene.tank is not None), frame.dim, int(samples > 1),
     )  # fmt: skip
 
 
