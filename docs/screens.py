@@ -74,7 +74,7 @@ def take(browser: Browser, name: str) -> None:
     for _ in range(int(SHARP)):
         time.sleep(1.0)
         browser.run("1")
-    browser.run("document.querySelector('#busy').hidden = true")  # a busy machine says so
+    browser.run("document.querySelector('#busy')?.remove()")  # a busy machine says so
     browser.picture(DOCS / f"{name}.jpg")
 
 
@@ -83,7 +83,7 @@ def playing() -> None:
     with page(wt.Scene.load("obstacle-tank"), (1280, 800)) as (browser, session):
         use(browser, "dye")
         start, end = browser.center("#picture", 0.1, 0.62), browser.center("#picture", 0.5, 0.78)
-        browser.drag(start, end, steps=24)
+        browser.drag(start, end, steps=24, pause=0.25)
         play(session, 0.5, lambda: browser.run("1"))
         browser.mouse("mouseMoved", *browser.center("#picture", 0.42, 0.74), button="none")
         take(browser, "playing")
