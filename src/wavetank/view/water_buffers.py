@@ -58,7 +58,6 @@ class SunlitWater:
     depth: qd.types.ndarray()  # i32: bits of the depth [m] at which the sun's rays meet the water
     spare: qd.types.ndarray()  # i32: the same while it is being smoothed
     caustic: qd.types.ndarray()  # i32: light that refraction brings or takes, in 1 / 4096 of the sun's
-    whole: qd.types.ndarray()  # i32: share of water in the sun's way through a tank, averaged, in 1 / 4096
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -161,7 +160,7 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
     buffers.water = WaterBuffers(
         cells=new_cells(frame, extent, REACH * extent.spacing),
         ellipsoids=_ellipsoids(capacity),
-        sunlit=SunlitWater(*_maps(4, qd.i32, texels, texels)),
+        sunlit=SunlitWater(*_maps(3, qd.i32, texels, texels)),
         sun_thickness=_thickness(texels, texels, shared, seen=False),
         key=key, **fields,
     )  # fmt: skip

@@ -36,7 +36,7 @@ class Inside:
     walls: Box
     solids: SolidSet
     paints: qd.types.ndarray()  # vec3 [solids]: their albedo
-    whole: qd.types.ndarray()  # i32 [texels, texels]: share of water in the sun's way, see `SunlitWater`
+    column: qd.types.ndarray()  # i32 [texels, texels]: water along the sun's rays, see `Thickness`
     shade: qd.types.ndarray()  # i32 [finer texels]: bits of the depth [m] at which they meet solids
 
 
@@ -133,10 +133,10 @@ def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usu
 
 
 @qd.func
-def wholeness(sun: Lens, first: qd.template(), share: qd.template(), walls: Box, at, spacing):
+def wholeness(sun: Lens, first: qd.template(), column: qd.template(), walls: Box, at, spacing, unit):
     """How much of a body the water around the point `at` is, 0 to 1: broken water leaves air in the sun's way.
 
-    It is 0 where there is none, and grows over the first spacing of it.
+    It is 0 where there is none.
     """
     inset = vec3(1.5 * spacing, 0.0, 1.5 * spacing)  # next to a wall the column's discs are cut
     inner = qd.min(qd.max(at, walls.lower + inset), walls.upper - inset)
@@ -149,14 +149,15 @@ def wholeness(sun: Lens, first: qd.template(), share: qd.template(), walls: Box,
     begins, water, weight = 0.0, 0.0, 1e-6
     for k in qd.static(range(4)):
         z = qd.bit_cast(first[top + k // 2, left + k % 2], qd.f32)
-        part = share_of(k, v, u)
+        share = share_of(k, v, u)
+        water += share * column[top + k // 2, left + k % 2]
         if z < 1e30:
-            water += part * share[top + k // 2, left + k % 2]
-            begins += part * z
-            weight += part
+            begins += share * z
+            weight += share
     under, result = c.z - begins / weight, 0.0
     if under > 0.0 and weight > 0.25:
-        result = smoothstep((water / (4096.0 * weight) - 0.3) / 0.45) * qd.min(under / spacing, 1.0)
+        length = qd.min(wall_ahead(walls, inner, sun.forward)[3] + under, 1e3)
+        result = smoothstep((water * unit / length - 0.3) / 0.45)
     return result
 
 
@@ -244,7 +245,7 @@ def through_body(
     seen_above = vec4(0.0, 0.0, 0.0, 0.0)
     p, ahead = qd.min(qd.max(at, inside.walls.lower), inside.walls.upper), bent
     begun = p + 2.0 * optics.spacing * ahead
-    whole = wholeness(sun, first, inside.whole, inside.walls, begun, optics.spacing)
+    whole = wholeness(sun, first, inside.column, inside.walls, begun, optics.spacing, optics.unit)
     if whole <= 0.0:
         total, done = -1.0, 1
     # Within, then where solids stand in the way of what leaves, and of what is mirrored.

@@ -62,7 +62,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if among and (world == 2 or shot.frame.scene.tank):
         world = {2: 1, 3: 4}[world]
     paints = buffers.paints.of(colors_of(shot)) if world == 4 else buffers.paints.device
-    inside = water.same(Inside, walls, solids, paints, water.sunlit.whole, buffers.sun_depth)
+    inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water, buffers.sun_depth)
     lay(
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit,
         strips_of(pixels.depth, together, buffers.supersample), shot.lens, shot.water_sun, shot.look,
