@@ -19,7 +19,7 @@ def both(monkeypatch):
         renderer, lay = Renderer(*SIZE, 2), water.lay
         shown = renderer.render(frame, camera, view="water", legend=False, **style).astype(int)
         with monkeypatch.context() as patch:
-            patch.setattr(water, "lay", lambda *arguments: lay(*arguments[:-1], 0))
+            patch.setattr(water, "lay", lambda *arguments: lay(*arguments[:-1], arguments[-1] % 100))
             resolved = renderer.render(frame, camera, view="water", legend=False, **style).astype(int)
         return shown, resolved
 

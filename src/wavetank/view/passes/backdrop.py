@@ -37,7 +37,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     paint(
         water.backdrop, pixels, water.sunlit, water.sun_thickness, strips_of(pixels.depth, samples, samples), shot.lens,
         shot.water_sun, shot.look, optics_of(shot, 0, samples, samples), shot.box,
-        int(frame.scene.tank is not None), frame.dim, int(samples > 1),
+        int(frame.scene.tank is not None), 10 * int(samples > 1) + frame.dim,
     )  # fmt: skip
 
 
@@ -141,21 +141,21 @@ def divide(
 @qd.kernel(fastcache=True)
 def paint(
     backdrop: Backdrop, pixels: Pixels, sunlit: SunlitWater, thickness: Thickness, strips: Strips, lens: Lens,
-    sun: Lens, look: Look, optics: Optics, box: Box, has_tank: qd.i32, dim: qd.template(),
-    finer: qd.template(),
+    sun: Lens, look: Look, optics: Optics, box: Box, has_tank: qd.i32, world: qd.template(),
 ):  # fmt: skip
     """Put sun and sky together as far as the water leaves them, and lay the tank over it.
 
-    Samples of a pixel that lie within a texel of the sun's view take as much of the sun as its middle does.
+    Samples of a pixel that lie within a texel of the sun's view take as much of the sun as its middle does. `world` is
+    2 or 3, its dimensions, ten more where pixels have several samples.
     """
     for task in range(strips.count):
         across, tall = 1, 1
-        if qd.static(finer == 1):
+        if qd.static(world >= 10):
             across, tall = optics.samples, optics.tall
         band, first, last = strip(strips, task, pixels.depth.shape[0] // tall, pixels.depth.shape[1])
         for pixel in range(first // across, last // across):
             together, middle, shared = 0, 0.0, vec3(1.0, 1.0, 1.0)
-            if qd.static(finer == 1 and dim == 3):
+            if qd.static(world == 13):
                 low, high = 1e30, 0.0
                 for k in range(across * tall):
                     z = qd.bit_cast(pixels.depth[band * tall + k // across, pixel * across + k % across], qd.f32)
@@ -168,7 +168,7 @@ def paint(
                 z = qd.bit_cast(pixels.depth[row, column], qd.f32)
                 in_sun, in_sky = backdrop.in_sun[row, column], backdrop.in_sky[row, column]
                 result = in_sun + in_sky
-                if qd.static(dim == 3):
+                if qd.static(world % 10 == 3):
                     if z < 1e30:
                         if k == 0 or together == 0:
                             at = origin + z * direction

@@ -67,7 +67,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit,
         strips_of(pixels.depth, together, buffers.supersample), shot.lens, shot.water_sun, shot.look,
         optics_of(shot, under_water(shot, buffers), together, buffers.supersample), inside,
-        10 * int(water.thickness.fluids > 0) + world, int(buffers.supersample > 1),
+        100 * int(buffers.supersample > 1) + 10 * int(water.thickness.fluids > 0) + world,
     )  # fmt: skip
 
 
@@ -75,13 +75,12 @@ def draw(shot: Shot, buffers: Buffers) -> None:
 def lay(
     pixels: Pixels, surface: WaterSurface, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater,
     strips: Strips, lens: Lens, sun: Lens, look: Look, optics: Optics, inside: Inside, world: qd.template(),
-    finer: qd.template(),
 ):  # fmt: skip
     """Shade every pixel that shows water, and copy the backdrop to the others; `surface.nearest` is filled with the
     nearer of its depth and the backdrop's.
 
     `world` is 1 for a plane with solids, 2 for one without, 3 for space, 4 for space with solids in a tank; ten more
-    with several fluids. `finer` is 1 where pixels have several samples.
+    with several fluids, and a hundred more where pixels have several samples.
     """
     for task in range(strips.count):
         band, begin, end = strip(strips, task, pixels.depth.shape[0] // optics.tall, pixels.depth.shape[1])
@@ -94,7 +93,7 @@ def lay(
         for index in range((end - begin + beside - 1) // beside * block):
             part = index % block
             row, column = band * optics.tall + part // beside, begin + index // block * beside + part % beside
-            if qd.static(finer == 1):
+            if qd.static(world >= 100):
                 if part == 0 and optics.under == 0:
                     even, even_z, even_normal = even_pixel(
                         pixels, surface, lens, look, optics, inside.walls, row, column, qd.static(world % 10)
@@ -182,7 +181,7 @@ def lay(
                                 result += share * shine(
                                     pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside, middle, at,
                                     n, origin, direction, body, above, whole, qd.static(world % 10),
-                                    qd.static(world >= 10),
+                                    qd.static(world % 100 >= 10),
                                 )  # fmt: skip
                         line = line_cover(pixels.lines[row, column], front, optics.slack)
                         result += look.line_strength * there * line * (look.line - result)
