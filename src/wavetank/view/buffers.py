@@ -43,7 +43,7 @@ class Light:
 class FoamMaps:
     """Foam over each pixel of the picture, and over each texel of a coarser relief, on the device."""
 
-    sums: qd.types.ndarray()  # i32 [height, width, 3]: optical depth in the shade, in the sun, times water above
+    sums: qd.types.ndarray()  # i32 [height, width, 3]: optical depth, its part in the sun, and times the water above
     relief: qd.types.ndarray()  # i32 [texels]: optical depth in 1/4096
     light: qd.types.ndarray()  # vec2 [texels]: share of the sun and of the sky that its slopes get
 

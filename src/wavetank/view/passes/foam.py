@@ -11,7 +11,7 @@ froth a shape (`shape`): it is thick where it is dense, and lit as such a relief
 
     code      symbol   meaning                                                              unit
     tau                optical depth of what lies over a pixel, in 1/4096                   1
-    in_sun             part of it that the sun sees                                         1
+    lit                tau weighted with the share of the sun that arrives                  1
     deep               tau weighted with the way through the water above it                 d / 4
     r, wide            radius of a disc, and as drawn: no smaller than the pixel grid       px
     behind             how far a particle is behind the surface that the pixel shows        m
@@ -243,7 +243,9 @@ def add_disc(maps: FoamMaps, c, middle, wide, strength, light, depth: qd.templat
                     tau = qd.cast(strength * rest * share_seen(behind, froth.deepest) + 0.5, qd.i32)
                     if tau > 0:
                         added += tau
-                        qd.atomic_add(maps.sums[row, column, qd.cast(light > 0.5, qd.i32)], tau)
+                        qd.atomic_add(maps.sums[row, column, 0], tau)
+                        if light > 0.5:
+                            qd.atomic_add(maps.sums[row, column, 1], tau)
                         if behind > 0.0 and behind < 1e3:
                             deep = tau * qd.min(behind * 4.0 / froth.size, 20.0)
                             qd.atomic_add(maps.sums[row, column, 2], qd.cast(deep + 0.5, qd.i32))
@@ -342,8 +344,7 @@ def blend(pixels: Pixels, maps: FoamMaps, depth: qd.types.ndarray(), froth: Frot
     """Lay the sums over the picture: what sun and sky give them or, over nothing, what it is in air."""
     samples = froth.samples
     for foam_row, foam_column in qd.ndrange(maps.sums.shape[0], maps.sums.shape[1]):
-        in_sun = maps.sums[foam_row, foam_column, 1]
-        tau = maps.sums[foam_row, foam_column, 0] + in_sun
+        tau = maps.sums[foam_row, foam_column, 0]
         if tau > 0:
             per = 1.0 / qd.cast(tau, qd.f32)
             place = vec2(foam_column + 0.5, foam_row + 0.5) / qd.cast(froth.grain, qd.f32)
@@ -352,7 +353,7 @@ def blend(pixels: Pixels, maps: FoamMaps, depth: qd.types.ndarray(), froth: Frot
             low = maps.light[r1, c] + u * (maps.light[r1, c1] - maps.light[r1, c])
             share = top + v * (low - top)
             # Froth scatters: a fifth of the sun comes around whatever is in the way.
-            sun = share.x * (0.2 + 0.8 * in_sun * per)
+            sun = share.x * (0.2 + 0.8 * maps.sums[foam_row, foam_column, 1] * per)
             under = qd.exp(-maps.sums[foam_row, foam_column, 2] * per * froth.swallow)
             white = under * (sun * froth.in_sun + share.y * froth.in_sky)
             most = 1.0 - qd.exp(-tau / 4096.0)
