@@ -175,7 +175,7 @@ RUN = """
 import wavetank as wt
 scene = wt.Scene.load("river").changed(spacing=0.03, gravity=(0.4, -9.8, 0.2), foam=3.0)
 sim = wt.Simulation(scene.changed(tank={"size": [2.4, 0.4, 0.8], "periodic": ["x", "z"]}))
-for _ in range(12):
+for _ in range(6):
     sim.step()
 print(sim.digest())
 """
@@ -183,7 +183,7 @@ print(sim.digest())
 
 def test_runs_repeat_on_any_number_of_threads():
     digests = set()
-    for threads in ("1", "2", "5"):
+    for threads in ("1", "3"):
         environment = {**os.environ, "QD_CPU_MAX_NUM_THREADS": threads}
         done = subprocess.run([sys.executable, "-c", RUN], capture_output=True, text=True, env=environment, check=True)
         digests.add(done.stdout.strip())
