@@ -76,7 +76,7 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         is_central=not (world.levels or kinds.mixed),
         on_grid=on_grid,
         # Else bumps of an interface have no weight, and water does not follow a body that rises: docs/notebook/calm.md.
-        balanced=on_grid and not kinds.mixed,
+        balanced=on_grid and not (kinds.mixed or world.pieces),
         # What thick fluids carry on has been shortened to their share already.
         carried=carried(dt, params.frame_time) if on_grid else float(thick),
     )
