@@ -1,6 +1,7 @@
 """Make the pictures of README and docs anew: `make figures`, `make gallery`, `make validation`, minutes on two cores.
 
 python docs/figures.py            the pictures of README.md and docs/look.md, and the plot of docs/method.md
+python docs/figures.py name ...   some of them: names of SHOTS, foam, film-obstacle
 python docs/figures.py gallery    docs/gallery.md with a picture of every bundled scene
 python docs/figures.py validation [case ...]
                                   validation/: a picture of every case of `wavetank validate`, or of these, and a table
@@ -79,6 +80,17 @@ def foam_figures() -> None:
     Image.fromarray(image).save(DOCS / "foam.jpg", quality=88, optimize=True)
 
 
+def film_figure() -> None:
+    """Write the picture of docs/look.md that has one wave above as a picture of two by two samples, below as film."""
+    sim = wt.Simulation(wt.Scene.load("obstacle-tank"))
+    sim.advance(0.6)
+    pictures = []
+    for quality, samples in (("standard", None), ("film", 24)):
+        supersample, chosen = quality_options(quality, samples)
+        pictures.append(Renderer(640, 360, supersample).render(sim.frame(), legend=False, **chosen))
+    Image.fromarray(np.vstack(pictures)).save(DOCS / "look" / "film-obstacle.jpg", quality=88, optimize=True)
+
+
 def picture(sim: wt.Simulation, path: Path, width: int, height: int, quality: str = "high", **options: Any) -> None:
     """Write a JPG of a world."""
     supersample, chosen = quality_options(quality, options.pop("samples", None))
@@ -92,6 +104,9 @@ def picture(sim: wt.Simulation, path: Path, width: int, height: int, quality: st
 def figures(names: list[str]) -> None:
     """Write the pictures of README and docs, or those of these names alone."""
     for name in names or SHOTS:
+        if name in ("foam", "film-obstacle"):
+            foam_figures() if name == "foam" else film_figure()
+            continue
         scene, moment, options = SHOTS[name]
         sim = wt.Simulation(scene)
         sim.advance(moment)
@@ -101,6 +116,7 @@ def figures(names: list[str]) -> None:
     if names:
         return
     foam_figures()
+    film_figure()
     with tempfile.TemporaryDirectory() as folder:
         converge(wt.Scene.load("obstacle-tank"), Path(folder), seconds=2.0)
         shutil.copy(Path(folder) / "converge.png", DOCS / "converge.png")

@@ -266,3 +266,19 @@ def test_forces_on_bodies_are_shown_by_a_key(open_page, browser):
     browser.key("n")
     browser.wait_for("document.querySelectorAll('#region-names .force').length === 0")
     assert browser.complaints() == []
+
+
+def test_numbers_of_forces_lie_beside_each_other(open_page, browser):
+    """Two crates in the same place in the picture: four numbers, none over another."""
+    pytest.importorskip("rapier3d")
+    crates = [wt.Box(name=f"crate{z}", center=(0.3, 0.4, z), size=(0.12, 0.12, 0.12), density=500) for z in (0.1, 0.3)]
+    open_page(BASIN.changed(solids=crates))
+    browser.key("n")
+    browser.wait_for("document.querySelectorAll('#region-names .force').length === 4")
+    boxes = browser.run(
+        "[...document.querySelectorAll('#region-names .force')].map((one) => one.getBoundingClientRect())"
+        ".map((b) => [b.left, b.top, b.right, b.bottom])"
+    )
+    for k, a in enumerate(boxes):
+        for b in boxes[k + 1 :]:
+            assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]

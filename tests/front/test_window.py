@@ -442,3 +442,14 @@ def test_play_opens_a_window_and_records(display, tmp_path):
         display.close()
     assert process.returncode == 0 and "session written to" in said, said
     assert "pause" in [command["do"] for command in Recording.load(tmp_path / "s.toml").commands]
+
+
+def test_numbers_of_forces_make_way_for_each_other():
+    from wavetank.front.window.hud import parted
+
+    boxes = [(0.0, 10.0, 40.0, 24.0), (10.0, 15.0, 50.0, 29.0), (60.0, 15.0, 90.0, 29.0), (20.0, 20.0, 70.0, 34.0)]
+    placed = parted(boxes)
+    assert placed[0] == boxes[0] and placed[2] == boxes[2], "those that are in nobody's way stay"
+    for k, a in enumerate(placed):
+        for b in placed[k + 1 :]:
+            assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]

@@ -38,9 +38,9 @@ def filled(level, heights) -> None:
     couple(level, poisson.LEAST_THETA)
 
 
-def levels_of(size, h):
+def levels_of(size, h, repeats=0):
     """Grids of a tank at the origin."""
-    return new_levels((np.zeros(len(size)), np.array(size)), h)
+    return new_levels((np.zeros(len(size)), np.array(size)), h, repeats)
 
 
 def test_weight_at_the_bottom_becomes_hydrostatic_pressure():
@@ -59,6 +59,37 @@ def test_weight_at_the_bottom_becomes_hydrostatic_pressure():
     depth = level.dy * (12.0 + 0.25 / 0.75 - np.arange(13))
     np.testing.assert_allclose(lam[:13], np.repeat(-depth[:, None] * level.dy, 8, axis=1), rtol=2e-3)
     assert not lam[13:].any()
+
+
+@pytest.mark.parametrize("cells", [4.0, 4.9, 5.0, 9.7, 10.0, 13.0, 50.0, 63.0, 217.3])
+def test_levels_of_an_axis_that_repeats_are_even(cells):
+    """Two colours alternate across the seam only then; cells are about a support long all the same."""
+    levels = levels_of((cells * 0.1, 1.6), 0.1, repeats=1)
+    assert all(level.nx % 2 == 0 for level in levels)
+    assert levels[0].nx / cells == pytest.approx(1.0, abs=0.21)
+    assert levels[-1].nx < 16
+    assert levels_of((1.6, 1.6), 0.1)[-1].nx == 8
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_levels_that_repeat_do_not_know_where_the_seam_is(number):
+    """What is moved along the ring by so many nodes gives the same multipliers, moved, on all levels."""
+    found = []
+    for by in (0, 8):
+        levels = levels_of((3.2, 1.6), 0.1, repeats=1)
+        finest = levels[0]
+        assert finest.nx == 32
+        heights = np.roll(11.4 + 2.0 * np.sin(2.0 * np.pi * np.arange(32) / 32), by)
+        filled(finest, heights)
+        rhs = np.zeros(finest.rhs.shape[0], np.float32)
+        errors = np.random.default_rng(number).normal(0.2, 1.0, (finest.ny, finest.nx))
+        rhs[: finest.nx * finest.ny] = np.roll(errors, by, axis=1).ravel()
+        finest.rhs.from_numpy(rhs)
+        poisson.solve_levels(levels)
+        lam = finest.lam.to_numpy()[: finest.nx * finest.ny].reshape(finest.ny, finest.nx)
+        found.append(np.roll(lam, -by, axis=1))
+    assert found[0].min() < 0
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-5, atol=1e-7)
 
 
 def random_errors(level) -> None:

@@ -119,6 +119,28 @@ def test_layers_stay_and_form(ratio):
     assert sim.stats()["density_error_mean"] < 0.02
 
 
+@pytest.mark.parametrize("ratio", [1.5, 10.0])
+def test_a_heavy_fluid_above_a_light_one_ends_below_it_to_the_last_drop(ratio):
+    """Rayleigh and Taylor's instability ends in layers: least potential energy; single particles hung in the other."""
+    sim = wt.Simulation(two_layers("light", "heavy", ratio, spacing=0.04))
+    heavy = sim.frame().rest_densities > 999.0
+    sim.advance(60.0)
+    y = sim.positions[:, 1].astype(float)
+    interface = np.sort(y)[heavy.sum() - 1]
+    assert y[heavy].max() < interface + 0.04
+    assert y[~heavy].min() > interface - 0.04
+
+
+def test_layers_at_rest_have_the_push_of_one_fluid():
+    """What lies level has no weight of its own: the layers beside an interface are as far apart as any."""
+    sim = wt.Simulation(two_layers("heavy", "light", 3.0, spacing=0.025))
+    heavy = sim.frame().rest_densities > 999.0
+    start = sim.positions[:, 1].astype(float)
+    sim.advance(5.0)
+    rise = sim.positions[:, 1].astype(float) - start
+    assert abs(rise[~heavy].mean() - rise[heavy].mean()) < 0.05 * 0.025
+
+
 def test_densities_and_energies_are_those_of_each_fluid():
     sim = wt.Simulation(two_layers("heavy", "light", 4.0))
     heavy = sim.frame().materials == 1

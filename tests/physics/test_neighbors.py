@@ -17,6 +17,14 @@ from wavetank.simulation import arrays
 from wavetank.simulation.simulation import Simulation
 
 
+def apart(difference: np.ndarray, tank: wt.Tank | None) -> np.ndarray:
+    """Difference of nearest images."""
+    for axis in tank.rings if tank else ():
+        length = np.float32(tank.size[axis])
+        difference[..., axis] -= length * np.round(difference[..., axis] / length)
+    return difference
+
+
 def neighbor_sets(sim: Simulation) -> list[set[int]]:
     """Ids of the neighbours of each particle, by id, out of the lists; and check the lists themselves."""
     sim.frame()
@@ -32,8 +40,8 @@ def neighbor_sets(sim: Simulation) -> list[set[int]]:
         listed = lists[group, : number[group]]
         assert len(set(listed.tolist())) == len(listed), "a neighbour is listed twice"
         assert set(members.tolist()) <= set(listed.tolist()), "a particle is not in its own list"
-        near = np.linalg.norm(p[members, None] - p[None, listed], axis=2) < h
-        edge = np.linalg.norm(p[members, None] - p[None, listed], axis=2) < h * (1 + 1e-6)
+        way = np.linalg.norm(apart(p[members, None] - p[None, listed], sim.scene.tank), axis=2)
+        near, edge = way < h, way < h * (1 + 1e-6)
         assert edge.any(axis=0).all(), "somebody is listed who is near nobody"
         for row, i in enumerate(members):
             sets[ids[i]] = set(ids[listed[near[row]]].tolist()) - {int(ids[i])}
@@ -45,7 +53,11 @@ def neighbor_sets(sim: Simulation) -> list[set[int]]:
 def check(x: np.ndarray, spacing: float, tank=None) -> None:
     sim = Simulation(wt.Scene(spacing=spacing, tank=tank, fluids=[wt.Points(positions=x)], gravity=(0.0,) * x.shape[1]))
     h = sim.scene.support * spacing
-    tree = cKDTree(x.astype(np.float64))
+    rings = tank.rings if tank else []
+    lower = tank.box()[0] if tank else np.zeros(x.shape[1])
+    x = x - lower if rings else x
+    boxsize = [tank.size[axis] if axis in rings else 0.0 for axis in range(x.shape[1])] if rings else None
+    tree = cKDTree(x.astype(np.float64), boxsize=boxsize)
     inside, outside = tree.query_ball_point(x, h * (1 - 1e-6)), tree.query_ball_point(x, h * (1 + 1e-6))
     for i, found in enumerate(neighbor_sets(sim)):
         # Pairs at the very edge of the support may fall on either side by rounding; their kernel is zero.
@@ -66,6 +78,23 @@ def test_same_as_a_tree_in_a_tank(dim):
     rng = np.random.default_rng(dim)
     size = (1.3, 0.4, 0.9)[:dim]
     check((rng.uniform(0, 1, (2000, dim)) * size).astype(np.float32), 0.05, wt.Tank(size=size))
+
+
+@pytest.mark.parametrize("size", [(1.3, 0.4), (1.0, 0.92, 0.5)])
+@pytest.mark.parametrize("periodic", ["x", "y", "xy", "xz", "yz", "xyz"])
+def test_same_as_a_tree_across_the_seams(size, periodic):
+    """Rows of cells are rings there, also such of four cells, and tanks need not begin at the origin."""
+    axes = [axis for axis in periodic if "xyz".index(axis) < len(size)]
+    lower = (-0.3, 0.2, 0.7)[: len(size)]
+    x = np.random.default_rng(len(axes)).uniform(0, 0.99999, (1500, len(size))) * size + lower
+    check(x.astype(np.float32), 0.05, wt.Tank(size=size, lower=lower, periodic=axes))
+
+
+@pytest.mark.parametrize("length", [0.38, 0.42, 3.0])
+def test_same_as_a_tree_across_the_seam_of_few_cells_and_of_many(length):
+    """Four supports are the least; a few particles in a long tank have fewer and longer cells than supports."""
+    x = np.random.default_rng(1).uniform(0, 0.99999, (400, 3)) * (length, 0.6, 0.6)
+    check(x.astype(np.float32), 0.05, wt.Tank(size=(length, 0.6, 0.6), periodic=["x"]))
 
 
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -220,10 +220,10 @@ def test_the_past_fits_into_its_memory():
         np.testing.assert_array_equal(unpacked.arrays[name], array)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_replay_has_the_same_particles_bit_for_bit(seed, tmp_path):
+@pytest.mark.parametrize(("seed", "periodic"), [(1, []), (2, []), (3, ["x"])])
+def test_a_replay_has_the_same_particles_bit_for_bit(seed, periodic, tmp_path):
     """Whatever was done: pouring, cutting, rewinding, bookmarks, other scenes, slow motion."""
-    start = pool()
+    start = pool(tank=wt.Tank(size=(1.0, 0.6), periodic=periodic))
     session, monkey = Session(start, most_particles=400), Monkey(seed)
     for number in range(300):
         if number == 150:

@@ -294,3 +294,41 @@ def test_jets_that_pass_or_part_take_no_shorter_steps():
     assert closing(((-1, 0, 0), (-1, 0, 0)), ((1, 0, 0), (1, 0, 0))) == 0.0, "they part"
     assert closing(((-1, 0, 0), (0, 1, 0)), ((1, 0, 0), (0, 1, 0))) == 0.0, "they go side by side"
     assert closing(((-1, 0, 0), (1, 0, 0))) == 0.0
+
+
+@pytest.mark.parametrize("place", [0.5, 0.999])
+def test_a_mouth_at_a_seam_brings_what_one_in_the_middle_does(place):
+    """What comes out beyond an end of a tank that repeats is within at the other side, and held in the jet there."""
+    tank = wt.Tank(size=(1.0, 0.8), periodic=["x"])
+    sim = world(wt.Emitter(position=(place, 0.7), direction=(0, -1), width=0.15, speed=2.0), tank=tank)
+    sim.advance(0.25)
+    way = sim.positions[:, 0].astype(float) - place
+    way -= np.round(way)
+    assert sim.count * 0.025**2 == pytest.approx(0.15 * 2.0 * 0.25, rel=0.05)
+    assert abs(way).max() < 0.15
+    assert abs(way.mean()) < 0.01
+    assert ((sim.positions[:, 0] >= 0.0) & (sim.positions[:, 0] < 1.0)).all()
+    assert not sim.notes
+
+
+@pytest.mark.parametrize(
+    "drain",
+    [
+        {"center": (0.99, 0.1), "radius": 0.1},
+        {"center": (0.99, 0.1), "radius": 0.1, "flow": 1e4},
+        {"lower": (0.9, 0.0), "upper": (1.1, 0.2)},
+        {"center": (0.99, 0.0), "radius": 0.1, "direction": (0, 1), "flow": 1e4},
+    ],
+    ids=["sphere", "with a flow", "box", "mouth"],
+)
+def test_a_drain_at_a_seam_takes_from_both_sides(drain):
+    tank = wt.Tank(size=(1.0, 0.8), periodic=["x"])
+    block = wt.Block(lower=(0, 0), upper=(1.0, 0.3))
+    sim = world(tank=tank, fluids=[block], drains=[wt.Drain(**drain)])
+    before = sim.positions
+    sim.step()
+    x, number = sim.positions, sim.count
+    assert number < len(before) - 20
+    sides = [(np.count_nonzero(p[:, 0] < 0.08), np.count_nonzero(p[:, 0] > 0.92)) for p in (before, x)]
+    assert sides[1][0] < sides[0][0] - 8
+    assert sides[1][1] < sides[0][1] - 8

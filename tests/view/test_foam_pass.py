@@ -237,3 +237,19 @@ def test_foam_stays_within_the_glass(tank_scene, make_frame):
     ).sum(axis=2)
     assert change[:, 100:].max() > 30
     assert change[:, :93].max() == 0
+
+
+def test_foam_casts_a_shadow(tank_scene, make_frame):
+    """A patch of foam on a pool darkens what lies below, along the sun's rays, and nothing in front of the tank."""
+    x, y, z = np.meshgrid(*[np.arange(0.025, n, 0.05) for n in (1.0, 0.4, 1.0)])
+    pool = np.stack([x.ravel(), y.ravel(), z.ravel()], 1)
+    patch = cloud(2000, center=(0.5, 0.41, 0.5), spread=0.08) * (1, 0, 1) + (0, 0.41, 0)
+    eye = Camera(eye=(0.5, 1.4, 2.4), target=(0.5, 0.15, 0.5))
+    bare, shaded = (
+        Renderer(192, 128).render(frame, eye, view="water").astype(int)
+        for frame in (make_frame(tank_scene, pool), with_foam(make_frame(tank_scene, pool), patch))
+    )
+    darker = (bare - shaded).min(axis=2) > 5
+    assert darker.sum() > 60
+    _, row, _ = eye.project(np.array([(0.5, 0.0, 1.1)]), 192, 128)[0]
+    assert not darker[int(row) :].any()

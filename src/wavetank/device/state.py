@@ -17,6 +17,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
+from wavetank.device.periods import Periods
 
 Numbers = TypeVar("Numbers")
 Together = TypeVar("Together")
@@ -86,6 +87,7 @@ class Grid:
     ny: qd.i32
     nz: qd.i32
     cells: qd.i32
+    periods: Periods
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -129,6 +131,7 @@ class CoarseGrid:
     parts: qd.i32  # of the particles that have sums of their own
     alone: Final[int]  # 1 where there are several, so that no thread waits for another, else 0
     width: Final[int]  # nodes of a row that a thread takes at once
+    repeats: Final[int]  # bit k is set where the world repeats along axis k
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.reactions import push_back
 from wavetank.solids.distance import (
     SolidSet,
+    image_near,
     lift,
     local_distance,
     plane_distance,
@@ -175,6 +176,15 @@ def kept_in_tank(target, near, solids: SolidSet, gap):
 
 
 @qd.func
+def image_of(point, place, image, solids: SolidSet):
+    """The `point` [m] as it is beside the `image` of a `place` that it is near; that of an image beside the place."""
+    moved = point
+    if qd.static(solids.repeats):
+        moved += image - place
+    return moved
+
+
+@qd.func
 def stopped(origin, target, near, solids: SolidSet, gap, mass):
     """Return where the way from `origin` to `target` ends outside of the marked solids, in their motion.
 
@@ -189,15 +199,16 @@ def stopped(origin, target, near, solids: SolidSet, gap, mass):
         last, push = -1, vec3(0.0, 0.0, 0.0)
         k = next_near(near, solids.tank_count - 1, solids)
         while k < solids.count:
-            away = (target - solids.position[k]).norm()
-            if away < solids.reach[k] + gap + moves_by(k, (target - origin).norm(), target, solids):
+            image = image_near(solids, k, target)
+            away = (image - solids.position[k]).norm()
+            if away < solids.reach[k] + gap + moves_by(k, (target - origin).norm(), image, solids):
                 rotation = solids.rotation[k]
-                end = to_local(solids.position[k], rotation, target)
-                at = to_local(solids.old_position[k], solids.old_rotation[k], origin)
+                end = to_local(solids.position[k], rotation, image)
+                at = to_local(solids.old_position[k], solids.old_rotation[k], image_of(origin, target, image, solids))
                 out = follow(k, at, end, solids, gap)
                 if (out - end).norm() > 0.0:
                     before = target
-                    target = solids.position[k] + rotate(rotation, out)
+                    target = image_of(solids.position[k] + rotate(rotation, out), image, before, solids)
                     moved = 1
                     if mass > 0.0:
                         last, push = k, target - before
@@ -241,7 +252,7 @@ def walls_near(
 @qd.func
 def moves_by(k, length, at, solids: SolidSet):
     """Bound of how far [m] a way of that length that ends at `at` leads in the frame of solid `k`, which moves."""
-    away = (at - solids.position[k]).norm() + length
+    away = (image_near(solids, k, at) - solids.position[k]).norm() + length
     return length + solids.sweep[k][0] + solids.sweep[k][1] * away
 
 
@@ -263,7 +274,7 @@ def bodies_around(origins: qd.template(), targets: qd.template(), solids: SolidS
     for k in range(solids.tank_count, solids.count):
         reach = solids.reach[k]
         farthest = reach + way + solids.sweep[k][0] + solids.sweep[k][1] * reach
-        if (middle - solids.position[k]).norm_sqr() < farthest * farthest:
+        if (image_near(solids, k, middle) - solids.position[k]).norm_sqr() < farthest * farthest:
             bits |= 1 << bit_of(k, solids)
     return bits
 
@@ -280,7 +291,7 @@ def near_bodies(x, p, among, solids: SolidSet, c: Coefficients):
     while k < solids.count:
         reach = solids.reach[k]
         farthest = reach + way + solids.sweep[k][0] + solids.sweep[k][1] * reach
-        away = (p - solids.position[k]).norm_sqr()
+        away = (image_near(solids, k, p) - solids.position[k]).norm_sqr()
         if away < farthest * farthest:
             margin = way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(reach, qd.sqrt(away))
             distance = signed_distance(solids, k, p).w
@@ -301,7 +312,7 @@ def bodies_in_reach(x, p, solids: SolidSet, gap):
     near = 0
     way = gap + (p - x).norm()
     for k in range(solids.tank_count, solids.count):
-        away = (p - solids.position[k]).norm()
+        away = (image_near(solids, k, p) - solids.position[k]).norm()
         if away < solids.reach[k] + way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(solids.reach[k], away):
             near |= 1 << bit_of(k, solids)
     return near

@@ -23,7 +23,7 @@ from wavetank.device.state import Coefficients, Particles, Scratch, Walls
 from wavetank.physics.boundary import is_near, wall_share
 from wavetank.physics.near_solids import facing_at, known, place_of
 from wavetank.physics.predicted_positions import predicted
-from wavetank.solids.distance import SolidSet, lift, plane_distance, rotate, to_local, vec3, vec4
+from wavetank.solids.distance import SolidSet, image_near, lift, plane_distance, rotate, to_local, vec3, vec4
 
 
 @qd.kernel(fastcache=True)
@@ -123,6 +123,7 @@ def free():
 @qd.func
 def surface_velocity(solids: SolidSet, k, x, dt):
     """Velocity [m/s] of the material point of solid `k` that is at `x` at the end of the substep."""
-    own = to_local(solids.position[k], solids.rotation[k], x)
+    at = image_near(solids, k, x)
+    own = to_local(solids.position[k], solids.rotation[k], at)
     before = solids.old_position[k] + rotate(solids.old_rotation[k], own)
-    return (x - before) / dt
+    return (at - before) / dt

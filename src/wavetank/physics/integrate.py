@@ -1,6 +1,7 @@
 """The two ends of a position-based step: predict positions, and read velocities off the corrected ones."""
 
 from wavetank.device.compiler import qd
+from wavetank.device.periods import Periods, within
 from wavetank.device.state import Coefficients, Grid, Particles
 from wavetank.physics.boundary import bodies_around, flattened, kept_in_tank, near_bodies, stopped, walls_near
 from wavetank.physics.neighbors import cell_of
@@ -87,6 +88,10 @@ def predict(
                         mass = mass_of(particles, i, rows) if qd.static(searched == 2) else 0.0
                         p = flattened(stopped(lift(x), lift(p), near, solids, c.wall_gap, mass), x)
                 particles.near[i] = near
+                if qd.static(grid.periods.axes):
+                    inside = x + (within(p, grid.periods) - p)
+                    particles.x[i] = inside
+                    p = free_motion(inside, v, c) + (p - free_motion(x, v, c))
                 predict_at(particles, i, p)
                 grid.cell[i] = cell_of(grid, p, c.h)
 
@@ -105,6 +110,15 @@ def update_velocities(particles: Particles, c: Coefficients, count: qd.i32):
         v += (p - free_motion(x, v, c)) / c.dt
         particles.x[i] = p
         particles.v[i] = v * qd.min(1.0, c.speed_limit / qd.max(v.norm(), 1e-12))
+
+
+@qd.kernel(fastcache=True)
+def bring_within(particles: Particles, periods: Periods, count: qd.i32):
+    """Put what has crossed a seam of the world, x = p, to its image within: at the end of a step."""
+    for i in range(count):
+        p = within(particles.x[i], periods)
+        particles.x[i] = p
+        predict_at(particles, i, p)
 
 
 @qd.kernel(fastcache=True)

@@ -20,7 +20,7 @@ from wavetank.device.state import Coefficients, Particles, Scratch, Walls
 from wavetank.physics.boundary import add_wall, fall, moves_by, next_near, wall_share
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.reactions import push_back
-from wavetank.solids.distance import SolidSet, lift, plane_distance, signed_distance, vec3, vec4
+from wavetank.solids.distance import SolidSet, image_near, lift, plane_distance, signed_distance, vec3, vec4
 
 FARTHEST = 0.05  # of a support: from where on a particle asks anew
 
@@ -62,7 +62,7 @@ def look(i, near, x, p, scratch: Scratch, solids: SolidSet, h):
     k = next_near(near, solids.tank_count - 1, solids)
     while k < solids.count:
         reach = solids.reach[k]
-        away = (p - solids.position[k]).norm()
+        away = (image_near(solids, k, p) - solids.position[k]).norm()
         margin = way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(reach, away)
         if away < reach + margin:
             value = signed_distance(solids, k, p)

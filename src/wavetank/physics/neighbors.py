@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import lanes, qd, threads, worth_sharing
+from wavetank.device.periods import NONE, Periods, nearest_along, within_along
 from wavetank.device.state import Coefficients, Grid, Particles, integers, nowhere
 from wavetank.device.sums import blocks_of, many_threads, share_of, sort_by
 from wavetank.foundation.errors import WavetankError
@@ -40,7 +41,14 @@ def cell_of(grid: Grid, x: qd.template(), h):
     """Number of the cell around the point `x`."""
     c = qd.Vector([0, 0, 0])
     for k in qd.static(range(x.n)):
-        c[k] = qd.cast(qd.floor(x[k] / h), qd.i32)
+        if qd.static(grid.periods.axes >> k & 1):
+            lower = qd.Vector([grid.periods.x0, grid.periods.y0, grid.periods.z0])[k]
+            period = qd.Vector([grid.periods.x, grid.periods.y, grid.periods.z])[k]
+            number = qd.Vector([grid.nx, grid.ny, grid.nz])[k]
+            share = (within_along(x[k], k, grid.periods) - lower) / period
+            c[k] = qd.min(qd.cast(qd.floor(share * number), qd.i32), number - 1)
+        else:
+            c[k] = qd.cast(qd.floor(x[k] / h), qd.i32)
     return cell_number(grid, c)
 
 
@@ -56,8 +64,15 @@ def remainder(number, size):
 @qd.func
 def cell_number(grid: Grid, c):
     """Number of the cell with the whole coordinates `c`."""
-    layer = remainder(c[1] + grid.ny * remainder(c[2], grid.nz), grid.ny * grid.nz)
-    return remainder(c[0] + grid.nx * layer, grid.cells)
+    number = 0
+    if qd.static(grid.periods.axes):
+        number = remainder(c[0], grid.nx) + grid.nx * (
+            remainder(c[1], grid.ny) + grid.ny * remainder(c[2], grid.nz)
+        )
+    else:
+        layer = remainder(c[1] + grid.ny * remainder(c[2], grid.nz), grid.ny * grid.nz)
+        number = remainder(c[0] + grid.nx * layer, grid.cells)
+    return number
 
 
 @qd.kernel(fastcache=True)
@@ -112,9 +127,48 @@ def row_offset(grid: Grid, row, dim: qd.template()):
 
 
 @qd.func
+def first_around(grid: Grid, cell, row, dim: qd.template()):
+    """Number of the first of the cells of a `row` around a cell: the one before it, or before one of its neighbours."""
+    low = 0
+    if qd.static(grid.periods.axes):
+        layer = cell // grid.nx
+        y = remainder(layer % grid.ny + row % 3 - 1, grid.ny)
+        z = layer // grid.ny
+        if qd.static(dim == 3):
+            z = remainder(z + row // 3 - 1, grid.nz)
+        low = remainder(cell % grid.nx - 1, grid.nx) + grid.nx * (y + grid.ny * z)
+    else:
+        low = remainder(cell + row_offset(grid, row, dim) - 1, grid.cells)
+    return low
+
+
+@qd.func
+def first_of_ring(grid: Grid, low):
+    """Number of the cell at which a row from number `low` on goes on behind the last one."""
+    first = 0
+    if qd.static(grid.periods.axes):
+        first = low - low % grid.nx
+    return first
+
+
+@qd.func
 def beyond_last(grid: Grid, low, cells):
     """How many of so many cells from number `low` on are beyond the last cell: the row goes on at the first one."""
-    return qd.max(low + cells - grid.cells, 0)
+    beyond = 0
+    if qd.static(grid.periods.axes):
+        beyond = qd.max(low % grid.nx + cells - grid.nx, 0)
+    else:
+        beyond = qd.max(low + cells - grid.cells, 0)
+    return beyond
+
+
+@qd.func
+def goes_on(grid: Grid, cell, first, cells):
+    """Whether a run of so many `cells`, with one on each side, from the cell `first` on goes on to a `cell`."""
+    follows = cell - first <= qd.min(cells, grid.nx - 3)
+    if qd.static(grid.periods.axes):
+        follows = follows and cell // grid.nx == first // grid.nx
+    return follows
 
 
 @qd.func
@@ -123,7 +177,8 @@ def piece_of_row(grid: Grid, low, cells, piece):
     over = beyond_last(grid, low, cells)
     span = qd.Vector([grid.start[low], grid.start[low + cells - over]])
     if piece == 1:
-        span = qd.Vector([0, grid.start[over]])
+        first = first_of_ring(grid, low)
+        span = qd.Vector([grid.start[first], grid.start[first + over]])
     return span
 
 
@@ -142,21 +197,21 @@ def list_group(group, particles: Particles, grid: Grid, h2, count):
         low_cell = grid.cell[grid.order[begin_run]]
         cells = 3
         end_run = begin_run + 1
-        while end_run < last and grid.cell[grid.order[end_run]] - low_cell <= qd.min(cells, grid.nx - 3):
+        while end_run < last and goes_on(grid, grid.cell[grid.order[end_run]], low_cell, cells):
             cells = grid.cell[grid.order[end_run]] - low_cell + 3
             end_run += 1
         run = places_of(particles, first, begin_run, end_run)
         earlier = places_of(particles, first, first, begin_run)
         for row in range(qd.static(9 if dim == 3 else 3)):
-            low = remainder(low_cell + row_offset(grid, row, dim) - 1, grid.cells)
+            low = first_around(grid, low_cell, row, dim)
             for piece in range(1 + qd.min(beyond_last(grid, low, cells), 1)):
                 span = piece_of_row(grid, low, cells, piece)
                 begin, end = span[0], span[1]
                 while begin < end:
                     length = qd.min(end - begin, block)
-                    hits = near_bits(particles, run, begin, length, h2, grid.lanes > 1)
+                    hits = near_bits(particles, run, begin, length, h2, grid, grid.lanes > 1)
                     if begin_run > first:
-                        hits &= ~near_bits(particles, earlier, begin, length, h2, grid.lanes > 1)
+                        hits &= ~near_bits(particles, earlier, begin, length, h2, grid, grid.lanes > 1)
                     while hits != qd.u32(0):
                         grid.list[group * room + qd.min(n, room - 1)] = begin + qd.math.ffs(hits) - 1
                         hits &= hits - qd.u32(1)
@@ -201,7 +256,7 @@ def places_of(particles: Particles, first, begin, end):
 
 
 @qd.func
-def near_bits(particles: Particles, places: qd.template(), begin, length, h2, whole: qd.template()):
+def near_bits(particles: Particles, places: qd.template(), begin, length, h2, grid: Grid, whole: qd.template()):
     """Bits of the particles from `begin` on, at most a block, that are within the root of `h2` of any of `places`.
 
     Vectors want a `whole` block, whose number of turns the compiler knows: the bits of what is too many are cut off.
@@ -213,7 +268,7 @@ def near_bits(particles: Particles, places: qd.template(), begin, length, h2, wh
         for column in qd.static(range(places.m)):
             square = 0.0
             for axis in qd.static(range(places.n)):
-                square += (p[axis] - places[axis, column]) ** 2
+                square += nearest_along(p[axis] - places[axis, column], axis, grid.periods) ** 2
             nearest = qd.min(nearest, square)
         hits |= qd.cast(nearest < h2, qd.u32) << qd.cast(k, qd.u32)
     return hits & (qd.u32(0xFFFFFFFF) >> qd.cast(32 - length, qd.u32))
@@ -221,19 +276,21 @@ def near_bits(particles: Particles, places: qd.template(), begin, length, h2, wh
 
 @qd.func
 def for_each_row_around(sums: qd.template(), visit: qd.template(), point, particles: Particles, grid: Grid, h):
-    """Call ``visit(sums, point, begin, end, particles, h)`` for every row of particles in the cells around `point`.
+    """Call ``visit(sums, point, begin, end, particles, grid, h)`` for every row of particles in cells around `point`.
 
     The particles of a row are those from `begin` to `end` - 1; some of them are farther away than h.
     """
     cell = cell_of(grid, point, h)
     for row in range(qd.static(9 if point.n == 3 else 3)):
-        low = remainder(cell + row_offset(grid, row, point.n) - 1, grid.cells)
+        low = first_around(grid, cell, row, point.n)
         for piece in range(1 + qd.min(beyond_last(grid, low, 3), 1)):
             span = piece_of_row(grid, low, 3, piece)
-            visit(sums, point, span[0], span[1], particles, h)
+            visit(sums, point, span[0], span[1], particles, grid, h)
 
 
-def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, room: int) -> Grid:
+def new_grid(
+    dim: int, capacity: int, size: tuple[float, ...] | None, h: float, room: int, periods: Periods = NONE
+) -> Grid:  # fmt: skip
     """Allocate a grid for `capacity` particles.
 
     `size` [m] is that of the tank, or None in the open. The number of cells follows the tank as long as that is not
@@ -247,6 +304,9 @@ def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, 
     else:
         # One layer of cells more on each side, for particles on a wall.
         cells[:dim] = [min(max(3, math.ceil(edge / h) + 2), 2**20) for edge in size]
+        # Along an axis that repeats they divide the tank, and none is shorter than the support.
+        rings = [axis for axis in range(dim) if periods.axes >> axis & 1]
+        cells[rings] = [min(max(3, math.floor(size[axis] / h * (1.0 - 1e-6))), 2**20) for axis in rings]
     while cells.prod() > max(limit, 27):
         cells[int(np.argmax(cells))] = max(3, cells.max() // 2)
     total = int(cells.prod())
@@ -257,6 +317,7 @@ def new_grid(dim: int, capacity: int, size: tuple[float, ...] | None, h: float, 
         parts=PARTS * max(threads(), 1),
         nowhere=capacity,
         nx=int(cells[0]), ny=int(cells[1]), nz=int(cells[2]), cells=total,
+        periods=periods,
     )  # fmt: skip
 
 

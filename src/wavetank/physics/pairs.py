@@ -22,7 +22,7 @@ import numpy as np
 
 from wavetank.device.compiler import download, qd
 from wavetank.device.state import Coefficients, Grid, Particles, integers
-from wavetank.physics.predicted_positions import predicted
+from wavetank.physics.predicted_positions import apart
 from wavetank.physics.teams import end_of, end_team, first_team, group_of, place_in_group, turns
 
 
@@ -69,7 +69,7 @@ def keep_pairs(
         for lane in range(lanes):
             for k in qd.static(range(4)):
                 j = grid.list[n + k]
-                r = predicted(particles, first + lane) - predicted(particles, j)
+                r = apart(particles, first + lane, j, grid)
                 found[k, lane] = strength(r.norm_sqr(), column(own, lane), _row(data, j), c)
         for k in qd.static(range(4)):
             for lane in range(lanes):
@@ -97,7 +97,7 @@ def _add(
             for k in qd.static(range(pace)):
                 n = begin + pace * turn + k
                 j = grid.list[n]
-                r = predicted(particles, first + lane) - predicted(particles, j)
+                r = apart(particles, first + lane, j, grid)
                 part = qd.Vector([0.0] * size)
                 if qd.static(is_kept):
                     given = kept[_place(n, first, lanes) + lane]

@@ -75,8 +75,7 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         is_smoothed=params.viscosity > 0.0 or params.calming > 0.0,
         is_central=not (world.levels or kinds.mixed),
         on_grid=on_grid,
-        # Else bumps of an interface have no weight, and water does not follow a body that rises: docs/notebook/calm.md.
-        balanced=on_grid and not (kinds.mixed or world.pieces),
+        balanced=on_grid and not world.pieces,
         # What thick fluids carry on has been shortened to their share already.
         carried=carried(dt, params.frame_time) if on_grid else float(thick),
     )
@@ -114,7 +113,9 @@ def steps_in(
     the bottom of the `box` from one corner to another [m]. Surface tension needs steps of its own.
     """
     on_grid, kinds = has_grid_pressure(world, params), blend(world.materials, params)
-    depth = 0.0 if on_grid else pool_depth(world.particles, world.count, params.gravity, *box)
+    repeats = world.grid.periods.axes  # what slides along an axis without an end rests on nothing there
+    across = tuple(0.0 if repeats >> axis & 1 else g for axis, g in enumerate(params.gravity))
+    depth = 0.0 if on_grid else pool_depth(world.particles, world.count, across, *box)
     carried_on = carried_share(kinds, params) if carries_on(world, kinds, params) else 0.0
     needed = steps_needed(params, duration, speed, depth, on_grid=on_grid, forced=forced, carried=carried_on)
     if world.pieces:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import download, qd, upload
+from wavetank.device.periods import NONE, Periods, nearest_image
 from wavetank.device.state import LASTING, Grid, Particles, integers, new_particles, vectors, with_viscosity
 from wavetank.foundation.errors import WavetankError
 from wavetank.physics.neighbors import copy_particle
@@ -30,9 +31,20 @@ class Capsule:
     start: vec3  # m
     end: vec3  # m
     radius: qd.f32  # m
+    periods: Periods
 
 
-def capsule_of(start: Any, end: Any, radius: Any) -> Capsule:
+@dataclasses.dataclass(frozen=True)
+class Clearance:
+    """How far free places are from what is there."""
+
+    gap: qd.f32  # m, from particles
+    wall: qd.f32  # m, from solids
+    first: qd.i32 = 0  # solids before this number do not count
+    periods: Periods = NONE  # of the world
+
+
+def capsule_of(start: Any, end: Any, radius: Any, periods: Periods = NONE) -> Capsule:
     """Return the capsule around the segment between two points, [3] or in a plane [2]; raises `WavetankError`."""
     points = []
     for name, point in (("start", start), ("end", end)):
@@ -45,15 +57,18 @@ def capsule_of(start: Any, end: Any, radius: Any) -> Capsule:
         points.append(np.append(place, np.float32(0.0))[:3])
     if not (isinstance(radius, int | float | np.number) and 0.0 <= radius < np.inf):
         raise WavetankError(f"radius = {radius!r} is not allowed; it must be a finite number from 0 on [m].")
-    return Capsule(start=points[0], end=points[1], radius=float(radius))
+    return Capsule(start=points[0], end=points[1], radius=float(radius), periods=periods)
 
 
 @qd.func
 def is_inside(capsule: Capsule, point):
-    """Say whether `point` is in the capsule."""
+    """Say whether `point`, or its image that is nearest to the capsule's middle, is in the capsule."""
     way = capsule.end - capsule.start
-    share = qd.min(qd.max((point - capsule.start).dot(way) / qd.max(way.norm_sqr(), 1e-20), 0.0), 1.0)
-    return (point - capsule.start - share * way).norm_sqr() < capsule.radius * capsule.radius
+    from_start = point - capsule.start
+    if qd.static(capsule.periods.axes):
+        from_start = nearest_image(from_start - 0.5 * way, capsule.periods) + 0.5 * way
+    share = qd.min(qd.max(from_start.dot(way) / qd.max(way.norm_sqr(), 1e-20), 0.0), 1.0)
+    return (from_start - share * way).norm_sqr() < capsule.radius * capsule.radius
 
 
 @qd.kernel(fastcache=True)
@@ -164,28 +179,28 @@ def clear_forces(particles: Particles, count: qd.i32):
 
 @qd.kernel(fastcache=True)
 def find_taken(
-    taken: qd.types.ndarray(), places: qd.types.ndarray(), particles: Particles, solids: SolidSet, middle: vec3,
-    reach: qd.f32, gap: qd.f32, wall: qd.f32, count: qd.i32, number: qd.i32, first: qd.i32,
+    taken: qd.types.ndarray(), places: qd.types.ndarray(), particles: Particles, solids: SolidSet, free: Clearance,
+    middle: vec3, reach: qd.f32, count: qd.i32, number: qd.i32,
 ):  # fmt: skip
-    """Mark places, all within `reach` of `middle`, nearer than `gap` to a particle or `wall` to a solid."""
+    """Mark places that are not `free`; all of them are within `reach` of `middle`."""
     for k in range(number):
         taken[k] = 0
-        for solid in range(first, solids.count):
-            if signed_distance(solids, solid, lift(places[k])).w < wall:
+        for solid in range(free.first, solids.count):
+            if signed_distance(solids, solid, lift(places[k])).w < free.wall:
                 taken[k] = 1
     for i in range(count):
-        if (lift(particles.x[i]) - middle).norm() < reach + gap:
+        if nearest_image(lift(particles.x[i]) - middle, free.periods).norm() < reach + free.gap:
             for k in range(number):
-                if (particles.x[i] - places[k]).norm() < gap:
+                if nearest_image(particles.x[i] - places[k], free.periods).norm() < free.gap:
                     taken[k] = 1
 
 
-def inside_capsule(particles: Particles, count: int, start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:
+def inside_capsule(particles: Particles, count: int, capsule: Capsule) -> np.ndarray:
     """Say for every particle, in device order, whether it is inside, bool [count]."""
     if not count:
         return np.zeros(0, bool)
     marks = integers(count)
-    mark_particles(marks, particles, capsule_of(start, end, radius), count)
+    mark_particles(marks, particles, capsule, count)
     result: np.ndarray = download(marks)[:count] == 1
     return result
 
@@ -201,27 +216,12 @@ def inside_box(particles: Particles, marks: Any, lower: np.ndarray, upper: np.nd
     return result
 
 
-def paint_capsule(
-    particles: Particles, count: int, start: np.ndarray, end: np.ndarray, radius: float, dye: int
-) -> None:
-    """Dye the particles inside."""
-    dye_particles(particles, capsule_of(start, end, radius), dye, count)
-
-
-def freeze_capsule(
-    particles: Particles, count: int, start: np.ndarray, end: np.ndarray, radius: float, frozen: int
-) -> int:
-    """Turn the particles inside to ice (1) or water (0); return how many are ice in all."""
-    return int(freeze_particles(particles, capsule_of(start, end, radius), frozen, count))
 
 
 def free_places(
-    places: np.ndarray, particles: Particles, solids: SolidSet, count: int, gap: float, wall: float, first: int = 0
-) -> np.ndarray:
-    """Say which of the places [n, dim] are no nearer than `gap` [m] to particles and `wall` to solids, bool [n].
-
-    Solids before number `first` do not count.
-    """
+    places: np.ndarray, particles: Particles, solids: SolidSet, count: int, clearance: Clearance
+) -> np.ndarray:  # fmt: skip
+    """Say which of the places [n, dim] have that `clearance`, bool [n]."""
     if not len(places):
         return np.zeros(0, bool)
     device, taken = vectors(places.shape[1], len(places)), integers(len(places))
@@ -229,7 +229,7 @@ def free_places(
     middle = np.zeros(3, np.float32)
     middle[: places.shape[1]] = places.mean(axis=0)
     reach = float(np.linalg.norm(places - places.mean(axis=0), axis=1).max())
-    find_taken(taken, device, particles, solids, middle, reach, gap, wall, count, len(places), first)
+    find_taken(taken, device, particles, solids, clearance, middle, reach, count, len(places))
     result: np.ndarray = download(taken)[: len(places)] == 0
     return result
 

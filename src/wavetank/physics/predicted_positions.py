@@ -6,7 +6,8 @@ processor that computes eight neighbours at a time reads plain numbers faster th
 """
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import Particles
+from wavetank.device.periods import nearest_image
+from wavetank.device.state import Grid, Particles
 
 
 @qd.func
@@ -18,6 +19,12 @@ def predicted(particles: Particles, i):
     if qd.static(p.n == 3):
         p[2] = particles.pz[i]
     return p
+
+
+@qd.func
+def apart(particles: Particles, i, j, grid: Grid):
+    """Vector r = p_i - p_j [m] from particle `j` to `i`, of their nearest images."""
+    return nearest_image(predicted(particles, i) - predicted(particles, j), grid.periods)
 
 
 @qd.func

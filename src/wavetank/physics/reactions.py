@@ -13,7 +13,7 @@ can press on it allows (`simulation/bodies.py`).
 """
 
 from wavetank.device.compiler import qd
-from wavetank.solids.distance import SolidSet, parts
+from wavetank.solids.distance import SolidSet, image_near, parts
 
 
 @qd.func
@@ -40,7 +40,7 @@ OF_GRID, IMMERSION, RUBBING = (number.fn() for number in (of_grid, immersion, ru
 @qd.func
 def add_to_body(solids: SolidSet, k, first, at, push):
     """Add a push [m] and its turn about the centre of mass, over the body's reach [m], to the sums from `first` on."""
-    turn = (at - solids.center[k]).cross(push) / solids.reach[k]
+    turn = (image_near(solids, k, at) - solids.center[k]).cross(push) / solids.reach[k]
     for axis in qd.static(range(3)):
         at_axis = parts() * k + first + axis
         qd.atomic_add(solids.reaction[at_axis], qd.cast(qd.round(solids.unit[k] * push[axis]), qd.i32))

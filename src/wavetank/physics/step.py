@@ -22,7 +22,7 @@ from wavetank.physics.density_constraint import (
 from wavetank.physics.dynamic_viscosity.implicit_viscosity import carry_on, solve_viscosity
 from wavetank.physics.friction import apply_friction
 from wavetank.physics.grid_pressure.correction import correct_pressure
-from wavetank.physics.integrate import predict, update_velocities
+from wavetank.physics.integrate import bring_within, predict, update_velocities
 from wavetank.physics.near_solids import FARTHEST, hand_over_pushes, look_again, look_at_solids
 from wavetank.physics.neighbors import find_neighbors, sort_particles
 from wavetank.physics.plan import Plan, plan_step
@@ -83,6 +83,8 @@ def step(
         smooth_and_confine(world, plan, c)  # 22
     if world.frozen:
         stop_frozen(world.particles, world.count)
+    if world.grid.periods.axes:
+        bring_within(world.particles, world.grid.periods, world.count)
     return True
 
 

@@ -7,8 +7,11 @@ Together with `model.FARTHEST` and the bounds of the forces these keep every pro
 import math
 from typing import Any
 
+from wavetank.solids.seams import check_seams
+
 FINEST, COARSEST = 1e-7, 1e4  # m, of the spacing
 STRONGEST = 1e6  # m/s^2, of gravity
+LEAST_SUPPORTS = 4  # of a tank along an axis that is periodic
 #: how many of each there may be
 MOST = {
     "solids": 2000, "fluids": 2000, "emitters": 200, "drains": 200, "joints": 2000, "forces": 100, "materials": 100,
@@ -40,6 +43,32 @@ def check_bodies(solids: Any, tank: Any, goal: Any) -> None:
                 f"goal.aims[{number}].body = {aim.body!r} is no body of the scene; they are: "
                 f"{', '.join(bodies) or 'none'}."
             )
+
+
+def check_periodic(tank: Any, spacing: float, support: float, gravity: tuple[float, ...], solids: Any) -> None:
+    """Raise `ValueError` where a tank that repeats is too short, falls for ever, or has a solid at its seam."""
+    strongest = max(map(abs, gravity), default=0.0)
+    for axis in tank.rings if tank else ():
+        name, length, least = "xyz"[axis], tank.size[axis], LEAST_SUPPORTS * support * spacing
+        if length < least:
+            raise ValueError(
+                f"tank.size = {tank.size} m is {length:g} m long along {name}, which is periodic; it must be at least "
+                f"{least:.4g} m, {LEAST_SUPPORTS} supports: make it longer or the spacing smaller."
+            )
+        if abs(gravity[axis]) == strongest > 0.0:
+            raise ValueError(
+                f"tank.periodic = {tank.periodic} with gravity = {tuple(gravity)}: water would fall along {name} for "
+                "ever; only axes across gravity can be periodic, all of them in a world without it."
+            )
+        bodies = [solid.name or f"solids[{number}]" for number, solid in enumerate(solids) if solid.is_body]
+        if bodies:
+            raise ValueError(
+                f"the tank is periodic along {name} and {bodies[0]!r} is a body, whose contacts do not reach over a "
+                "seam; give it no density and no mass, or the tank walls."
+            )
+    if tank and tank.rings:
+        lower, upper = tank.box()
+        check_seams(solids, lower, upper, tank.rings, spacing)
 
 
 def check_scales(spacing: float, gravity: tuple[float, ...]) -> None:

@@ -70,6 +70,12 @@ class Drain(Timed):
         own = [(name, value) for name, value in found if value is not None]
         return own + [(f"gauge.{name}", value) for name, value in self.gauge.vectors()] if self.gauge else own
 
+    def middle(self) -> np.ndarray | None:
+        """Return the middle [m], [dim], of what takes from a place; None for what takes from all others."""
+        if self.shape == "outside":
+            return None
+        return np.array(self.center, float) if self.center else 0.5 * (np.array(self.lower) + np.array(self.upper))
+
     def depths(self, x: np.ndarray, spacing: float) -> np.ndarray:
         """Say how far [m] the points [n, dim] are from where this takes them first; infinite where it takes none."""
         if self.shape in ("box", "outside"):

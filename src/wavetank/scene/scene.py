@@ -20,10 +20,10 @@ from wavetank.foundation.model import Model, is_length, sentence
 from wavetank.foundation.params import PRESETS, QUALITIES, Parameters
 from wavetank.foundation.replacing import replacing
 from wavetank.foundation.tracks import scaled
-from wavetank.scene.bounds import check_bodies, check_numbers, check_scales
+from wavetank.scene.bounds import check_bodies, check_numbers, check_periodic, check_scales
 from wavetank.scene.filled import AnyFluid, Filled
 from wavetank.scene.film import Film
-from wavetank.scene.fluids import Points
+from wavetank.scene.fluids import Block, Points
 from wavetank.scene.forces import AnyForce
 from wavetank.scene.goal import Goal
 from wavetank.scene.joints import AnyJoint, check_joints
@@ -83,6 +83,7 @@ class Scene(Timetable, Parameters):
                     f"{name} = {tuple(vector)} has {len(vector)} components in a {dim}-D world; give {dim}."
                 )
         check_scales(self.spacing, self.gravity)
+        check_periodic(self.tank, self.spacing, self.support, self.gravity, self.solids)
         self._check_count()
         self._check_inside()
         self._check_names()
@@ -239,8 +240,8 @@ class Scene(Timetable, Parameters):
         """Positions and velocities of each fluid."""
         parts = []
         for number, fluid in enumerate(self.fluids):
-            x = fluid.particles(self.spacing)
-            x = x.reshape(len(x), self.dim)  # none at all have no width of their own
+            x = fluid.particles(self.spacing).reshape(-1, self.dim)  # none at all have no width of their own
+            x = self.tank.spread(x, self.spacing) if self.tank and isinstance(fluid, Block) else x
             v = np.zeros_like(x) if fluid.velocity is None else np.tile(np.array(fluid.velocity, float), (len(x), 1))
             if isinstance(fluid, Points):
                 v = v if fluid.velocities is None else fluid.velocities.reshape(x.shape)

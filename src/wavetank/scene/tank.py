@@ -1,10 +1,11 @@
 """The tank: a box with walls, which holds the water of a scene."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from wavetank.device.periods import Periods, periods_of, places_within
 from wavetank.foundation.model import Edges, Place
 from wavetank.scene.schedule import Tilted
 from wavetank.solids.shapes import HalfSpace
@@ -16,12 +17,14 @@ _OTHER_NAMES = {"bottom": "-y", "top": "+y"}
 class Tank(Tilted):
     """The container: its inner size [m] and its lower corner, the origin unless told. Two numbers make a 2-D world.
 
-    What crosses an open side is taken out of the world; to the water inside there is air beyond it.
+    What crosses an open side is taken out of the world; to the water inside there is air beyond it. What crosses one
+    side of an axis that is periodic comes in at the other: there is no wall, and the water goes on.
     """
 
     size: Edges
     lower: Place | None = None
     open: list[Literal["-x", "+x", "-y", "+y", "-z", "+z", "bottom", "top"]] = []  # sides without a wall: an outflow
+    periodic: list[Literal["x", "y", "z"]] = []  # axes along which the world repeats
 
     @model_validator(mode="after")
     def _fits(self) -> "Tank":
@@ -32,7 +35,57 @@ class Tank(Tilted):
             )
         if len(self.size) == 2 and any(side.endswith("z") for side in self.open):
             raise ValueError(f"tank.open = {self.open} names a side along z, which a 2-D world does not have.")
+        self._check_periodic()
         return self
+
+    def _check_periodic(self) -> None:
+        if len(self.size) == 2 and "z" in self.periodic:
+            raise ValueError("tank.periodic names the axis z, which a 2-D world does not have.")
+        if len({*self.periodic}) < len(self.periodic):
+            raise ValueError(f"tank.periodic = {self.periodic} names an axis twice.")
+        for axis in self.periodic:
+            if any(self.is_open("xyz".index(axis), side) for side in (0, 1)):
+                raise ValueError(
+                    f"tank.open = {self.open} leaves out a wall along {axis}, and tank.periodic = {self.periodic} says "
+                    "that there is none: the water goes on at the other side; take the axis out of one of them."
+                )
+
+    @model_serializer(mode="wrap")
+    def _as_it_was(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out `periodic` where nothing is, so that digests of other worlds are what they were."""
+        values: dict[str, Any] = plain(self)
+        if not self.periodic:
+            values.pop("periodic", None)
+        return values
+
+    @property
+    def rings(self) -> list[int]:
+        """The axes along which the world repeats."""
+        return sorted("xyz".index(axis) for axis in self.periodic)
+
+    def periods(self) -> Periods:
+        """Return how the world repeats, for the device."""
+        return periods_of(self.rings, self.box()[0], self.size)
+
+    def within(self, places: np.ndarray) -> np.ndarray:
+        """Return the images of `places` [m], [n, dim], in the tank along the axes that are periodic."""
+        return places_within(places, *self.box(), self.rings)
+
+    def beside(self, places: np.ndarray, point: np.ndarray) -> np.ndarray:
+        """Return the images of `places` [m], [n, dim], that are nearest to a point, along axes that are periodic."""
+        half = 0.5 * np.array(self.size, float)
+        return places_within(places, point - half, point + half, self.rings)
+
+    def spread(self, lattice: np.ndarray, spacing: float) -> np.ndarray:
+        """Return a block's `lattice` [n, dim] [m] with even rows across the seam, where it reaches from end to end."""
+        x, (lower, upper) = lattice, self.box()
+        for axis in self.rings if len(x) else ():
+            first, last, length = x[:, axis].min(), x[:, axis].max(), upper[axis] - lower[axis]
+            width = last - first + spacing  # of whole rows
+            if abs(first - lower[axis] - 0.5 * spacing) < 1e-6 * spacing and length - width < spacing:
+                x = x.copy()
+                x[:, axis] = lower[axis] + (x[:, axis] - lower[axis]) * (length / width)
+        return x
 
     def is_open(self, axis: int, side: int) -> bool:
         """Say whether there is no wall at the lower (0) or upper (1) side along an axis."""
@@ -55,12 +108,12 @@ class Tank(Tilted):
         return np.where(low < lower, lower, -1e9), np.where(high > upper, upper, 1e9)
 
     def walls(self) -> list[Solid]:
-        """Return the walls as half-spaces, lower and upper for each axis, but for the sides that are open."""
+        """Return the walls as half-spaces, lower and upper for each axis, but where there are none."""
         result: list[Solid] = []
         for axis, name in enumerate("xyz"[: len(self.size)]):
             normal = np.eye(len(self.size))[axis]
             for side, corner in enumerate(self.box()):
-                if not self.is_open(axis, side):
+                if not self.is_open(axis, side) and axis not in self.rings:
                     title, inward = f"tank {name} {('lower', 'upper')[side]}", (1.0 - 2.0 * side) * normal
                     result.append(HalfSpace(name=title, point=tuple(corner * normal), normal=tuple(inward)))
         return result

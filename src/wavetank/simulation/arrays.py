@@ -42,6 +42,7 @@ def check_newcomers(scene: Scene, positions: Any, velocities: Any, dyes: Any, ma
         )
     if not (bool((np.abs(x) <= FARTHEST).all()) and bool((np.abs(v) <= FARTHEST).all())):
         raise WavetankError(f"positions and velocities of new particles must be finite numbers within {FARTHEST:g}.")
+    x = scene.tank.within(x) if scene.tank else x
     check_crowd("positions", x, scene.spacing)
     return Newcomers(x, v, dye, material)
 

@@ -65,6 +65,7 @@ class Contents:
     @positions.setter
     def positions(self, values: Any) -> None:
         x = check_rows("positions", values, (self.count, self.scene.dim))
+        x = self.scene.tank.within(x) if self.scene.tank else x
         check_crowd("positions", x, self.scene.spacing)
         if not np.array_equal(x, self.positions):
             population.clear_forces(self.world.particles, self.count)  # what pressed them was elsewhere

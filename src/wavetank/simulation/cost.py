@@ -60,8 +60,9 @@ def cost_of(scene: Scene, capacity: int | None = None) -> Cost:
     own = 2 * (4 * dim + 5) + SCRATCH + 2 + 1 + -(-list_room(dim, scene.support) // 8)
     cells = 2 * max(4 * particles, 4096)
     host = 6 * dim if capacity is None else 2 * dim  # places in double precision while they are chosen
+    h = scene.support * scene.spacing
     nodes = (
-        nodes_of(scene.tank.beyond(OPEN_CELLS * scene.support * scene.spacing), scene.support * scene.spacing)
+        nodes_of(scene.tank.beyond(OPEN_CELLS * h), h, scene.tank.periods().axes)
         if scene.tank
         else 0
     )

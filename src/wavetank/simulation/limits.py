@@ -54,13 +54,16 @@ def find_speed_limit(
 ) -> float:
     """Return the largest speed [m/s] that gravity, the start, solids and forces can have given to a particle.
 
-    Gravity gives that of a free fall through the tank. Without one a fall has no end, and neither has the limit. The
+    Gravity gives that of a free fall through the tank. Without one, and along
+    an axis that is periodic, a fall has no end, and neither has the limit. The
     ledger keeps the fastest of solids and forces.
     """
     if scene.tank is None:
         return math.inf
     ledger.fastest_solid = max(ledger.fastest_solid, solid_speed(scene, solids, duration))
     ledger.fastest_force = max(ledger.fastest_force, sum(force.largest_speed() for force in forces))
+    if any(scene.gravity[axis] for axis in scene.tank.rings):
+        return math.inf  # a slope that has no end
     start = max([ledger.fastest_start, *(_start_speed(solid) for solid in scene.solids)])
     fall = sum(2.0 * abs(g) * edge for g, edge in zip(scene.gravity, scene.tank.size, strict=True))
     ledger.steepest = max(ledger.steepest, 0.5 * fall)  # what gravity was a moment ago is still in the water

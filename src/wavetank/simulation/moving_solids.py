@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import upload
+from wavetank.device.periods import NONE, Periods
 from wavetank.device.state import Particles
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import interpolate, matrix_of, turned, unit_quaternion
-from wavetank.physics.population import free_places
+from wavetank.physics.population import Clearance, free_places
 from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene
 from wavetank.simulation.courses import Courses
 from wavetank.solids import shapes
 from wavetank.solids.motion import Pose
+from wavetank.solids.seams import seen_periods
 from wavetank.solids.solid import Solid
 
 SMALLEST = 0.02  # size at which a growing solid starts, of its full size
@@ -28,9 +30,10 @@ class MovingSolids:
     """Solids by name; the first `tank_count` are the walls of the tank."""
 
     def __init__(
-        self, walls: Sequence[Solid], others: Sequence[Solid], friction: float, spacing: float, start: float = 0.0
-    ) -> None:
-        self.tank_count, self.friction, self.spacing = len(walls), friction, spacing
+        self, walls: Sequence[Solid], others: Sequence[Solid], friction: float, spacing: float, start: float = 0.0,
+        periods: Periods = NONE,
+    ) -> None:  # fmt: skip
+        self.tank_count, self.friction, self.spacing, self.periods = len(walls), friction, spacing, periods
         self.members = [*walls, *others]
         self.names: list[str] = []
         for solid in self.members:
@@ -55,7 +58,8 @@ class MovingSolids:
         """
         chosen = self.members if members is None else members
         reaches = [solid.span() for solid in chosen]
-        self.device = shapes.build(chosen, self.tank_count, self.friction, self.spacing)
+        repeats = self.periods.axes, seen_periods(chosen, self.periods, self.spacing)
+        self.device = shapes.build(chosen, self.tank_count, self.friction, self.spacing, repeats)
         self.members, self.reaches = chosen, reaches
         self.has_friction = self.friction > 0.0 or any(solid.friction for solid in chosen)
         self.walls = [solid.program()[0] for solid in chosen[: self.tank_count]]
@@ -121,7 +125,8 @@ class MovingSolids:
         if not any(_touch(solid, *box) for solid in self.members[self.tank_count :] for box in boxes):
             return np.ones(len(places), bool)
         wall = scene.wall_gap * scene.spacing
-        free = free_places(places, particles, self.device, 0, 0.0, wall, self.tank_count) | scene.has_own_place()
+        clearance = Clearance(0.0, wall, self.tank_count)
+        free = free_places(places, particles, self.device, 0, clearance) | scene.has_own_place()
         if not free.any():
             raise WavetankError("the fluids of this scene are inside of its solids; move them, or make them larger.")
         return free
@@ -284,6 +289,12 @@ class MovingSolids:
         while not name or name in self.names:
             name, number = f"solid {number}", number + 1
         return name
+
+
+def solids_of(scene: Scene, walls: Sequence[Solid], others: Sequence[Solid]) -> MovingSolids:
+    """Return these solids, the walls of the tank first, in the world of `scene`."""
+    periods = scene.tank.periods() if scene.tank else NONE
+    return MovingSolids(walls, others, scene.friction, scene.spacing, scene.start_time, periods)
 
 
 def _equal(a: Pose, b: Pose) -> bool:

@@ -1,6 +1,7 @@
 """An empty world for a scene: all its arrays, allocated once."""
 
 from wavetank.device import compiler
+from wavetank.device.periods import NONE
 from wavetank.device.state import Fluids, Walls, new_particles, new_scratch, vectors
 from wavetank.physics.bodies import Pieces
 from wavetank.physics.grid_pressure.coarse_grid import OPEN_CELLS, new_levels
@@ -18,8 +19,9 @@ def new_world(scene: Scene, capacity: int, solids: MovingSolids, pieces: Pieces 
     walls = Walls(vectors(2, len(table)))
     compiler.upload(walls.table, table)
     size = scene.tank.size if scene.tank else None
+    periods = scene.tank.periods() if scene.tank else NONE
     return World(
-        grid=new_grid(dim, capacity, size, h, list_room(dim, scene.support)),  # first: it may be refused
+        grid=new_grid(dim, capacity, size, h, list_room(dim, scene.support), periods),  # first: it may be refused
         particles=new_particles(dim, capacity),
         spare=new_particles(dim, capacity),
         scratch=new_scratch(capacity),
@@ -29,6 +31,6 @@ def new_world(scene: Scene, capacity: int, solids: MovingSolids, pieces: Pieces 
         materials={},
         count=0,
         has_friction=solids.has_friction,
-        levels=new_levels(scene.tank.beyond(OPEN_CELLS * h), h) if scene.tank else [],
+        levels=new_levels(scene.tank.beyond(OPEN_CELLS * h), h, periods.axes) if scene.tank else [],
         pieces=pieces,
     )

@@ -10,7 +10,7 @@ from wavetank.device.state import MARGIN, integers, new_diffuse, scalars, vector
 from wavetank.scene.scene import Scene
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.instant import Instant
-from wavetank.simulation.moving_solids import MovingSolids
+from wavetank.simulation.moving_solids import MovingSolids, solids_of
 
 FOAM_ROWS = {"foam_positions": "x", "foam_velocities": "v", "foam_kinds": "kind", "foam_ages": "age",
              "foam_lives": "life", "foam_ids": "id"}  # fmt: skip
@@ -59,7 +59,7 @@ class Shown:
         if self._solids is None or names != self._names:
             walls = self.scene.tank.walls() if self.scene.tank else []
             others = [one.solid for one in instant.standing]
-            self._solids = MovingSolids(walls, others, self.scene.friction, self.scene.spacing, self.scene.start_time)
+            self._solids = solids_of(self.scene, walls, others)
             self._names = names
         solids = self._solids
         solids.targets.clear()

@@ -15,6 +15,7 @@ from wavetank.physics.foam.pool import pool_from, pool_rows
 from wavetank.physics.foam.update import load_kernels, update_foam
 from wavetank.physics.time_step import filled_share, whole
 from wavetank.scene.forces import Force
+from wavetank.scene.forces.images import with_images
 from wavetank.scene.scene import MAX_PARTICLES, Scene
 from wavetank.scene.schedule import changes_gravity, gravity_at
 from wavetank.simulation import limits
@@ -25,7 +26,7 @@ from wavetank.simulation.filling import fill
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.joints import Joints
 from wavetank.simulation.ledger import Ledger
-from wavetank.simulation.moving_solids import MovingSolids
+from wavetank.simulation.moving_solids import solids_of
 from wavetank.simulation.new_world import new_world
 from wavetank.simulation.sources import Sources, check_places
 from wavetank.simulation.states import States
@@ -49,7 +50,7 @@ class Simulation(States):
         check_cost(self.scene)
         start, scene = fill(self.scene, lambda scene: type(self)(scene, self.arch or "cpu")), self.scene
         positions, velocities = start.particles()
-        self.solids = MovingSolids(self._walls(), scene.solids, scene.friction, scene.spacing, scene.start_time)
+        self.solids = solids_of(scene, self._walls(), scene.solids)
         self.sources, self.notes = Sources(scene), []
         self.gravity_by_hand = None
         self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
@@ -143,7 +144,7 @@ class Simulation(States):
                 self.bodies.advance(scene.gravity, dt, shares[1], limit, start + dt + self.scene.start_time)
             self.world.solids_version = self.solids.move_to(*shares)
             if self.count:
-                for force in acting:
+                for force in with_images(acting, scene.tank):
                     force.apply(self.world.particles, self.count, dt, start)
                 self.bodies.step(self.world, scene, dt, limit, shares)
         self.solids.passing.clear()
@@ -298,22 +299,28 @@ class Simulation(States):
 
         Raises `WavetankError` for what is none.
         """
-        return self._keep(~population.inside_capsule(self.world.particles, self.count, start, end, radius))
+        capsule = self._capsule(start, end, radius)
+        return self._keep(~population.inside_capsule(self.world.particles, self.count, capsule))
 
     def free_places(self, places: np.ndarray, gap: float, wall: float) -> np.ndarray:
         """Say which `places` [n, dim] keep the distances `gap` [m] to all particles and `wall` to all solids."""
-        return population.free_places(places, self.world.particles, self.world.solids, self.count, gap, wall)
+        clearance = population.Clearance(gap, wall, periods=self.world.grid.periods)
+        return population.free_places(places, self.world.particles, self.world.solids, self.count, clearance)
+
+    def _capsule(self, start: Any, end: Any, radius: Any) -> population.Capsule:
+        return population.capsule_of(start, end, radius, self.world.grid.periods)
 
     def paint_inside(self, start: Any, end: Any, radius: float, dye: int) -> None:
         """Dye the particles in that capsule; 0 washes them."""
         if self.count:
-            population.paint_capsule(self.world.particles, self.count, start, end, radius, dye)
+            population.dye_particles(self.world.particles, self._capsule(start, end, radius), dye, self.count)
 
     def freeze_inside(self, start: Any, end: Any, radius: float, frozen: bool = True) -> None:
         """Turn the particles in that capsule to ice that keeps its place, or back to water."""
         if self.count:
-            self.world.frozen = population.freeze_capsule(
-                self.world.particles, self.count, start, end, radius, int(frozen)
+            capsule = self._capsule(start, end, radius)
+            self.world.frozen = int(
+                population.freeze_particles(self.world.particles, capsule, int(frozen), self.count)
             )
 
     def _keep(self, keep: np.ndarray) -> int:

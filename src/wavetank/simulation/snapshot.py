@@ -14,7 +14,7 @@ from wavetank.physics.foam.pool import pool_from, pool_rows
 from wavetank.physics.world import World
 from wavetank.scene.scene import Scene
 from wavetank.simulation.ledger import Ledger
-from wavetank.simulation.moving_solids import MovingSolids
+from wavetank.simulation.moving_solids import MovingSolids, solids_of
 from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
@@ -76,7 +76,7 @@ def take_snapshot(scene: Scene, world: World, solids: MovingSolids, ledger: Ledg
 
 def restore_solids(scene: Scene, walls: list[Solid], snapshot: Snapshot) -> MovingSolids:
     """Return the solids of an instant, where they were."""
-    solids = MovingSolids(walls, snapshot.solids, scene.friction, scene.spacing, scene.start_time)
+    solids = solids_of(scene, walls, snapshot.solids)
     solids.names, solids.poses = [*snapshot.names], [*snapshot.poses]
     solids.targets, solids.growing = {**snapshot.targets}, {**snapshot.growing}
     solids.courses.read(snapshot.courses)

@@ -246,6 +246,7 @@ def check_places(sim: Water) -> None:
                 f"larger, not much less than spacing = {scene.spacing:g} m, or the spacing smaller."
             )
         lower, upper = scene.tank.box() if scene.tank else (-np.inf, np.inf)
+        x = scene.tank.within(x) if scene.tank else x
         inside = np.all((x >= lower) & (x <= upper), axis=1)
         if not (sim.free_places(x, 0.0, scene.wall_gap * scene.spacing) & inside).any():
             raise WavetankError(
@@ -276,6 +277,9 @@ def take(sim: Water, drain: Drain, most: int | None = None) -> int:
         return sim.remove_inside(center, center, drain.radius)
     most = sim.count if most is None else most
     x = download(sim.world.particles.x)[: sim.count].astype(np.float64)
+    middle = drain.middle()
+    if sim.scene.tank and middle is not None:
+        x = sim.scene.tank.beside(x, middle)
     depth = drain.depths(x, sim.scene.spacing)
     chosen = np.flatnonzero(np.isfinite(depth))
     if not len(chosen) or most <= 0:

@@ -19,6 +19,7 @@ length. Beyond the grid no distance is overestimated: the nearest point of the g
 """
 
 import dataclasses
+from typing import Final
 
 from wavetank.device.compiler import qd
 
@@ -214,8 +215,10 @@ class SolidSet:
     reaction: qd.types.ndarray()  # i32 [13 solids]: what the water does to each, see `physics/reactions.py`
     grid: qd.types.ndarray()  # i32 vec4 [grids]: number of its first sample, numbers of nodes along x, y, z
     samples: qd.types.ndarray()  # f32: for each grid its cell edge, then the distances at its nodes, x fastest; m
+    period: qd.types.ndarray()  # vec3 [solids], m: of the world, as far as a solid is seen at its nearest image
     count: qd.i32
     tank_count: qd.i32  # the first so many are the walls of the tank, all of them half-spaces
+    repeats: Final[int]  # bit k is set where the world repeats along axis k
 
 
 @qd.func
@@ -314,6 +317,21 @@ def to_local(position, rotation, x):
 
 
 @qd.func
+def image_near(solids: SolidSet, k, x):
+    """The image of the world point `x` (vec3) that is nearest to solid `k`: it is where the solid sees it.
+
+    What moves on and on along an axis may be many lengths of the world away.
+    """
+    image = x
+    if qd.static(solids.repeats):
+        for axis in qd.static(range(3)):
+            if qd.static(solids.repeats >> axis & 1):
+                period = solids.period[k][axis]
+                image[axis] -= period * qd.round((x[axis] - solids.position[k][axis]) / period)
+    return image
+
+
+@qd.func
 def plane_distance(solids: SolidSet, k, x):
     """(gradient, distance) of wall `k` of the tank at the world point `x`, with the pose of the substep's end."""
     plane = solids.plane[k]
@@ -328,7 +346,7 @@ def signed_distance(solids: SolidSet, k, x):
         value = plane_distance(solids, k, x)
     else:
         q = solids.rotation[k]
-        own = local_distance(solids, k, to_local(solids.position[k], q, x))
+        own = local_distance(solids, k, to_local(solids.position[k], q, image_near(solids, k, x)))
         n = rotate(q, vec3(own.x, own.y, own.z))
         value = vec4(n.x, n.y, n.z, own.w)
     return value

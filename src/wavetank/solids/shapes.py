@@ -267,8 +267,13 @@ for _shape in SHAPES:
     register_model(_shape.model_fields["shape"].default, _shape)
 
 
-def build(solids: Sequence[Solid], tank_count: int, friction: float, spacing: float) -> SolidSet:
-    """Put `solids` on the device, for particles of that spacing [m]; the first `tank_count` are the tank's walls."""
+def build(
+    solids: Sequence[Solid], tank_count: int, friction: float, spacing: float, repeats: tuple[int, Any] = (0, ())
+) -> SolidSet:  # fmt: skip
+    """Put `solids` on the device, for particles of that spacing [m]; the first `tank_count` are the tank's walls.
+
+    `repeats`: bits of the axes along which the world repeats, and what `seams.seen_periods` says of the solids there.
+    """
     programs = [solid.program() for solid in solids]
     for solid, program in zip(solids, programs, strict=True):
         depth = deepest = 0
@@ -313,8 +318,10 @@ def build(solids: Sequence[Solid], tank_count: int, friction: float, spacing: fl
         reaction=array([], qd.i32, PARTS * count),
         grid=grid,
         samples=samples,
+        period=array(repeats[1], vec3, count),
         count=len(solids),
         tank_count=tank_count,
+        repeats=repeats[0],
     )
 
 

@@ -20,6 +20,7 @@ from wavetank.view.extent import Extent, extent_of
 from wavetank.view.film.samples import Watch
 from wavetank.view.film.tracer import Tracer
 from wavetank.view.glare import add_glare, excess_of
+from wavetank.view.images import Images
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
 from wavetank.view.look import fluid_optics, usual_depth
 from wavetank.view.optics.dyes import ICE, lay_ice
@@ -58,6 +59,7 @@ class Renderer:
         self._seen: Any = None  # i32 [capacity]: dyes or materials as they are seen where there is ice
         self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
         self._tracer: Tracer | None = None
+        self._images = Images()
 
     def render(
         self, frame: Frame, camera: Camera | None = None, *, timings: Timings = None, watch: Watch | None = None,
@@ -94,7 +96,7 @@ class Renderer:
     def shot(self, frame: Frame, camera: Camera | None = None, style: Style | None = None) -> Shot:
         """Return what the passes need to know of a picture."""
         style = style or Style()
-        frame = self._with_ice(frame, style)
+        frame = self._images.within(self._with_ice(frame, style))
         extent = extent_of(frame.scene)
         if camera is None:
             camera = Camera.framing_extent(extent, self.width / self.height).tilted(frame.scene, frame.time, ROOM)

@@ -62,7 +62,7 @@ VIEWS: dict[str, View] = {
         ),
         sunny=(
             thickness.draw_from_sun, surface.draw_from_sun, flatten.draw_from_sun, clip.draw_from_sun,
-            caustics.draw_from_sun,
+            caustics.draw_from_sun, foam.draw_from_sun,
         ),
         passes=(
             backdrop.draw, surface.draw, flatten.draw, thickness.draw, water.draw, below.draw,

@@ -56,8 +56,8 @@ class SunlitWater:
     """The surface of the water as the sun sees it, [texels, texels], on the device."""
 
     depth: qd.types.ndarray()  # i32: bits of the depth [m] at which the sun's rays meet the water
-    spare: qd.types.ndarray()  # i32: the same while it is being smoothed
-    caustic: qd.types.ndarray()  # i32: light that refraction brings or takes, in 1 / 4096 of the sun's
+    spare: qd.types.ndarray()  # i32: the same while it is being smoothed; then optical depth of foam in 1 / 4096
+    caustic: qd.types.ndarray()  # i32: light that refraction brings or takes, and foam keeps, in 1 / 4096 of the sun's
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

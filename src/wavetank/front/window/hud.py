@@ -84,21 +84,36 @@ def _forces(desk: Desk, box: Box) -> None:
     """Draw what the water does to bodies as arrows with their numbers, and the power of joints as numbers."""
     draw, em, (x, y, width, height) = imgui.get_window_draw_list(), imgui.get_font_size(), box
     draw.push_clip_rect(ImVec2(x, y), ImVec2(x + width, y + height), True)
+    numbers = []
     for region in desk.shown.regions:
         if "label" not in region:
             continue
-        color = FORCES[region["mark"]]
         points = [ImVec2(x + u * width, y + v * height) for u, v in region["outline"]]
         end = points[-1]
         if len(points) > 1:
-            _arrow(draw, points[0], end, ink(color), em)
+            _arrow(draw, points[0], end, ink(FORCES[region["mark"]]), em)
         size = imgui.calc_text_size(region["label"])
-        low = ImVec2(end.x + 0.6 * em, end.y - 0.5 * size.y - 2)
-        high = ImVec2(low.x + size.x + 10, low.y + size.y + 4)
-        draw.add_rect_filled(low, high, ink(color, 0.9), 5.0)
-        draw.add_text(ImVec2(low.x + 5, low.y + 2), ink("#ffffff"), region["label"])
-        desk.places[f"force.{region['mark']}"] = (low.x, low.y, high.x, high.y)
+        left, top = end.x + 0.6 * em, end.y - 0.5 * size.y - 2
+        numbers.append((region, (left, top, left + size.x + 10, top + size.y + 4)))
+    numbers.sort(key=lambda number: number[1][1])
+    for (region, _), place in zip(numbers, parted([place for _, place in numbers]), strict=True):
+        draw.add_rect_filled(ImVec2(*place[:2]), ImVec2(*place[2:]), ink(FORCES[region["mark"]], 0.9), 5.0)
+        draw.add_text(ImVec2(place[0] + 5, place[1] + 2), ink("#ffffff"), region["label"])
+        desk.places[f"force.{region['mark']}"] = place
     draw.pop_clip_rect()
+
+
+def parted(boxes: list[Box], gap: float = 2.0) -> list[Box]:
+    """Return boxes (left, top, right, bottom) [px], which come from above to below, each moved below those it met."""
+    placed: list[Box] = []
+    for left, top, right, bottom in boxes:
+        high = bottom - top
+        for other in sorted(placed, key=lambda box: box[1]):
+            beside = left >= other[2] + gap or other[0] >= right + gap
+            if not beside and top < other[3] + gap and other[1] < top + high + gap:
+                top = other[3] + gap
+        placed.append((left, top, right, top + high))
+    return placed
 
 
 def _arrow(draw: Any, start: ImVec2, end: ImVec2, color: int, em: float) -> None:

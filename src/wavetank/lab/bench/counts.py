@@ -21,7 +21,7 @@ from wavetank.simulation.simulation import Simulation
 
 
 @qd.func
-def add_length(sums: qd.template(), point, begin, end, particles: Particles, h):
+def add_length(sums: qd.template(), point, begin, end, particles: Particles, grid: Grid, h):
     """Count the particles of a row."""
     sums[0] += end - begin
 

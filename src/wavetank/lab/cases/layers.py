@@ -1,7 +1,8 @@
 """Two fluids at rest, the heavy one below: they stay where they are, at small and at large ratios of density.
 
 Reference: hydrostatics. The interface is where the lower fluid was filled to; no particle crosses it by more than two
-spacings. v_rms is weighted with mass, as the kinetic energy is.
+spacings. v_rms is weighted with mass, as the kinetic energy is. And the heavy one above, by a half: what rolls over
+(Rayleigh and Taylor's instability) ends in the same layers, of the least potential energy.
 """
 
 from typing import Any
@@ -16,19 +17,35 @@ from wavetank.simulation.simulation import Simulation
 LOWER, UPPER, WIDTH = 0.3, 0.6, 1.0  # m
 
 
-def scene(ratio: float, spacing: float) -> Scene:
-    """Return water under a fluid `ratio` times lighter, in a 2-D tank."""
+def scene(ratio: float, spacing: float, lower: str = "heavy", upper: str = "light") -> Scene:
+    """Return water under a fluid `ratio` times lighter, or the other way round, in a 2-D tank."""
     table = {
         "spacing": spacing,
         "tank": {"size": [WIDTH, 0.9]},
         "materials": [{"name": "heavy", "density": 1000.0}, {"name": "light", "density": 1000.0 / ratio}],
         "fluids": [
-            {"lower": [0, 0], "upper": [WIDTH, LOWER], "material": "heavy"},
-            {"lower": [0, LOWER], "upper": [WIDTH, UPPER], "material": "light"},
+            {"lower": [0, 0], "upper": [WIDTH, LOWER], "material": lower},
+            {"lower": [0, LOWER], "upper": [WIDTH, UPPER], "material": upper},
         ],
     }
     result: Scene = Scene.parse(table)
     return result
+
+
+def overturned(spacing: float, seconds: float, arch: str) -> list[Figure]:
+    """Let a fluid that is half as heavy again lie on the other one, and look at how they lie in the end."""
+    sim = Simulation(scene(1.5, spacing, "light", "heavy"), arch)
+    sim.advance(seconds)
+    frame = sim.frame()
+    y, heavy = frame.positions[:, 1].astype(float), frame.rest_densities > 999.0
+    interface = np.sort(y)[heavy.sum() - 1]
+    over = np.where(heavy, y - interface, interface - y) / spacing
+    wrong, mean = 100.0 * float(np.mean(over > 1.0)), float(2.0 * y[heavy].mean() / LOWER)
+    name, source = f"heavy above light, {seconds:g} s", "hydrostatics"
+    return [
+        Figure(f"{name}: share on the wrong side", wrong, "%", None, 0.1, "0", source),
+        Figure(f"{name}: lower layer, twice its mean height", mean, "", 0.975, 1.02, "1", source),
+    ]
 
 
 def run(quick: bool, arch: str) -> Outcome:
@@ -53,6 +70,7 @@ def run(quick: bool, arch: str) -> Outcome:
         ]
         series["time"], series[f"v_rms_{ratio:g}"] = times, rms
         last[name] = (x, heavy)
+    figures += overturned(0.05 if quick else 0.025, 30.0 if quick else 60.0, arch)
 
     def draw(plot: Any) -> None:
         panels = plot.subplots(1, 3)

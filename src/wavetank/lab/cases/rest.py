@@ -28,6 +28,7 @@ RESTLESS = {
     "weightless-drop-2d": "a drop under tension shivers",
     "dam-break-2d": "its waves keep 95 % a period",
     "mountain-lake": "films run down the valley",
+    "river": "runs downhill without an end",
 }
 DRIVEN = "a tap or a motion goes on"
 V_RMS, V_MAX, STILL, ROUGH = 0.001, 0.01, 0.02, 0.06  # m/s, m/s, m/s, d

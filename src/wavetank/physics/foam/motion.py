@@ -24,16 +24,17 @@ Where we differ, and why:
 """
 
 from wavetank.device.compiler import qd
+from wavetank.device.periods import nearest_image, within
 from wavetank.device.state import Air, Births, Coefficients, Diffuse, Grid, Particles, bubble, foam, spray
 from wavetank.device.sums import sum_up
 from wavetank.physics.boundary import bodies_in_reach, flattened, stopped
 from wavetank.physics.neighbors import for_each_row_around, near_bits, row_block
 from wavetank.physics.predicted_positions import predicted
-from wavetank.solids.distance import SolidSet, lift, signed_distance, vec2, vec3
+from wavetank.solids.distance import SolidSet, image_near, lift, signed_distance, vec2, vec3
 
 
 @qd.func
-def add_water(sums: qd.template(), point, begin, end, water: Particles, h):
+def add_water(sums: qd.template(), point, begin, end, water: Particles, grid: Grid, h):
     """Add the water particles of a row to (sum W, sum v W) with Poly6."""
     block = qd.static(row_block(point.n))
     place = qd.Matrix.zero(qd.f32, point.n, 1)
@@ -41,11 +42,12 @@ def add_water(sums: qd.template(), point, begin, end, water: Particles, h):
         place[k, 0] = point[k]
     first = begin
     while first < end:
-        hits = near_bits(water, place, first, qd.min(end - first, block), h * h, True)
+        hits = near_bits(water, place, first, qd.min(end - first, block), h * h, grid, True)
         while hits != qd.u32(0):
             j = first + qd.math.ffs(hits) - 1
             hits &= hits - qd.u32(1)
-            t = qd.max(1.0 - (point - predicted(water, j)).norm_sqr() / (h * h), 0.0)
+            r = nearest_image(point - predicted(water, j), grid.periods)
+            t = qd.max(1.0 - r.norm_sqr() / (h * h), 0.0)
             w = t * t * t
             sums[0] += w
             for k in qd.static(range(point.n)):
@@ -62,7 +64,7 @@ def surroundings(point, solids: SolidSet, h):
     """
     nearest, free = h, 1.0
     for k in range(solids.count):
-        if k < solids.tank_count or (point - solids.position[k]).norm() < solids.reach[k] + h:
+        if k < solids.tank_count or (image_near(solids, k, point) - solids.position[k]).norm() < solids.reach[k] + h:
             distance = signed_distance(solids, k, point).w
             if distance < h:
                 nearest = qd.min(nearest, distance)
@@ -136,7 +138,7 @@ def move(
         if (out - lift(target)).norm_sqr() > 0.0:
             target = flattened(out, x)
             later = (target - x) / a.dt
-        diffuse.x[i] = target
+        diffuse.x[i] = within(target, grid.periods)
         diffuse.v[i] = later
         diffuse.kind[i] = kind
         age = diffuse.age[i] + a.dt

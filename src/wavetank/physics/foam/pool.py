@@ -9,6 +9,7 @@ import dataclasses
 import numpy as np
 
 from wavetank.device.compiler import download, qd, upload
+from wavetank.device.periods import within
 from wavetank.device.state import (
     MARGIN,
     Air,
@@ -110,7 +111,7 @@ def append_births(
                 around = surroundings(lift(x), solids, c.h)
                 if around[0] < c.wall_gap:  # inside of a solid: born where the water is
                     x = water.x[i]
-                diffuse.x[slot] = x
+                diffuse.x[slot] = within(x, grid.periods)
                 diffuse.v[slot] = v + (0.25 * v.norm()) * aside
                 diffuse.kind[slot] = kind_in(water_at(x, around[1], water, grid, c, a)[0])
                 diffuse.age[slot] = 0.0

@@ -15,7 +15,7 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Scratch, Walls
 from wavetank.physics.boundary import next_near, wall_share
 from wavetank.physics.near_solids import facing_at, known, place_of
-from wavetank.solids.distance import SolidSet, plane_distance, rotate, to_local, vec3
+from wavetank.solids.distance import SolidSet, image_near, plane_distance, rotate, to_local, vec3
 
 
 @qd.func
@@ -34,8 +34,9 @@ def approached(
             for slot in range(known(scratch, i)):
                 at = place_of(scratch, i, slot)
                 k = scratch.solid[at]
-                own = to_local(solids.old_position[k], solids.old_rotation[k], x)
-                moved = solids.position[k] + rotate(solids.rotation[k], own) - x
+                before = image_near(solids, k, x)
+                own = to_local(solids.old_position[k], solids.old_rotation[k], before)
+                moved = solids.position[k] + rotate(solids.rotation[k], own) - before
                 value = facing_at(scratch, at, i, p)
                 if solids.sweep[k].norm_sqr() > 0.0:
                     added += free * not_answered(value, moved - driven, walls, c, missing, spacing)

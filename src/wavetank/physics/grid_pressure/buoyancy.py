@@ -16,8 +16,8 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Particles
 from wavetank.physics.bodies import Pieces
 from wavetank.physics.boundary import flattened
-from wavetank.physics.grid_pressure.coarse_grid import corners, in_cells, tents
-from wavetank.physics.grid_pressure.surface import along
+from wavetank.physics.grid_pressure.coarse_grid import beside_on, corners, in_cells, tents
+from wavetank.physics.grid_pressure.surface import nodes_beyond
 from wavetank.physics.reactions import add_to_body, immersion, of_grid
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, parts, rotate, vec3
@@ -41,14 +41,15 @@ def continue_pressure(grid: CoarseGrid, turn: qd.i32):
             for axis in qd.static(range(3)):
                 if grid.nz > 1 or axis < 2:
                     for side in qd.static((-1, 1)):
-                        nodes = along(grid, n, axis, side)
-                        if nodes[0] > 0:
-                            m = n + nodes[1]
+                        nodes = nodes_beyond(grid, n, axis, side)
+                        if nodes > 0:
+                            m = beside_on(grid, n, axis, side)
                             if grid.slope_z[m] < turn:
                                 value = grid.lam[m]
-                                if nodes[0] > 1:
-                                    if grid.slope_z[m + nodes[1]] < turn:
-                                        value += value - grid.lam[m + nodes[1]]
+                                if nodes > 1:
+                                    farther = beside_on(grid, m, axis, side)
+                                    if grid.slope_z[farther] < turn:
+                                        value += value - grid.lam[farther]
                                 lam += qd.min(value, 0.0)
                                 weight += 1.0
             if weight > 0.0:
@@ -62,7 +63,10 @@ def value_at(values: qd.template(), grid: CoarseGrid, at, x: qd.template()):
     dim = qd.static(x.n)
     s = in_cells(grid, flattened(at, x))
     last = vec3(grid.nx - 2, grid.ny - 2, grid.nz - 2)
-    low = qd.max(qd.min(qd.floor(s), last), 0.0)
+    low = qd.floor(s)
+    for axis in qd.static(range(3)):
+        if qd.static(not grid.repeats >> axis & 1):
+            low[axis] = qd.max(qd.min(low[axis], last[axis]), 0.0)
     nodes = corners(grid, qd.cast(low, qd.i32), dim)
     weights = tents(s - low, dim)
     total = 0.0

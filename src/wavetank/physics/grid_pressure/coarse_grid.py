@@ -58,11 +58,53 @@ def tents(share, dim: qd.template()):
 
 
 @qd.func
+def sizes(grid: CoarseGrid):
+    """Numbers of nodes along x, y and z."""
+    return qd.Vector([grid.nx, grid.ny, grid.nz])
+
+
+@qd.func
+def on_axis(grid: CoarseGrid, number, axis: qd.template()):
+    """A whole coordinate along an axis as that of a node: of the nearest, or of its image where the world repeats."""
+    size = sizes(grid)[axis]
+    node = number
+    if qd.static(grid.repeats >> axis & 1):
+        node += qd.select(number < 0, size, qd.select(number >= size, -size, 0))
+    return qd.min(qd.max(node, 0), size - 1)
+
+
+@qd.func
+def stride(grid: CoarseGrid, axis: qd.template()):
+    """By how much the numbers of neighbours along an axis differ, but across the seam of an axis that repeats."""
+    return qd.Vector([1, grid.nx, grid.nx * grid.ny])[axis]
+
+
+@qd.func
+def beside_on(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
+    """Number of the next node on a `side`, -1 or 1, of node `n` along an axis.
+
+    Beyond the tank it is no node; along an axis that repeats the last one's next is the first.
+    """
+    following = n + side * stride(grid, axis)
+    if qd.static(grid.repeats >> axis & 1):
+        last = sizes(grid)[axis] - 1
+        if coordinates(grid, n)[axis] == (last if qd.static(side > 0) else 0):
+            following = n - side * last * stride(grid, axis)
+    return following
+
+
+@qd.func
 def corners(grid: CoarseGrid, low, dim: qd.template()):
     """Numbers of the nodes at the corners of the cell from the whole coordinates `low` on, or of the nearest."""
+    # Spelled out, because what vectors the compiler makes of this depends on how it is said, and with it last digits.
     x = qd.Vector([qd.min(qd.max(low[0] + k, 0), grid.nx - 1) for k in qd.static(range(2))])
     y = qd.Vector([qd.min(qd.max(low[1] + k, 0), grid.ny - 1) * grid.nx for k in qd.static(range(2))])
     z = qd.Vector([qd.min(qd.max(low[2] + k, 0), grid.nz - 1) * grid.nx * grid.ny for k in qd.static(range(2))])
+    if qd.static(grid.repeats):
+        for k in qd.static(range(2)):
+            x[k] = on_axis(grid, low[0] + k, 0)
+            y[k] = on_axis(grid, low[1] + k, 1) * grid.nx
+            z[k] = on_axis(grid, low[2] + k, 2) * grid.nx * grid.ny
     return qd.Vector([x[k & 1] + y[k >> 1 & 1] + z[k >> 2] for k in qd.static(range(2**dim))])
 
 
@@ -72,6 +114,8 @@ def nearest(grid: CoarseGrid, c):
     x = qd.min(qd.max(c[0], 0), grid.nx - 1)
     y = qd.min(qd.max(c[1], 0), grid.ny - 1)
     z = qd.min(qd.max(c[2], 0), grid.nz - 1)
+    if qd.static(grid.repeats):  # `corners` says why all is said twice
+        x, y, z = on_axis(grid, c[0], 0), on_axis(grid, c[1], 1), on_axis(grid, c[2], 2)
     return x + grid.nx * (y + grid.ny * z)
 
 
@@ -100,23 +144,28 @@ def taken(sums: qd.template(), n, nodes, parts):
     return total
 
 
-def new_levels(box: tuple[np.ndarray, np.ndarray], h: float) -> list[CoarseGrid]:
-    """Allocate the grid of a tank between the corners `box` [m] and its coarser levels, the finest first."""
-    shape = _shape_of(box, h)
-    levels = [_new_level(shape, box)]
-    while any(_can_halve(n) for n in shape):
-        shape = [n // 2 if _can_halve(n) else n for n in shape]
-        levels.append(_new_level(shape, box))
+def new_levels(box: tuple[np.ndarray, np.ndarray], h: float, repeats: int = 0) -> list[CoarseGrid]:
+    """Allocate the grid of a tank between the corners `box` [m] and its coarser levels, the finest first.
+
+    Bits of `repeats` say along which axes the world repeats: there all levels have an even number of nodes, as the
+    sweeps over every other node need it.
+    """
+    shape = _shape_of(box, h, repeats)
+    levels = [_new_level(shape, box, repeats)]
+    while any(_can_halve(n, repeats >> axis & 1) for axis, n in enumerate(shape)):
+        shape = [n // 2 if _can_halve(n, repeats >> axis & 1) else n for axis, n in enumerate(shape)]
+        levels.append(_new_level(shape, box, repeats))
     return levels
 
 
-def nodes_of(box: tuple[np.ndarray, np.ndarray], h: float) -> int:
+def nodes_of(box: tuple[np.ndarray, np.ndarray], h: float, repeats: int = 0) -> int:
     """Return how many nodes the finest of these grids has, in Python's integers: it may be more than there can be."""
-    return math.prod(_shape_of(box, h))
+    return math.prod(_shape_of(box, h, repeats))
 
 
-def _shape_of(box: tuple[np.ndarray, np.ndarray], h: float) -> list[int]:
-    return [_divided(float(edge) / (EDGE * h)) for edge in box[1] - box[0]]
+def _shape_of(box: tuple[np.ndarray, np.ndarray], h: float, repeats: int) -> list[int]:
+    lengths = [float(edge) / (EDGE * h) for edge in box[1] - box[0]]
+    return [_ring(cells) if repeats >> axis & 1 else _divided(cells) for axis, cells in enumerate(lengths)]
 
 
 def piece_width() -> int:
@@ -131,8 +180,8 @@ def sums_of(nodes: int) -> int:
     return max(PARTS, min(threads(), MOST_PARTS)) if worth_sharing(nodes) else PARTS
 
 
-def _can_halve(n: int) -> bool:
-    return n % 2 == 0 and n > SMALLEST
+def _can_halve(n: int, ring: int) -> bool:
+    return n % (4 if ring else 2) == 0 and n > SMALLEST
 
 
 def _divided(cells: float) -> int:
@@ -141,7 +190,13 @@ def _divided(cells: float) -> int:
     return max(1, round(cells / 2**halvings)) * 2**halvings
 
 
-def _new_level(shape: list[int], box: tuple[np.ndarray, np.ndarray]) -> CoarseGrid:
+def _ring(cells: float) -> int:
+    """Return the even number near `cells` that can be halved until less than twice `SMALLEST`, and even, is left."""
+    halvings = max(0, math.floor(math.log2(max(cells, 1.0) / SMALLEST)))
+    return max(2, round(cells / 2 ** (halvings + 1))) * 2 ** (halvings + 1)
+
+
+def _new_level(shape: list[int], box: tuple[np.ndarray, np.ndarray], repeats: int) -> CoarseGrid:
     nx, ny, nz = [*shape, 1][:3]
     edges = [float(edge) / n for edge, n in zip(box[1] - box[0], shape, strict=True)]
     x0, y0, z0 = [*map(float, box[0]), 0.0][:3]
@@ -156,4 +211,5 @@ def _new_level(shape: list[int], box: tuple[np.ndarray, np.ndarray]) -> CoarseGr
     return CoarseGrid(
         **sums, **fields, nx=nx, ny=ny, nz=nz, pieces=-(-nx // piece_width()), dx=dx, dy=dy, dz=dz,
         x0=x0, y0=y0, z0=z0, parts=parts, alone=int(parts > 1), width=piece_width(),
+        repeats=repeats,
     )  # fmt: skip

@@ -42,6 +42,7 @@ from wavetank.physics.grid_pressure.approach import approached
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import (
     add_whole,
+    beside_on,
     corners,
     in_cells,
     nearest,
@@ -50,6 +51,7 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     tents,
 )  # fmt: skip
 from wavetank.physics.grid_pressure.films import left_to_grid
+from wavetank.physics.grid_pressure.own_weight import FOREIGN, own_push
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, open_area, solve_levels
 from wavetank.physics.grid_pressure.room import (
     LEAST_OPEN,
@@ -134,6 +136,8 @@ class Push:
     borne_to: qd.f32  # and from which all of it is
     dry: qd.f32  # the fill up to which water is a puddle
     wet: qd.f32  # and from which it is none
+    foreign_from: qd.f32  # how foreign a particle is where its own weight begins to count
+    foreign_to: qd.f32  # and where all of it does
 
 
 def carried(dt: float, frame_time: float) -> float:
@@ -311,7 +315,7 @@ def slope_along(
 @qd.kernel(fastcache=True)
 def move_particles(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, solids: SolidSet, c: Coefficients,
-    push: Push, count: qd.i32, few: qd.template(), searched: qd.template(),
+    push: Push, count: qd.i32, few: qd.template(), searched: qd.template(), mixed: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by M grad lambda, inside the tank, and carry it on; what sticks out has less.
 
@@ -319,9 +323,9 @@ def move_particles(
     """
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
-        grid.slope_x[n] = slope_across(grid, grid.wx[n], grid.dx, n, n + 1)
-        grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, n + grid.nx)
-        grid.slope_z[n] = slope_across(grid, grid.wz[n], grid.dz, n, n + grid.nx * grid.ny)
+        grid.slope_x[n] = slope_across(grid, grid.wx[n], grid.dx, n, beside_on(grid, n, 0, 1))
+        grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, beside_on(grid, n, 1, 1))
+        grid.slope_z[n] = slope_across(grid, grid.wz[n], grid.dz, n, beside_on(grid, n, 2, 1))
     for turn in range(turns(cells, count)):
         at_rest = -fall(c) / push.stiffness
         for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
@@ -333,6 +337,9 @@ def move_particles(
                 s = in_cells(grid, predicted(particles, first + lane))
                 carried_at = carried_share(grid, s, push.supported, push.fade, dim)
                 shares[0, lane] = carried_at[0]
+                if qd.static(mixed):
+                    density = 1.0 / scratch.weight[first + lane]
+                    shares[0, lane] *= own_push(grid, s, density, push.foreign_from, push.foreign_to, dim)
                 shares[1, lane] = qd.min(qd.max((push.wet - carried_at[1]) / (push.wet - push.dry), 0.0), 1.0)
                 slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, at_rest.x, push, dim, searched)
                 slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, at_rest.y, push, dim, searched)
@@ -371,9 +378,10 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         errors(finest, params, stiffness), count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
     )  # fmt: skip
     solve_levels(world.levels, balanced=c.fallen > 0.0)
-    push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing, *BORNE, *PUDDLE)
+    push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing, *BORNE, *PUDDLE, *FOREIGN)
     move_particles(
-        finest, world.particles, world.scratch, cells, world.solids, c, remembered(push), count, few, searched
+        finest, world.particles, world.scratch, cells, world.solids, c, remembered(push), count, few, searched,
+        kinds.mixed,
     )
     if world.pieces:
         acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2

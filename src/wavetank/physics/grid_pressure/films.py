@@ -9,7 +9,8 @@ through a film.
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.surface import along
+from wavetank.physics.grid_pressure.coarse_grid import beside_on
+from wavetank.physics.grid_pressure.surface import nodes_beyond
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 
 
@@ -25,19 +26,19 @@ def thickness(grid: CoarseGrid, n, axis: qd.template()):
     total = qd.min(grid.fill[n], 1.0)
     closed, open = 0, 0
     for side in qd.static((-1, 1)):
-        nodes = along(grid, n, axis, side)
+        nodes = nodes_beyond(grid, n, axis, side)
         m, ended = n, 0
-        for _ in range(qd.min(nodes[0], reach())):
+        for _ in range(qd.min(nodes, reach())):
             if ended == 0:
                 before = m
-                m += nodes[1]
+                m = beside_on(grid, m, axis, side)
                 if grid.room[m] <= 0.0 or shut_towards(grid, before, m, axis) == 1:
                     closed, ended = closed + 1, 1
                 else:
                     total += qd.min(grid.fill[m], 1.0)
                     if grid.fill[m] < 0.5:
                         open, ended = open + 1, 1
-        if ended == 0 and nodes[0] < reach():  # the tank ends there
+        if ended == 0 and nodes < reach():  # the tank ends there
             closed += 1
     return qd.select(closed == 1 and open == 1, total, 2.0 * reach())
 

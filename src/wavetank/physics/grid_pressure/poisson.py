@@ -92,20 +92,26 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta):
     y = row % grid.ny
     z = row // grid.ny
     begin, layer, rim = grid.nx * row, grid.nx * grid.ny, grid.nx * grid.ny * grid.nz
-    after_y = begin + grid.nx if y + 1 < grid.ny else rim
-    before_y = begin - grid.nx if y > 0 else rim
-    after_z = begin + layer if z + 1 < grid.nz else rim
-    before_z = begin - layer if z > 0 else rim
+    over_x = begin if qd.static(grid.repeats & 1) else rim
+    under_x = begin + grid.nx - 1 if qd.static(grid.repeats & 1) else rim
+    over_y = begin - y * grid.nx if qd.static(grid.repeats & 2) else rim
+    under_y = begin + (grid.ny - 1) * grid.nx if qd.static(grid.repeats & 2) else rim
+    over_z = begin - z * layer if qd.static(grid.repeats & 4) else rim
+    under_z = begin + (grid.nz - 1) * layer if qd.static(grid.repeats & 4) else rim
+    after_y = begin + grid.nx if y + 1 < grid.ny else over_y
+    before_y = begin - grid.nx if y > 0 else under_y
+    after_z = begin + layer if z + 1 < grid.nz else over_z
+    before_z = begin - layer if z > 0 else under_z
     found = qd.Matrix.zero(qd.f32, 4, grid.width)
     for lane in range(grid.width):
         x = first + lane
         n = begin + x
         shut = qd.cast(grid.shut[n], qd.i32)
-        wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, rim), grid.dx, least_theta, shut & 1)
+        wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, over_x), grid.dx, least_theta, shut & 1)
         wy = coupling(grid, n, after_y + x, grid.dy, least_theta, shut & 2)
         wz = coupling(grid, n, after_z + x, grid.dz, least_theta, shut & 4)
         diagonal = wx + wy + wz
-        before = qd.select(x > 0, n - 1, rim)
+        before = qd.select(x > 0, n - 1, under_x)
         diagonal += coupling(grid, n, before, grid.dx, least_theta, is_shut(grid, before, 0))
         diagonal += coupling(grid, n, before_y + x, grid.dy, least_theta, is_shut(grid, before_y + x, 1))
         diagonal += coupling(grid, n, before_z + x, grid.dz, least_theta, is_shut(grid, before_z + x, 2))
@@ -144,20 +150,34 @@ def start_nodes(grid: CoarseGrid, coarser: CoarseGrid, row, first, last, start):
 def relax_nodes(grid: CoarseGrid, row, first, last, over_relaxation):
     """One step of projected over-relaxation, lambda <= 0, at every other node of a `row` from x = `first` to `last`.
 
-    What a node is coupled with beyond the tank stands in the rim of the arrays, and is 0.
+    What a node is coupled with beyond the tank stands in the rim of the arrays, and is 0. Along axes that repeat the
+    numbers of nodes are even, so that colours alternate across the seam as well.
     """
     begin, layer, rim = grid.nx * row, grid.nx * grid.ny, grid.nx * grid.ny * grid.nz
-    before_y = begin - grid.nx if row % grid.ny > 0 else rim
+    y, z = row % grid.ny, row // grid.ny
+    before_y = begin - grid.nx if y > 0 else rim
     before_z = begin - layer if row >= grid.ny else rim
+    after_y, after_z = begin + grid.nx, begin + layer
+    if qd.static(grid.repeats & 2):
+        before_y = before_y if y > 0 else begin + (grid.ny - 1) * grid.nx
+        after_y = after_y if y + 1 < grid.ny else begin - y * grid.nx
+    if qd.static(grid.repeats & 4):
+        before_z = before_z if z > 0 else begin + (grid.nz - 1) * layer
+        after_z = after_z if z + 1 < grid.nz else begin - z * layer
     for k in range((last - first + 1) // 2):
         x = first + 2 * k
         n = begin + x
         if grid.inverse[n] > 0.0:
-            total = grid.wx[n] * grid.lam[n + 1] - grid.rhs[n]
-            total += grid.wy[n] * grid.lam[n + grid.nx] + grid.wy[before_y + x] * grid.lam[before_y + x]
-            total += grid.wz[n] * grid.lam[n + layer] + grid.wz[before_z + x] * grid.lam[before_z + x]
+            after_x = n + 1
+            if qd.static(grid.repeats & 1):
+                after_x = n + 1 if x + 1 < grid.nx else begin
+            total = grid.wx[n] * grid.lam[after_x] - grid.rhs[n]
+            total += grid.wy[n] * grid.lam[after_y + x] + grid.wy[before_y + x] * grid.lam[before_y + x]
+            total += grid.wz[n] * grid.lam[after_z + x] + grid.wz[before_z + x] * grid.lam[before_z + x]
             if x > 0:
                 total += grid.wx[n - 1] * grid.lam[n - 1]
+            elif qd.static(grid.repeats & 1):
+                total += grid.wx[begin + grid.nx - 1] * grid.lam[begin + grid.nx - 1]
             lam = grid.lam[n]
             grid.lam[n] = qd.min(lam + over_relaxation * (total * grid.inverse[n] - lam), 0.0)
 

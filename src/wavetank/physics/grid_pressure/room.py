@@ -4,7 +4,7 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients
 from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, corners, nearest, tents
 from wavetank.physics.grid_pressure.thin_walls import behind, keep_thin, mark_shut, way_from
-from wavetank.solids.distance import SolidSet, signed_distance, vec3, vec4
+from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec3, vec4
 
 LEAST_OPEN = 0.1  # a cell that is less open is solid
 
@@ -104,7 +104,7 @@ def nearest_wall(grid: CoarseGrid, solids: SolidSet, n):
     edge = longest_edge(grid)
     nearest = vec4(0.0, 1.0, 0.0, 4.0 * edge)
     for k in range(solids.tank_count, solids.count):
-        way, reach = center - solids.position[k], solids.reach[k]
+        way, reach = image_near(solids, k, center) - solids.position[k], solids.reach[k]
         if way.norm_sqr() < (reach + nearest.w) ** 2 and reach + nearest.w > 0.0 and nearest.w > -2.0 * edge:
             # What is farther away takes no room: that of the ball around the solid is good enough there.
             value = vec4(way.x, way.y, way.z, way.norm() - reach)

@@ -22,28 +22,28 @@ distance of a plane that cuts them there.
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import coordinates, corners, tents
+from wavetank.physics.grid_pressure.coarse_grid import beside_on, coordinates, corners, sizes, tents
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3
 
 
 @qd.func
-def along(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
-    """How many nodes there are beyond node `n` on a `side` along an `axis`, and by how much their numbers differ."""
-    stride = qd.Vector([1, grid.nx, grid.nx * grid.ny])[axis] * side
-    place = coordinates(grid, n)[axis]
-    beyond = place if qd.static(side < 0) else qd.Vector([grid.nx, grid.ny, grid.nz])[axis] - 1 - place
-    return qd.Vector([beyond, stride])
+def nodes_beyond(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
+    """How many nodes there are beyond node `n` on a `side` along an `axis`: all of them where the world repeats."""
+    beyond = sizes(grid)[axis]
+    if qd.static(not grid.repeats >> axis & 1):
+        place = coordinates(grid, n)[axis]
+        beyond = place if qd.static(side < 0) else sizes(grid)[axis] - 1 - place
+    return beyond
 
 
 @qd.func
 def way_to_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
     """Cells from node `n`, in water, to the surface on a `side` along an `axis`; 0 if there is none within three."""
-    nodes = along(grid, n, axis, side)
     total, reached, m = grid.fill[n] - 0.5, 0, n
-    for _ in range(qd.min(nodes[0], 3)):
+    for _ in range(qd.min(nodes_beyond(grid, n, axis, side), 3)):
         before = m
-        m += nodes[1]
+        m = beside_on(grid, m, axis, side)
         if grid.room[m] <= 0.0 or shut_towards(grid, before, m, axis) == 1:
             break
         total += qd.min(grid.fill[m], 1.0)
@@ -54,8 +54,7 @@ def way_to_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
 @qd.func
 def depth_in_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
     """Depth [cells] of node `n`, in the air, if there is water at the next node; else one cell above the surface."""
-    nodes = along(grid, n, axis, side)
-    m = n + (nodes[1] if nodes[0] > 0 else 0)
+    m = beside_on(grid, n, axis, side) if nodes_beyond(grid, n, axis, side) > 0 else n
     next_to_water = grid.room[m] > 0.0 and grid.fill[m] >= 0.5 and shut_towards(grid, n, m, axis) == 0
     return grid.fill[n] + qd.min(grid.fill[m], 1.0) - 1.5 if next_to_water else -1.0
 

@@ -11,8 +11,8 @@ make, one of them is felt.
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, nearest
-from wavetank.solids.distance import SolidSet, signed_distance, vec3
+from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, nearest, on_axis, stride
+from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec3
 
 
 @qd.func
@@ -32,7 +32,7 @@ def depth_in_solids(solids: SolidSet, at):
     """Depth [m] of the place `at` in the solid that it is in, 0 outside; the tank's walls are left aside."""
     depth = 0.0
     for k in range(solids.tank_count, solids.count):
-        if (at - solids.position[k]).norm() < solids.reach[k]:
+        if (image_near(solids, k, at) - solids.position[k]).norm() < solids.reach[k]:
             depth = qd.max(depth, -signed_distance(solids, k, at).w)
     return depth
 
@@ -98,10 +98,11 @@ def keep_thin(grid: CoarseGrid, solids: SolidSet, n, wall):
 @qd.func
 def way_from(grid: CoarseGrid, low, k: qd.template(), s):
     """Way [m] to the place `s` [cells] from corner `k` of the cell from the whole coordinates `low` on."""
-    x = qd.min(qd.max(low[0] + (k & 1), 0), grid.nx - 1)
-    y = qd.min(qd.max(low[1] + (k >> 1 & 1), 0), grid.ny - 1)
-    z = qd.min(qd.max(low[2] + (k >> 2), 0), grid.nz - 1)
-    return vec3((s.x - x) * grid.dx, (s.y - y) * grid.dy, (s.z - z) * grid.dz)
+    node = qd.Vector([low[0] + (k & 1), low[1] + (k >> 1 & 1), low[2] + (k >> 2)])
+    for axis in qd.static(range(3)):
+        if qd.static(not grid.repeats >> axis & 1):
+            node[axis] = on_axis(grid, node[axis], axis)
+    return vec3((s.x - node[0]) * grid.dx, (s.y - node[1]) * grid.dy, (s.z - node[2]) * grid.dz)
 
 
 @qd.func
@@ -136,4 +137,8 @@ def is_shut(grid: CoarseGrid, n, axis: qd.template()):
 @qd.func
 def shut_towards(grid: CoarseGrid, n, m, axis: qd.template()):
     """The same for two nodes that are neighbours along an axis."""
-    return is_shut(grid, qd.min(n, m), axis)
+    first = qd.min(n, m)
+    if qd.static(grid.repeats >> axis & 1):
+        if qd.abs(n - m) != stride(grid, axis):  # the last node of a row and the first
+            first = qd.max(n, m)
+    return is_shut(grid, first, axis)

@@ -4,8 +4,8 @@ What gravity moves particles by in a step, less what is carried on, is the same 
 beside solids that cut cells they tell it wrong, by a part of the whole weight, which drove water round for ever. So it
 goes to the right side of the equation as the faces of the cells count it, and densities are read where particles were
 before (`boundary.fall`). The slope of water at rest then fulfils the equation whatever the solids are: a well-balanced
-scheme, as Greenberg and Leroux 1996 (10.1137/0733001) have it for shallow water. Worlds with bodies, and mixtures,
-leave it to the densities (docs/notebook/calm.md).
+scheme, as Greenberg and Leroux 1996 (10.1137/0733001) have it for shallow water. Worlds with bodies
+leave it to the densities (docs/notebook/calm.md). What particles weigh among those of another fluid: `own_weight.py`.
 
     code     meaning                                                                      unit
     way      by which all particles have fallen alike                                     m
@@ -14,8 +14,9 @@ leave it to the densities (docs/notebook/calm.md).
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
+from wavetank.physics.grid_pressure.coarse_grid import beside_on
 from wavetank.physics.grid_pressure.poisson import open_area
-from wavetank.physics.grid_pressure.surface import along
+from wavetank.physics.grid_pressure.surface import nodes_beyond
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3
 
@@ -34,9 +35,8 @@ def flow_out(grid: CoarseGrid, n, way):
     for axis in qd.static(range(3)):
         if grid.nz > 1 or axis < 2:
             for side in qd.static((-1, 1)):
-                nodes = along(grid, n, axis, side)
-                if nodes[0] > 0:
-                    m = n + nodes[1]
+                if nodes_beyond(grid, n, axis, side) > 0:
+                    m = beside_on(grid, n, axis, side)
                     if qd.min(grid.room[n], grid.room[m]) > 0.0 and shut_towards(grid, n, m, axis) == 0:
                         total += side * open_area(grid, n, m) * way[axis] / edges[axis]
     return total

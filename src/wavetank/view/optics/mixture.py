@@ -16,7 +16,8 @@ from wavetank.view.lens import Lens, to_pixel, to_view, vec2, vec3
 from wavetank.view.look import Look
 from wavetank.view.optics.body import depth_below
 from wavetank.view.optics.fluid import Optics
-from wavetank.view.optics.maps import corners, gap_at
+from wavetank.view.optics.maps import corners
+from wavetank.view.optics.probes import sun_share
 from wavetank.view.optics.radiance import smoothstep, surface_radiance
 from wavetank.view.water_buffers import SunlitWater, Thickness
 
@@ -106,20 +107,6 @@ def mixed(thickness: Thickness, look: Look, optics: Optics, pixel, tau, plane: q
 
 
 @qd.func
-def past_solids(sun: Lens, first: qd.template(), shade: qd.template(), look: Look, at, slack):
-    """Share of the sun that solids leave to a point, softer the farther off they are."""
-    c = to_view(sun, at)
-    fine = qd.cast(shade.shape[0], qd.f32) / first.shape[0]  # both maps show the same
-    place = fine * to_pixel(sun, c)
-    wide = 1.5 + 0.5 * look.sun_size * fine * sun.focal * qd.min(qd.max(gap_at(shade, place, c.z), 0.0), 1e3)
-    seen = 0.0
-    for k in range(9):
-        off = vec2(qd.cast(k % 3 - 1, qd.f32), qd.cast(k // 3 - 1, qd.f32))
-        seen += qd.select(gap_at(shade, place + wide * off, c.z - slack) > 0.0, 0.0, 1.0 / 9.0)
-    return seen
-
-
-@qd.func
 def murky(
     sunlit: SunlitWater, shade: qd.template(), sun: Lens, look: Look, optics: Optics, color, glow, at, n, seen,
     plane: qd.template(),
@@ -133,5 +120,10 @@ def murky(
         under = depth_below(sun, sunlit.depth, above)
         share = 1.0 - smoothstep((under - 0.75 * optics.spacing) / (2.5 * optics.spacing))
         if share > 0.0:
-            share *= past_solids(sun, sunlit.depth, shade, look, above, 0.5 * optics.spacing)
+            # Shadows are the same as elsewhere; both maps show the same, in texels of their own.
+            c, fine = to_view(sun, above), qd.cast(shade.shape[0], qd.f32) / sunlit.depth.shape[0]
+            share *= sun_share(
+                shade, fine * to_pixel(sun, c), c.z - 0.5 * optics.spacing, fine * sun.focal, look.sun_size,
+                vec2(1.0, 0.0), 16,
+            )  # fmt: skip
     return surface_radiance(look, color, n, seen, vec2(share, 1.0), 0.45, 0.0) + glow

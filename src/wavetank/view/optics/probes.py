@@ -2,12 +2,17 @@
 
 Few probes a pixel and an average over 4 x 4 pixels are worth sixteen times as many, and the pattern, unlike noise,
 averages out without a rest.
+
+Shadows soften with the distance between what casts and what receives them (R. Fernando, "Percentage-closer soft
+shadows", 2005): a few probes find the mean distance of what is in the way, a few more, spread as wide as the sun then
+looks, count what is hidden.
 """
 
 import math
 
 from wavetank.device.compiler import qd
 from wavetank.view.lens import vec2
+from wavetank.view.optics.maps import gap_at
 
 
 @qd.func
@@ -47,3 +52,31 @@ def pattern_turn(row, column):
 def turned(turn, point):
     """Point (x, y) turned by (cos, sin)."""
     return vec2(turn.x * point.x - turn.y * point.y, turn.y * point.x + turn.x * point.y)
+
+
+@qd.func
+def sun_reach(sun_depth: qd.template(), sun_size):
+    """Radius [texels] of the cone in which something as high as a few tenths of the map could stand in the way."""
+    return 0.25 * sun_size * sun_depth.shape[0]
+
+
+@qd.func
+def sun_share(sun_depth: qd.template(), place, depth, focal, sun_size, turn, probes: qd.template()):
+    """Share 0 to 1 of the sun that is seen from a point at `depth` that the map, of `focal` texels a metre, shows at
+    `place`.
+    """
+    below, casters, wide = 0.0, 0, sun_reach(sun_depth, sun_size)
+    for k in qd.static(range(5)):
+        gap = gap_at(sun_depth, place + wide * turned(turn, spiral(k, 5)), depth)
+        if gap > 0.0:
+            below += gap
+            casters += 1
+    share = 1.0
+    if casters == 5:
+        share = 0.0
+    elif casters > 0:
+        spread = qd.min(qd.max(sun_size * below / casters * focal, 1.0), wide)
+        for k in qd.static(range(probes)):
+            if gap_at(sun_depth, place + spread * turned(turn, spiral(k, probes)), depth) > 0.0:
+                share -= 1.0 / probes
+    return qd.max(share, 0.0)

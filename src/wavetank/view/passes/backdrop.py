@@ -33,9 +33,11 @@ def prepare(shot: Shot, buffers: Buffers) -> None:
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill the radiance behind the water: what was prepared, in the light that the water leaves."""
     water, pixels, frame = water_of(buffers, shot), buffers.pixels, shot.frame
+    samples = buffers.supersample
     paint(
-        water.backdrop, pixels, water.sunlit, water.sun_thickness, strips_of(pixels.depth), shot.lens,
-        shot.water_sun, shot.look, optics_of(shot), shot.box, int(frame.scene.tank is not None), frame.dim,
+        water.backdrop, pixels, water.sunlit, water.sun_thickness, strips_of(pixels.depth, samples, samples), shot.lens,
+        shot.water_sun, shot.look, optics_of(shot, 0, samples, samples), shot.box,
+        int(frame.scene.tank is not None), 10 * int(samples > 1) + frame.dim,
     )  # fmt: skip
 
 
@@ -139,24 +141,45 @@ def divide(
 @qd.kernel(fastcache=True)
 def paint(
     backdrop: Backdrop, pixels: Pixels, sunlit: SunlitWater, thickness: Thickness, strips: Strips, lens: Lens,
-    sun: Lens, look: Look, optics: Optics, box: Box, has_tank: qd.i32, dim: qd.template(),
+    sun: Lens, look: Look, optics: Optics, box: Box, has_tank: qd.i32, world: qd.template(),
 ):  # fmt: skip
-    """Put sun and sky together as far as the water leaves them, and lay the tank over it."""
+    """Put sun and sky together as far as the water leaves them, and lay the tank over it.
+
+    Samples of a pixel that lie within a texel of the sun's view take as much of the sun as its middle does. `world` is
+    2 or 3, its dimensions, ten more where pixels have several samples.
+    """
     for task in range(strips.count):
-        row, first, last = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
-        for column in range(first, last):
-            ray = view_ray(lens, row, column)
-            origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
-            z = qd.bit_cast(pixels.depth[row, column], qd.f32)
-            in_sun, in_sky = backdrop.in_sun[row, column], backdrop.in_sky[row, column]
-            result = in_sun + in_sky
-            if qd.static(dim == 3):
-                if z < 1e30:
-                    through = sun_through_water(sunlit, thickness, sun, look, optics, origin + z * direction)
-                    if through.x != 1.0 or through.z != 1.0:
-                        # The sky comes from everywhere; water above takes some of it.
-                        result = through * in_sun + (0.45 + 0.55 * qd.min(through, 1.0)) * in_sky
-            if has_tank == 1:
-                line = pixels.lines[row, column]
-                result = with_tank(lens, look, box, origin, direction, z, line, result)
-            backdrop.behind[row, column] = result
+        across, tall = 1, 1
+        if qd.static(world >= 10):
+            across, tall = optics.samples, optics.tall
+        band, first, last = strip(strips, task, pixels.depth.shape[0] // tall, pixels.depth.shape[1])
+        for pixel in range(first // across, last // across):
+            together, middle, shared = 0, 0.0, vec3(1.0, 1.0, 1.0)
+            if qd.static(world == 13):
+                low, high = 1e30, 0.0
+                for k in range(across * tall):
+                    z = qd.bit_cast(pixels.depth[band * tall + k // across, pixel * across + k % across], qd.f32)
+                    low, high = qd.min(low, z), qd.max(high, z)
+                together, middle = qd.cast(high < 1e30 and high - low < 0.7 * sun.pixel, qd.i32), 0.5 * (low + high)
+            for k in range(across * tall):
+                row, column = band * tall + k // across, pixel * across + k % across
+                ray = view_ray(lens, row, column)
+                origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
+                z = qd.bit_cast(pixels.depth[row, column], qd.f32)
+                in_sun, in_sky = backdrop.in_sun[row, column], backdrop.in_sky[row, column]
+                result = in_sun + in_sky
+                if qd.static(world % 10 == 3):
+                    if z < 1e30:
+                        if k == 0 or together == 0:
+                            at = origin + z * direction
+                            if together == 1:
+                                ray = view_ray(lens, row + 0.5 * (tall - 1), column + 0.5 * (across - 1))
+                                at = ray_origin(lens, ray) + middle * ray_direction(lens, ray)
+                            shared = sun_through_water(sunlit, thickness, sun, look, optics, at)
+                        if shared.x != 1.0 or shared.z != 1.0:
+                            # The sky comes from everywhere; water above takes some of it.
+                            result = shared * in_sun + (0.45 + 0.55 * qd.min(shared, 1.0)) * in_sky
+                if has_tank == 1:
+                    line = pixels.lines[row, column]
+                    result = with_tank(lens, look, box, origin, direction, z, line, result)
+                backdrop.behind[row, column] = result

@@ -40,7 +40,7 @@ from wavetank.view.optics.glass import line_cover, slack
 from wavetank.view.optics.maps import corners, gap_at
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
-from wavetank.view.water_buffers import water_of
+from wavetank.view.water_buffers import SunlitWater, water_of
 
 DEEPEST = 5.0  # d: depth below the surface at which foam is no longer seen
 SIZE = {2: 1.7, 3: 1.0}  # of the drawn particles: a plane has fewer of them
@@ -85,6 +85,14 @@ def draw_over_water(shot: Shot, buffers: Buffers) -> None:
     """Do the same where the water is not part of the picture's depth but lies in front of it."""
     if shot.frame.foam_count > 0:
         lay(shot, buffers, water_of(buffers, shot).surface.nearest, 0.25 * shot.extent.spacing)
+
+
+def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
+    """Take from the sun's light below the water what foam keeps."""
+    frame, strength = shot.frame, float(shot.look.caustic)
+    if frame.dim == 3 and frame.diffuse is not None and frame.foam_count > 0 and strength > 0.0:
+        sunlit, d = water_of(buffers, shot).sunlit, shot.extent.spacing
+        take(sunlit, frame.diffuse, shot.water_sun, SIZE[3] * d, strength, frame.foam_count)
 
 
 def lay(shot: Shot, buffers: Buffers, depth: Any, sunk: float) -> None:
@@ -138,6 +146,46 @@ def size_and_strength(kind, share, number):
     # A spread of sizes that stays with the particle.
     radius *= 0.6 + 0.8 * qd.cast((number * 40503) & 0xFFFF, qd.f32) / 65536.0
     return radius, strength * qd.min(1.0, 0.4 + 12.0 * share) * (1.0 - share * share)
+
+
+@qd.kernel(fastcache=True)
+def take(
+    sunlit: SunlitWater, diffuse: Diffuse, sun: Lens, size: qd.f32, caustic: qd.f32, count: qd.i32
+):  # fmt: skip
+    """Spread every particle's optical depth over the texels of the sun's view around it, as smooth as a spline, and
+    take from the light that gathers there, as it is shown with the strength `caustic`, what so much froth keeps.
+
+    What scatters alone, none of it forward more than backward, lets 1 / (1 + tau / 2) through (two streams).
+    """
+    texels = sunlit.spare.shape[0]
+    for row, column in qd.ndrange(texels, texels):
+        sunlit.spare[row, column] = 0
+    for i in range(count):
+        place = to_pixel(sun, to_view(sun, lift(diffuse.x[i])))
+        radius, strength = size_and_strength(diffuse.kind[i], diffuse.age[i] / diffuse.life[i], diffuse.id[i])
+        # Of a disc that is thinner towards its rim, in texels.
+        full = 4096.0 * strength * 1.5708 * (radius * size * sun.focal) ** 2
+        if qd.min(place.x, place.y) > 1.0 and qd.max(place.x, place.y) < texels - 1.0:
+            row, column = qd.cast(place.y, qd.i32), qd.cast(place.x, qd.i32)
+            v, u = place.y - row - 0.5, place.x - column - 0.5
+            for n in qd.static(range(9)):
+                down, across = spline(v, qd.static(n // 3 - 1)), spline(u, qd.static(n % 3 - 1))
+                r, c = row + qd.static(n // 3 - 1), column + qd.static(n % 3 - 1)
+                qd.atomic_add(sunlit.spare[r, c], qd.cast(full * down * across + 0.5, qd.i32))
+    for row, column in qd.ndrange(texels, texels):
+        tau = sunlit.spare[row, column] / 4096.0
+        if tau > 0.0:
+            light = 1.0 + caustic * qd.min(sunlit.caustic[row, column] / 4096.0, 3.0)
+            sunlit.caustic[row, column] = qd.cast(4096.0 * (light / (1.0 + 0.5 * tau) - 1.0) / caustic, qd.i32)
+
+
+@qd.func
+def spline(off, k: qd.template()):
+    """Share of texel `k`, -1 to 1, of what lies `off` from the middle of texel 0 (a quadratic B-spline)."""
+    share = 0.75 - off * off
+    if qd.static(k != 0):
+        share = 0.5 * (0.5 + k * off) ** 2
+    return share
 
 
 @qd.func

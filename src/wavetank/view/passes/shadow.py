@@ -1,9 +1,7 @@
 """How much of the sun every visible point receives, from the depths that the sun sees.
 
-Shadows soften with the distance between what casts and what receives them (R. Fernando, "Percentage-closer soft
-shadows", 2005): a few probes find the mean distance of what is in the way, a few more, spread as wide as the sun then
-looks, count what is hidden. The probes lie on a spiral that is turned from pixel to pixel in a 4 x 4 pattern; the
-smooth pass averages that pattern away.
+The probes of `sun_share` lie on a spiral that is turned from pixel to pixel in a 4 x 4 pattern; the smooth pass
+averages that pattern away.
 
     code      symbol   meaning                                              unit
     c                  the point in the sun's view: right, up, depth        m
@@ -15,8 +13,7 @@ smooth pass averages that pattern away.
 from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers, Light, Pixels
 from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec2, vec3
-from wavetank.view.optics.maps import gap_at
-from wavetank.view.optics.probes import pattern_turn, spiral, turned
+from wavetank.view.optics.probes import pattern_turn, sun_reach, sun_share
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import water_of
@@ -74,30 +71,9 @@ def receive(
                     away += lift
                 c = to_view(sun, at + away * normal)
                 place = to_pixel(sun, c)
-                # The cone in which something as high as a few tenths of the map could stand in the way.
-                wide = 0.25 * sun_size * texels
+                wide = sun_reach(sun_depth, sun_size)
                 if qd.min(place.x, place.y) > -wide and qd.max(place.x, place.y) < texels + wide:
                     share = sun_share(
-                        sun, sun_size, wide, probes, c.z, place, pattern_turn(own_row, own_column), sun_depth
+                        sun_depth, place, c.z, sun.focal, sun_size, pattern_turn(own_row, own_column), probes
                     )
             light.share[own_row, own_column] = vec2(share, 1.0)
-
-
-@qd.func
-def sun_share(sun: Lens, sun_size, wide, probes: qd.template(), depth, place, turn, sun_depth: qd.template()):
-    """Share 0 to 1 of the sun that is seen from a point at `depth` that the map shows at `place`."""
-    below, casters = 0.0, 0
-    for k in qd.static(range(5)):
-        gap = gap_at(sun_depth, place + wide * turned(turn, spiral(k, 5)), depth)
-        if gap > 0.0:
-            below += gap
-            casters += 1
-    share = 1.0
-    if casters == 5:
-        share = 0.0
-    elif casters > 0:
-        spread = qd.min(qd.max(sun_size * below / casters * sun.focal, 1.0), wide)
-        for k in qd.static(range(probes)):
-            if gap_at(sun_depth, place + spread * turned(turn, spiral(k, probes)), depth) > 0.0:
-                share -= 1.0 / probes
-    return qd.max(share, 0.0)

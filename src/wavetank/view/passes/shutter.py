@@ -76,7 +76,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if foam is not None and count > 0:
         gather(motion, surface.nearest, foam.x, foam.v, shot.lens, shutter, count)
     settle(motion, shutter, rows, columns)
-    smear(buffers.pixels, surface, motion, shot.lens, shot.look, shot.walls, shutter, rows, columns)
+    smear(buffers.pixels, surface, motion, shot.lens, shot.look, shot.walls, shutter, rows, columns, samples)
 
 
 @qd.kernel(fastcache=True)
@@ -154,10 +154,10 @@ def moves(way: qd.template(), row, column, rows, columns, least):
 @qd.kernel(fastcache=True)
 def smear(
     pixels: Pixels, surface: WaterSurface, motion: Motion, lens: Lens, look: Look, walls: Box, shutter: Shutter,
-    rows: qd.i32, columns: qd.i32,
+    rows: qd.i32, columns: qd.i32, samples: qd.template(),
 ):  # fmt: skip
     """Average along the ways; `pixels.normal` and `surface.rim` hold what is new meanwhile."""
-    samples, grain = shutter.samples, shutter.grain
+    grain = shutter.grain
     high, wide = pixels.depth.shape[0] // samples, pixels.depth.shape[1] // samples
     for texel_row, texel_column in qd.ndrange(rows, columns):
         if moves(motion.way, texel_row, texel_column, rows, columns, shutter.least):
@@ -176,32 +176,37 @@ def smear(
                                 moving = True
                     if moving:
                         total, weight, cover = vec3(0.0, 0.0, 0.0), 0.0, 0.0
+                        here, line, wet, own, edge = 0, 0, False, vec3(0.0, 0.0, 0.0), 0.0
                         cuts = qd.min(qd.max(qd.cast(0.4 * length, qd.i32) + 3, samples * samples), shutter.cuts)
                         for k in range(cuts):
                             # The samples of a pixel take turns.
-                            i, j = k // samples % samples, k % samples
-                            own_r, own_c = down + i, across + j
+                            i, j = k // qd.static(samples) % qd.static(samples), k % qd.static(samples)
+                            if qd.static(samples > 1) or k == 0:
+                                own_r, own_c = down + i, across + j
+                                here, line = surface.nearest[own_r, own_c], pixels.lines[own_r, own_c]
+                                wet, own = here < pixels.depth[own_r, own_c], pixels.color[own_r, own_c]
+                                if line != 0:
+                                    edge = line_cover(line, qd.bit_cast(here, qd.f32), shutter.slack)
                             share = (k + 0.5) / cuts - 0.5
                             r, c = pixel_along(row, column, share * way, high, wide)
                             r, c = r * samples + i, c * samples + j
-                            here, there = surface.nearest[own_r, own_c], surface.nearest[r, c]
+                            there = surface.nearest[r, c]
                             # Of what stands still, and of what hides the water, a pixel beside them shows nothing.
                             gives = there < pixels.depth[r, c]
-                            if here < pixels.depth[own_r, own_c]:
+                            if wet:
                                 gives = gives or there > here
                             elif gives:
                                 gives = there < here
                             open = 0.5 - qd.abs(share)
-                            line = pixels.lines[own_r, own_c]
                             if gives:
                                 if pixels.lines[r, c] == 0:
                                     total += open * qd.min(pixels.color[r, c], shutter.white)
                                     weight += open
                             elif line == 0:
-                                total += open * pixels.color[own_r, own_c]
+                                total += open * own
                                 weight += open
                             if line != 0:
-                                cover += line_cover(line, qd.bit_cast(here, qd.f32), shutter.slack) / cuts
+                                cover += edge / cuts
                         if weight > 0.0:
                             mark = 1
                             total /= weight
@@ -212,7 +217,7 @@ def smear(
             for row in range(texel_row * grain, qd.min((texel_row + 1) * grain, high)):
                 for column in range(texel_column * grain, qd.min((texel_column + 1) * grain, wide)):
                     if surface.rim[row * samples, column * samples] == 1:
-                        for k in range(samples * samples):
+                        for k in range(qd.static(samples * samples)):
                             pixels.color[row * samples + k // samples, column * samples + k % samples] = pixels.normal[
                                 row * samples, column * samples
                             ]

@@ -66,8 +66,8 @@ def neutral(color):
 
 @qd.kernel(fastcache=True)
 def develop(
-    picture: qd.types.ndarray(), color: qd.types.ndarray(), curve: qd.types.ndarray(), samples: qd.i32,
-    mapped: qd.i32, threes: qd.i32,
+    picture: qd.types.ndarray(), color: qd.types.ndarray(), curve: qd.types.ndarray(),
+    samples: qd.template(), mapped: qd.template(), threes: qd.i32,
 ):  # fmt: skip
     """Write the picture from `samples`^2 samples a pixel; `curve` encodes linear light as sRGB bytes.
 
@@ -81,12 +81,11 @@ def develop(
         column = 4 * group - row * columns
         for k in range(4):
             total = vec3(0.0, 0.0, 0.0)
-            for y in range(row * samples, row * samples + samples):
-                for x in range(column * samples, column * samples + samples):
-                    sample = color[y, x]
-                    if mapped == 0:
-                        sample = neutral(sample)
-                    total += sample
+            for part in range(qd.static(samples * samples)):
+                sample = color[row * samples + part // samples, column * samples + part % samples]
+                if qd.static(mapped == 0):
+                    sample = neutral(sample)
+                total += sample
             column += 1
             if column == columns:
                 column, row = 0, qd.min(row + 1, rows - 1)

@@ -15,12 +15,9 @@ takes the finished backdrop where that point is seen.
 """
 
 from wavetank.device.compiler import qd
-from wavetank.solids.distance import SolidSet, signed_distance
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import (
     Lens,
-    from_view,
-    point_at,
     ray_direction,
     ray_origin,
     to_pixel,
@@ -40,9 +37,11 @@ from wavetank.view.optics.maps import margins_inside, picture_at, thickness_at
 from wavetank.view.optics.marks import rim_cover, rim_key
 from wavetank.view.optics.mixture import mixed, murky
 from wavetank.view.optics.normals import normal_of, rise_at
-from wavetank.view.optics.panes import share_before_wall, share_behind, tank_interval
+from wavetank.view.optics.panes import share_behind, tank_interval
 from wavetank.view.optics.radiance import environment, glint, smoothstep
-from wavetank.view.optics.rays import Box, box
+from wavetank.view.optics.rays import box
+from wavetank.view.optics.resolve import even_pixel
+from wavetank.view.optics.sheet import sheet_at, sheet_normal
 from wavetank.view.paints import colors_of
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
@@ -68,54 +67,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit,
         strips_of(pixels.depth, together, buffers.supersample), shot.lens, shot.water_sun, shot.look,
         optics_of(shot, under_water(shot, buffers), together, buffers.supersample), inside,
-        10 * int(water.thickness.fluids > 0) + world,
+        100 * int(buffers.supersample > 1) + 10 * int(water.thickness.fluids > 0) + world,
     )  # fmt: skip
-
-
-@qd.func
-def wall_share(at, walls: Box, disc):
-    """Share of a disc around `at` that the walls of a plane leave; behind them nothing adds to a thickness."""
-    share = 1.0
-    for k in qd.static(range(2)):
-        for side in qd.static(range(2)):
-            gap = (at[k] - walls.lower[k]) / disc
-            if qd.static(side == 1):
-                gap = (walls.upper[k] - at[k]) / disc
-            share *= share_before_wall(qd.max(gap, 0.0))
-    return share
-
-
-@qd.func
-def solid_share(at, solids: SolidSet, disc):
-    """Share of a disc around `at` that the solids of a plane leave, each taken for a straight wall."""
-    share = 1.0
-    for k in range(solids.tank_count, solids.count):
-        if (solids.position[k] - at).norm() < solids.reach[k] + disc or solids.reach[k] > 1e4:
-            share *= share_before_wall(qd.max(signed_distance(solids, k, at).w / disc, 0.0))
-    return share
-
-
-@qd.func
-def sheet_at(thickness: qd.template(), lens: Lens, optics: Optics, inside: Inside, place, among: qd.template()):
-    """Thickness of the sheet that a 2-D world is, at a place in the picture [m]; `among` solids or not."""
-    at = lens.eye + from_view(lens, point_at(lens, place.y - 0.5, place.x - 0.5, 1.0))
-    thick = thickness_at(thickness, place / optics.coarse, optics.unit) / wall_share(at, inside.walls, optics.disc)
-    if qd.static(among):  # beside corners less is missing than beside a wall: no more than a whole sheet
-        left = solid_share(vec3(at.x, at.y, 0.0), inside.solids, optics.disc)
-        thick = qd.max(thick, qd.min(thick / qd.max(left, 0.2), optics.spacing))
-    return thick
-
-
-@qd.func
-def sheet_normal(thickness: qd.template(), lens: Lens, optics: Optics, inside: Inside, place, among: qd.template()):
-    """Normal of the sheet: a plane has no shape in depth and gets that of a drop between two panes."""
-    dx, dy = vec2(optics.coarse, 0.0), vec2(0.0, optics.coarse)
-    right = sheet_at(thickness, lens, optics, inside, place + dx, among)
-    right -= sheet_at(thickness, lens, optics, inside, place - dx, among)
-    below = sheet_at(thickness, lens, optics, inside, place + dy, among)
-    below -= sheet_at(thickness, lens, optics, inside, place - dy, among)
-    bulge = optics.disc / (2.0 * optics.coarse * lens.pixel * optics.spacing)
-    return from_view(lens, vec3(-bulge * right, bulge * below, -1.0).normalized())
 
 
 @qd.kernel(fastcache=True)
@@ -127,7 +80,7 @@ def lay(
     nearer of its depth and the backdrop's.
 
     `world` is 1 for a plane with solids, 2 for one without, 3 for space, 4 for space with solids in a tank; ten more
-    with several fluids.
+    with several fluids, and a hundred more where pixels have several samples.
     """
     for task in range(strips.count):
         band, begin, end = strip(strips, task, pixels.depth.shape[0] // optics.tall, pixels.depth.shape[1])
@@ -135,27 +88,40 @@ def lay(
         # What is seen through a body of water is found once for all samples of a pixel, or of two: one after the other.
         kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
         kept_above, kept_whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
+        # A pixel whose samples all show the same is shaded once, in its middle.
+        even, even_z, even_normal = 0, 0.0, vec3(0.0, 0.0, 0.0)
         for index in range((end - begin + beside - 1) // beside * block):
             part = index % block
             row, column = band * optics.tall + part // beside, begin + index // block * beside + part % beside
-            if column < end:
+            if qd.static(world >= 100):
+                if part == 0 and optics.under == 0:
+                    even, even_z, even_normal = even_pixel(
+                        pixels, surface, lens, look, optics, inside.walls, row, column, qd.static(world % 10)
+                    )
+            if column < end and (part == 0 or even == 0):
+                middle = vec2(column + 0.5, row + 0.5)
                 result = backdrop.behind[row, column]
                 z, back = (
                     qd.bit_cast(surface.depth[row, column], qd.f32),
                     qd.bit_cast(pixels.depth[row, column], qd.f32),
                 )
+                if even > 0:
+                    middle += 0.5 * (vec2(beside, optics.tall) - 1.0)
+                    z = even_z
                 front = 1.7e38
                 if optics.under == 1:
                     result = from_within(thickness.water, lens, optics, row, column, back, result)
                 elif z < 1e30:
-                    ray = view_ray(lens, row, column)
+                    ray = view_ray(lens, middle.y - 0.5, middle.x - 0.5)
                     origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
                     ends, turns, wall = tank_interval(lens, origin, direction, inside.walls)
                     front = qd.max(z, ends[0])
                     if ends[0] <= ends[1] and front < back:
                         # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
                         wet, there, cover, edge, rise = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0)
-                        if qd.static(world % 10 >= 3):
+                        if even > 0:
+                            wet = even - 1.0
+                        elif qd.static(world % 10 >= 3):
                             at_pane = ends[0] > lens.near and wall.y == 0.0  # not through the open top
                             if at_pane and z < ends[0] - optics.spacing:
                                 wet = 1.0
@@ -181,7 +147,9 @@ def lay(
                             share, n, at = first, wall, front
                             if layer == 1:
                                 share = second
-                                if qd.static(world % 10 >= 3):
+                                if even > 0:
+                                    n = even_normal
+                                elif qd.static(world % 10 >= 3):
                                     n = normal_of(lens, row, column, z, rise)
                             elif layer == 2:
                                 share, at = cover, edge
@@ -211,9 +179,9 @@ def lay(
                                             kept_z, kept_layer, kept_pixel = at, layer, pixel
                                         body, above, whole = kept, kept_above, kept_whole
                                 result += share * shine(
-                                    pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside, row, column,
-                                    at, n, origin, direction, body, above, whole, qd.static(world % 10),
-                                    qd.static(world >= 10),
+                                    pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside, middle, at,
+                                    n, origin, direction, body, above, whole, qd.static(world % 10),
+                                    qd.static(world % 100 >= 10),
                                 )  # fmt: skip
                         line = line_cover(pixels.lines[row, column], front, optics.slack)
                         result += look.line_strength * there * line * (look.line - result)
@@ -221,9 +189,11 @@ def lay(
                             front = 1.7e38
                     else:
                         front = 1.7e38
-                pixels.color[row, column] = result
                 key = qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
-                surface.nearest[row, column] = qd.min(key, pixels.depth[row, column])
+                for k in range(qd.select(even > 0, block, 1)):
+                    r, c = row + k // beside, column + k % beside
+                    pixels.color[r, c] = result
+                    surface.nearest[r, c] = qd.min(key, pixels.depth[r, c])
 
 
 @qd.func
@@ -271,16 +241,16 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
 @qd.func
 def shine(
     pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
-    optics: Optics, inside: Inside, row, column, z, normal, origin, direction, body, above, whole, world: qd.template(),
+    optics: Optics, inside: Inside, place, z, normal, origin, direction, body, above, whole, world: qd.template(),
     many: qd.template(),
 ):  # fmt: skip
-    """Radiance of the water that a pixel shows at depth `z` with this normal.
+    """Radiance of the water that is seen at depth `z` with this normal, at a place (column, row) of the picture.
 
     `body`, `above` and `whole` are what `through_body` found for it; a negative way where it found none.
     """
     n, pace = normal, direction.norm()
     ahead, at = direction / pace, origin + z * direction
-    place = vec2(column + 0.5, row + 0.5)
+    row, column = qd.cast(place.y, qd.i32), qd.cast(place.x, qd.i32)
     tau, raw = 0.0, 0.0
     if qd.static(world <= 2):
         tau = sheet_at(thickness.water, lens, optics, inside, place, qd.static(world == 1))

@@ -25,6 +25,21 @@ function drawForce(outline, mark, text) {
   names.append(label);
 }
 
+/** Numbers make way for each other: from above to below each moves below those that it would lie on. */
+function part() {
+  const placed = [], gap = 2;
+  const labels = [...names.querySelectorAll(".force")].map((label) => ({ label, box: label.getBoundingClientRect() }));
+  for (const { label, box } of labels.sort((a, b) => a.box.top - b.box.top)) {
+    let { top, bottom } = box;
+    for (const other of placed)
+      if (box.left < other.right + gap && other.left < box.right + gap && top < other.bottom + gap && other.top < bottom + gap)
+        [top, bottom] = [other.bottom + gap, other.bottom + gap + box.height];
+    if (top > box.top) label.style.marginTop = `${top - box.top}px`;
+    placed.push({ left: box.left, right: box.right, top, bottom });
+    placed.sort((a, b) => a.top - b.top);
+  }
+}
+
 let outlined = "";
 function drawRegions() {
   const now = JSON.stringify([regions, game?.aims ?? null]);
@@ -46,6 +61,7 @@ function drawRegions() {
     label.style.top = `${100 * Math.min(0.99, low)}%`;
     names.append(label);
   });
+  part();
 }
 
 const stars = (count) => make("span", { className: "stars", role: "img", "aria-label": `${count} stars` }, ...[1, 2, 3].map((k) => make("i", { className: k <= count ? "on" : "", textContent: "★" })));

@@ -1,0 +1,41 @@
+"""Pixels are shaded once where all of their samples show the same, and nobody can tell."""
+
+import numpy as np
+import pytest
+from test_drops import ABOVE, SIZE, pool
+
+from wavetank import Camera, Scene, Simulation
+from wavetank.view.passes import water
+from wavetank.view.renderer import Renderer
+
+BESIDE = Camera(eye=(0.5, 0.7, 3.0), target=(0.5, 0.3, 0.5))
+
+
+@pytest.fixture
+def both(monkeypatch):
+    """Pictures of 2 x 2 samples, as they are and with every sample shaded by itself."""
+
+    def pictures(frame, camera=None, **style):
+        renderer, lay = Renderer(*SIZE, 2), water.lay
+        shown = renderer.render(frame, camera, view="water", legend=False, **style).astype(int)
+        with monkeypatch.context() as patch:
+            patch.setattr(water, "lay", lambda *arguments: lay(*arguments[:-1], arguments[-1] % 100))
+            resolved = renderer.render(frame, camera, view="water", legend=False, **style).astype(int)
+        return shown, resolved
+
+    return pictures
+
+
+@pytest.mark.parametrize("scene", ["above", "beside", "breaking"])
+def test_what_is_shaded_once_looks_as_if_it_were_resolved(both, scene):
+    """Few pixels differ, by little, and the mean of the picture by next to nothing; but something was shaded once."""
+    camera, frame = {"above": ABOVE, "beside": BESIDE}.get(scene), pool((0.5, 0.9, 0.5))
+    if scene == "breaking":
+        sim = Simulation(Scene.load("obstacle-tank").changed(spacing=0.05))
+        sim.advance(0.6)
+        frame = sim.frame()
+    shown, resolved = both(frame, camera)
+    change = np.abs(shown - resolved).max(axis=2)
+    assert 0.1 < change.mean() < 1.5
+    assert np.percentile(change, 99) < 14 and (change > 20).mean() < 0.006
+    assert np.abs(shown.mean(axis=(0, 1)) - resolved.mean(axis=(0, 1))).max() < 0.2
