@@ -211,6 +211,21 @@ def test_bodies_are_held_moved_and_let_go():
         _ = sim.bodies["bow"]
 
 
+def test_a_body_that_was_held_owes_nothing_when_it_is_let_go():
+    """What held it took its momentum: the first step gives what water and gravity give in that step (Newton)."""
+    box = wt.Box(name="box", center=(1.0, 0.44), size=(0.4, 0.2), density=500, held=True)
+    block = wt.Block(lower=(0, 0), upper=(2.0, 0.4))
+    sim = wt.Simulation(wt.Scene(spacing=0.02, tank=wt.Tank(size=(2.0, 0.8)), fluids=[block], solids=[box]))
+    sim.advance(0.5)
+    sim.hold("box", False)
+    sim.step()
+    assert sim.time_steps == 1
+    body = sim.bodies["box"]
+    got = body.mass * body.velocity + body.owed[:2]
+    given = (body.force + body.mass * np.array(sim.gravity)) * sim.scene.frame_time
+    assert got == pytest.approx(given, abs=1e-6)
+
+
 def test_a_tank_without_gravity_has_bodies():
     """Where nothing is deep."""
     sim = pool(wt.Sphere(name="ball", center=(0.48, 0.4, 0.48), radius=0.1, density=500), gravity=(0, 0, 0))

@@ -210,8 +210,8 @@ class Bodies(Mapping[str, Body]):
         Expressions and keyframes of joints have the time `clock` [s] then.
         """
         self.fastest, self.gravity = fastest, np.array([*gravity, 0.0][:3])
-        self.coupling.held = np.array([self._is_held(body) for body in self.members])
-        self.coupling.begin(self._rotations(), self.gravity, dt, self.pushes)
+        held = np.array([self._is_held(body) for body in self.members])
+        self.coupling.begin(self._rotations(), held, self.gravity, dt, self.pushes)
         for body in self.members:
             self._hold(body, body.rigid())
         for joint in self.joints.values():

@@ -125,15 +125,17 @@ class Coupling:
         self.rubbed = np.stack([mass, mass * self.reaches**2], axis=1)
 
     def begin(
-        self, rotations: np.ndarray, gravity: np.ndarray, dt: float, pushes: np.ndarray | None = None
+        self, rotations: np.ndarray, held: np.ndarray, gravity: np.ndarray, dt: float,
+        pushes: np.ndarray | None = None,
     ) -> None:  # fmt: skip
         """Find the velocities `wanted` [n, 6] for a step of `dt` [s] of bodies that are turned so [n, 4].
 
-        Besides gravity, forces of the scene give them the momentum `pushes` [n, 6].
+        Besides gravity, forces of the scene give them the momentum `pushes` [n, 6]. Those that were `held` [n] in the
+        step before are owed nothing by it.
         """
         self._heavy = self.masses * np.linalg.norm(gravity)
         self._learn()
-        owed = self.owed
+        owed, self.held = np.where(held[:, None], 0.0, self.owed), held
         weight = np.zeros_like(owed)
         weight[:, :3] = self.masses[:, None] * gravity * dt
         if pushes is not None:

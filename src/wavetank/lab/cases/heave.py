@@ -3,7 +3,7 @@
 References: linear theory with added mass and waves in the very same tank (`linear_waves.py`; its added mass of a square
 section is that of Newman 1977, Table 4.3, within 1 %). In 3-D, the sphere of Kramer et al. 2021 (10.3390/en14020269, a
 public benchmark: 0.3 m across, half immersed, drop heights from 0.03 m): linear theory with the added mass and damping
-of Hulme 1982 (10.1017/S0022112082001980, Table 1) gives its period.
+of Hulme 1982 (10.1017/S0022112082001980, Table 1) gives its course.
 """
 
 import math
@@ -100,16 +100,27 @@ def sphere_decay(spacing: float, seconds: float, arch: str) -> tuple[np.ndarray,
 
 
 def sphere_theory(times: np.ndarray) -> np.ndarray:
-    """Return the decay of a half-immersed sphere by the added mass and damping at its own frequency."""
-    table, ratio = measured("hulme_hemisphere_heave.csv"), 1.0
-    for _ in range(50):  # K a = 1.5 / (1 + added mass): 2 pi / 3 rho a^3 (1 + A) omega^2 = pi rho g a^2
-        ratio = 1.5 / (1.0 + float(np.interp(ratio, table["Ka"], table["A"])))
-    added, damping = (float(np.interp(ratio, table["Ka"], table[name])) for name in ("A", "B"))
-    omega = math.sqrt(ratio * 9.81 / RADIUS)
-    share = 0.5 * damping / (1.0 + added)  # of the critical
-    swing = omega * math.sqrt(1.0 - share**2)
-    phase = times * swing
-    return np.exp(-share * omega * times) * (np.cos(phase) + share / math.sqrt(1.0 - share**2) * np.sin(phase))
+    """Return how far a sphere that is let go is from where it floats half immersed, over where it began.
+
+    By the added mass A and damping B of all frequencies, so that waves are what they are from the first moment on
+    (Cummins 1962, "The impulse response function and ship motions"): with C the stiffness and m the mass,
+
+        x(t) = 2 / pi int_0^oo Re((i w (m + A) + B) / (C - w^2 (m + A) + i w B)) cos(w t) dw
+
+    in open water, which lies as much lower than in the end as a sphere that is held up takes less room.
+    """
+    table = measured("hulme_hemisphere_heave.csv")
+    w = np.arange(1, 100_000) * 1e-3  # over sqrt(g / a); masses are over that of the displaced water
+    ratio, last = w**2, {name: float(column[-1]) for name, column in table.items()}
+    far = np.minimum(1.0, last["Ka"] / ratio)  # beyond the table: towards a sphere that is suddenly moved
+    added = 0.5 - far * (0.5 - np.interp(ratio, table["Ka"], table["A"]))
+    damping = w * far**3 * np.interp(ratio, table["Ka"], table["B"])
+    stiffness = 1.5 - ratio * (1.0 + added)
+    course = ((1j * w * (1.0 + added) + damping) / (stiffness + 1j * w * damping)).real
+    scaled = times * math.sqrt(9.81 / RADIUS)
+    way = np.array([2.0 / math.pi * 1e-3 * float(course @ np.cos(w * t)) for t in scaled])
+    lower = math.pi * RADIUS**2 / (SIDE**2 - math.pi * RADIUS**2)
+    return (1.0 + lower) * way - lower
 
 
 def compare(name: str, times: np.ndarray, way: np.ndarray, theory: np.ndarray) -> list[Figure]:

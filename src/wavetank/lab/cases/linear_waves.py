@@ -160,7 +160,10 @@ def _solve(along_x: np.ndarray, along_y: np.ndarray, free: np.ndarray, rhs: np.n
 
 
 def decay(barge: Barge, cell: float, times: np.ndarray, *, rolls: bool) -> np.ndarray:
-    """Return how far the body still is from rest at `times` [s], over where it is let go at time 0."""
+    """Return how far the body still is from rest at `times` [s], over where it is let go at time 0.
+
+    The water rests then, and lies as much lower than in the end as a body that is held up takes less room.
+    """
     theory = linear(barge, cell, rolls=rolls)
     surface, modes = len(theory.widths), len(theory.added)
     mass = np.array([[barge.mass]]) if not rolls else np.diag([barge.mass, barge.inertia])
@@ -180,5 +183,7 @@ def decay(barge: Barge, cell: float, times: np.ndarray, *, rolls: bool) -> np.nd
     values, vectors = np.linalg.eig(rate)
     start = np.zeros(size)
     start[xi.stop - 1] = 1.0
+    if not rolls:
+        start[eta] = -barge.beam / (barge.length - barge.beam)
     weights = np.linalg.solve(vectors, start)
     return np.real((np.exp(np.outer(times, values)) * weights) @ vectors[xi.stop - 1])
