@@ -66,9 +66,7 @@ def cell_number(grid: Grid, c):
     """Number of the cell with the whole coordinates `c`."""
     number = 0
     if qd.static(grid.periods.axes):
-        number = remainder(c[0], grid.nx) + grid.nx * (
-            remainder(c[1], grid.ny) + grid.ny * remainder(c[2], grid.nz)
-        )
+        number = remainder(c[0], grid.nx) + grid.nx * (remainder(c[1], grid.ny) + grid.ny * remainder(c[2], grid.nz))
     else:
         layer = remainder(c[1] + grid.ny * remainder(c[2], grid.nz), grid.ny * grid.nz)
         number = remainder(c[0] + grid.nx * layer, grid.cells)

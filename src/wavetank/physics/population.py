@@ -216,8 +216,6 @@ def inside_box(particles: Particles, marks: Any, lower: np.ndarray, upper: np.nd
     return result
 
 
-
-
 def free_places(
     places: np.ndarray, particles: Particles, solids: SolidSet, count: int, clearance: Clearance
 ) -> np.ndarray:  # fmt: skip

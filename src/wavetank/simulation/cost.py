@@ -61,11 +61,7 @@ def cost_of(scene: Scene, capacity: int | None = None) -> Cost:
     cells = 2 * max(4 * particles, 4096)
     host = 6 * dim if capacity is None else 2 * dim  # places in double precision while they are chosen
     h = scene.support * scene.spacing
-    nodes = (
-        nodes_of(scene.tank.beyond(OPEN_CELLS * h), h, scene.tank.periods().axes)
-        if scene.tank
-        else 0
-    )
+    nodes = nodes_of(scene.tank.beyond(OPEN_CELLS * h), h, scene.tank.periods().axes) if scene.tank else 0
     fields = len(dataclasses.fields(CoarseGrid)) + 2 * 16
     return Cost(particles, nodes, 4 * (particles * (own + host) + cells + nodes * fields * 8 // 7))
 

@@ -319,9 +319,7 @@ class Simulation(States):
         """Turn the particles in that capsule to ice that keeps its place, or back to water."""
         if self.count:
             capsule = self._capsule(start, end, radius)
-            self.world.frozen = int(
-                population.freeze_particles(self.world.particles, capsule, int(frozen), self.count)
-            )
+            self.world.frozen = int(population.freeze_particles(self.world.particles, capsule, int(frozen), self.count))
 
     def _keep(self, keep: np.ndarray) -> int:
         removed = int(len(keep) - keep.sum())

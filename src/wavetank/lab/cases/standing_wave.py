@@ -62,7 +62,12 @@ def run(quick: bool, arch: str) -> Outcome:
         Figure("period, error", 100.0 * (period / PERIOD - 1.0), "%", -limit, limit, theory, "Lamb, art. 228"),
         Figure("period", period, "s", reference=theory, source="Lamb, art. 228"),
         Figure(
-            "period in a periodic tank, error", 100.0 * (seamless / PERIOD - 1.0), "%", -limit, limit, theory,
+            "period in a periodic tank, error",
+            100.0 * (seamless / PERIOD - 1.0),
+            "%",
+            -limit,
+            limit,
+            theory,
             "Lamb, art. 228",
         ),
         Figure("amplitude kept per period", 100.0 * kept, "%", reference="100 %", source="no friction"),

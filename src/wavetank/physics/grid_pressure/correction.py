@@ -37,12 +37,11 @@ import math
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls, remembered
 from wavetank.foundation.params import Parameters
-from wavetank.physics.boundary import fall, flattened, kept_in_tank
+from wavetank.physics.boundary import fall
 from wavetank.physics.grid_pressure.approach import approached
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import (
     add_whole,
-    beside_on,
     corners,
     in_cells,
     nearest,
@@ -51,8 +50,8 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     tents,
 )  # fmt: skip
 from wavetank.physics.grid_pressure.films import left_to_grid
-from wavetank.physics.grid_pressure.own_weight import FOREIGN, own_push
-from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, open_area, solve_levels
+from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
+from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import (
     LEAST_OPEN,
     below_roof,
@@ -63,21 +62,16 @@ from wavetank.physics.grid_pressure.room import (
     open_tents,
     whole,
 )  # fmt: skip
-from wavetank.physics.grid_pressure.surface import carried_share, depth_at
-from wavetank.physics.grid_pressure.weight import borne, flow_out
+from wavetank.physics.grid_pressure.surface import depth_at
+from wavetank.physics.grid_pressure.weight import BORNE, borne, flow_out
 from wavetank.physics.mixture import Blend
-from wavetank.physics.pairs import column
-from wavetank.physics.predicted_positions import predict_at, predicted
+from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.smoothing import rest_lattice
 from wavetank.physics.teams import (
-    end_of,
     end_of_part,
-    end_team,
     first_of_part,
-    first_team,
     part_of,
     teams,
-    turns,
     turns_over,
 )  # fmt: skip
 from wavetank.physics.world import World
@@ -85,14 +79,9 @@ from wavetank.solids.distance import SolidSet, lift, vec3
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
-BORNE = (0.6, 0.9)  # fill of a cell from where to where the grid bears its weight
-PUDDLE = (0.43, 0.6)  # fill at a particle: up to where it lies in a puddle, and from where in none
 FILM = (0.75, 1.25)  # cells of water: from where to where the grid takes part in a film
-REACH = 0.2  # of the support: the longest correction
 DAMPING = 0.1  # of a frame: the length of a step that damps as much, docs/notebook/calm.md
 LARGEST_CARRIED = 1.2  # of gravity
-SUPPORTED = 0.5  # d: depth from which on the grid carries a particle in full, that of the top layer at rest
-FADE = 1.0  # d: by how much higher it carries nothing
 MISSING = 1.0 / 3.0  # of a wall's answer, over what it gives: all of what lacks, docs/notebook/grid-pressure.md
 FULL = 0.98  # fill that cells without gaps have at least, also where few rows of particles do not match them
 SLIT = 0.7  # fill of a cell that touches a solid, as far as its tents can tell
@@ -122,22 +111,6 @@ class Errors:
     thin: qd.f32  # cells of water that are left to the iterations
     thick: qd.f32  # and from which on the grid does all
     spacing: qd.f32  # m
-
-
-@dataclasses.dataclass(frozen=True)
-class Push:
-    """The numbers of `move_particles`, likewise."""
-
-    stiffness: qd.f32  # M
-    reach: qd.f32  # m: the longest correction
-    supported: qd.f32  # m: depth from which on particles have all of it
-    fade: qd.f32  # m: by how much higher they have none
-    borne_from: qd.f32  # the fill from which weight is borne in gaps
-    borne_to: qd.f32  # and from which all of it is
-    dry: qd.f32  # the fill up to which water is a puddle
-    wet: qd.f32  # and from which it is none
-    foreign_from: qd.f32  # how foreign a particle is where its own weight begins to count
-    foreign_to: qd.f32  # and where all of it does
 
 
 def carried(dt: float, frame_time: float) -> float:
@@ -280,85 +253,6 @@ def gather(
         couple_nodes(grid, piece, e.least_theta)
 
 
-@qd.func
-def slope_across(grid: CoarseGrid, coupled, edge, n, m):
-    """Derivative of lambda [m] across the face from node `n` to `m`, told from 0 where it leads into water."""
-    area = qd.max(open_area(grid, n, m), 1e-3)
-    return coupled / area * edge * (grid.lam[m] - grid.lam[n]) + (1e-30 if coupled > 0.0 else 0.0)
-
-
-@qd.func
-def slope_along(
-    grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), at_rest, push: Push, dim: qd.template(),
-    searched: qd.template(),
-):  # fmt: skip
-    """Derivative of lambda [m] along `axis` at the place `s` [cells], from the faces around that lead into water.
-
-    The `slope` of the others is 0. In a gap so narrow that there is none it is what holds water `at_rest`.
-    """
-    place = s
-    place[axis] -= 0.5
-    at = corners(grid, qd.floor(place, qd.i32), dim)
-    weights = tents(place - qd.floor(place), dim)
-    total, weight = 0.0, 0.0
-    for k in qd.static(range(2**dim)):
-        own = slope[at[k]]
-        total += weights[k] * own
-        weight += weights[k] if own != 0.0 else 0.0
-    found = total / qd.max(weight, 1e-9)
-    if qd.static(searched):
-        enclosed = at_rest * borne(grid.fill[nearest(grid, qd.floor(s + 0.5, qd.i32))], push.borne_from, push.borne_to)
-        found = qd.select(weight == 0.0, enclosed, found)
-    return found
-
-
-@qd.kernel(fastcache=True)
-def move_particles(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, solids: SolidSet, c: Coefficients,
-    push: Push, count: qd.i32, few: qd.template(), searched: qd.template(), mixed: qd.template(),
-):  # fmt: skip
-    """Move the predicted positions by M grad lambda, inside the tank, and carry it on; what sticks out has less.
-
-    One thread sees to the nodes where they are `few`.
-    """
-    qd.loop_config(serialize=bool(few))
-    for n in range(grid.nx * grid.ny * grid.nz):
-        grid.slope_x[n] = slope_across(grid, grid.wx[n], grid.dx, n, beside_on(grid, n, 0, 1))
-        grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, beside_on(grid, n, 1, 1))
-        grid.slope_z[n] = slope_across(grid, grid.wz[n], grid.dz, n, beside_on(grid, n, 2, 1))
-    for turn in range(turns(cells, count)):
-        at_rest = -fall(c) / push.stiffness
-        for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
-            first = team * cells.lanes
-            dim = qd.static(particles.x[first].n)
-            slopes = qd.Matrix.zero(qd.f32, dim, cells.lanes)
-            shares = qd.Matrix.zero(qd.f32, 2, cells.lanes)
-            for lane in range(cells.lanes):
-                s = in_cells(grid, predicted(particles, first + lane))
-                carried_at = carried_share(grid, s, push.supported, push.fade, dim)
-                shares[0, lane] = carried_at[0]
-                if qd.static(mixed):
-                    density = 1.0 / scratch.weight[first + lane]
-                    shares[0, lane] *= own_push(grid, s, density, push.foreign_from, push.foreign_to, dim)
-                shares[1, lane] = qd.min(qd.max((push.wet - carried_at[1]) / (push.wet - push.dry), 0.0), 1.0)
-                slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, at_rest.x, push, dim, searched)
-                slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, at_rest.y, push, dim, searched)
-                if qd.static(dim == 3):
-                    slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, at_rest.z, push, dim, searched)
-            for i in range(first, end_of(team, cells, count)):
-                p = predicted(particles, i)
-                dp = column(slopes, i - first) * (push.stiffness * shares[0, i - first])
-                dp *= qd.min(1.0, push.reach / qd.max(dp.norm(), 1e-12))
-                p += dp
-                a = particles.a[i] + dp / (c.dt * c.dt)
-                particles.a[i] = a * qd.min(1.0, c.largest_carried / qd.max(a.norm(), 1e-12))
-                near = particles.near[i]
-                if near != 0:
-                    p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
-                predict_at(particles, i, p)
-                scratch.puddle[i] = shares[1, i - first]
-
-
 def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
     """Move the predicted positions so that the share `grid_pressure` of the mean errors of densities vanishes.
 
@@ -378,11 +272,10 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         errors(finest, params, stiffness), count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
     )  # fmt: skip
     solve_levels(world.levels, balanced=c.fallen > 0.0)
-    push = Push(stiffness, REACH * c.h, SUPPORTED * params.spacing, FADE * params.spacing, *BORNE, *PUDDLE, *FOREIGN)
     move_particles(
-        finest, world.particles, world.scratch, cells, world.solids, c, remembered(push), count, few, searched,
-        kinds.mixed,
-    )
+        finest, world.particles, world.scratch, cells, world.solids, c,
+        remembered(push_of(params, stiffness, c.h)), count, few, searched, kinds.mixed,
+    )  # fmt: skip
     if world.pieces:
         acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2
         push_on_grid(world, stiffness, stiffness / acting if acting else 0.0)  # nothing is deep without gravity

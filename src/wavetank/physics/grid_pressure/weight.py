@@ -20,6 +20,8 @@ from wavetank.physics.grid_pressure.surface import nodes_beyond
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3
 
+BORNE = (0.6, 0.9)  # fill of a cell from where to where the grid bears its weight
+
 
 @qd.func
 def borne(fill, first, last):
