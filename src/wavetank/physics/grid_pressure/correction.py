@@ -86,7 +86,6 @@ MISSING = 1.0 / 3.0  # of a wall's answer, over what it gives: all of what lacks
 FULL = 0.98  # fill that cells without gaps have at least, also where few rows of particles do not match them
 SLIT = 0.7  # fill of a cell that touches a solid, as far as its tents can tell
 CLOSING = 0.5  # of what lacks, in a step
-IN_CORNER = 0.02  # what cells in a corner of the tank may have less, for each wall but the first
 GAP_SHARE = 6.0  # by which errors are less, of what lacks there
 
 
@@ -104,7 +103,6 @@ class Errors:
     inner_to: qd.f32  # and with which it counts in full
     missing: qd.f32  # share by which the answer of solids is increased
     full: qd.f32  # fill of cells without gaps
-    in_corner: qd.f32  # by which it is less in a corner of the tank, for each wall but the first
     gap_share: qd.f32  # by which errors are less, of what lacks there
     least_open: qd.f32  # share of a cell
     slit: qd.f32  # fill from which on there is no slit
@@ -233,7 +231,7 @@ def gather(
             close_slit(grid, n, surely, e.slit)
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
-        grid.gaps[n] = gaps_at(grid, n, e.full, e.in_corner)
+        grid.gaps[n] = gaps_at(grid, n, e.full)
         grid.depth[n] = depth_at(grid, n)
     for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
@@ -289,7 +287,7 @@ def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
     return remembered(Errors(
         unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness,
         per_way=params.grid_pressure / stiffness, borne_from=BORNE[0], borne_to=BORNE[1], inner_from=INNER[0],
-        inner_to=INNER[1], missing=MISSING, full=FULL, in_corner=IN_CORNER, gap_share=GAP_SHARE,
-        least_open=LEAST_OPEN, slit=SLIT, closing=CLOSING * params.grid_pressure / stiffness,
-        least_theta=LEAST_THETA, thin=FILM[0], thick=FILM[1], spacing=params.spacing,
+        inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT,
+        closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, thin=FILM[0],
+        thick=FILM[1], spacing=params.spacing,
     ))  # fmt: skip

@@ -10,22 +10,10 @@ LEAST_OPEN = 0.1  # a cell that is less open is solid
 
 
 @qd.func
-def walls_beside(grid: CoarseGrid, n):
-    """Along how many axes node `n` lies next to a wall of the tank."""
-    place, last = coordinates(grid, n), qd.Vector([grid.nx, grid.ny, grid.nz]) - 1
-    walls = 0
-    for axis in qd.static(range(3)):
-        if qd.static(not grid.repeats >> axis & 1):
-            walls += qd.cast(last[axis] > 0 and (place[axis] == 0 or place[axis] == last[axis]), qd.i32)
-    return walls
-
-
-@qd.func
-def gaps_at(grid: CoarseGrid, n, full, in_corner):
+def gaps_at(grid: CoarseGrid, n, full):
     """How far even the fullest two cells in a row are from `full`, of those around node `n`.
 
-    In a corner of the tank `full` is less by `in_corner` for each wall but the first. 0 near solids, since
-    what room these leave is known only roughly.
+    0 near solids, since what room these leave is known only roughly.
     """
     fullest = 0.0
     if grid.clear[n] > 0.0:
@@ -39,9 +27,7 @@ def gaps_at(grid: CoarseGrid, n, full, in_corner):
                         at = nearest(grid, c)
                         fullest = qd.max(fullest, 0.5 * (before + grid.fill[at]))
                         before = grid.fill[at]
-    return (
-        qd.max(full - in_corner * qd.max(walls_beside(grid, n) - 1, 0) - fullest, 0.0) if grid.clear[n] > 0.0 else 0.0
-    )
+    return qd.max(full - fullest, 0.0) if grid.clear[n] > 0.0 else 0.0
 
 
 @qd.func
