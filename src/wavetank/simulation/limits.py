@@ -54,9 +54,8 @@ def find_speed_limit(
 ) -> float:
     """Return the largest speed [m/s] that gravity, the start, solids and forces can have given to a particle.
 
-    Gravity gives that of a free fall through the tank. Without one, and along
-    an axis that is periodic, a fall has no end, and neither has the limit. The
-    ledger keeps the fastest of solids and forces.
+    Gravity gives that of a free fall through the tank. Without one, and along an axis that is periodic, a fall has no
+    end, and neither has the limit. The ledger keeps the fastest of solids and forces.
     """
     if scene.tank is None:
         return math.inf

@@ -273,8 +273,8 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     )  # fmt: skip
     solve_levels(world.levels, balanced=c.fallen > 0.0)
     move_particles(
-        finest, world.particles, world.scratch, cells, world.solids, c,
-        remembered(push_of(params, stiffness, c.h)), count, few, searched, kinds.mixed,
+        finest, world.particles, world.scratch, cells, world.solids, c, push_of(params, stiffness, c.h), count, few,
+        searched, kinds.mixed,
     )  # fmt: skip
     if world.pieces:
         acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2

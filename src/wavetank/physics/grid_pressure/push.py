@@ -8,7 +8,7 @@ another fluid that of its own weight (`own_weight.py`).
 import dataclasses
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch
+from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, remembered
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import fall, flattened, kept_in_tank
 from wavetank.physics.grid_pressure.coarse_grid import beside_on, corners, in_cells, nearest, tents
@@ -125,4 +125,4 @@ def move_particles(
 def push_of(params: Parameters, stiffness: float, h: float) -> Push:
     """Return the numbers of `move_particles`, of a stiffness M and the support `h` [m]."""
     d = params.spacing
-    return Push(stiffness, REACH * h, SUPPORTED * d, FADE * d, *BORNE, *PUDDLE, *FOREIGN)
+    return remembered(Push(stiffness, REACH * h, SUPPORTED * d, FADE * d, *BORNE, *PUDDLE, *FOREIGN))
