@@ -46,6 +46,7 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     in_cells,
     nearest,
     parts_of,
+    ramp,
     taken,
     tents,
 )  # fmt: skip
@@ -63,7 +64,7 @@ from wavetank.physics.grid_pressure.room import (
     whole,
 )  # fmt: skip
 from wavetank.physics.grid_pressure.surface import depth_at
-from wavetank.physics.grid_pressure.weight import BORNE, borne, flow_out
+from wavetank.physics.grid_pressure.weight import BORNE, flow_out
 from wavetank.physics.mixture import Blend
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.smoothing import rest_lattice
@@ -79,6 +80,7 @@ from wavetank.solids.distance import SolidSet, lift, vec3
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
+BELOW = (0.4, 0.65)  # supports: and its depth, so that the top layer never counts, however it lies in the cells
 FILM = (0.75, 1.25)  # cells of water: from where to where the grid takes part in a film
 DAMPING = 0.1  # of a frame: the length of a step that damps as much, docs/notebook/calm.md
 LARGEST_CARRIED = 1.2  # of gravity
@@ -101,6 +103,8 @@ class Errors:
     borne_to: qd.f32  # and from which all of it is
     inner_from: qd.f32  # the fill from which a particle counts
     inner_to: qd.f32  # and with which it counts in full
+    below_from: qd.f32  # m: and the depth below the surface from which it does
+    below_to: qd.f32  # m: and in full
     missing: qd.f32  # share by which the answer of solids is increased
     full: qd.f32  # fill of cells without gaps
     gap_share: qd.f32  # by which errors are less, of what lacks there
@@ -179,10 +183,11 @@ def add_errors(
         s = in_cells(grid, predicted(particles, first + lane))
         nodes = corners(grid, qd.floor(s, qd.i32), dim)
         weights = weights_at(grid, nodes, s, dim, searched)
-        filled = 0.0
+        filled, depth = 0.0, 0.0
         for k in qd.static(range(2**dim)):
             filled += weights[k] * grid.fill[nodes[k]]
-        inside = qd.min(qd.max((filled - e.inner_from) / (e.inner_to - e.inner_from), 0.0), 1.0)
+            depth += weights[k] * grid.depth[nodes[k]]
+        inside = qd.min(ramp(filled, e.inner_from, e.inner_to), ramp(depth, e.below_from, e.below_to))
         error = scratch.rho[first + lane] * scratch.weight[first + lane] - 1.0
         error += added[0, lane] - e.gap_share * grid.gaps[nearest(grid, qd.floor(s + 0.5, qd.i32))]
         error = e.unit * inside * qd.min(qd.max(error, -1.0), 1.0)
@@ -242,7 +247,7 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.rhs[n] = e.scale * total - e.per_way * flow_out(grid, n, fall(c)) * borne(
+        grid.rhs[n] = e.scale * total - e.per_way * flow_out(grid, n, fall(c)) * ramp(
             grid.fill[n], e.borne_from, e.borne_to
         )
         if qd.static(searched):
@@ -283,11 +288,12 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
 
 def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
     """Return the numbers of `gather`."""
+    h = params.support * params.spacing
     volume = params.spacing**params.dim / (grid.dx * grid.dy * grid.dz) / UNIT
     return remembered(Errors(
         unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness,
         per_way=params.grid_pressure / stiffness, borne_from=BORNE[0], borne_to=BORNE[1], inner_from=INNER[0],
-        inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT,
-        closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, thin=FILM[0],
-        thick=FILM[1], spacing=params.spacing,
+        inner_to=INNER[1], below_from=BELOW[0] * h, below_to=BELOW[1] * h, missing=MISSING, full=FULL,
+        gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT, closing=CLOSING * params.grid_pressure / stiffness,
+        least_theta=LEAST_THETA, thin=FILM[0], thick=FILM[1], spacing=params.spacing,
     ))  # fmt: skip
