@@ -159,6 +159,14 @@ def add_fill(
 
 
 @qd.func
+def inside_at(grid: CoarseGrid, n, e: Errors):
+    """How far inside of the water node `n` lies: below 0 no particle there counts, above 1 all do in full."""
+    by_fill = (grid.fill[n] - e.inner_from) / (e.inner_to - e.inner_from)
+    by_depth = (grid.depth[n] - e.below_from) / (e.below_to - e.below_from)
+    return qd.min(by_fill, by_depth)
+
+
+@qd.func
 def add_errors(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     e: Errors, cells: Grid, team, part, count, searched: qd.template(),
@@ -183,14 +191,12 @@ def add_errors(
         s = in_cells(grid, predicted(particles, first + lane))
         nodes = corners(grid, qd.floor(s, qd.i32), dim)
         weights = weights_at(grid, nodes, s, dim, searched)
-        filled, depth = 0.0, 0.0
+        inside = 0.0
         for k in qd.static(range(2**dim)):
-            filled += weights[k] * grid.fill[nodes[k]]
-            depth += weights[k] * grid.depth[nodes[k]]
-        inside = qd.min(ramp(filled, e.inner_from, e.inner_to), ramp(depth, e.below_from, e.below_to))
+            inside += weights[k] * grid.slope_y[nodes[k]]
         error = scratch.rho[first + lane] * scratch.weight[first + lane] - 1.0
         error += added[0, lane] - e.gap_share * grid.gaps[nearest(grid, qd.floor(s + 0.5, qd.i32))]
-        error = e.unit * inside * qd.min(qd.max(error, -1.0), 1.0)
+        error = e.unit * ramp(inside, 0.0, 1.0) * qd.min(qd.max(error, -1.0), 1.0)
         for k in qd.static(range(2**dim)):
             at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
             amounts[k, lane] = qd.cast(qd.round(error * weights[k]), qd.i32)
@@ -238,6 +244,7 @@ def gather(
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.gaps[n] = gaps_at(grid, n, e.full)
         grid.depth[n] = depth_at(grid, n)
+        grid.slope_y[n] = inside_at(grid, n, e)
     for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
         for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
