@@ -30,20 +30,21 @@ def touching(lower: np.ndarray, upper: np.ndarray, low: np.ndarray, high: np.nda
     return beside & (np.abs([lower - high, upper - low]) < NEAR * spacing)
 
 
-def fitted(lower: np.ndarray, upper: np.ndarray, spacing: float, held: np.ndarray) -> np.ndarray:
+def fitted(lower: np.ndarray, upper: np.ndarray, spacing: float, held: np.ndarray, rings: list[int]) -> np.ndarray:
     """Return the positions [m], float64 [n, dim], of a block that is `held` on both sides along some axes, bool [dim].
 
-    Where all are held the rows of the second lie as the others have it, upwards.
+    The world repeats along the axes that are `rings`. Where all axes are held, one that is none gives way, upwards if
+    it can; where all are rings, particles have a little more than their volume.
     """
     size, dim = upper - lower, len(lower)
     counts, ways = plain_rows(lower, upper, spacing), np.full(dim, spacing)
-    is_fitted = held & (np.arange(dim) != 1) if held.all() else held
-    rows = np.maximum(np.rint(size / spacing), 1.0)
-    is_fitted = is_fitted & (np.abs(size / rows - spacing) < UNLIKE * spacing)
-    is_even = np.abs(size / rows - spacing) < NEAR * spacing
-    if (is_fitted & ~is_even).any():
+    rows = np.maximum(counts if len(rings) == dim else np.rint(size / spacing), 1)
+    yielding = [axis for axis in (1, 0, 2)[:dim] if axis not in rings] if held.all() else []
+    is_fitted = held & (np.abs(size / rows - spacing) < UNLIKE * spacing)
+    is_fitted[yielding[:1]] = False
+    if (np.abs(size / rows - spacing) > NEAR * spacing)[is_fitted].any():
         counts[is_fitted], ways[is_fitted] = rows[is_fitted], (size / rows)[is_fitted]
         others = ~is_fitted
-        ways[others] *= (spacing ** is_fitted.sum() / ways[is_fitted].prod()) ** (1.0 / others.sum())
+        ways[others] *= (spacing ** is_fitted.sum() / ways[is_fitted].prod()) ** (1.0 / max(others.sum(), 1))
         counts[others] = np.floor(size[others] / ways[others] + BEYOND)
     return lattice(lower, counts, ways)
