@@ -160,10 +160,13 @@ def add_fill(
 
 @qd.func
 def inside_at(grid: CoarseGrid, n, e: Errors):
-    """How far inside of the water node `n` lies: below 0 no particle there counts, above 1 all do in full."""
+    """How far inside of the water node `n` lies: below 0 no particle there counts, above 1 all do in full.
+
+    Depths beside solids are known only roughly, and so do not count.
+    """
     by_fill = (grid.fill[n] - e.inner_from) / (e.inner_to - e.inner_from)
     by_depth = (grid.depth[n] - e.below_from) / (e.below_to - e.below_from)
-    return qd.min(by_fill, by_depth)
+    return qd.min(by_fill, by_depth) if grid.clear[n] > 0.0 else by_fill
 
 
 @qd.func
