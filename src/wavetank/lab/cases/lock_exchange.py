@@ -3,8 +3,8 @@
 Benjamin 1968, J. Fluid Mech. 31, 209, doi:10.1017/S0022112068000133: a current that fills half the depth H without
 losing energy runs at U = 0.5 sqrt(g (rho_heavy - rho_light) H / rho), rho being the density of what it runs into, since
 it is that which is accelerated. So the heavy current is faster, by sqrt(rho_heavy / rho_light); both were measured by
-Lowe, Rottman and Linden 2005, J. Fluid Mech. 537, 101, doi:10.1017/S0022112005005069. Full-depth locks with nearly equal
-densities give 0.92 to 1 of that speed: Shin, Dalziel and Linden 2004, J. Fluid Mech. 521, 1,
+Lowe, Rottman and Linden 2005, J. Fluid Mech. 537, 101, doi:10.1017/S0022112005005069. Full-depth locks with nearly
+equal densities give 0.92 to 1 of that speed: Shin, Dalziel and Linden 2004, J. Fluid Mech. 521, 1,
 doi:10.1017/S002211200400165X. The light current runs under a free surface here. Speeds are fitted between 0.3 H and
 1.3 H from the lock; particles are counted in the lower third for the heavy current and in the upper third for the light
 one, the eighth from the front.
