@@ -1,10 +1,10 @@
 """The Poisson equation laplace lambda = rhs on the grids of a tank, with lambda <= 0.
 
 At the free surface lambda is 0 (the ghost fluid method, Gibou et al. 2002, 10.1006/jcph.2001.6977): as far from a node
-in the water as the water of its cell and of the next one reaches (`surface.py`; docs/notebook/calm.md). Nothing flows
-into solids. The solution on a grid starts from that of the next coarser one, so that a few sweeps of projected
-over-relaxation are enough on each. It does not start from the time step before: pressures that are carried over make
-water pulse (docs/notebook/solver.md).
+in the water as the water of its cell and of the next one reaches (`surface.py`; docs/notebook/calm.md), but beside
+solids, where fills are known only roughly, at a fill of one half. Nothing flows into solids. The solution on a grid
+starts from that of the next coarser one, so that a few sweeps of projected over-relaxation are enough on each. It does
+not start from the time step before: pressures that are carried over make water pulse (docs/notebook/solver.md).
 
     code    symbol     meaning                                                      unit
     fill    f          water in the tent of a node, over the room that it has       1
@@ -20,6 +20,7 @@ import math
 from wavetank.device.compiler import current_backend, qd, worth_sharing
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import coordinates
+from wavetank.physics.grid_pressure.room import whole
 from wavetank.physics.grid_pressure.thin_walls import is_shut
 
 SWEEPS, MOST_SWEEPS = 8, 200  # at once, and of the coarsest level
@@ -73,8 +74,9 @@ def coupling(grid: CoarseGrid, n, m, edge, least_theta, shut):
     """
     a = qd.min(grid.fill[n], 1.0) - 0.5
     b = qd.min(grid.fill[m], 1.0) - 0.5
-    to_surface = qd.min(qd.max(a + b + 0.5, least_theta), 1.0)
-    theta = qd.select(a * b < 0.0, to_surface, 1.0)
+    crossed = qd.max(a, b) / qd.max(qd.abs(a - b), 1e-6)
+    to_surface = qd.select(qd.min(grid.room[n], grid.room[m]) < whole(), crossed, a + b + 0.5)
+    theta = qd.select(a * b < 0.0, qd.min(qd.max(to_surface, least_theta), 1.0), 1.0)
     # Light fluid gives way more: the inverse of the mean density, and of that of the water where there is air.
     mean = 0.5 * (grid.density[n] + grid.density[m])
     density = qd.select(a <= 0.0, grid.density[m], qd.select(b <= 0.0, grid.density[n], mean))
