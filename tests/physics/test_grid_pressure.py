@@ -24,7 +24,7 @@ from wavetank.simulation.simulation import Simulation
 def couple(level: CoarseGrid, least_theta: qd.f32):
     """Set the couplings of a finest level, as `gather` does."""
     for piece in range(level.pieces * level.ny * level.nz):
-        poisson.couple_nodes(level, piece, least_theta)
+        poisson.couple_nodes(level, piece, least_theta, 0.0)
 
 
 def filled(level, heights) -> None:
