@@ -3,9 +3,9 @@
 At the free surface lambda is 0 (the ghost fluid method, Gibou et al. 2002, 10.1006/jcph.2001.6977): as far from a node
 in the water as the water of its cell and of the next one reaches (`surface.py`; docs/notebook/calm.md), but in worlds
 with bodies at a fill of one half beside solids, where fills are known only roughly. Nothing flows into solids. The
-solution on a grid starts from that of the next coarser one, so that a few sweeps of projected over-relaxation are
-enough on each. It does not start from the time step before: pressures that are carried over make water pulse
-(docs/notebook/solver.md).
+solution on a grid starts from that of the next coarser one, linearly between its nodes, so that a few sweeps of projected
+over-relaxation are enough on each. It does not start from the time step before: pressures that are carried over make
+water pulse (docs/notebook/solver.md).
 
     code    symbol     meaning                                                      unit
     fill    f          water in the tent of a node, over the room that it has       1
@@ -20,7 +20,7 @@ import math
 
 from wavetank.device.compiler import current_backend, qd, worth_sharing
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import coordinates
+from wavetank.physics.grid_pressure.coarse_grid import coordinates, nearest
 from wavetank.physics.grid_pressure.thin_walls import is_shut
 
 SWEEPS, MOST_SWEEPS = 8, 200  # at once, and of the coarsest level
@@ -134,12 +134,29 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta, rough):
 
 
 @qd.func
+def interpolated(coarser: CoarseGrid, c, halved):
+    """Value at the node `c` of the next finer level between those of a `coarser` one, linear along each axis.
+
+    Axes that are not `halved` have as many nodes on both. Beyond solids and the rim of the tank it is even.
+    """
+    at = c >> halved
+    own = coarser.lam[at[0] + coarser.nx * (at[1] + coarser.ny * at[2])]
+    found = own
+    for axis in qd.static(range(3)):
+        if halved[axis] == 1:
+            place = at
+            place[axis] += 2 * (c[axis] & 1) - 1
+            m = nearest(coarser, place)
+            if coarser.room[m] > 0.0:
+                found += 0.25 * (coarser.lam[m] - own)
+    return qd.min(found, 0.0)
+
+
+@qd.func
 def start_nodes(grid: CoarseGrid, coarser: CoarseGrid, row, first, last, start):
     """Set lambda of the nodes of a `row` from x = `first` to `last` to what `start` says; 0 outside of the water."""
-    halved = grid.nx // coarser.nx - 1  # 1, or 0 where the levels have as many nodes along x
-    y = row % grid.ny // (grid.ny // coarser.ny)
-    z = row // grid.ny // (grid.nz // coarser.nz)
-    below = coarser.nx * (y + coarser.ny * z)
+    halved = qd.Vector([grid.nx // coarser.nx - 1, grid.ny // coarser.ny - 1, grid.nz // coarser.nz - 1])
+    c = qd.Vector([0, row % grid.ny, row // grid.ny])
     for x in range(first, last):
         n = grid.nx * row + x
         lam = 0.0
@@ -147,7 +164,8 @@ def start_nodes(grid: CoarseGrid, coarser: CoarseGrid, row, first, last, start):
             if start == start_where_it_was():
                 lam = grid.lam[n]
             if start == start_from_coarser():
-                lam = coarser.lam[below + (x >> halved)]
+                c[0] = x
+                lam = interpolated(coarser, c, halved)
         grid.lam[n] = lam
 
 
