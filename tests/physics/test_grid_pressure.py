@@ -55,8 +55,8 @@ def test_weight_at_the_bottom_becomes_hydrostatic_pressure():
     for _ in range(4):
         poisson.solve(level, level, poisson.GO_ON, 200, 1.8, 0)
     lam = level.lam.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
-    # Between the full cell below and the air above, the level set f - 1/2 is zero a third of the way up.
-    depth = level.dy * (12.0 + 0.25 / 0.75 - np.arange(13))
+    # The fill crosses one half a third of the way up, but the volume ends after a quarter.
+    depth = level.dy * (12.25 - np.arange(13))
     np.testing.assert_allclose(lam[:13], np.repeat(-depth[:, None] * level.dy, 8, axis=1), rtol=2e-3)
     assert not lam[13:].any()
 

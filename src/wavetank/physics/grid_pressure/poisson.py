@@ -3,9 +3,9 @@
 At the free surface lambda is 0 (the ghost fluid method, Gibou et al. 2002, 10.1006/jcph.2001.6977): as far from a node
 in the water as the water of its cell and of the next one reaches (`surface.py`; docs/notebook/calm.md), but in worlds
 with bodies at a fill of one half beside solids, where fills are known only roughly. Nothing flows into solids. The
-solution on a grid starts from that of the next coarser one, linearly between its nodes, so that a few sweeps of projected
-over-relaxation are enough on each. It does not start from the time step before: pressures that are carried over make
-water pulse (docs/notebook/solver.md).
+solution on a grid starts from that of the next coarser one, linearly between its nodes, so that a few sweeps of
+projected over-relaxation are enough on each. It does not start from the time step before: pressures that are carried
+over make water pulse (docs/notebook/solver.md).
 
     code    symbol     meaning                                                      unit
     fill    f          water in the tent of a node, over the room that it has       1
