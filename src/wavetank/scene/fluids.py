@@ -82,7 +82,7 @@ class Block(Fluid):
         for other in fluids:
             if isinstance(other, Block) and other is not self:
                 touched |= touching(lower, upper, *other.bounds(), spacing)
-        return fitted(lower, upper, spacing, touched.all(0), tank.rings if tank else [])
+        return fitted(lower, upper, spacing, touched[0] & touched[1], tank.rings if tank else [])
 
 
 class Ball(Fluid):
