@@ -12,7 +12,7 @@ def test_two_sides_that_are_the_same_differ_in_nothing(capsys, monkeypatch):
     monkeypatch.setattr(backends.compare, "__defaults__", (("particles",), 0.05))
     experiments._compare_backends("cpu", as_json=True)
     result = json.loads(capsys.readouterr().out)
-    assert result["particles"] == 4913
+    assert result["particles"] == 5184
     assert result["views"] == {"particles": {"close": 1.0, "largest": 0}}
     for name, (ours, theirs) in {**result["figures"], "height": result["height"]}.items():
         assert ours == theirs > 0.0, name

@@ -89,16 +89,17 @@ def test_amount_follows_the_surface_and_not_the_resolution(dim):
     """Births times d^(dim - 1), the share of a surface that each one covers, is the same at twice the resolution.
 
     With as many time steps, and to a third: coarse water is damped more itself. Without the share it would be 2 or 4.
-    How often a jet in the plane breaks is a matter of chance (single pairs: 1.11 to 1.60), hence a mean: 1.29.
+    How often a jet in the plane breaks is a matter of chance (single pairs: 1.11 to 1.60), hence a mean: 1.29. In space
+    five pairs give 0.53 to 0.83, their mean 0.69.
     """
     coarse, fine = (0.064, 0.032) if dim == 3 else (0.04, 0.02)
     same = {"substeps": 8, "courant": 100.0, "wave_courant": 100.0}
-    near = (0.94, 0.96, 0.97, 0.98, 0.99, 1.0, 1.01, 1.02, 1.03, 1.04, 1.06) if dim == 2 else (1.0,)
+    near = (0.94, 0.96, 0.97, 0.98, 0.99, 1.0, 1.01, 1.02, 1.03, 1.04, 1.06) if dim == 2 else (0.98, 1.0, 1.02)
     shares = [
         np.mean([born(dam(dim, spacing=f * d, **same), 1.2) * (f * d) ** (dim - 1) for f in near])
         for d in (coarse, fine)
     ]
-    assert shares[0] == pytest.approx(shares[1], rel=0.33)
+    assert shares[0] == pytest.approx(shares[1], rel=0.33 if dim == 2 else 0.4)
 
 
 def test_lifetimes_spread_around_the_parameter():

@@ -1,5 +1,6 @@
 """Fluids as plain data: where a scene's particles start."""
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -7,6 +8,8 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema, model_val
 from typing_extensions import override
 
 from wavetank.foundation.model import FARTHEST, METRES, Length, Model, Place, Vector, register_model
+from wavetank.scene.lattice import fitted, lattice, plain_rows, touching
+from wavetank.scene.tank import Tank
 
 
 class Fluid(Model):
@@ -35,10 +38,12 @@ class Fluid(Model):
     def particles(self, spacing: float) -> np.ndarray:
         """Positions [n, dim] of a cubic lattice that fills this fluid, half a spacing from its lower corner."""
         lower, upper = self.bounds()
-        counts = np.floor((upper - lower) / spacing + 1e-6).astype(int)
-        axes = [low + (np.arange(n) + 0.5) * spacing for low, n in zip(lower, counts, strict=True)]
-        lattice = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
-        return lattice[self.contains(lattice)]
+        x = lattice(lower, plain_rows(lower, upper, spacing), np.full(len(lower), spacing))
+        return x[self.contains(x)]
+
+    def placed(self, spacing: float, tank: Tank | None, fluids: Sequence["Fluid"]) -> np.ndarray:
+        """Positions [n, dim] of this fluid's particles where it lies in a `tank` beside all the scene's `fluids`."""
+        return self.particles(spacing)
 
 
 class Block(Fluid):
@@ -69,6 +74,15 @@ class Block(Fluid):
     def contains(self, points: np.ndarray) -> np.ndarray:
         lower, upper = self.bounds()
         return np.all((points > lower) & (points < upper), axis=1)
+
+    @override
+    def placed(self, spacing: float, tank: Tank | None, fluids: Sequence[Fluid]) -> np.ndarray:
+        lower, upper = self.bounds()
+        touched = np.zeros((2, len(lower)), bool) if tank is None else tank.touched_by(lower, upper, spacing)
+        for other in fluids:
+            if isinstance(other, Block) and other is not self:
+                touched |= touching(lower, upper, *other.bounds(), spacing)
+        return fitted(lower, upper, spacing, touched.all(0), tank.rings if tank else [])
 
 
 class Ball(Fluid):

@@ -23,7 +23,7 @@ from wavetank.foundation.tracks import scaled
 from wavetank.scene.bounds import check_bodies, check_numbers, check_periodic, check_scales
 from wavetank.scene.filled import AnyFluid, Filled
 from wavetank.scene.film import Film
-from wavetank.scene.fluids import Block, Points
+from wavetank.scene.fluids import Points
 from wavetank.scene.forces import AnyForce
 from wavetank.scene.goal import Goal
 from wavetank.scene.joints import AnyJoint, check_joints
@@ -240,8 +240,8 @@ class Scene(Timetable, Parameters):
         """Positions and velocities of each fluid."""
         parts = []
         for number, fluid in enumerate(self.fluids):
-            x = fluid.particles(self.spacing).reshape(-1, self.dim)  # none at all have no width of their own
-            x = self.tank.spread(x, self.spacing) if self.tank and isinstance(fluid, Block) else x
+            x = fluid.placed(self.spacing, self.tank, self.fluids)
+            x = x.reshape(-1, self.dim)  # none at all have no width of their own
             v = np.zeros_like(x) if fluid.velocity is None else np.tile(np.array(fluid.velocity, float), (len(x), 1))
             if isinstance(fluid, Points):
                 v = v if fluid.velocities is None else fluid.velocities.reshape(x.shape)

@@ -7,6 +7,7 @@ from pydantic import SerializerFunctionWrapHandler, model_serializer, model_vali
 
 from wavetank.device.periods import Periods, periods_of, places_within
 from wavetank.foundation.model import Edges, Place
+from wavetank.scene.lattice import NEAR
 from wavetank.scene.schedule import Tilted
 from wavetank.solids.shapes import HalfSpace
 from wavetank.solids.solid import Solid
@@ -76,16 +77,11 @@ class Tank(Tilted):
         half = 0.5 * np.array(self.size, float)
         return places_within(places, point - half, point + half, self.rings)
 
-    def spread(self, lattice: np.ndarray, spacing: float) -> np.ndarray:
-        """Return a block's `lattice` [n, dim] [m] with even rows across the seam, where it reaches from end to end."""
-        x, (lower, upper) = lattice, self.box()
-        for axis in self.rings if len(x) else ():
-            first, last, length = x[:, axis].min(), x[:, axis].max(), upper[axis] - lower[axis]
-            width = last - first + spacing  # of whole rows
-            if abs(first - lower[axis] - 0.5 * spacing) < 1e-6 * spacing and length - width < spacing:
-                x = x.copy()
-                x[:, axis] = lower[axis] + (x[:, axis] - lower[axis]) * (length / width)
-        return x
+    def touched_by(self, lower: np.ndarray, upper: np.ndarray, spacing: float) -> np.ndarray:
+        """Say where a box between two corners [m] reaches a wall or a seam, at both sides along each axis, [2, dim]."""
+        low, high = self.box()
+        is_open = np.array([[self.is_open(axis, side) for axis in range(len(low))] for side in (0, 1)])
+        return ~is_open & np.array([lower < low + NEAR * spacing, upper > high - NEAR * spacing])
 
     def is_open(self, axis: int, side: int) -> bool:
         """Say whether there is no wall at the lower (0) or upper (1) side along an axis."""

@@ -49,6 +49,12 @@ def in_cells(grid: CoarseGrid, p: qd.template()):
 
 
 @qd.func
+def ramp(value, first, last):
+    """Share from 0, up to `first`, to 1, from `last` on."""
+    return qd.min(qd.max((value - first) / (last - first), 0.0), 1.0)
+
+
+@qd.func
 def tents(share, dim: qd.template()):
     """Weights of the corners of a cell, in the order of `corners`, for a place with the coordinates `share` in it."""
     x = qd.Vector([1.0 - share.x, share.x])

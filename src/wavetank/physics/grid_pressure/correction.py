@@ -46,11 +46,12 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     in_cells,
     nearest,
     parts_of,
+    ramp,
     taken,
     tents,
 )  # fmt: skip
 from wavetank.physics.grid_pressure.films import left_to_grid
-from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
+from wavetank.physics.grid_pressure.poisson import LEAST_THETA, ROUGH, couple_nodes, is_shared, solve_levels
 from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import (
     LEAST_OPEN,
@@ -63,7 +64,7 @@ from wavetank.physics.grid_pressure.room import (
     whole,
 )  # fmt: skip
 from wavetank.physics.grid_pressure.surface import depth_at
-from wavetank.physics.grid_pressure.weight import BORNE, borne, flow_out
+from wavetank.physics.grid_pressure.weight import BORNE, flow_out
 from wavetank.physics.mixture import Blend
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.smoothing import rest_lattice
@@ -79,6 +80,7 @@ from wavetank.solids.distance import SolidSet, lift, vec3
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
+BELOW = (0.4, 0.65)  # supports: and its depth, so that the top layer never counts, however it lies in the cells
 FILM = (0.75, 1.25)  # cells of water: from where to where the grid takes part in a film
 DAMPING = 0.1  # of a frame: the length of a step that damps as much, docs/notebook/calm.md
 LARGEST_CARRIED = 1.2  # of gravity
@@ -101,6 +103,8 @@ class Errors:
     borne_to: qd.f32  # and from which all of it is
     inner_from: qd.f32  # the fill from which a particle counts
     inner_to: qd.f32  # and with which it counts in full
+    below_from: qd.f32  # m: and the depth below the surface from which it does
+    below_to: qd.f32  # m: and in full
     missing: qd.f32  # share by which the answer of solids is increased
     full: qd.f32  # fill of cells without gaps
     gap_share: qd.f32  # by which errors are less, of what lacks there
@@ -108,6 +112,7 @@ class Errors:
     slit: qd.f32  # fill from which on there is no slit
     closing: qd.f32  # 1/m^2: what lacks is closed by in a step, over the stiffness M
     least_theta: qd.f32  # of an edge
+    rough: qd.f32  # room up to which the surface is where the fill crosses one half
     thin: qd.f32  # cells of water that are left to the iterations
     thick: qd.f32  # and from which on the grid does all
     spacing: qd.f32  # m
@@ -155,6 +160,17 @@ def add_fill(
 
 
 @qd.func
+def inside_at(grid: CoarseGrid, n, e: Errors):
+    """How far inside of the water node `n` lies: below 0 no particle there counts, above 1 all do in full.
+
+    Depths beside solids are known only roughly, and so do not count.
+    """
+    by_fill = (grid.fill[n] - e.inner_from) / (e.inner_to - e.inner_from)
+    by_depth = (grid.depth[n] - e.below_from) / (e.below_to - e.below_from)
+    return qd.min(by_fill, by_depth) if grid.clear[n] > 0.0 else by_fill
+
+
+@qd.func
 def add_errors(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     e: Errors, cells: Grid, team, part, count, searched: qd.template(),
@@ -179,13 +195,12 @@ def add_errors(
         s = in_cells(grid, predicted(particles, first + lane))
         nodes = corners(grid, qd.floor(s, qd.i32), dim)
         weights = weights_at(grid, nodes, s, dim, searched)
-        filled = 0.0
+        inside = 0.0
         for k in qd.static(range(2**dim)):
-            filled += weights[k] * grid.fill[nodes[k]]
-        inside = qd.min(qd.max((filled - e.inner_from) / (e.inner_to - e.inner_from), 0.0), 1.0)
+            inside += weights[k] * grid.slope_y[nodes[k]]
         error = scratch.rho[first + lane] * scratch.weight[first + lane] - 1.0
         error += added[0, lane] - e.gap_share * grid.gaps[nearest(grid, qd.floor(s + 0.5, qd.i32))]
-        error = e.unit * inside * qd.min(qd.max(error, -1.0), 1.0)
+        error = e.unit * ramp(inside, 0.0, 1.0) * qd.min(qd.max(error, -1.0), 1.0)
         for k in qd.static(range(2**dim)):
             at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
             amounts[k, lane] = qd.cast(qd.round(error * weights[k]), qd.i32)
@@ -233,6 +248,7 @@ def gather(
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.gaps[n] = gaps_at(grid, n, e.full)
         grid.depth[n] = depth_at(grid, n)
+        grid.slope_y[n] = inside_at(grid, n, e)
     for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
         for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
@@ -242,7 +258,7 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.rhs[n] = e.scale * total - e.per_way * flow_out(grid, n, fall(c)) * borne(
+        grid.rhs[n] = e.scale * total - e.per_way * flow_out(grid, n, fall(c)) * ramp(
             grid.fill[n], e.borne_from, e.borne_to
         )
         if qd.static(searched):
@@ -250,7 +266,7 @@ def gather(
         grid.rhs[n] *= left_to_grid(grid, n, e.thin, e.thick)
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
-        couple_nodes(grid, piece, e.least_theta)
+        couple_nodes(grid, piece, e.least_theta, e.rough)
 
 
 def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
@@ -267,11 +283,12 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         world.has_thin_walls = bool(world.thin_walls.to_numpy()[0])
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     few = int(not is_shared(finest))
+    balanced = c.fallen > 0.0
     gather(
         finest, world.particles, world.scratch, cells, world.solids, world.walls, c,
-        errors(finest, params, stiffness), count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
+        errors(finest, params, stiffness, balanced), count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
     )  # fmt: skip
-    solve_levels(world.levels, balanced=c.fallen > 0.0)
+    solve_levels(world.levels, balanced=balanced)
     move_particles(
         finest, world.particles, world.scratch, cells, world.solids, c, push_of(params, stiffness, c.h), count, few,
         searched, kinds.mixed,
@@ -281,13 +298,14 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         push_on_grid(world, stiffness, stiffness / acting if acting else 0.0)  # nothing is deep without gravity
 
 
-def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
-    """Return the numbers of `gather`."""
+def errors(grid: CoarseGrid, params: Parameters, stiffness: float, balanced: bool) -> Errors:
+    """Return the numbers of `gather`, where weight is `balanced` or not."""
+    h = params.support * params.spacing
     volume = params.spacing**params.dim / (grid.dx * grid.dy * grid.dz) / UNIT
     return remembered(Errors(
         unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness,
         per_way=params.grid_pressure / stiffness, borne_from=BORNE[0], borne_to=BORNE[1], inner_from=INNER[0],
-        inner_to=INNER[1], missing=MISSING, full=FULL, gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT,
-        closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, thin=FILM[0],
-        thick=FILM[1], spacing=params.spacing,
+        inner_to=INNER[1], below_from=BELOW[0] * h, below_to=BELOW[1] * h, missing=MISSING, full=FULL,
+        gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT, closing=CLOSING * params.grid_pressure / stiffness,
+        least_theta=LEAST_THETA, rough=ROUGH[balanced], thin=FILM[0], thick=FILM[1], spacing=params.spacing,
     ))  # fmt: skip

@@ -9,7 +9,7 @@ through a film.
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import beside_on
+from wavetank.physics.grid_pressure.coarse_grid import beside_on, ramp
 from wavetank.physics.grid_pressure.surface import nodes_beyond
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 
@@ -51,4 +51,4 @@ def left_to_grid(grid: CoarseGrid, n, thin, thick):
         for axis in qd.static(range(3)):
             if grid.nz > 1 or axis < 2:
                 cells = qd.min(cells, thickness(grid, n, axis))
-    return qd.min(qd.max((cells - thin) / (thick - thin), 0.0), 1.0)
+    return ramp(cells, thin, thick)

@@ -18,7 +18,7 @@ own; what is higher by a spacing reads 0.7. As with the surface (`surface.py`), 
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import corners, nearest, tents
+from wavetank.physics.grid_pressure.coarse_grid import corners, nearest, ramp, tents
 
 FOREIGN = (0.45, 0.8)  # how foreign a particle is where its own weight begins to count, and where all of it does
 
@@ -46,5 +46,5 @@ def own_push(grid: CoarseGrid, s, density, foreign_from, foreign_to, dim: qd.tem
     for k in qd.static(range(2**dim)):
         around += weights[k] * grid.density[at[k]]
     foreign = qd.abs(around - density) / farthest_density(grid, qd.floor(s + 0.5, qd.i32), density, dim)
-    share = qd.min(qd.max((foreign - foreign_from) / (foreign_to - foreign_from), 0.0), 1.0)
+    share = ramp(foreign, foreign_from, foreign_to)
     return 1.0 + share * (around - density) / (density + 0.5 * around)

@@ -11,11 +11,11 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, remembered
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import fall, flattened, kept_in_tank
-from wavetank.physics.grid_pressure.coarse_grid import beside_on, corners, in_cells, nearest, tents
+from wavetank.physics.grid_pressure.coarse_grid import beside_on, corners, in_cells, nearest, ramp, tents
 from wavetank.physics.grid_pressure.own_weight import FOREIGN, own_push
 from wavetank.physics.grid_pressure.poisson import open_area
 from wavetank.physics.grid_pressure.surface import carried_share
-from wavetank.physics.grid_pressure.weight import BORNE, borne
+from wavetank.physics.grid_pressure.weight import BORNE
 from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.teams import end_of, end_team, first_team, turns
@@ -70,7 +70,7 @@ def slope_along(
         weight += weights[k] if own != 0.0 else 0.0
     found = total / qd.max(weight, 1e-9)
     if qd.static(searched):
-        enclosed = at_rest * borne(grid.fill[nearest(grid, qd.floor(s + 0.5, qd.i32))], push.borne_from, push.borne_to)
+        enclosed = at_rest * ramp(grid.fill[nearest(grid, qd.floor(s + 0.5, qd.i32))], push.borne_from, push.borne_to)
         found = qd.select(weight == 0.0, enclosed, found)
     return found
 
@@ -103,7 +103,7 @@ def move_particles(
                 if qd.static(mixed):
                     density = 1.0 / scratch.weight[first + lane]
                     shares[0, lane] *= own_push(grid, s, density, push.foreign_from, push.foreign_to, dim)
-                shares[1, lane] = qd.min(qd.max((push.wet - carried_at[1]) / (push.wet - push.dry), 0.0), 1.0)
+                shares[1, lane] = 1.0 - ramp(carried_at[1], push.dry, push.wet)
                 slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, at_rest.x, push, dim, searched)
                 slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, at_rest.y, push, dim, searched)
                 if qd.static(dim == 3):

@@ -20,13 +20,7 @@ from wavetank.physics.grid_pressure.surface import nodes_beyond
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3
 
-BORNE = (0.6, 0.9)  # fill of a cell from where to where the grid bears its weight
-
-
-@qd.func
-def borne(fill, first, last):
-    """Share of the weight that the grid bears where water is so thin that it hardly fills a cell."""
-    return qd.min(qd.max((fill - first) / (last - first), 0.0), 1.0)
+BORNE = (0.6, 0.9)  # fill of a cell from where to where the grid bears its weight; thin water hardly fills one
 
 
 @qd.func
