@@ -370,3 +370,25 @@ def test_the_lattice_holds_however_the_surface_lies_in_the_cells(layers):
     start = sim.positions
     sim.advance(3.0)
     assert np.abs(sim.positions - start).max() < 0.05 * 0.05
+
+
+@pytest.mark.parametrize("count", [3, 40])
+def test_solids_together_leave_the_room_that_their_union_does(count):
+    """Nodes ask the few solids near them; where more are near than a list has places for, all are asked."""
+    rng = np.random.default_rng(1)
+    balls = [wt.Sphere(center=rng.uniform(0.2, 0.5, 3).tolist(), radius=0.06) for _ in range(count)]
+    water = wt.Block(lower=(0, 0, 0), upper=(1.0, 0.1, 0.6))
+
+    def room(solids) -> tuple[np.ndarray, ...]:
+        scene = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6, 0.6)), fluids=[water], solids=solids)
+        sim = Simulation(scene)
+        level = sim.world.levels[0]
+        args = coarse_pressure.LEAST_OPEN, coarse_pressure.UNIT, int(sim.world.has_solids), 3
+        coarse_pressure.find_room(level, sim.world.thin_walls, sim.world.solids, *args)
+        nodes = level.nx * level.ny * level.nz
+        return level.room.to_numpy()[:nodes], level.thin_s.to_numpy()[:nodes]
+
+    apart, together = room(balls), room([wt.Union(parts=balls)])
+    assert apart[0].min() < 0.95
+    for own, other in zip(apart, together, strict=True):
+        np.testing.assert_allclose(own, other, atol=1e-5)

@@ -168,16 +168,15 @@ class Bodies(Mapping[str, Body]):
             lambda: self.solids.poses[number], lambda: self.gravity, self.dim, dry, wet, unit, self.coupling, row,
         )  # fmt: skip
         self.members.append(body)
-        self._weigh(body, body.rigid())
+        self._weigh(body, body.rigid(), tuple(self.coupling.held_by[row].tolist()))
         if solid.velocity is not None:
             body.velocity = solid.velocity
         if solid.angular_velocity is not None:
             spin = solid.angular_velocity
             body.angular_velocity = (0.0, 0.0, spin) if isinstance(spin, int | float) else spin
 
-    def _weigh(self, body: Body, rigid: Any) -> None:
-        """Tell the engine the mass of a body and of the water that goes along."""
-        along = tuple(self.coupling.held_by[body.row].tolist())
+    def _weigh(self, body: Body, rigid: Any, along: tuple[float, ...]) -> None:
+        """Tell the engine the mass of a body and of the water that goes `along` [2] [kg, kg m^2]."""
         if self._told.get(body.row) == along:
             return
         self._told[body.row], (mass, inertia) = along, along
@@ -223,8 +222,9 @@ class Bodies(Mapping[str, Body]):
     def _move(self, dt: float, share: float) -> None:
         """Let the engine take the step, from where it began, with the velocities that are wanted."""
         rigid = [body.rigid() for body in self.members]
-        for body, now, velocity in zip(self.members, rigid, self._slowed(self.coupling.wanted), strict=True):
-            self._weigh(body, now)
+        alongs, velocities = self.coupling.held_by.tolist(), self._slowed(self.coupling.wanted)
+        for body, now, along, velocity in zip(self.members, rigid, alongs, velocities, strict=True):
+            self._weigh(body, now, tuple(along))
             now.linvel, now.angvel = velocity[:3], velocity[3:]
         begun = self._velocities(rigid)
         for number in self.solids.targets:

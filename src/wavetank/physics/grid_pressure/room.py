@@ -3,7 +3,8 @@
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients
 from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, corners, nearest, tents
-from wavetank.physics.grid_pressure.thin_walls import behind, keep_thin, mark_shut, way_from
+from wavetank.physics.grid_pressure.listed_solids import listed, solids_near
+from wavetank.physics.grid_pressure.thin_walls import behind, farthest, keep_thin, mark_shut, way_from
 from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec3, vec4
 
 LEAST_OPEN = 0.1  # a cell that is less open is solid
@@ -98,12 +99,13 @@ def close_slit(grid: CoarseGrid, n, surely, full):
 
 
 @qd.func
-def nearest_wall(grid: CoarseGrid, solids: SolidSet, n):
-    """(gradient, distance [m]) of the solid nearest to node `n`; far away where none is near its cell."""
+def nearest_wall(grid: CoarseGrid, solids: SolidSet, around: qd.template(), n):
+    """(gradient, distance [m]) of that of the solids `around` nearest to node `n`; far away where none is near."""
     center = center_of(grid, n)
     edge = longest_edge(grid)
     nearest = vec4(0.0, 1.0, 0.0, 4.0 * edge)
-    for k in range(solids.tank_count, solids.count):
+    for number in range(around[0]):
+        k = listed(solids, around, number)
         way, reach = image_near(solids, k, center) - solids.position[k], solids.reach[k]
         if way.norm_sqr() < (reach + nearest.w) ** 2 and reach + nearest.w > 0.0 and nearest.w > -2.0 * edge:
             # What is farther away takes no room: that of the ball around the solid is good enough there.
@@ -218,6 +220,22 @@ def spread_along(to: qd.template(), values: qd.template(), grid: CoarseGrid, row
         to[x + grid.nx * row] = 0.75 * values[x + grid.nx * row] + 0.125 * around
 
 
+@qd.func
+def find_walls(grid: CoarseGrid, thin: qd.template(), solids: SolidSet, piece, least_open):
+    """Find the wall nearest to each of `width` nodes of a row, and whether it leaves them room, for `find_room`."""
+    first = piece % grid.pieces * grid.width
+    begin = grid.nx * (piece // grid.pieces) + first
+    nodes = qd.min(grid.width, grid.nx - first)
+    around = solids_near(grid, solids, begin, nodes, farthest() * longest_edge(grid))
+    for n in range(begin, begin + nodes):
+        wall = nearest_wall(grid, solids, around, n)
+        grid.slope_x[n], grid.slope_y[n], grid.slope_z[n], grid.lam[n] = wall.x, wall.y, wall.z, wall.w
+        grid.room[n] = qd.cast(open_share(grid, n) >= least_open, qd.f32)
+        if keep_thin(grid, solids, around, n, wall) == 1:
+            qd.atomic_add(thin[0], 1)
+        grid.rhs[n] = qd.cast(grid.room[n] == 0.0 or grid.thin_s[n] > 0.0, qd.f32)
+
+
 @qd.kernel(fastcache=True)
 def find_room(
     grid: CoarseGrid, thin: qd.types.ndarray(), solids: SolidSet, least_open: qd.f32, unit: qd.f32,
@@ -234,13 +252,8 @@ def find_room(
             grid.room[n] = 1.0
             grid.clear[n] = 1.0
     else:
-        for n in range(grid.nx * grid.ny * grid.nz):
-            wall = nearest_wall(grid, solids, n)
-            grid.slope_x[n], grid.slope_y[n], grid.slope_z[n], grid.lam[n] = wall.x, wall.y, wall.z, wall.w
-            grid.room[n] = qd.cast(open_share(grid, n) >= least_open, qd.f32)
-            if keep_thin(grid, solids, n, wall) == 1:
-                qd.atomic_add(thin[0], 1)
-            grid.rhs[n] = qd.cast(grid.room[n] == 0.0 or grid.thin_s[n] > 0.0, qd.f32)
+        for piece in range(grid.pieces * grid.ny * grid.nz):
+            find_walls(grid, thin, solids, piece, least_open)
         for n in range(grid.nx * grid.ny * grid.nz):
             mark_shut(grid, n)
         for row in range(grid.ny * grid.nz):

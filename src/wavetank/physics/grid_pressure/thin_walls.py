@@ -12,6 +12,7 @@ make, one of them is felt.
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, nearest, on_axis, stride
+from wavetank.physics.grid_pressure.listed_solids import listed
 from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec3
 
 
@@ -22,39 +23,47 @@ def near():
 
 
 @qd.func
+def farthest():
+    """Edges of a cell from a node up to which solids are asked: its wall is near, and looked through from there."""
+    return 4.0
+
+
+@qd.func
 def thickest():
     """Edges of a cell: a wall that is thicker is no thin one."""
     return 1.6
 
 
 @qd.func
-def depth_in_solids(solids: SolidSet, at):
-    """Depth [m] of the place `at` in the solid that it is in, 0 outside; the tank's walls are left aside."""
+def depth_in_solids(solids: SolidSet, around: qd.template(), at):
+    """Depth [m] of the place `at` in that of the solids listed as `around` that it is in, 0 outside."""
     depth = 0.0
-    for k in range(solids.tank_count, solids.count):
+    for number in range(around[0]):
+        k = listed(solids, around, number)
         if (image_near(solids, k, at) - solids.position[k]).norm() < solids.reach[k]:
             depth = qd.max(depth, -signed_distance(solids, k, at).w)
     return depth
 
 
 @qd.func
-def ahead(solids: SolidSet, middle, way, outward):
+def ahead(solids: SolidSet, around: qd.template(), middle, way, outward):
     """Return 1 where a solid goes on from its `middle` by a `way` along it, or bends up or down from there."""
     goes = 0
-    for k in range(-3, 4):  # thin walls are met by a step of a sixteenth of a turn
-        angle = qd.math.pi / 8.0 * k
-        if goes == 0 and depth_in_solids(solids, middle + way * qd.cos(angle) - outward * qd.sin(angle)) > 0.0:
-            goes = 1
+    for number in range(7):  # straight on first; thin walls are met by a step of a sixteenth of a turn
+        angle = qd.math.pi / 8.0 * ((number + 1) // 2 * (1 - 2 * (number % 2)))
+        if goes == 0:
+            at = middle + way * qd.cos(angle) - outward * qd.sin(angle)
+            goes = qd.cast(depth_in_solids(solids, around, at) > 0.0, qd.i32)
     return goes
 
 
 @qd.func
-def goes_on(grid: CoarseGrid, solids: SolidSet, surface, outward, edge):
+def goes_on(grid: CoarseGrid, solids: SolidSet, around: qd.template(), surface, outward, edge):
     """Say whether what is thin behind the place `surface` goes on to its sides: a wall, perhaps its rim, no bar."""
     middle, deepest = surface, 0.0
     for k in qd.static(range(4)):
         at = surface - outward * (0.1 * 2.0**k * edge)
-        depth = depth_in_solids(solids, at)
+        depth = depth_in_solids(solids, around, at)
         if depth > deepest:
             middle, deepest = at, depth
     # Two directions along the wall; a world in a plane goes on along z.
@@ -64,17 +73,19 @@ def goes_on(grid: CoarseGrid, solids: SolidSet, surface, outward, edge):
     first = outward.cross(aside).normalized()
     second = outward.cross(first) if grid.nz > 1 else vec3(0.0, 0.0, 0.0)
     inside = 0
-    for side in qd.static((-1, 1)):
-        inside += ahead(solids, middle, first * (0.75 * side * edge), outward * (0.75 * edge))
-        inside += ahead(solids, middle, second * (0.75 * side * edge), outward * (0.75 * edge))
+    for k in range(4):
+        if inside >= k - 1:  # else two sides are free already
+            way = (first if k % 2 == 0 else second) * ((k // 2 - 0.5) * 1.5 * edge)
+            inside += ahead(solids, around, middle, way, outward * (0.75 * edge))
     return inside >= 3
 
 
 @qd.func
-def keep_thin(grid: CoarseGrid, solids: SolidSet, n, wall):
+def keep_thin(grid: CoarseGrid, solids: SolidSet, around: qd.template(), n, wall):
     """Keep the plane of a thin `wall`, (gradient, distance [m]), that node `n` lies at; return 1 if there is one.
 
-    If the node lies inside of it, it is closed. A wall is thin where it is free beyond, straight through.
+    If the node lies inside of it, it is closed. A wall is thin where it is free beyond, straight through; the solids
+    that are asked are those listed as `around`.
     """
     edge = qd.min(grid.dx, grid.dy)
     outward = vec3(wall.x, wall.y, wall.z)
@@ -83,9 +94,9 @@ def keep_thin(grid: CoarseGrid, solids: SolidSet, n, wall):
     if wall.w < near() * edge and wall.w > -edge and outward.norm() > 0.5:
         surface = center_of(grid, n) - outward * wall.w
         most = thickest() * edge
-        is_thin = depth_in_solids(solids, surface - outward * most) == 0.0
-        is_thin = is_thin or depth_in_solids(solids, surface - outward * (0.5 * most)) == 0.0
-        if is_thin and goes_on(grid, solids, surface, outward, edge):
+        is_thin = depth_in_solids(solids, around, surface - outward * most) == 0.0
+        is_thin = is_thin or depth_in_solids(solids, around, surface - outward * (0.5 * most)) == 0.0
+        if is_thin and goes_on(grid, solids, around, surface, outward, edge):
             found = 1
             if wall.w <= 0.0:
                 grid.room[n] = 0.0
