@@ -30,8 +30,8 @@ from wavetank.view.style import quality_options
 
 DOCS = Path(__file__).parent
 VALIDATION = DOCS.parent / "validation"
-#: name -> eye of the gallery's picture [m], where the usual one looks at a wall
-SEEN_FROM = {"ducks": (0.9, 1.5, 1.5)}
+#: name -> eye of the gallery's picture [m], where the usual one looks at a wall, or through a corner of water
+SEEN_FROM = {"ducks": (0.9, 1.5, 1.5), "mountain-lake": (4.3, 4.4, 3.8), "still-tank": (1.9, 1.0, 1.5)}
 LARGEST = 80_000  # bytes of a picture there
 VALIDATION_HEAD = """# Validation
 

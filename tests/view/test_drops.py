@@ -67,6 +67,17 @@ def test_a_drop_turns_the_world_round():
     assert image[left].mean() > image[right].mean() + 30
 
 
+def test_a_drop_on_a_pane_is_a_drop():
+    """Not a flat disc of more than two spacings that hides the pool behind it."""
+    camera = Camera(eye=(0.5, 1.6, 2.4), target=(0.5, 0.3, 0.5))
+    column, row, _ = camera.project((0.5, 0.6, 0.98), *SIZE)[0]
+    spacing = abs(camera.project((0.5 + D, 0.6, 0.98), *SIZE)[0][0] - column)
+    bare, _ = picture(pool(), camera)
+    wet, _ = picture(pool((0.5, 0.6, 0.98)), camera)
+    assert 3 < np.ptp(np.nonzero((np.abs(wet - bare).max(axis=2) > 10).any(axis=0))[0]) < 1.6 * spacing
+    assert np.abs(wet - bare)[int(row) - 1 : int(row) + 2, int(column) - 1 : int(column) + 2].max() < 20
+
+
 def test_what_is_fast_flies_apart():
     """A slow particle is one drop; a fast one is several, over more of the picture."""
     bare, _ = picture(pool())

@@ -22,7 +22,11 @@ from wavetank.view.renderer import Renderer
 
 FOLDER = Path(__file__).parent / "pictures"
 SIZE = (320, 180)
-UNDER = Camera(eye=(0.12, 0.08, 0.35), target=(0.6, 0.32, 0.3), field_of_view=1.5)  # an eye in the water
+EYES = {
+    "under": Camera(eye=(0.12, 0.08, 0.35), target=(0.6, 0.32, 0.3), field_of_view=1.5),  # in the water
+    "brief": Camera(eye=(0.55, 0.6, 1.2), target=(0.55, 0.45, 0.3), field_of_view=0.6),
+}
+OPEN = {"sharp": 0.0, "brief": 0.01}  # s: the water with a shutter that shows drops
 
 
 def lattice(size, spacing):
@@ -74,8 +78,9 @@ def looks_like(image, kept):
 
 
 def picture(dim, view):
-    frame, camera = world(dim), UNDER if view == "under" else None
-    return Renderer(*SIZE).render(frame, camera, view="water" if camera else view, legend=False, shutter=0.1)
+    frame, camera, shutter = world(dim), EYES.get(view), OPEN.get(view, 0.1)
+    kind = "water" if view in ("under", *OPEN) else view
+    return Renderer(*SIZE).render(frame, camera, view=kind, legend=False, shutter=shutter)
 
 
 def kept_picture(dim, view):
@@ -84,7 +89,7 @@ def kept_picture(dim, view):
 
 PARTS = ("still", "once", "passes")
 LIGHT = ("shadow", "occlusion", "smooth")  # they fill one map of light, and are left out as one
-CASES = [*((dim, view) for dim in (2, 3) for view in views.VIEWS), (3, "under")]
+CASES = [*((dim, view) for dim in (2, 3) for view in views.VIEWS), *((3, view) for view in ("under", *OPEN))]
 
 
 @pytest.mark.parametrize(("dim", "view"), CASES)
@@ -105,7 +110,7 @@ def test_no_pass_can_be_left_out(monkeypatch, name):
     kind = views.VIEWS["water"]
     without = {part: tuple(f for f in getattr(kind, part) if name_of(f) != name) for part in PARTS}
     monkeypatch.setitem(views.VIEWS, "water", dataclasses.replace(kind, **without))
-    view = "under" if name == "below" else "water"
+    view = {"below": "under", "drops": "sharp", "streaks": "brief"}.get(name, "water")
     assert not looks_like(picture(3, view), kept_picture(3, view))
 
 

@@ -3,9 +3,11 @@
 import numpy as np
 from test_drops import ABOVE, SIZE, D, pool
 from test_ellipsoids import lattice
+from test_foam_pass import with_foam
 from worlds import frame_of
 
 from wavetank import Box, Camera, Scene, Simulation, Tank
+from wavetank.device.compiler import upload
 from wavetank.view.renderer import Renderer
 
 TIME = 1.0 / 60.0
@@ -21,8 +23,8 @@ def jumps(film):
     return ((np.abs(before) > 40) & (np.abs(after) > 40) & (before * after > 0)).any(axis=-1).mean()
 
 
-def test_breaking_water_flickers_a_third_as_much():
-    """`obstacle-tank` from 0.75 s on, the issue's hardest: 1.7 % of all pixels with a closed shutter, 0.58 open."""
+def test_breaking_water_flickers_a_quarter_as_much():
+    """`obstacle-tank` from 0.75 s on, the hardest: 1.7 % of all pixels with a closed shutter, 0.44 open."""
     sim = Simulation(Scene.load("obstacle-tank"))
     sim.advance(0.75)
     films, renderer = {0.0: [], TIME: []}, Renderer(640, 360)
@@ -32,7 +34,7 @@ def test_breaking_water_flickers_a_third_as_much():
         sim.advance(TIME)
     shut, opened = (jumps(np.array(film)) for film in films.values())
     assert shut > 0.012
-    assert opened < 0.007
+    assert opened < 0.005
 
 
 def test_a_drop_is_smeared_along_its_way():
@@ -50,6 +52,37 @@ def test_a_drop_is_smeared_along_its_way():
         assert sides[1][0] > sides[0][0] + 2, supersample
         assert sides[1][0] - sides[0][0] > 2 * (sides[1][1] - sides[0][1]), supersample
         assert smeared.max() < 0.9 * sharp.max(), supersample
+
+
+def test_a_drop_before_a_wave_goes_its_own_way():
+    """The water below rushes to the right, the drop falls past a wall: it is longer downwards, and no wider."""
+    x = lattice((0, 0, 0), (1.0, 0.4, 1.0))
+    frames = []
+    for drop in (np.zeros((0, 3)), [(0.5, 0.6, 0.9)]):
+        v = np.tile((2.0, 0.0, 0.0), (len(x) + len(drop), 1))
+        v[len(x) :] = (0.0, -0.65, 0.0)
+        frames.append(frame_of(Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 1.0))), np.concatenate([x, drop]), v))
+    camera = Camera(eye=(0.5, 1.2, 2.6), target=(0.5, 0.5, 0.8))
+    sizes = []
+    for shutter in (0.0, 0.1):
+        bare, wet = (picture(frame, camera, shutter=shutter) for frame in frames)
+        seen = np.abs(wet - bare).max(axis=2) > 8
+        sizes.append([np.ptp(np.nonzero(seen.any(axis=axis))[0]) for axis in (0, 1)])
+    assert sizes[1][1] > sizes[0][1] + 4
+    assert sizes[1][0] <= sizes[0][0] + 1
+
+
+def test_foam_behind_a_pane_is_smeared_along_its_way():
+    """The pane keeps what stands behind sharp, but foam moves: its speck is longer."""
+    still, (speck,) = lattice((0, 0, 0), (1.0, 0.7, 1.0)), [(0.5, 0.35, 0.99)]
+    camera, seen = Camera(eye=(0.5, 0.35, 3.0), target=(0.5, 0.35, 0.5)), []
+    for shutter in (0.0, 0.05):
+        frames = [frame_of(Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 1.0))), still) for _ in range(2)]
+        upload(with_foam(frames[1], [speck] * 4).diffuse.v, np.tile(np.float32((2.0, 0.0, 0.0)), (7, 1)))
+        bare, white = (picture(frame, camera, shutter=shutter) for frame in frames)
+        seen.append((white - bare).max(axis=2))
+    wide = [np.ptp(np.nonzero((one > 3).any(axis=0))[0]) for one in seen]
+    assert wide[1] > wide[0] + 6
 
 
 def test_what_rests_is_left_as_it_is():

@@ -7,7 +7,7 @@ from wavetank import Camera
 from wavetank.device.compiler import qd
 from wavetank.view.lens import vec3
 from wavetank.view.look import Look, pool
-from wavetank.view.optics.radiance import environment
+from wavetank.view.optics.radiance import environment, glint
 from wavetank.view.renderer import Renderer
 
 
@@ -26,10 +26,31 @@ def mirrored(directions):
     return arrays[0].to_numpy()
 
 
+@qd.kernel
+def glints(found: qd.types.ndarray(), directions: qd.types.ndarray(), look: Look, rough: qd.f32):
+    for k in range(directions.shape[0]):
+        found[k] = glint(look, directions[k].y, rough)
+
+
 def half_sphere(count=4000):
     up = (np.arange(count) + 0.5) / count
     around, flat = 2.3999632297 * np.arange(count), np.sqrt(1.0 - up * up)
     return np.stack([flat * np.cos(around), up, flat * np.sin(around)], axis=1)
+
+
+def test_a_rough_surface_spreads_the_image_of_the_sun():
+    """Toksvig 2005: as many normals, over more of the surface, as bright in all and fainter in its middle."""
+    normals = half_sphere(20000).astype(np.float32)
+    arrays = [qd.ndarray(vec3, shape=(len(normals),)) for _ in range(2)]
+    arrays[1].from_numpy(normals)
+    sums, peaks = [], []
+    for rough in (0.0, 0.005, 0.02):
+        glints(*arrays, pool(), rough)
+        light = arrays[0].to_numpy().sum(axis=1)
+        sums.append(light.sum())
+        peaks.append(light.max() * (1.0 + 600.0 * rough))
+    assert np.ptp(sums) < 0.1 * sums[0]
+    assert np.ptp(peaks) < 0.05 * peaks[0]
 
 
 def test_nothing_in_the_sky_has_an_edge():

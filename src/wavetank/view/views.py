@@ -23,6 +23,7 @@ from wavetank.view.passes import (
     smooth,
     solids,
     spheres,
+    streaks,
     surface,
     tank,
     thickness,
@@ -66,7 +67,7 @@ VIEWS: dict[str, View] = {
         ),
         passes=(
             backdrop.draw, surface.draw, flatten.draw, thickness.draw, water.draw, below.draw,
-            drops.draw, solids.draw_glass, foam.draw_over_water, shutter.draw,
+            drops.draw, solids.draw_glass, foam.draw_over_water, shutter.draw, streaks.draw,
         ),
     ),
     "particles": View(

@@ -1,6 +1,7 @@
 """What a direction and a surface shine with, in the light of a `Look`."""
 
 from wavetank.device.compiler import qd
+from wavetank.view.lens import vec3
 from wavetank.view.look import Look
 
 
@@ -66,6 +67,15 @@ def environment(look: Look, direction):
 
 
 @qd.func
-def glint(look: Look, cosine):
-    """Radiance of the sun's image in the water, by the cosine of the angle that it is missed by."""
-    return qd.min(qd.max(cosine, 0.0), 1.0) ** 600 * look.sparkle * look.sun
+def glint(look: Look, cosine, rough):
+    """Radiance of the sun's image in the water, by the cosine of the angle that it is missed by.
+
+    `rough` is the variance of the normals that share it: they widen it and take from its height as much (M. Toksvig,
+    "Mipmapping normal maps", 2005).
+    """
+    result = vec3(0.0, 0.0, 0.0)
+    if cosine > 0.9:
+        wide = 1.0 / (1.0 + 600.0 * rough)
+        near = qd.min(20.0 * (cosine - 0.9), 1.0)
+        result = (near * qd.min(cosine, 1.0) ** (600.0 * wide) * wide * look.sparkle) * look.sun
+    return result

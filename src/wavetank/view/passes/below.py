@@ -92,7 +92,7 @@ def through(depth: qd.template(), backdrop: Backdrop, lens: Lens, look: Look, op
         p = (cosi - 1.33 * cost) / (cosi + 1.33 * cost)
         mirror = 0.5 * (s * s + p * p)
         up = 1.33 * ahead + (cost - 1.33 * cosi) * n
-        above = environment(look, up) + glint(look, up.dot(look.to_sun))
+        above = environment(look, up) + glint(look, up.dot(look.to_sun), 0.0)
     # What is mirrored comes from the floor or out of deep water.
     down = ahead - 2.0 * cosi * n
     below, more = optics.glow, 1e3

@@ -129,7 +129,7 @@ def fit(ellipsoids: Ellipsoids, cells: Cells, walls: Box, shape: Shape, dim: qd.
             side = trust * shape.growth * o
             touch, to_wall = near_walls(p, walls, shape.spacing, dim)
             if qd.static(dim == 3):
-                if weight < 3.0 and touch.max() == 0.0:  # no more than two next to it, or some farther off
+                if weight < 3.0:  # no more than two next to it, or some farther off; walls are no neighbours
                     ellipsoids.lone[a] = 1
             free, share = 1.0 - touch, 1.0
             for k in qd.static(range(dim)):

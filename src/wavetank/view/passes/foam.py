@@ -1,13 +1,13 @@
 """Spray, foam and bubbles: clouds of fine droplets over the picture, thicker where there are more of them.
 
 What the simulation moves is a few thousand points; what they stand for is a froth of far smaller things. Each point
-becomes a handful of discs, spread about a spacing and along the way that it goes in half a frame, as a shutter that is
-open for so long sees it. A cloud has its own fixed places, so that nothing flickers, and near the eye it has more and
-smaller discs: none is ever large in the picture, and together they cover the same. Every disc adds its optical depth to
-the pixels it covers, and the part of it that the sun reaches. Sums of whole numbers do not depend on the order of
-threads, and no sorting by depth is needed: what is added is all of one white stuff. The sums are kept per pixel of the
-picture, not per sample, which is enough for soft things. The same depths on a grid as coarse as the spacing give the
-froth a shape (`shape`): it is thick where it is dense, and lit as such a relief is.
+becomes a handful of discs, spread about a spacing and along the way that it goes in half a frame, or while the shutter
+is open, as a camera sees it. A cloud has its own fixed places, so that nothing flickers, and near the eye it has more
+and smaller discs: none is ever large in the picture, and together they cover the same. Every disc adds its optical
+depth to the pixels it covers, and the part of it that the sun reaches. Sums of whole numbers do not depend on the order
+of threads, and no sorting by depth is needed: what is added is all of one white stuff. The sums are kept per pixel of
+the picture, not per sample, which is enough for soft things. The same depths on a grid as coarse as the spacing give
+the froth a shape (`shape`): it is thick where it is dense, and lit as such a relief is.
 
     code      symbol   meaning                                                              unit
     tau                optical depth of what lies over a pixel, in 1/4096                   1
@@ -48,7 +48,9 @@ IN_FRONT = 1e9  # m: what shows through everything
 PARTS, MOST_PARTS = 10.0, 60.0  # discs of a cloud far from the eye, and next to it
 FINE = 0.0022  # of the picture's height: radius that a disc has before a cloud gets more of them
 LARGEST = 0.02  # of the picture's height: radius up to which a disc is drawn at its size
-SHUTTER = 0.5  # of a frame: time for which it is open
+SHUTTER = 0.5  # of a frame: time for which it is open in a still
+OPEN = 1.4  # of the time that an open shutter lets in: it opens and closes gradually, as even light of so long does
+SHARP, SOFT = 1.1, 1.7  # px: least radius of a disc in a still, and while the shutter is open
 ALBEDO = 1.15  # of froth: what it scatters on within adds to what a matte surface would give
 PALE = vector(*to_linear(np.array(rgb_of("#6fa8d2"))))
 
@@ -62,6 +64,7 @@ class Froth:
     sunk: qd.f32  # m: how far behind a solid it is still seen
     fine: qd.f32  # px: radius of a disc from which on a cloud has more of them
     largest: qd.f32  # px: radius up to which a disc is drawn at its size
+    least: qd.f32  # px: radius below which a disc is drawn fainter instead
     shutter: qd.f32  # s: time for which it is open
     in_sun: vec3  # radiance that the sun gives
     in_sky: vec3  # radiance that everything else gives
@@ -78,13 +81,13 @@ class Froth:
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Lay spray, foam and bubbles over the radiance in `color`, by the depth that the picture shows."""
-    lay(shot, buffers, buffers.pixels.depth, IN_FRONT)
+    lay(shot, buffers, buffers.pixels.depth, IN_FRONT, 0.0)
 
 
 def draw_over_water(shot: Shot, buffers: Buffers) -> None:
     """Do the same where the water is not part of the picture's depth but lies in front of it."""
     if shot.frame.foam_count > 0:
-        lay(shot, buffers, water_of(buffers, shot).surface.nearest, 0.25 * shot.extent.spacing)
+        lay(shot, buffers, water_of(buffers, shot).surface.nearest, 0.25 * shot.extent.spacing, shot.shutter)
 
 
 def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
@@ -95,12 +98,15 @@ def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
         take(sunlit, frame.diffuse, shot.water_sun, SIZE[3] * d, strength, frame.foam_count)
 
 
-def lay(shot: Shot, buffers: Buffers, depth: Any, sunk: float) -> None:
-    """Lay spray, foam and bubbles over whatever lies at `depth`; solids hide what is `sunk` [m] behind them."""
+def lay(shot: Shot, buffers: Buffers, depth: Any, sunk: float, shutter: float) -> None:
+    """Lay spray, foam and bubbles over whatever lies at `depth`; solids hide what is `sunk` [m] behind them.
+
+    What moves is smeared as by a `shutter` that is open for so long [s], or by half a frame where that is closed.
+    """
     frame, pixels, maps = shot.frame, buffers.pixels, buffers.foam
     if frame.diffuse is None or frame.foam_count == 0:
         return
-    froth = froth_of(shot, buffers, sunk)
+    froth = froth_of(shot, buffers, sunk, shutter)
     rows, columns = (int(size) // int(froth.grain) + 2 for size in maps.sums.shape[:2])
     clear(maps, rows, columns)
     splat(
@@ -111,14 +117,15 @@ def lay(shot: Shot, buffers: Buffers, depth: Any, sunk: float) -> None:
     blend(pixels, maps, depth, froth)
 
 
-def froth_of(shot: Shot, buffers: Buffers, sunk: float) -> Froth:
+def froth_of(shot: Shot, buffers: Buffers, sunk: float, shutter: float) -> Froth:
     """Return how spray, foam and bubbles look in a picture."""
     frame, look, d, flat = shot.frame, shot.look, shot.extent.spacing, shot.frame.dim == 2
     height = buffers.rows / buffers.supersample
     in_sun, in_sky = vector(*(ALBEDO * look.sun)), vector(*(ALBEDO * look.sky))
     return remembered(Froth(
         size=SIZE[frame.dim] * d, deepest=IN_FRONT if flat else DEEPEST * d, sunk=sunk, fine=max(FINE * height, 0.8),
-        largest=max(LARGEST * height, 1.0), shutter=SHUTTER * frame.scene.frame_time, in_sun=in_sun, in_sky=in_sky,
+        largest=max(LARGEST * height, 1.0), shutter=OPEN * shutter or SHUTTER * frame.scene.frame_time,
+        least=SOFT if shutter else SHARP, in_sun=in_sun, in_sky=in_sky,
         in_air=PALE, swallow=vector(*(0.5 * d * shot.absorption * (not flat))),
         line_strength=look.line_strength if frame.scene.tank else 0.0, slack=slack(shot), samples=buffers.supersample,
         grain=grain_of(shot, buffers.supersample), parts=PARTS, most_parts=MOST_PARTS, flat=int(flat),
@@ -285,7 +292,7 @@ def splat(
                     p = to_view(lens, at)
                     if p.z > lens.near:
                         r = qd.min(each * own, froth.largest)
-                        wide = qd.max(r, 1.1)
+                        wide = qd.max(r, froth.least)
                         # What is smaller than a pixel is as faint as it is small.
                         full = 4096.0 * strength * (r / wide) ** 2 * qd.min(parts - k, 1.0)
                         added += add_disc(

@@ -14,7 +14,7 @@ belongs to its frame.
 
 Where they differ from the paper: ways are means, not the largest ones, because particles tell them more evenly than
 pixels; instead of two depths per pixel, what stands still takes light only from water before it, and edges of the tank
-neither give nor take.
+neither give nor take. Drops have streaks of their own (`streaks.py`), foam its own ways (`foam.py`).
 """
 
 import dataclasses
@@ -23,6 +23,7 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import remembered
 from wavetank.solids.distance import lift
 from wavetank.view.buffers import Buffers, Motion, Pixels
+from wavetank.view.cells import Cells
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec2, vec3, view_ray
 from wavetank.view.look import Look
 from wavetank.view.optics.fluid import grain_of
@@ -30,13 +31,13 @@ from wavetank.view.optics.glass import line_cover, slack
 from wavetank.view.optics.maps import picture_at
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
-from wavetank.view.water_buffers import WaterSurface, water_of
+from wavetank.view.water_buffers import Drops, WaterSurface, water_of
 from wavetank.view.weights import under_water
 
 VISIBLE = 1.5  # d: how far behind the surface a particle still counts as what is seen
 LONGEST = 0.08  # of the picture's height: way that is not exceeded
 LEAST = 1.0  # px: ways that are not worth it
-CUTS = 8  # at most
+CUTS = 16  # at most
 WHITE = 1.1  # radiance that counts at most
 UNIT = 64.0  # steps of a pixel
 
@@ -62,7 +63,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     frame, open_for = shot.frame, shot.shutter
     if frame.dim == 2 or open_for <= 0.0 or frame.count == 0 or under_water(shot, buffers):
         return
-    motion, surface = buffers.motion, water_of(buffers, shot).surface
+    water, motion = water_of(buffers, shot), buffers.motion
+    surface = water.surface
     grain, samples = max(4, grain_of(shot, buffers.supersample)), buffers.supersample
     shutter = remembered(Shutter(
         open=float(open_for), visible=VISIBLE * shot.extent.spacing, longest=LONGEST * buffers.rows / samples,
@@ -70,11 +72,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         slack=slack(shot),
     ))  # fmt: skip
     rows, columns = (size // samples // grain + 2 for size in (buffers.rows, buffers.columns))
-    foam, count = (frame.diffuse, frame.foam_count) if frame.diffuse is not None else (None, 0)
     begin(motion, rows, columns)
-    gather(motion, surface.nearest, frame.x, frame.v, shot.lens, shutter, frame.count)
-    if foam is not None and count > 0:
-        gather(motion, surface.nearest, foam.x, foam.v, shot.lens, shutter, count)
+    gather(motion, surface.nearest, water.drops(frame), water.cells, shot.lens, shutter, frame.count)
     settle(motion, shutter, rows, columns)
     smear(buffers.pixels, surface, motion, shot.lens, shot.look, shot.walls, shutter, rows, columns, samples)
 
@@ -89,17 +88,17 @@ def begin(motion: Motion, rows: qd.i32, columns: qd.i32):
 
 @qd.kernel(fastcache=True)
 def gather(
-    motion: Motion, nearest: qd.types.ndarray(), x: qd.types.ndarray(), v: qd.types.ndarray(), lens: Lens,
-    shutter: Shutter, count: qd.i32,
+    motion: Motion, nearest: qd.types.ndarray(), drops: Drops, cells: Cells, lens: Lens, shutter: Shutter,
+    count: qd.i32,
 ):  # fmt: skip
-    """Add up the ways of all points that the eye sees."""
-    for i in range(count):
-        c = to_view(lens, lift(x[i]))
-        if c.z > lens.near:
+    """Add up the ways of all particles that the eye sees, but for drops, which have their own."""
+    for a in range(count):
+        c = to_view(lens, cells.x[a])
+        if c.z > lens.near and drops.lone[a] == 0:
             here = to_pixel(lens, c)
             if here.x > 0.0 and here.y > 0.0 and here.x < nearest.shape[1] and here.y < nearest.shape[0]:
                 seen = qd.bit_cast(nearest[qd.cast(here.y, qd.i32), qd.cast(here.x, qd.i32)], qd.f32)
-                later = to_view(lens, lift(x[i]) + shutter.open * lift(v[i]))
+                later = to_view(lens, cells.x[a] + shutter.open * lift(drops.v[cells.order[a]]))
                 if c.z < seen + shutter.visible and later.z > lens.near:
                     way = (to_pixel(lens, later) - here) / shutter.samples
                     way *= qd.min(1.0, shutter.longest / qd.max(way.norm(), 1e-6))

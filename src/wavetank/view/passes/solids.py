@@ -249,4 +249,4 @@ def lay_glass(
                     slant = qd.min(1.0 / cosi, 4.0)
                     shown = pixels.color[row, column] * qd.exp(slant * qd.log(qd.max(tint, 0.01)))
                     shown += mirror * (environment(look, ahead + 2.0 * cosi * n) - shown)
-                    pixels.color[row, column] = shown + glint(look, n.dot((look.to_sun - ahead).normalized(1e-9)))
+                    pixels.color[row, column] = shown + glint(look, n.dot((look.to_sun - ahead).normalized(1e-9)), 0.0)

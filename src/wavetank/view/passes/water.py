@@ -178,9 +178,14 @@ def lay(
                                             )  # fmt: skip
                                             kept_z, kept_layer, kept_pixel = at, layer, pixel
                                         body, above, whole = kept, kept_above, kept_whole
+                                rough = 0.0
+                                if qd.static(world % 10 >= 3):
+                                    half = (look.to_sun - direction / direction.norm()).normalized(1e-9)
+                                    if layer == 1 and n.dot(half) > 0.9:
+                                        rough = roughness(lens, row, column, z, n, optics, surface.depth)
                                 result += share * shine(
                                     pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside, middle, at,
-                                    n, origin, direction, body, above, whole, qd.static(world % 10),
+                                    n, origin, direction, body, above, whole, rough, qd.static(world % 10),
                                     qd.static(world % 100 >= 10),
                                 )  # fmt: skip
                         line = line_cover(pixels.lines[row, column], front, optics.slack)
@@ -222,6 +227,20 @@ def normal_beside(lens: Lens, row, column, z, limit, depth: qd.template()):
 
 
 @qd.func
+def roughness(lens: Lens, row, column, z, n, optics: Optics, depth: qd.template()):
+    """Variance of the normals of the surface around a pixel, along an axis, within a spacing."""
+    total, k = 0.0, qd.cast(2.0 * optics.coarse, qd.i32)
+    for axis in range(2):
+        r = qd.min(row + k * axis, depth.shape[0] - 1)
+        c = qd.min(column + k * (1 - axis), depth.shape[1] - 1)
+        there, away = qd.bit_cast(depth[r, c], qd.f32), vec3(1.0, 0.0, 0.0)
+        if qd.abs(there - z) < 3.0 * optics.spacing:
+            away = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * optics.spacing, depth)) - n
+        total += away.dot(away)
+    return total / 12.0  # a mean of two, half of it along each axis, a third of it at the edge is that within
+
+
+@qd.func
 def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, start, direction, row, column, z):
     """Radiance along a ray that has left a drop: of the floor or of what stands behind, as far as they are seen."""
     way = qd.min(qd.bit_cast(pixels.depth[row, column], qd.f32) - z, 1e3)
@@ -241,12 +260,13 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
 @qd.func
 def shine(
     pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
-    optics: Optics, inside: Inside, place, z, normal, origin, direction, body, above, whole, world: qd.template(),
-    many: qd.template(),
+    optics: Optics, inside: Inside, place, z, normal, origin, direction, body, above, whole, rough,
+    world: qd.template(), many: qd.template(),
 ):  # fmt: skip
     """Radiance of the water that is seen at depth `z` with this normal, at a place (column, row) of the picture.
 
     `body`, `above` and `whole` are what `through_body` found for it; a negative way where it found none.
+    `rough` is the variance of the normals around, see `glint`.
     """
     n, pace = normal, direction.norm()
     ahead, at = direction / pace, origin + z * direction
@@ -338,5 +358,5 @@ def shine(
         mirrored += above[3] * (vec3(above[0], above[1], above[2]) - mirrored)
         result += mirror * (mirrored - result)
         half = (look.to_sun - ahead).normalized(1e-9)
-        result += glint(look, n.dot(half))
+        result += glint(look, n.dot(half), rough)
     return result
