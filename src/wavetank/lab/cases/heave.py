@@ -4,8 +4,13 @@ References: linear theory with added mass and waves in the very same tank (`line
 section is that of Newman 1977, Table 4.3, within 1 %). In 3-D, the sphere of Kramer et al. 2021 (10.3390/en14020269, a
 public benchmark: 0.3 m across, half immersed, drop heights from 0.03 m): linear theory with the added mass and damping
 of Hulme 1982 (10.1017/S0022112082001980, Table 1) gives its course.
+
+The second passing of rest comes where the course is flat, and a layer below a flat bottom is hit where that crosses a
+cell: one start of a barge says little. So each figure is the mean over starts of other depths and lifts
+(docs/notebook/bodies.md, "Eight starts instead of one").
 """
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -22,33 +27,48 @@ from wavetank.simulation.simulation import Simulation
 from wavetank.solids.shapes import Box, Sphere
 
 BARGE = Barge(beam=0.4, height=0.2, ratio=0.5, length=4.0, depth=0.4)
-LIFT, TILT = 0.02, 0.1  # m, rad: where it is let go
-RADIUS, DROP, SIDE, DEEP = 0.15, 0.03, 2.1, 0.6  # m: of the sphere, its tank's edge and water
+DEPTHS = (0.38, 0.39, 0.4, 0.41)  # m: of its water, for as many starts
+LIFTS, TILTS = (0.02, 0.025), (0.1, 0.12)  # m, rad: where it is let go, at each of these depths
+DROPS = (0.03, 0.035)  # m: of the sphere
+RADIUS, SIDE, DEEP = 0.15, 2.1, 0.6  # m: of the sphere, its tank's edge and water
 CALM = 1.0  # s, until it is let go
 PERIOD = "half a period, over linear theory's"
 
 
+@dataclasses.dataclass
+class Decay:
+    """How a body swings back to rest, from one start."""
+
+    times: np.ndarray  # s since it was let go
+    way: np.ndarray  # from rest, over where it began
+    theory: np.ndarray  # the same by linear theory
+
+
 def run(quick: bool, arch: str) -> Outcome:
-    """Let a barge go in a plane, and a sphere in space (quick: coarser, and no sphere)."""
-    figures: list[Figure] = []
-    series: dict[str, Sequence[float]] = {}
-    for rolls in (False, True):
-        name = "roll" if rolls else "heave"
-        times, way = barge_decay(0.02 if quick else 0.01, 1.6, arch, rolls=rolls)
-        theory = decay(BARGE, 0.02 if quick else 0.01, times, rolls=rolls)
-        figures += compare(f"2-D barge, {name}", times, way, theory)
-        series |= {f"time_{name}": times.tolist(), name: way.tolist(), f"{name}_theory": theory.tolist()}
+    """Let a barge go in a plane, and a sphere in space (quick: coarser, one start, and no sphere)."""
+    spacing = 0.02 if quick else 0.01
+    depths, lifts = (DEPTHS[2:3], 1) if quick else (DEPTHS, len(LIFTS))
+    barges = [dataclasses.replace(BARGE, depth=depth) for depth in depths]
+    found = {
+        "heave": [barge_decay(barge, spacing, arch, lift=lift) for barge in barges for lift in LIFTS[:lifts]],
+        "roll": [barge_decay(barge, spacing, arch, tilt=tilt) for barge in barges for tilt in TILTS[:lifts]],
+    }
+    figures = [figure for name, decays in found.items() for figure in compare(f"2-D barge, {name}", decays)]
     if not quick:
-        times, way = sphere_decay(0.025, 1.2, arch)
-        theory = sphere_theory(times)
-        figures += compare("3-D sphere, heave", times, way, theory)
-        series |= {"time_sphere": times.tolist(), "sphere": way.tolist(), "sphere_theory": theory.tolist()}
+        found["sphere"] = [sphere_decay(drop, 0.025, arch) for drop in DROPS]
+        figures += compare("3-D sphere, heave", found["sphere"])
+    series: dict[str, Sequence[float]] = {}
+    for name, decays in found.items():
+        series[f"time_{name}"] = decays[0].times.tolist()
+        series |= {f"{name}_{number}": one.way.tolist() for number, one in enumerate(decays)}
+        series[f"{name}_theory"] = decays[0].theory.tolist()
 
     def draw(plot: Any) -> None:
-        names = [name for name in ("heave", "roll", "sphere") if name in series]
-        for axis, name in zip(plot.subplots(1, len(names), sharey=True), names, strict=True):
-            axis.plot(series[f"time_{name}"], series[name], color=BLUE, label="measured")
-            axis.plot(series[f"time_{name}"], series[f"{name}_theory"], color=RED, lw=1.0, label="linear theory")
+        for axis, (name, decays) in zip(plot.subplots(1, len(found), sharey=True), found.items(), strict=True):
+            for one in decays:
+                label = "measured" if one is decays[0] else None
+                axis.plot(one.times, one.way, color=BLUE, lw=0.8, alpha=0.6, label=label)
+            axis.plot(decays[0].times, decays[0].theory, color=RED, lw=1.2, label="linear theory")
             axis.set(title=name, xlabel="time [s]", ylabel="of where it was let go")
             axis.legend(frameon=False)
             tidy(axis)
@@ -56,46 +76,44 @@ def run(quick: bool, arch: str) -> Outcome:
     return Outcome(figures, series, draw)
 
 
-def barge_decay(spacing: float, seconds: float, arch: str, *, rolls: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return times [s] since the barge was let go, and how far it is from rest, over where it began."""
-    middle, keel = 0.5 * BARGE.length, BARGE.depth - BARGE.draft
-    start = (middle, keel + 0.5 * BARGE.height + (0.0 if rolls else LIFT))
+def barge_decay(barge: Barge, spacing: float, arch: str, *, lift: float = 0.0, tilt: float = 0.0) -> Decay:
+    """Let the barge go from a `lift` [m] or a `tilt` [rad]."""
+    middle, keel = 0.5 * barge.length, barge.depth - barge.draft
+    start = (middle, keel + 0.5 * barge.height + lift)
     box = Box(
-        name="body", center=start, size=(BARGE.beam, BARGE.height), density=1000.0 * BARGE.ratio, held=True,
-        rotation=TILT if rolls else 0.0,
+        name="body", center=start, size=(barge.beam, barge.height), density=1000.0 * barge.ratio, held=True,
+        rotation=tilt,
     )  # fmt: skip
-    block = Block(lower=(0.0, 0.0), upper=(BARGE.length, BARGE.depth))
-    tank = Tank(size=(BARGE.length, 2.0 * BARGE.depth))
+    block = Block(lower=(0.0, 0.0), upper=(barge.length, barge.depth))
+    tank = Tank(size=(barge.length, 2.0 * BARGE.depth))
     sim = Simulation(Scene(spacing=spacing, tank=tank, fluids=[block], solids=[box], foam=0.0), arch)
+    rest = (sim.count * spacing**2 + barge.draft * barge.beam) / barge.length - barge.draft + 0.5 * barge.height
+    times, way = let_go(sim, 1.6, rest, tilt)
+    return Decay(times, way, decay(barge, spacing, times, rolls=tilt > 0.0))
+
+
+def sphere_decay(drop: float, spacing: float, arch: str) -> Decay:
+    """Let the sphere go from a `drop` [m] above where it floats."""
+    ball = Sphere(name="body", center=(0.5 * SIDE, DEEP + drop, 0.5 * SIDE), radius=RADIUS, density=500.0, held=True)
+    block = Block(lower=(0.0, 0.0, 0.0), upper=(SIDE, DEEP, SIDE))
+    tank = Tank(size=(SIDE, DEEP + 0.3, SIDE))
+    volume = 2.0 / 3.0 * math.pi * RADIUS**3
+    sim = Simulation(Scene(spacing=spacing, tank=tank, fluids=[block], solids=[ball], foam=0.0), arch)
+    times, way = let_go(sim, 1.2, (sim.count * spacing**3 + volume) / SIDE**2)
+    return Decay(times, way, sphere_theory(times))
+
+
+def let_go(sim: Simulation, seconds: float, rest: float, tilt: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return times [s] since the body was let go in calm water, and its height over `rest` [m], or angle, from 1 on."""
     sim.advance(CALM)
     body, times, ways = sim.bodies["body"], [0.0], [1.0]
-    rest = (sim.count * spacing**2 + BARGE.draft * BARGE.beam) / BARGE.length - BARGE.draft + 0.5 * BARGE.height
     began = float(body.position[1]) - rest
     sim.hold("body", False)
     while times[-1] < seconds:
         sim.step()
         times.append(sim.time - CALM)
         angle = 2.0 * math.atan2(body.rotation[3], body.rotation[0])
-        ways.append(angle / TILT if rolls else (float(body.position[1]) - rest) / began)
-    return np.array(times), np.array(ways)
-
-
-def sphere_decay(spacing: float, seconds: float, arch: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the same of the sphere."""
-    ball = Sphere(name="body", center=(0.5 * SIDE, DEEP + DROP, 0.5 * SIDE), radius=RADIUS, density=500.0, held=True)
-    block = Block(lower=(0.0, 0.0, 0.0), upper=(SIDE, DEEP, SIDE))
-    tank = Tank(size=(SIDE, DEEP + 0.3, SIDE))
-    volume = 2.0 / 3.0 * math.pi * RADIUS**3
-    sim = Simulation(Scene(spacing=spacing, tank=tank, fluids=[block], solids=[ball], foam=0.0), arch)
-    sim.advance(CALM)
-    body, times, ways = sim.bodies["body"], [0.0], [1.0]
-    rest = (sim.count * spacing**3 + volume) / SIDE**2
-    began = float(body.position[1]) - rest
-    sim.hold("body", False)
-    while times[-1] < seconds:
-        sim.step()
-        times.append(sim.time - CALM)
-        ways.append((float(body.position[1]) - rest) / began)
+        ways.append(angle / tilt if tilt > 0.0 else (float(body.position[1]) - rest) / began)
     return np.array(times), np.array(ways)
 
 
@@ -123,15 +141,19 @@ def sphere_theory(times: np.ndarray) -> np.ndarray:
     return (1.0 + lower) * way - lower
 
 
-def compare(name: str, times: np.ndarray, way: np.ndarray, theory: np.ndarray) -> list[Figure]:
-    """Compare the time from the first passing of rest to the second, and both courses until then."""
-    own, other = passings(times, way), passings(times, theory)
-    ratio = (own[1] - own[0]) / (other[1] - other[0]) if len(own) > 1 else math.nan
-    until = times <= other[1]
-    off = float(np.sqrt(np.mean((way[until] - theory[until]) ** 2)))
+def compare(name: str, decays: Sequence[Decay]) -> list[Figure]:
+    """Compare the time from the first passing of rest to the second, and the courses until then, with theory's."""
+    halves, offs = [], []
+    for one in decays:
+        own, other = passings(one.times, one.way), passings(one.times, one.theory)
+        halves.append((own[1] - own[0]) / (other[1] - other[0]) if len(own) > 1 else math.nan)
+        until = one.times <= other[1]
+        offs.append(float(np.sqrt(np.mean((one.way[until] - one.theory[until]) ** 2))))
     source = "Hulme 1982" if "sphere" in name else "linear potential flow"
+    half, scatter, off = float(np.mean(halves)), float(np.std(halves)), float(np.mean(offs))
     return [
-        Figure(f"{name}: {PERIOD}", ratio, "", 0.95, 1.05, "1", source),
+        Figure(f"{name}: {PERIOD}", half, "", 0.95, 1.05, "1", source),
+        Figure(f"{name}: the same, standard deviation of {len(halves)} starts", scatter, ""),
         Figure(f"{name}: rms off theory until then, of the lift", off, "", reference="0", source=source),
     ]
 
