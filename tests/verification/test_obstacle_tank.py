@@ -8,7 +8,7 @@ from wavetank.physics.measure import density_error
 from wavetank.simulation.simulation import Simulation
 
 
-@pytest.fixture(scope="module", params=[(0.025, 21952, 1.5), (0.04, 4913, 6.0)], ids=["as it is", "for long"])
+@pytest.fixture(scope="module", params=[(0.025, 21952, 1.5), (0.04, 5184, 6.0)], ids=["as it is", "for long"])
 def run(request):
     spacing, count, seconds = request.param
     sim = Simulation(wt.Scene.load("obstacle-tank").changed(spacing=spacing))
