@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema, model_val
 from typing_extensions import override
 
 from wavetank.foundation.model import FARTHEST, METRES, Length, Model, Place, Vector, register_model
-from wavetank.scene.lattice import fitted, lattice, plain_rows, touching
+from wavetank.scene.lattice import fitted, plain_lattice, touching
 from wavetank.scene.tank import Tank
 
 
@@ -38,7 +38,7 @@ class Fluid(Model):
     def particles(self, spacing: float) -> np.ndarray:
         """Positions [n, dim] of a cubic lattice that fills this fluid, half a spacing from its lower corner."""
         lower, upper = self.bounds()
-        x = lattice(lower, plain_rows(lower, upper, spacing), np.full(len(lower), spacing))
+        x = plain_lattice(lower, upper, spacing)
         return x[self.contains(x)]
 
     def placed(self, spacing: float, tank: Tank | None, fluids: Sequence["Fluid"]) -> np.ndarray:

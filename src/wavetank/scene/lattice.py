@@ -2,7 +2,7 @@
 
 Rows that are a whole spacing apart leave up to one free beside the last, and the block falls into it: a tank of a metre
 at d = 2.4 cm began at 0.45 m/s. Rows therefore fill the way between two walls, or to another block, or around a world
-that repeats. Along the other axes they lie as much closer as keeps a particle its volume.
+that repeats. Along the other axes they lie as much farther apart or closer as keeps a particle its volume.
 """
 
 import numpy as np
@@ -12,15 +12,23 @@ BEYOND = 0.25  # of a row: how far the last one may reach out of its block
 NEAR = 1e-6  # spacings: what is as near touches
 
 
-def lattice(lower: np.ndarray, counts: np.ndarray, ways: np.ndarray) -> np.ndarray:
-    """Return positions [m], float64 [n, dim]: `counts` rows along each axis, `ways` [m] apart, from half of one on."""
-    axes = [low + (np.arange(n) + 0.5) * way for low, n, way in zip(lower, counts, ways, strict=True)]
+def lattice(lower: np.ndarray, counts: np.ndarray, ways: np.ndarray, more: int = 0) -> np.ndarray:
+    """Return positions [m], float64 [n, dim]: `counts` rows along each axis, `ways` [m] apart, from half of one on.
+
+    There are `more` rows around these.
+    """
+    axes = [low + (np.arange(-more, n + more) + 0.5) * way for low, n, way in zip(lower, counts, ways, strict=True)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
 
 
 def plain_rows(lower: np.ndarray, upper: np.ndarray, spacing: float) -> np.ndarray:
     """Return how many rows a `spacing` [m] apart lie between two corners [m], int [dim]."""
     return np.floor((upper - lower) / spacing + NEAR).astype(int)
+
+
+def plain_lattice(lower: np.ndarray, upper: np.ndarray, spacing: float, more: int = 0) -> np.ndarray:
+    """Return the positions [m], float64 [n, dim], of those rows, and of `more` around."""
+    return lattice(lower, plain_rows(lower, upper, spacing), np.full(len(lower), spacing), more)
 
 
 def touching(lower: np.ndarray, upper: np.ndarray, low: np.ndarray, high: np.ndarray, spacing: float) -> np.ndarray:

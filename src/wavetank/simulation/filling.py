@@ -23,6 +23,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.physics.world import World
 from wavetank.scene.filled import Filled
 from wavetank.scene.fluids import Ball, Block, Fluid, Points
+from wavetank.scene.lattice import plain_lattice
 from wavetank.scene.scene import Scene
 from wavetank.solids.sampling import nearest_distances
 from wavetank.solids.shapes import Box, Difference, Sphere
@@ -70,7 +71,7 @@ def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulat
     volume = _volume(name, fluid, scene, obstacles)
     number = round(volume / scene.spacing**scene.dim)
     lower, upper = fluid.bounds()
-    lattice = _lattice(lower, upper, scene.spacing, 1)
+    lattice = plain_lattice(lower, upper, scene.spacing, 1)
     s = _depths(fluid, lattice, scene, obstacles)
     chosen = np.sort(np.argsort(s, kind="stable")[:number])
     if len(chosen) < number:
@@ -103,7 +104,7 @@ def _volume(name: str, fluid: Filled, scene: Scene, obstacles: list[Solid]) -> f
     d, dim = scene.spacing, scene.dim
     few = np.prod((upper - lower) / d + 1.0) * FINE**dim <= MOST_POINTS
     finest = FINE if few else COARSE
-    points = _lattice(lower, upper, d / finest, 1)
+    points = plain_lattice(lower, upper, d / finest, 1)
     own = nearest_distances([fluid.inside], points, d)
     if scene.tank is not None:
         outside = (own < -SLACK * d) & (_to_tank(points, scene) < -SLACK * d)
@@ -130,13 +131,6 @@ def _volume(name: str, fluid: Filled, scene: Scene, obstacles: list[Solid]) -> f
             f"{held:.3g} of {whole:.3g} m^{dim} have room for particles; use a smaller spacing or a larger shape."
         )
     return held
-
-
-def _lattice(lower: np.ndarray, upper: np.ndarray, edge: float, more: int) -> np.ndarray:
-    """Return the points of a lattice of that edge [m], half of it from the lower corner, and `more` around."""
-    counts = np.floor((upper - lower) / edge + 1e-6).astype(int)
-    axes = [low + (np.arange(-more, n + more) + 0.5) * edge for low, n in zip(lower, counts, strict=True)]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
 
 
 def _depths(fluid: Filled, points: np.ndarray, scene: Scene, obstacles: list[Solid]) -> np.ndarray:

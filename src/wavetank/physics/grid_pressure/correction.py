@@ -163,7 +163,7 @@ def add_fill(
 def inside_at(grid: CoarseGrid, n, e: Errors):
     """How far inside of the water node `n` lies: below 0 no particle there counts, above 1 all do in full.
 
-    Depths beside solids are known only roughly, and so do not count.
+    Depths beside solids are known only roughly, and so do not count. `slope_y` keeps it until errors are summed.
     """
     by_fill = (grid.fill[n] - e.inner_from) / (e.inner_to - e.inner_from)
     by_depth = (grid.depth[n] - e.below_from) / (e.below_to - e.below_from)
