@@ -29,6 +29,20 @@ def solids_near(grid: CoarseGrid, solids: SolidSet, n, nodes, far):
 
 
 @qd.func
+def narrowed(solids: SolidSet, around: qd.template(), at, far):
+    """List those of the solids listed as `around` that reach as near as `far` [m] to the place `at`."""
+    close = around
+    if around[0] < around.n:
+        close[0] = 0
+        for number in range(around[0]):
+            k = around[1 + number]
+            if (image_near(solids, k, at) - solids.position[k]).norm() < solids.reach[k] + far:
+                close[0] += 1
+                close[close[0]] = k
+    return close
+
+
+@qd.func
 def listed(solids: SolidSet, around: qd.template(), number):
     """Solid that has this `number` in the list `around`."""
     k = solids.tank_count + number

@@ -2,7 +2,7 @@
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients
-from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, corners, nearest, tents
+from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, corners, nearest, on_axis, tents
 from wavetank.physics.grid_pressure.listed_solids import listed, solids_near
 from wavetank.physics.grid_pressure.thin_walls import behind, farthest, keep_thin, mark_shut, way_from
 from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec3, vec4
@@ -159,19 +159,29 @@ def add_tents(grid: CoarseGrid, n, unit, dim: qd.template()):
     if grid.nz > 1:
         edge = qd.min(edge, 0.5 * grid.dz)
     wall = kept_wall(grid, n)
+    # Whole numbers, summed up here first: a node beside is one of several corners of each piece.
+    amounts = qd.Vector.zero(qd.i32, 3**dim)
     for k in range(qd.static(2**dim)):
         way, s = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+        first, stride_of = 0, 1
         for axis in qd.static(range(dim)):
             aside = 0.5 * ((k >> axis) % 2) - 0.25  # of the piece, in cells from the node
             s[axis] = own[axis] + aside
             way[axis] = aside * edges[axis]
+            first += (k >> axis) % 2 * stride_of
+            stride_of *= 3
         free = free_of(wall, way, edge)
         if free > 0.0:
             at = corners(grid, qd.floor(s, qd.i32), dim)
             weights = open_tents(grid, at, s, dim, 1)
             for corner in qd.static(range(2**dim)):
                 amount = unit * free * weights[corner] / 2.0**dim
-                qd.atomic_add(grid.sums[at[corner]], qd.cast(qd.round(amount), qd.i32))
+                beside = first + (corner & 1) + 3 * (corner >> 1 & 1) + 9 * (corner >> 2)
+                amounts[beside] += qd.cast(qd.round(amount), qd.i32)
+    for beside in range(qd.static(3**dim)):
+        if amounts[beside] != 0:
+            c = own + qd.Vector([beside % 3 - 1, beside // 3 % 3 - 1, beside // 9 - 1 if qd.static(dim == 3) else 0])
+            qd.atomic_add(grid.sums[nearest(grid, c)], amounts[beside])
 
 
 @qd.func
@@ -193,9 +203,9 @@ def open_tents(grid: CoarseGrid, at: qd.template(), s, dim: qd.template(), thin:
 
 
 @qd.func
-def beside(grid: CoarseGrid, x, row, axis: qd.template(), aside):
-    """Number of the node `aside` along an axis of the one that is `x` in its row, or of the nearest."""
-    c = qd.Vector([x, row % grid.ny, row // grid.ny])
+def row_beside(grid: CoarseGrid, row, axis: qd.template(), aside):
+    """Number of the first node of the row that is `aside` of a `row` along y or z, or of the nearest."""
+    c = qd.Vector([0, row % grid.ny, row // grid.ny])
     c[axis] += aside
     return nearest(grid, c)
 
@@ -205,19 +215,35 @@ def largest_along(
     to: qd.template(), values: qd.template(), grid: CoarseGrid, row, axis: qd.template(), far: qd.template()
 ):
     """Put the largest of the values of `far` nodes on each side along an axis to the nodes of a row."""
-    for x in range(grid.nx):
-        largest = 0.0
-        for aside in qd.static(range(-far, far + 1)):
-            largest = qd.max(largest, values[beside(grid, x, row, axis, aside)])
-        to[x + grid.nx * row] = largest
+    first = grid.nx * row
+    if qd.static(axis == 0):
+        for x in range(grid.nx):
+            largest = 0.0
+            for aside in qd.static(range(-far, far + 1)):
+                largest = qd.max(largest, values[first + on_axis(grid, x + aside, 0)])
+            to[first + x] = largest
+    else:
+        rows = qd.Vector([row_beside(grid, row, axis, aside) for aside in qd.static(range(-far, far + 1))])
+        for x in range(grid.nx):
+            largest = 0.0
+            for k in qd.static(range(2 * far + 1)):
+                largest = qd.max(largest, values[rows[k] + x])
+            to[first + x] = largest
 
 
 @qd.func
 def spread_along(to: qd.template(), values: qd.template(), grid: CoarseGrid, row, axis: qd.template()):
     """Put what the free cells beside a node count there along an axis, see `add_tents`, to the nodes of a row."""
-    for x in range(grid.nx):
-        around = values[beside(grid, x, row, axis, -1)] + values[beside(grid, x, row, axis, 1)]
-        to[x + grid.nx * row] = 0.75 * values[x + grid.nx * row] + 0.125 * around
+    first = grid.nx * row
+    if qd.static(axis == 0):
+        for x in range(grid.nx):
+            around = values[first + on_axis(grid, x - 1, 0)] + values[first + on_axis(grid, x + 1, 0)]
+            to[first + x] = 0.75 * values[first + x] + 0.125 * around
+    else:
+        before, behind_it = row_beside(grid, row, axis, -1), row_beside(grid, row, axis, 1)
+        for x in range(grid.nx):
+            around = values[before + x] + values[behind_it + x]
+            to[first + x] = 0.75 * values[first + x] + 0.125 * around
 
 
 @qd.func
