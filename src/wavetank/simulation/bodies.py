@@ -30,6 +30,7 @@ from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
 from wavetank.simulation.coupling import DENSITY, Coupling
 from wavetank.simulation.effort import given
+from wavetank.simulation.engine import import_engine, isometry, poses_of, velocities_of
 from wavetank.simulation.joints import Joints, put_joints
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.solids.distance import PARTS
@@ -42,17 +43,6 @@ FAR = 0.3  # of a spacing: bodies that yield by more begin the step anew
 FEWEST = 4.0  # pieces across a body
 IN_JOINTS = 16  # inner iterations of the engine where there are joints: with 1 a motor sagged by 0.3 rad/s under a load
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
-
-
-def import_engine() -> Any:
-    """Return the module of the engine; raise `WavetankError` where it is not installed."""
-    try:
-        import rapier3d
-    except ImportError:
-        raise WavetankError(
-            "this scene has bodies, and these need the package rapier3d; install it with: pip install wavetank[bodies]"
-        ) from None
-    return rapier3d
 
 
 class Bodies(Mapping[str, Body]):
@@ -69,9 +59,9 @@ class Bodies(Mapping[str, Body]):
         self.joints = Joints()
         self.acting: Acting | None = None  # made when forces first act
         self.pushes: np.ndarray | None = None  # kg m/s, kg m^2/s: by forces, in the next step
-        self._told: dict[int, tuple[float, ...]] = {}  # water that goes along with each body, as the engine knows it
+        self._told = np.zeros((0, 2))  # water that goes along with each body, as the engine knows it
         self.density = density
-        solids.feeling, solids.passing = {}, {}
+        solids.feeling, solids.passing = {}, None
         numbers = [number for number, solid in enumerate(solids.members) if solid.is_body]
         if not numbers:
             return
@@ -83,13 +73,14 @@ class Bodies(Mapping[str, Body]):
         self.joints = put_joints(self.engine, lambda: self.world, self.handles, solids, scene.joints)
         for joint in self.joints.values():
             joint.ask(functools.partial(given, self.members, self.joints))
+        self.numbers = np.array(numbers)
+        self._see()
         self._weigh_all(numbers)
         far, along = scene.support * scene.spacing, ALONG * self.coupling.added
         solids.feel({
             body.number: (body.dry.center, body.unit, grip(self.dim, body.dry, body.wet, along[body.row], far))
             for body in self.members
         })  # fmt: skip
-        self.numbers = np.array([body.number for body in self.members])
         self.units = np.array([body.unit for body in self.members])  # 1/m
         self.wet_masses = np.array([body.wet.mass for body in self.members])  # kg
         displaced = self.wet_masses / self.density
@@ -120,10 +111,16 @@ class Bodies(Mapping[str, Body]):
 
     # --- the engine's world ---
 
+    def _see(self) -> None:
+        """Look at the engine's world, which is another one."""
+        self.solid_views = [self.world.rigid_bodies[handle] for handle in self.handles]
+        self.views = [self.solid_views[number] for number in self.numbers]
+        self._told = np.full((len(self.numbers), 2), np.nan)
+
     def _add(self, number: int, solid: Solid) -> Any:
         engine, pose = self.engine, self.solids.poses[number]
         maker = engine.RigidBody.dynamic() if solid.is_body else engine.RigidBody.kinematic_position_based()
-        maker = maker.position(self._isometry(*pose)).can_sleep(False)
+        maker = maker.position(isometry(engine, *pose)).can_sleep(False)
         if self.dim == 2:
             maker = maker.enabled_translations((True, True, False)).enabled_rotations((False, False, True))
         else:
@@ -131,7 +128,7 @@ class Bodies(Mapping[str, Body]):
         handle = self.world.add_body(maker)
         friction = self.solids.friction if solid.friction is None else solid.friction
         for position, rotation, shape in shapes_of(solid, self.dim, self.scene.spacing):
-            collider = engine.Collider.new(shape).position(self._isometry(position, rotation))
+            collider = engine.Collider.new(shape).position(isometry(engine, position, rotation))
             self.world.add_collider(collider.density(0.0).friction(friction).restitution(solid.restitution), handle)
         return handle
 
@@ -152,11 +149,13 @@ class Bodies(Mapping[str, Body]):
         tensors = np.array([dry.tensor for dry, _ in inertias])
         reaches = [self.solids.members[number].reach() for number in numbers]
         self.coupling = Coupling(masses, tensors, np.array(reaches), np.array(added))
+        self.middles = [dry.center.tolist() for dry, _ in inertias]
         self.moments, frames = np.linalg.eigh(tensors)
         frames[np.linalg.det(frames) < 0.0, :, 0] *= -1.0
         self.frames = [self.engine.Rotation3(*quaternion_of(matrix)) for matrix in frames]
         for row, number in enumerate(numbers):
             self._put(row, number, *inertias[row])
+        self._weigh()
 
     def _put(self, row: int, number: int, dry: Inertia, wet: Inertia) -> None:
         """Put a body among the others; how fine its sums are follows from how many particles can press on it."""
@@ -168,22 +167,20 @@ class Bodies(Mapping[str, Body]):
             lambda: self.solids.poses[number], lambda: self.gravity, self.dim, dry, wet, unit, self.coupling, row,
         )  # fmt: skip
         self.members.append(body)
-        self._weigh(body, body.rigid(), tuple(self.coupling.held_by[row].tolist()))
         if solid.velocity is not None:
             body.velocity = solid.velocity
         if solid.angular_velocity is not None:
             spin = solid.angular_velocity
             body.angular_velocity = (0.0, 0.0, spin) if isinstance(spin, int | float) else spin
 
-    def _weigh(self, body: Body, rigid: Any, along: tuple[float, ...]) -> None:
-        """Tell the engine the mass of a body and of the water that goes `along` [2] [kg, kg m^2]."""
-        if self._told.get(body.row) == along:
-            return
-        self._told[body.row], (mass, inertia) = along, along
-        moments = (self.moments[body.row] + inertia).tolist()
-        center, frame = body.dry.center.tolist(), self.frames[body.row]
-        properties = self.engine.MassProperties(center, body.dry.mass + mass, moments, frame)
-        rigid.set_additional_mass_properties(properties)
+    def _weigh(self) -> None:
+        """Tell the engine the masses of the bodies and of the water that goes along."""
+        along = self.coupling.held_by
+        masses, moments = (self.coupling.masses + along[:, 0]).tolist(), (self.moments + along[:, 1:]).tolist()
+        for row in np.flatnonzero((along != self._told).any(axis=1)).tolist():
+            properties = self.engine.MassProperties(self.middles[row], masses[row], moments[row], self.frames[row])
+            self.views[row].set_additional_mass_properties(properties)
+        self._told = along
 
     def _pieces(self) -> Pieces:
         """Return the pieces of all bodies on the device."""
@@ -210,33 +207,32 @@ class Bodies(Mapping[str, Body]):
         """
         self.fastest, self.gravity = fastest, np.array([*gravity, 0.0][:3])
         held = np.array([self._is_held(body) for body in self.members])
-        self.coupling.begin(self._rotations(), held, self.gravity, dt, self.pushes)
-        for body in self.members:
-            self._hold(body, body.rigid())
+        self.begins = self._stand()
+        self.coupling.begin(self.begins[1], held, self.gravity, dt, self.pushes)
+        for body, now in zip(self.members, self.views, strict=True):
+            self._hold(body, now)
         for joint in self.joints.values():
             joint.drive(clock, dt)
-        self.begun = [(handle, self.world.rigid_bodies[handle].position) for handle in self.handles]
-        self.begins = {body.number: self.solids.poses[body.number] for body in self.members}
+        self.begun = [now.position for now in self.solid_views]
         self._move(dt, share)
 
     def _move(self, dt: float, share: float) -> None:
         """Let the engine take the step, from where it began, with the velocities that are wanted."""
-        rigid = [body.rigid() for body in self.members]
-        alongs, velocities = self.coupling.held_by.tolist(), self._slowed(self.coupling.wanted)
-        for body, now, along, velocity in zip(self.members, rigid, alongs, velocities, strict=True):
-            self._weigh(body, now, tuple(along))
+        self._weigh()
+        for now, velocity in zip(self.views, self._slowed(self.coupling.wanted), strict=True):
             now.linvel, now.angvel = velocity[:3], velocity[3:]
-        begun = self._velocities(rigid)
+        begun = velocities_of(self.views)
         for number in self.solids.targets:
-            pose = self._isometry(*self.solids.between(number, share))
-            self.world.rigid_bodies[self.handles[number]].set_next_kinematic_position(pose)
+            pose = isometry(self.engine, *self.solids.between(number, share))
+            self.solid_views[number].set_next_kinematic_position(pose)
         self.world.integration_parameters.dt = dt
         self.world.integration_parameters.num_internal_pgs_iterations = IN_JOINTS if self.joints else 1
         self.world.step()
-        rotations = np.array([self.begins[body.number][1] for body in self.members])
-        self.coupling.start(rotations, begun, self._velocities(rigid), dt)
-        for body, now in zip(self.members, rigid, strict=True):
-            self._pass(body, now, self.begins[body.number])
+        self.coupling.start(self.begins[1], begun, velocities_of(self.views), dt)
+        ends = poses_of(self.views)
+        self.solids.passing = (self.numbers, self.begins, ends)
+        for number, position, rotation in zip(self.numbers.tolist(), *ends, strict=True):
+            self.solids.poses[number] = (position, rotation)
 
     def step(self, world: World, scene: Scene, dt: float, fastest: float, part: tuple[float, float]) -> None:
         """Let the water take a step of `dt` [s], which is that `part` of a frame.
@@ -295,13 +291,14 @@ class Bodies(Mapping[str, Body]):
         The step of `dt` [s] is then to be taken again: the water pushed as if the body could not give way.
         """
         slow = float(np.linalg.norm(self.gravity) * self.scene.spacing) ** 0.5
-        if not self.coupling.yields(self._rotations(), slow, FAR * self.scene.spacing):
+        if not self.coupling.yields(self._stand()[1], slow, FAR * self.scene.spacing):
             return False
-        for handle, position in self.begun:
-            self.world.rigid_bodies[handle].position = position
-        for body in self.members:
+        for now, position in zip(self.solid_views, self.begun, strict=True):
+            now.position = position
+        for row, body in enumerate(self.members):
             if self._is_held(body):
-                body.rigid().set_next_kinematic_position(self._isometry(*self.begins[body.number]))
+                pose = isometry(self.engine, self.begins[0][row], self.begins[1][row])
+                self.views[row].set_next_kinematic_position(pose)
         self._move(dt, share)
         return True
 
@@ -315,12 +312,7 @@ class Bodies(Mapping[str, Body]):
         if rigid.body_type != kind:
             rigid.body_type = kind
         if held:
-            rigid.set_next_kinematic_position(self._isometry(*self.solids.poses[body.number]))
-
-    def _pass(self, body: Body, rigid: Any, begin: Pose) -> None:
-        end = self._pose(rigid)
-        self.solids.passing[body.number] = (begin, end)
-        self.solids.poses[body.number] = end
+            rigid.set_next_kinematic_position(isometry(self.engine, *self.solids.poses[body.number]))
 
     def _slowed(self, velocities: np.ndarray) -> list[list[float]]:
         """Return the velocities [n, 6] of which no part of a body's surface is faster than the water may get."""
@@ -331,18 +323,10 @@ class Bodies(Mapping[str, Body]):
         ).tolist()
         return slowed
 
-    def _velocities(self, rigid: list[Any]) -> np.ndarray:
-        return np.array([(*_three(now.linvel), *_three(now.angvel)) for now in rigid])
-
-    def _rotations(self) -> np.ndarray:
-        return np.array([self.solids.poses[body.number][1] for body in self.members])
-
-    def _pose(self, rigid: Any) -> Pose:
-        q = rigid.rotation
-        return np.array(_three(rigid.translation)), np.array([q.w, q.i, q.j, q.k])
-
-    def _isometry(self, position: np.ndarray, rotation: np.ndarray) -> Any:
-        return self.engine.Isometry3([*map(float, position)], self.engine.Rotation3(*map(float, rotation)))
+    def _stand(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return where the bodies are: places [n, 3] and rotations [n, 4]."""
+        places, turns = zip(*[self.solids.poses[number] for number in self.numbers.tolist()], strict=True)
+        return np.array(places), np.array(turns)
 
     # --- states ---
 
@@ -377,7 +361,7 @@ class Bodies(Mapping[str, Body]):
             self.world = self.engine.PhysicsWorld.restore(arrays["bodies_engine"].tobytes())
         except self.engine.SerializationError as error:
             raise WavetankError(f"the engine's state of the bodies cannot be read: {error}.") from None
-        self._told.clear()
+        self._see()
         for row, memory in enumerate(arrays["bodies_memory"]):
             self.coupling.recall(row, memory)
 
@@ -386,14 +370,10 @@ class Bodies(Mapping[str, Body]):
         for name, joint in self.joints.items():
             if not joint.is_there:
                 raise WavetankError(f"the engine's state lacks the joint {name!r}.")
-        for body in self.members:
-            (position, rotation), (place, turn) = self._pose(body.rigid()), poses[body.number]
+        for body, position, rotation in zip(self.members, *poses_of(self.views), strict=True):
+            place, turn = poses[body.number]
             off = np.concatenate(
-                [position - place, np.abs(rotation) - np.abs(turn), 0.0 * self._velocities([body.rigid()])[0]]
+                [position - place, np.abs(rotation) - np.abs(turn), 0.0 * velocities_of([body.rigid()])[0]]
             )
             if not np.abs(off).max() <= 1e-3 * (1.0 + np.abs(place).max()):
                 raise WavetankError(f"the engine's state of the body {body.name!r} is not that of the solid.")
-
-
-def _three(v: Any) -> tuple[float, float, float]:
-    return (v.x, v.y, v.z)

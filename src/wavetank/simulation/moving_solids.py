@@ -23,6 +23,7 @@ from wavetank.solids.solid import Solid
 
 SMALLEST = 0.02  # size at which a growing solid starts, of its full size
 PARTS = 4  # of a frame, in which the speed of a solid on a course is looked at
+Rows = tuple[np.ndarray, np.ndarray]  # places [n, 3] and rotations [n, 4]
 _versions = itertools.count(1)
 
 
@@ -45,7 +46,7 @@ class MovingSolids:
         self.starts = list(self.poses)  # where they began
         self.targets: dict[int, Pose] = {}  # at the end of the next frame
         self.growing: dict[int, tuple[float, float]] = {}  # age and time to grow [s]
-        self.passing: dict[int, tuple[Pose, Pose]] = {}  # begin and end of a time step, of bodies
+        self.passing: tuple[np.ndarray, Rows, Rows] | None = None  # bodies: numbers, begin and end of a time step
         self.feeling: dict[int, tuple[np.ndarray, float, float]] = {}  # of bodies, see `feel`
         self.version = 0  # of what is on the device
         self._stand, self._tank = b"", np.zeros((0, 4))  # how the tank stands, and its planes then
@@ -72,6 +73,7 @@ class MovingSolids:
         By number: centre of mass [m], `SolidSet.unit` [1/m] and `SolidSet.grip`.
         """
         self.feeling = feeling
+        self._middles = np.array([*feeling], int), np.array([center for center, *_ in feeling.values()])
         units, grips = np.zeros(len(self.members), np.float32), np.ones(len(self.members), np.float32)
         for number, (_, unit, grip) in feeling.items():
             units[number], grips[number] = unit, grip
@@ -192,7 +194,7 @@ class MovingSolids:
 
         No two versions of any world's solids have the same number.
         """
-        if not self.targets and not self.passing:
+        if not self.targets and self.passing is None:
             return self.version
         self._upload(begin, end)
         resting = all(_equal(self.poses[number], target) for number, target in self.targets.items())
@@ -227,10 +229,7 @@ class MovingSolids:
         self.version = next(_versions)
         if not self.poses:
             return
-        (old_at, old_turn), (at, turn) = (
-            [np.array(column) for column in zip(*self._instant(share, last), strict=True)]
-            for last, share in enumerate((begin, end))
-        )
+        (old_at, old_turn), (at, turn) = (self._instant(share, last) for last, share in enumerate((begin, end)))
         sweep = [np.linalg.norm(at - old_at, axis=1), 2.0 * np.linalg.norm(turn - old_turn, axis=1)]
         device = self.device
         for array, values in (
@@ -252,21 +251,22 @@ class MovingSolids:
             return self.courses.pose(self.names[number], self.courses.began + share * self.courses.duration)
         return place + share * (goal - place), interpolate(turn, goal_turn, share)
 
-    def _instant(self, share: float, last: int) -> list[Pose]:
+    def _instant(self, share: float, last: int) -> Rows:
         """Return all poses at a `share` of the frame; those of bodies at the begin of a time step, or its `last`."""
-        poses = list(self.poses)
+        places, turns = ([pose[part] for pose in self.poses] for part in range(2))
         for number in self.targets:
-            poses[number] = self.between(number, share)
-        for number, ends in self.passing.items():
-            poses[number] = ends[last]
-        return poses
+            places[number], turns[number] = self.between(number, share)
+        at, turn = np.concatenate(places).reshape(-1, 3), np.concatenate(turns).reshape(-1, 4)
+        if self.passing:
+            numbers, *ends = self.passing
+            at[numbers], turn[numbers] = ends[last]
+        return at, turn
 
     def _centers(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Return where the centres of mass are at these poses, [n, 3]."""
         centers = positions.copy()
         if self.feeling:
-            numbers = [*self.feeling]
-            own = np.array([center for center, *_ in self.feeling.values()])
+            numbers, own = self._middles
             centers[numbers] += (matrix_of(rotations[numbers]) @ own[..., None])[..., 0]
         return centers
 

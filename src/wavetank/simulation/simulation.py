@@ -147,7 +147,7 @@ class Simulation(States):
                 for force in with_images(acting, scene.tank):
                     force.apply(self.world.particles, self.count, dt, start)
                 self.bodies.step(self.world, scene, dt, limit, shares)
-        self.solids.passing.clear()
+        self.solids.passing = None
         self.solids.move_to(0.0, 1.0)
         update_foam(self.world, self._scene_at(self.time + 0.5 * duration), duration, self.frame_number)
         self._let_out()  # after the foam, which looks for water in the cells of the last step

@@ -34,7 +34,7 @@ nothing; of two cells in a row the mean counts, as a single one of four or eight
 import dataclasses
 import math
 
-from wavetank.device.compiler import qd
+from wavetank.device.compiler import download, qd
 from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scratch, Walls, remembered
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import fall
@@ -280,7 +280,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         world.thin_walls.fill(0)
         find_room(finest, world.thin_walls, world.solids, LEAST_OPEN, UNIT, searched, params.dim)
         world.room_version = world.solids_version
-        world.has_thin_walls = bool(world.thin_walls.to_numpy()[0])
+        world.has_thin_walls = bool(download(world.thin_walls)[0])
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     few = int(not is_shared(finest))
     balanced = c.fallen > 0.0
