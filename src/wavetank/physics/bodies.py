@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import MARGIN, Particles, integers, new_particles, scalars, vectors, with_viscosity
-from wavetank.physics.neighbors import copy_particle
+from wavetank.device.state import integers, scalars, vectors
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -19,33 +18,6 @@ class Pieces:
     volume: qd.types.ndarray()  # f32 [pieces]: over that of a particle
     count: qd.i32
     reach: qd.f32  # m: radius of the largest body
-
-
-@qd.kernel(fastcache=True)
-def copy_particles(target: Particles, source: Particles, count: qd.i32):
-    """Copy all that particles carry."""
-    for i in range(count):
-        copy_particle(target, i, source, i)
-
-
-class Retry:
-    """The particles before a step, for when it has to be taken again."""
-
-    def __init__(self) -> None:
-        self.particles: Particles | None = None
-
-    def keep(self, particles: Particles, dim: int, count: int) -> None:
-        """Keep the particles as they are."""
-        if self.particles is None or self.particles.id.shape != particles.id.shape:
-            self.particles = new_particles(dim, particles.id.shape[0] - MARGIN)
-        if particles.viscous.shape == particles.x.shape and self.particles.viscous.shape != particles.x.shape:
-            self.particles = with_viscosity(self.particles)
-        copy_particles(self.particles, particles, count)
-
-    def restore(self, particles: Particles, count: int) -> None:
-        """Put them back."""
-        assert self.particles is not None
-        copy_particles(particles, self.particles, count)
 
 
 def new_pieces(bodies: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]], reach: float) -> Pieces:

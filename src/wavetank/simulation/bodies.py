@@ -15,11 +15,12 @@ from typing_extensions import override
 from wavetank.device.compiler import download, upload
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import quaternion_of
-from wavetank.physics.bodies import Pieces, Retry, new_pieces
+from wavetank.physics.bodies import Pieces, new_pieces
 from wavetank.physics.dynamic_viscosity.implicit_viscosity import hold_on_bodies
 from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED, carried
 from wavetank.physics.mixture import blend
 from wavetank.physics.reactions import IMMERSION, OF_GRID, RUBBING
+from wavetank.physics.retry import Retry
 from wavetank.physics.step import step as take_step
 from wavetank.physics.world import World
 from wavetank.scene.forces import Force
@@ -243,7 +244,7 @@ class Bodies(Mapping[str, Body]):
         if not self.members:
             take_step(world, scene, dt, fastest)
             return
-        self.retry.keep(world.particles, self.dim, world.count)
+        self.retry.keep(world)
         tries = 1
 
         def settle() -> bool | None:
@@ -263,7 +264,7 @@ class Bodies(Mapping[str, Body]):
             upload(world.solids.reaction, self.nothing)
             if take_step(world, scene, dt, fastest, settle):
                 break
-            self.retry.restore(world.particles, world.count)
+            self.retry.restore(world)
         self.feel(world, dt)
         self.coupling.end()
 

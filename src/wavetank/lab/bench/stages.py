@@ -17,7 +17,7 @@ from wavetank.device import compiler
 #: Stages and the modules, or packages of them, whose kernels they are. There is no rest: a kernel that has moved must
 #: not count as something else unnoticed.
 STAGES: dict[str, tuple[str, ...]] = {
-    "contact": ("wavetank.physics.boundary", "wavetank.physics.bodies", "wavetank.physics.near_solids"),
+    "contact": ("wavetank.physics.boundary", "wavetank.physics.retry", "wavetank.physics.near_solids"),
     "neighbours": ("wavetank.physics.neighbors", "wavetank.physics.pairs"),
     "grid": ("wavetank.physics.grid_pressure",),
     "constraint": ("wavetank.physics.density_constraint",),
