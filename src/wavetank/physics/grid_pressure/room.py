@@ -159,29 +159,19 @@ def add_tents(grid: CoarseGrid, n, unit, dim: qd.template()):
     if grid.nz > 1:
         edge = qd.min(edge, 0.5 * grid.dz)
     wall = kept_wall(grid, n)
-    # Whole numbers, summed up here first: a node beside is one of several corners of each piece.
-    amounts = qd.Vector.zero(qd.i32, 3**dim)
     for k in range(qd.static(2**dim)):
         way, s = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
-        first, stride_of = 0, 1
         for axis in qd.static(range(dim)):
             aside = 0.5 * ((k >> axis) % 2) - 0.25  # of the piece, in cells from the node
             s[axis] = own[axis] + aside
             way[axis] = aside * edges[axis]
-            first += (k >> axis) % 2 * stride_of
-            stride_of *= 3
         free = free_of(wall, way, edge)
         if free > 0.0:
             at = corners(grid, qd.floor(s, qd.i32), dim)
             weights = open_tents(grid, at, s, dim, 1)
             for corner in qd.static(range(2**dim)):
                 amount = unit * free * weights[corner] / 2.0**dim
-                beside = first + (corner & 1) + 3 * (corner >> 1 & 1) + 9 * (corner >> 2)
-                amounts[beside] += qd.cast(qd.round(amount), qd.i32)
-    for beside in range(qd.static(3**dim)):
-        if amounts[beside] != 0:
-            c = own + qd.Vector([beside % 3 - 1, beside // 3 % 3 - 1, beside // 9 - 1 if qd.static(dim == 3) else 0])
-            qd.atomic_add(grid.sums[nearest(grid, c)], amounts[beside])
+                qd.atomic_add(grid.sums[at[corner]], qd.cast(qd.round(amount), qd.i32))
 
 
 @qd.func
