@@ -31,8 +31,8 @@ patches.apply_all()
 warnings.filterwarnings("ignore", module=r"quadrants\.lang\._fast_caching")
 
 __all__ = [
-    "BACKENDS", "LANES", "available_backends", "cache_folder", "current_backend", "download", "lanes", "qd", "start",
-    "synchronize", "threads", "upload", "watched", "worth_sharing",
+    "BACKENDS", "LANES", "Mirror", "available_backends", "cache_folder", "current_backend", "download", "lanes", "qd",
+    "start", "synchronize", "threads", "upload", "watched", "worth_sharing",
 ]  # fmt: skip
 
 #: Names a user may pass as ``arch``; ``gpu`` means the best one present.
@@ -170,6 +170,30 @@ def upload(array: Any, values: Any) -> None:
         memory[: len(values)] = values
     if not shares:
         array.from_numpy(memory)
+
+
+class Mirror:
+    """What a device array holds, read and written again and again: where the host shares its memory it is that memory.
+
+    To look for that memory each time takes ten times as long as to write a few numbers to it. Whoever reads or writes
+    waits for the device before, with `synchronize`.
+    """
+
+    def __init__(self, array: Any) -> None:
+        self._array = array
+        self._memory: np.ndarray | None = download(array) if _current == "cpu" else None
+
+    def read(self) -> np.ndarray:
+        """Return what the array holds, to be read at once."""
+        return download(self._array) if self._memory is None else self._memory
+
+    def write(self, values: Any) -> None:
+        """Write `values` to the front; what is beyond becomes zero."""
+        if self._memory is None:
+            upload(self._array, values)
+        else:
+            self._memory[: len(values)] = values
+            self._memory[len(values) :] = 0
 
 
 @contextlib.contextmanager

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from wavetank.device.compiler import download, upload
+from wavetank.device.compiler import Mirror, synchronize
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import quaternion_of
 from wavetank.physics.bodies import Pieces, new_pieces
@@ -29,7 +29,7 @@ from wavetank.simulation.acting import Acting
 from wavetank.simulation.added_mass import ALONG, added_mass, grip
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
-from wavetank.simulation.coupling import DENSITY, Coupling
+from wavetank.simulation.coupling import DENSITY, Coupling, lengths
 from wavetank.simulation.effort import given
 from wavetank.simulation.engine import import_engine, isometry, poses_of, velocities_of
 from wavetank.simulation.joints import Joints, put_joints
@@ -88,7 +88,8 @@ class Bodies(Mapping[str, Body]):
         self.radii = np.cbrt(0.75 / np.pi * displaced) if self.dim == 3 else np.sqrt(displaced / np.pi)  # m
         self.coupling.sinks = self.coupling.masses > self.wet_masses
         self.pieces = self._pieces()
-        self.nothing = np.zeros(PARTS * len(solids.members), np.int32)
+        self.sums, self.nothing = Mirror(solids.device.reaction), np.zeros(PARTS * len(solids.members), np.int32)
+        self.levers = np.repeat(np.stack([np.ones(len(numbers)), self.coupling.reaches], axis=1), 3, axis=1)  # 1, m
 
     @override
     def __getitem__(self, name: str) -> Body:
@@ -220,9 +221,11 @@ class Bodies(Mapping[str, Body]):
     def _move(self, dt: float, share: float) -> None:
         """Let the engine take the step, from where it began, with the velocities that are wanted."""
         self._weigh()
-        for now, velocity in zip(self.views, self._slowed(self.coupling.wanted), strict=True):
+        slowed = self._slowed(self.coupling.wanted)
+        for now, velocity in zip(self.views, slowed.tolist(), strict=True):
             now.linvel, now.angvel = velocity[:3], velocity[3:]
-        begun = velocities_of(self.views)
+        # The engine keeps what it is given, in single precision, but for what it does not move itself.
+        begun = velocities_of(self.views) if self.coupling.held.any() else np.float32(slowed).astype(float)
         for number in self.solids.targets:
             pose = isometry(self.engine, *self.solids.between(number, share))
             self.solid_views[number].set_next_kinematic_position(pose)
@@ -261,7 +264,8 @@ class Bodies(Mapping[str, Body]):
             return True
 
         while True:
-            upload(world.solids.reaction, self.nothing)
+            synchronize()
+            self.sums.write(self.nothing)
             if take_step(world, scene, dt, fastest, settle):
                 break
             self.retry.restore(world)
@@ -270,14 +274,14 @@ class Bodies(Mapping[str, Body]):
 
     def feel(self, world: World, dt: float) -> None:
         """Take what the water did to the bodies in a step of `dt` [s]."""
-        sums = download(world.solids.reaction).astype(float).reshape(-1, PARTS)
+        synchronize()
+        sums = self.sums.read().reshape(-1, PARTS)[self.numbers].astype(float)
         particle = blend(world.materials, self.scene).largest_density * self.scene.spacing**self.dim
-        rows, coupling, wet = sums[self.numbers] / self.units[:, None], self.coupling, self.wet_masses
-        scale = np.repeat(np.stack([np.ones(len(wet)), coupling.reaches], axis=1), 3, axis=1) * (particle / dt)
-        grid = rows[:, OF_GRID : OF_GRID + 6] * scale
-        force = carried(dt, self.scene.frame_time) * coupling.carried + grid / dt
+        rows, coupling, wet = sums / self.units[:, None], self.coupling, self.wet_masses
+        scale = self.levers * (particle / dt)
+        force = carried(dt, self.scene.frame_time) * coupling.carried + rows[:, OF_GRID : OF_GRID + 6] * scale / dt
         most = LARGEST_CARRIED * float(np.linalg.norm(self.gravity)) * wet
-        share = np.minimum(1.0, most / np.maximum(np.linalg.norm(force[:, :3], axis=1), 1e-30))
+        share = np.minimum(1.0, most / np.maximum(lengths(force[:, :3]), 1e-30))
         coupling.by_grid = force * share[:, None]
         coupling.impulse = rows[:, :6] * scale + force * dt
         cell = world.levels[0].dy if world.levels else 1.0
@@ -315,13 +319,13 @@ class Bodies(Mapping[str, Body]):
         if held:
             rigid.set_next_kinematic_position(isometry(self.engine, *self.solids.poses[body.number]))
 
-    def _slowed(self, velocities: np.ndarray) -> list[list[float]]:
+    def _slowed(self, velocities: np.ndarray) -> np.ndarray:
         """Return the velocities [n, 6] of which no part of a body's surface is faster than the water may get."""
-        speeds = np.linalg.norm(velocities.reshape(-1, 2, 3), axis=2)
+        speeds = np.sqrt((velocities * velocities).reshape(-1, 2, 3).sum(axis=2))
         speeds[:, 1] *= self.coupling.reaches
-        slowed: list[list[float]] = (
-            velocities * np.repeat(np.minimum(1.0, self.fastest / np.maximum(speeds, 1e-30)), 3, axis=1)
-        ).tolist()
+        slowed: np.ndarray = velocities * np.repeat(
+            np.minimum(1.0, self.fastest / np.maximum(speeds, 1e-30)), 3, axis=1
+        )
         return slowed
 
     def _stand(self) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.device.compiler import upload
+from wavetank.device.compiler import Mirror, synchronize, upload
 from wavetank.device.periods import NONE, Periods
 from wavetank.device.state import Particles
 from wavetank.foundation.errors import WavetankError
@@ -22,6 +22,7 @@ from wavetank.solids.seams import seen_periods
 from wavetank.solids.solid import Solid
 
 SMALLEST = 0.02  # size at which a growing solid starts, of its full size
+PLACED = ("old_position", "old_rotation", "position", "rotation", "center", "plane", "sweep")  # of `SolidSet`
 PARTS = 4  # of a frame, in which the speed of a solid on a course is looked at
 Rows = tuple[np.ndarray, np.ndarray]  # places [n, 3] and rotations [n, 4]
 _versions = itertools.count(1)
@@ -61,6 +62,7 @@ class MovingSolids:
         reaches = [solid.span() for solid in chosen]
         repeats = self.periods.axes, seen_periods(chosen, self.periods, self.spacing)
         self.device = shapes.build(chosen, self.tank_count, self.friction, self.spacing, repeats)
+        self._placed = {name: Mirror(getattr(self.device, name)) for name in PLACED}
         self.members, self.reaches = chosen, reaches
         self.has_friction = self.friction > 0.0 or any(solid.friction for solid in chosen)
         self.walls = [solid.program()[0] for solid in chosen[: self.tank_count]]
@@ -230,14 +232,11 @@ class MovingSolids:
         if not self.poses:
             return
         (old_at, old_turn), (at, turn) = (self._instant(share, last) for last, share in enumerate((begin, end)))
-        sweep = [np.linalg.norm(at - old_at, axis=1), 2.0 * np.linalg.norm(turn - old_turn, axis=1)]
-        device = self.device
-        for array, values in (
-            (device.old_position, old_at), (device.old_rotation, old_turn), (device.position, at),
-            (device.rotation, turn), (device.center, self._centers(at, turn)),
-            (device.plane, self._planes(at, turn)), (device.sweep, np.stack(sweep, axis=1)),
-        ):  # fmt: skip
-            upload(array, values.astype(np.float32))
+        sweep = np.stack([np.linalg.norm(at - old_at, axis=1), 2.0 * np.linalg.norm(turn - old_turn, axis=1)], axis=1)
+        values = old_at, old_turn, at, turn, self._centers(at, turn), self._planes(at, turn), sweep
+        synchronize()
+        for mirror, rows in zip(self._placed.values(), values, strict=True):
+            mirror.write(rows)
 
     def between(self, number: int, share: float) -> Pose:
         """Return where a solid is after a share of the present frame: on its course, or on the straight way."""
