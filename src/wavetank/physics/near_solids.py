@@ -116,8 +116,9 @@ def hand_over_pushes(scratch: Scratch, particles: Particles, solids: SolidSet, c
         for slot in range(known(scratch, i)):
             at = place_of(scratch, i, slot)
             k = scratch.solid[at]
-            if solids.unit[k] > 0.0:
-                push_back(solids, k, lift(predicted(particles, i)), scratch.push[at])
+            push = scratch.push[at]
+            if solids.unit[k] > 0.0 and push.norm_sqr() > 0.0:
+                push_back(solids, k, lift(predicted(particles, i)), push)
                 scratch.push[at] = vec3(0.0, 0.0, 0.0)
 
 

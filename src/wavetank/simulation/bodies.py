@@ -118,6 +118,7 @@ class Bodies(Mapping[str, Body]):
         self.solid_views = [self.world.rigid_bodies[handle] for handle in self.handles]
         self.views = [self.solid_views[number] for number in self.numbers]
         self._told = np.full((len(self.numbers), 2), np.nan)
+        self._held: Sequence[bool | None] = [None] * len(self.numbers)
 
     def _add(self, number: int, solid: Solid) -> Any:
         engine, pose = self.engine, self.solids.poses[number]
@@ -208,11 +209,13 @@ class Bodies(Mapping[str, Body]):
         Expressions and keyframes of joints have the time `clock` [s] then.
         """
         self.fastest, self.gravity = fastest, np.array([*gravity, 0.0][:3])
-        held = np.array([self._is_held(body) for body in self.members])
+        held = [self._is_held(body) for body in self.members]
         self.begins = self._stand()
-        self.coupling.begin(self.begins[1], held, self.gravity, dt, self.pushes)
-        for body, now in zip(self.members, self.views, strict=True):
-            self._hold(body, now)
+        self.coupling.begin(self.begins[1], np.array(held), self.gravity, dt, self.pushes)
+        for row, (is_held, was_held) in enumerate(zip(held, self._held, strict=True)):
+            if is_held or is_held != was_held:
+                self._hold(row, is_held)
+        self._held = held
         for joint in self.joints.values():
             joint.drive(clock, dt)
         self.begun = [now.position for now in self.solid_views]
@@ -233,9 +236,9 @@ class Bodies(Mapping[str, Body]):
         self.world.integration_parameters.num_internal_pgs_iterations = IN_JOINTS if self.joints else 1
         self.world.step()
         self.coupling.start(self.begins[1], begun, velocities_of(self.views), dt)
-        ends = poses_of(self.views)
-        self.solids.passing = (self.numbers, self.begins, ends)
-        for number, position, rotation in zip(self.numbers.tolist(), *ends, strict=True):
+        self.ends = poses_of(self.views)
+        self.solids.passing = (self.numbers, self.begins, self.ends)
+        for number, position, rotation in zip(self.numbers.tolist(), *self.ends, strict=True):
             self.solids.poses[number] = (position, rotation)
 
     def step(self, world: World, scene: Scene, dt: float, fastest: float, part: tuple[float, float]) -> None:
@@ -296,7 +299,7 @@ class Bodies(Mapping[str, Body]):
         The step of `dt` [s] is then to be taken again: the water pushed as if the body could not give way.
         """
         slow = float(np.linalg.norm(self.gravity) * self.scene.spacing) ** 0.5
-        if not self.coupling.yields(self._stand()[1], slow, FAR * self.scene.spacing):
+        if not self.coupling.yields(self.ends[1], slow, FAR * self.scene.spacing):
             return False
         for now, position in zip(self.solid_views, self.begun, strict=True):
             now.position = position
@@ -310,14 +313,14 @@ class Bodies(Mapping[str, Body]):
     def _is_held(self, body: Body) -> bool:
         return body.solid.held or body.number in self.solids.targets
 
-    def _hold(self, body: Body, rigid: Any) -> None:
+    def _hold(self, row: int, held: bool) -> None:
         """Let a body stay where it is, or is moved to; let it go as fast as it was moved."""
-        kinds, held = self.engine.RigidBodyType, self._is_held(body)
+        kinds, now = self.engine.RigidBodyType, self.views[row]
         kind = kinds.KINEMATIC_POSITION_BASED if held else kinds.DYNAMIC
-        if rigid.body_type != kind:
-            rigid.body_type = kind
+        if now.body_type != kind:
+            now.body_type = kind
         if held:
-            rigid.set_next_kinematic_position(isometry(self.engine, *self.solids.poses[body.number]))
+            now.set_next_kinematic_position(isometry(self.engine, self.begins[0][row], self.begins[1][row]))
 
     def _slowed(self, velocities: np.ndarray) -> np.ndarray:
         """Return the velocities [n, 6] of which no part of a body's surface is faster than the water may get."""
