@@ -222,3 +222,14 @@ def program():
 def resident():
     """Bytes of this process in memory."""
     return int(re.search(r"VmRSS:\s+(\d+)", Path("/proc/self/status").read_text())[1]) * 1024
+
+
+def test_a_mirror_reads_and_writes_what_the_device_has():
+    """It sees what kernels wrote since it was made, and what it does not write becomes zero, as with `upload`."""
+    array = qd.ndarray(qd.f32, shape=(4,))
+    mirror = compiler.Mirror(array)
+    compiler.upload(array, np.arange(4.0))
+    compiler.synchronize()
+    assert mirror.read().tolist() == [0.0, 1.0, 2.0, 3.0]
+    mirror.write(np.array([0.1, 7.0]))
+    assert compiler.download(array).tolist() == [float(np.float32(0.1)), 7.0, 0.0, 0.0]
