@@ -2,6 +2,7 @@
 
 import importlib.util
 import itertools
+import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.rotations import turned
+from wavetank.foundation.rotations import length_of, turned
 from wavetank.scene.tank import Tank
 from wavetank.solids.ground.polygon import Polygon
 from wavetank.solids.meshes.counted import check_file
@@ -29,7 +30,9 @@ def turn_of(row: dict[str, Any], planar: bool = False) -> np.ndarray:
     """Return the unit quaternion (w, x, y, z) of an axis and an angle [rad]; about z where `planar`."""
     angle = float(row.get("rotationAngle", 0.0))
     axis = np.array([0.0, 0.0, 1.0] if planar else row.get("rotationAxis", (0.0, 0.0, 1.0)), float)
-    length = float(np.linalg.norm(axis))
+    length = length_of(axis)
+    if not (math.isfinite(angle) and math.isfinite(length)):
+        raise WavetankError(f"rotationAngle = {angle:g} about rotationAxis = {axis.tolist()} is not a rotation.")
     if length == 0.0 or abs(angle) < STRAIGHT:
         return np.array([1.0, 0.0, 0.0, 0.0])
     return np.concatenate([[np.cos(0.5 * angle)], np.sin(0.5 * angle) * axis / length])

@@ -1,5 +1,6 @@
 """Unit quaternions (w, x, y, z) on the host."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -7,13 +8,21 @@ import numpy as np
 from wavetank.foundation.errors import WavetankError
 
 
+def length_of(vector: np.ndarray) -> float:
+    """Return the length of a vector [n], also of one whose squares are no numbers any more: what a file says may be."""
+    largest = float(np.abs(vector).max())
+    return float(np.linalg.norm(vector)) if 1e-100 < largest < 1e100 else math.hypot(*vector.tolist())
+
+
 def unit_quaternion(rotation: Sequence[float] | float) -> np.ndarray:
     """Return (w, x, y, z) of unit length from a quaternion or from an angle about z [rad]."""
     if isinstance(rotation, int | float):
+        if not math.isfinite(rotation):
+            raise WavetankError(f"rotation = {rotation} is not an angle [rad]; it must be a finite number.")
         return np.array([np.cos(0.5 * rotation), 0.0, 0.0, np.sin(0.5 * rotation)])
     q = np.asarray(rotation, float)
-    length = np.linalg.norm(q)
-    if q.shape != (4,) or not np.isfinite(length) or length < 1e-12:
+    length = length_of(q) if q.shape == (4,) else math.nan
+    if not math.isfinite(length) or length < 1e-12:
         raise WavetankError(f"rotation = {rotation} is not a quaternion (w, x, y, z) of non-zero length.")
     return q / length
 
@@ -51,7 +60,7 @@ def matrix_of(rotations: np.ndarray) -> np.ndarray:
 
 def turn_from_y(axis: np.ndarray) -> np.ndarray:
     """Return the shortest turn that takes the y axis to the direction of `axis` (identity for a zero vector)."""
-    length = float(np.linalg.norm(axis))
+    length = length_of(axis)
     if length < 1e-12:
         return np.array([1.0, 0.0, 0.0, 0.0])
     y = np.array([0.0, 1.0, 0.0])
