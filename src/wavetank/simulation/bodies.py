@@ -53,6 +53,7 @@ class Bodies(Mapping[str, Body]):
         """Begin among these solids, in fluids of at most that `density` [kg/m^3]; those of the scene where it is 0."""
         self.scene, self.solids, self.dim = scene, solids, scene.dim
         self.members: list[Body] = []
+        self.views: list[Any] = []  # of the members in the engine's world
         self.fastest = 0.0  # m/s
         self.retry = Retry()
         self.gravity = np.array([*scene.gravity, 0.0][:3])  # m/s^2, of the present step
@@ -378,6 +379,8 @@ class Bodies(Mapping[str, Body]):
         for name, joint in self.joints.items():
             if not joint.is_there:
                 raise WavetankError(f"the engine's state lacks the joint {name!r}.")
+        if not self.members:
+            return
         for body, position, rotation in zip(self.members, *poses_of(self.views), strict=True):
             place, turn = poses[body.number]
             off = np.concatenate(
