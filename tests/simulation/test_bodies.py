@@ -367,3 +367,19 @@ def test_a_heavy_box_comes_down_on_the_floor_of_a_plane_and_is_not_thrown_up_aga
         fastest = max(fastest, float(np.linalg.norm(sim.bodies["box"].velocity)))
     assert fastest < 1.0
     assert sim.bodies["box"].position[1] == pytest.approx(0.1, abs=0.02)
+
+
+@pytest.mark.parametrize("ratio", [1.1, 1.3, 2.0])
+@pytest.mark.parametrize("on", ["floor", "block"])
+def test_what_sinks_lies_on_the_ground_and_rests(ratio, on):
+    """It squeezes out the layer of water that it comes down on, 0.6 d thick, which held it up and shook it at 5 cm/s."""
+    ground, solids = (0.0, []) if on == "floor" else (0.1, [wt.Box(center=(0.48, 0.05, 0.48), size=(0.6, 0.1, 0.6))])
+    sim = pool(wt.Box(name="box", center=(0.48, ground + 0.16, 0.48), size=(0.32, 0.2, 0.32), density=1000.0 * ratio),
+               *solids)  # fmt: skip
+    box, speeds = sim.bodies["box"], []
+    for frame in range(420):
+        sim.step()
+        if frame >= 360:
+            speeds.append(np.linalg.norm(box.velocity))
+    assert abs(box.position[1] - 0.1 - ground) < 0.1 * D
+    assert np.sqrt(np.mean(np.square(speeds))) < 0.005

@@ -278,7 +278,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     finest, cells, count, searched = world.levels[0], world.grid, world.count, int(world.has_solids)
     if world.room_version != world.solids_version:
         world.thin_walls.fill(0)
-        find_room(finest, world.thin_walls, world.solids, LEAST_OPEN, UNIT, searched, params.dim)
+        find_room(finest, world.thin_walls, world.solids, LEAST_OPEN, UNIT, world.searched, params.dim)
         world.room_version = world.solids_version
         world.has_thin_walls = bool(download(world.thin_walls)[0])
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
