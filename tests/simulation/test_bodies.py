@@ -340,13 +340,13 @@ def test_a_cup_rests_on_the_walls_of_the_tank(dim):
 
 def test_friction_does_not_turn_small_bodies_back_and_forth():
     """A body and the water at it slide together at one speed at most: the water within reach is the heavier."""
-    places = [(0.16 + 0.32 * (k % 2), 0.32, 0.16 + 0.32 * (k // 2)) for k in range(4)]
+    places = [(0.2 + 0.4 * (k % 2), 0.32, 0.2 + 0.4 * (k // 2)) for k in range(4)]  # away from each other and walls
     boxes = [
         wt.Box(center=place, size=(0.14, 0.11, 0.15), density=density, rotation=(1.0, 0.1 * k, 0.0, 0.2))
         for k, (place, density) in enumerate(zip(places, (300.0, 500.0, 700.0, 500.0), strict=True))
     ]
-    block = wt.Block(lower=(0, 0, 0), upper=(0.64, 0.32, 0.64))
-    sim = wt.Simulation(wt.Scene(spacing=0.04, tank=wt.Tank(size=(0.64, 0.8, 0.64)), fluids=[block], solids=boxes))
+    block = wt.Block(lower=(0, 0, 0), upper=(0.8, 0.32, 0.8))
+    sim = wt.Simulation(wt.Scene(spacing=0.04, tank=wt.Tank(size=(0.8, 0.8, 0.8)), fluids=[block], solids=boxes))
     torques = []
     for frame in range(180):
         sim.step()
@@ -372,7 +372,7 @@ def test_a_heavy_box_comes_down_on_the_floor_of_a_plane_and_is_not_thrown_up_aga
 @pytest.mark.parametrize("ratio", [1.1, 1.3, 2.0])
 @pytest.mark.parametrize("on", ["floor", "block"])
 def test_what_sinks_lies_on_the_ground_and_rests(ratio, on):
-    """It squeezes out the layer of water that it comes down on, 0.6 d thick, which held it up and shook it at 5 cm/s."""
+    """It squeezes out the layer of water that it comes down on, 0.6 d thick, which held it up and shook it."""
     ground, solids = (0.0, []) if on == "floor" else (0.1, [wt.Box(center=(0.48, 0.05, 0.48), size=(0.6, 0.1, 0.6))])
     sim = pool(wt.Box(name="box", center=(0.48, ground + 0.16, 0.48), size=(0.32, 0.2, 0.32), density=1000.0 * ratio),
                *solids)  # fmt: skip
@@ -383,3 +383,32 @@ def test_what_sinks_lies_on_the_ground_and_rests(ratio, on):
             speeds.append(np.linalg.norm(box.velocity))
     assert abs(box.position[1] - 0.1 - ground) < 0.1 * D
     assert np.sqrt(np.mean(np.square(speeds))) < 0.005
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_dry_bodies_slide_no_farther_than_coulomb_says(dim):
+    """v^2 / (2 mu g) at mu = 0.5, which is that of solids that name none; in 2-D they went on for ever."""
+    box = wt.Box(name="box", center=(0.3, 0.1, 0.5)[:dim], size=(0.2,) * dim, density=2000.0, velocity=(1, 0, 0)[:dim])
+    block = wt.Block(lower=(2.8, 0.0, 0.0)[:dim], upper=(3.0, 0.1, 1.0)[:dim])
+    tank = wt.Tank(size=(3.0, 1.0, 1.0)[:dim])
+    sim = wt.Simulation(wt.Scene(spacing=0.05, tank=tank, fluids=[block], solids=[box], foam=0.0))
+    sim.advance(0.4)
+    assert sim.bodies["box"].position[0] - 0.3 == pytest.approx(1.0 / 9.81, abs=0.015)
+    assert np.linalg.norm(sim.bodies["box"].velocity) < 0.02
+
+
+def test_bodies_of_a_plane_stay_in_it():
+    """Contacts between capsules turned them out of it: one went 8 m away in as many seconds."""
+    places = [(0.2 + 0.15 * (k % 5), 0.3 + 0.2 * (k // 5)) for k in range(10)]
+    solids = [
+        wt.Capsule(start=(x - 0.05, y), end=(x + 0.05, y + 0.02), radius=0.03, density=300.0 + 150.0 * k)
+        if k % 2 else wt.Box(center=(x, y), size=(0.1, 0.08), density=1500.0 - 150.0 * k, rotation=0.1 * k)
+        for k, (x, y) in enumerate(places)
+    ]  # fmt: skip
+    block = wt.Block(lower=(0, 0), upper=(1.0, 0.2))
+    sim = wt.Simulation(wt.Scene(spacing=0.025, tank=wt.Tank(size=(1.0, 1.2)), fluids=[block], solids=solids))
+    sim.advance(1.5)
+    for body in sim.bodies.values():
+        assert body.rigid().translation.z == 0.0
+        assert body.rotation[1:3].tolist() == [0.0, 0.0]
+        assert body.angular_velocity[:2].tolist() == [0.0, 0.0]

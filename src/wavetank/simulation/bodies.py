@@ -31,7 +31,7 @@ from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
 from wavetank.simulation.coupling import DENSITY, Coupling, lengths
 from wavetank.simulation.effort import given
-from wavetank.simulation.engine import import_engine, isometry, poses_of, velocities_of
+from wavetank.simulation.engine import import_engine, isometry, keep_in_plane, poses_of, velocities_of
 from wavetank.simulation.joints import Joints, put_joints
 from wavetank.simulation.moving_solids import MovingSolids
 from wavetank.solids.distance import PARTS
@@ -43,6 +43,7 @@ MOST_TRIES = 4  # of a step
 FAR = 0.3  # of a spacing: bodies that yield by more begin the step anew
 FEWEST = 4.0  # pieces across a body
 IN_JOINTS = 16  # inner iterations of the engine where there are joints: with 1 a motor sagged by 0.3 rad/s under a load
+DRY = 0.5  # Coulomb's coefficient between solids where none is named: wood on wood
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
 
 
@@ -126,11 +127,12 @@ class Bodies(Mapping[str, Body]):
         maker = engine.RigidBody.dynamic() if solid.is_body else engine.RigidBody.kinematic_position_based()
         maker = maker.position(isometry(engine, *pose)).can_sleep(False)
         if self.dim == 2:
-            maker = maker.enabled_translations((True, True, False)).enabled_rotations((False, False, True))
+            # The engine finds no friction where one of its two directions is locked: `keep_in_plane`.
+            maker = maker.enabled_rotations((False, False, True))
         else:
             maker = maker.gyroscopic_forces(True)
         handle = self.world.add_body(maker)
-        friction = self.solids.friction if solid.friction is None else solid.friction
+        friction = (self.solids.friction or DRY) if solid.friction is None else solid.friction
         for position, rotation, shape in shapes_of(solid, self.dim, self.scene.spacing):
             collider = engine.Collider.new(shape).position(isometry(engine, position, rotation))
             self.world.add_collider(collider.density(0.0).friction(friction).restitution(solid.restitution), handle)
@@ -236,6 +238,8 @@ class Bodies(Mapping[str, Body]):
         self.world.integration_parameters.dt = dt
         self.world.integration_parameters.num_internal_pgs_iterations = IN_JOINTS if self.joints else 1
         self.world.step()
+        if self.dim == 2:
+            keep_in_plane(self.engine, self.views)
         self.coupling.start(self.begins[1], begun, velocities_of(self.views), dt)
         self.ends = poses_of(self.views)
         self.solids.passing = (self.numbers, self.begins, self.ends)

@@ -39,7 +39,7 @@ class Solid(Model):
     rotation: Quaternion | Number = (1.0, 0.0, 0.0, 0.0)  # (w, x, y, z), or an angle about z [rad]
     color: Annotated[str, Field(pattern=r"^(#[0-9a-fA-F]{6})?$")] = ""  # in pictures; the usual one where empty
     finish: Literal["matte", "metal", "glass"] = "matte"  # metal in pictures of quality film only
-    friction: Annotated[Number, Field(ge=0, le=1)] | None = None  # the scene's friction where None
+    friction: Annotated[Number, Field(ge=0, le=1)] | None = None  # where None the scene's, or 0.5 between solids
     density: Positive | None = None  # kg/m^3: a density or a mass makes a solid a body that water moves
     mass: Positive | None = None  # kg, in a 2-D world of a metre's length of it
     hollow: bool = False  # whether its mass lies in its surface

@@ -267,16 +267,25 @@ def find_walls(grid: CoarseGrid, thin: qd.template(), solids: SolidSet, piece, l
 
 @qd.func
 def is_slit(grid: CoarseGrid, n):
-    """Whether node `n` lies in a slit, where a solid takes most of its cell and of those beside it; rooms in `rhs`."""
-    widest = grid.rhs[n]
-    if widest > 0.0 and widest < narrow():
+    """Whether node `n` has room only between two solids that leave less than half a cell there; rooms in `rhs`."""
+    narrowest, widest = 1.0, 0.0
+    if grid.rhs[n] > 0.0 and grid.rhs[n] < narrow():
         for axis in qd.static(range(3)):
-            for side in qd.static((-1, 1)):
-                place = coordinates(grid, n)
-                place[axis] += side
-                m = nearest(grid, place)
-                widest = qd.max(widest, grid.rhs[m] if m != n else 0.0)
-    return widest < mostly() and grid.rhs[n] < narrow()
+            if grid.nz > 1 or axis < 2:
+                width = grid.rhs[n]
+                for side in qd.static((-1, 1)):
+                    place = coordinates(grid, n)
+                    before, is_open = n, grid.rhs[n] > 0.0
+                    for _ in range(2):
+                        place[axis] += side
+                        m = nearest(grid, place)
+                        is_open = is_open and m != before
+                        width += grid.rhs[m] if is_open else 0.0
+                        widest = qd.max(widest, grid.rhs[m] if is_open and before == n else 0.0)
+                        is_open = is_open and grid.rhs[m] > 0.0
+                        before = m
+                narrowest = qd.min(narrowest, width)
+    return narrowest < narrow() and widest < mostly()
 
 
 @qd.kernel(fastcache=True)
