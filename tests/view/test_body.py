@@ -6,6 +6,7 @@ from test_ellipsoids import lattice
 from worlds import frame_of
 
 from wavetank import Box, Camera, Scene, Tank
+from wavetank.device.compiler import download
 from wavetank.view.renderer import Renderer
 
 D = 0.05
@@ -72,3 +73,37 @@ def test_the_floor_is_lifted_as_snell_has_it():
     met = 0.5 + slope * (2.0 - 0.6) + 0.6 * np.tan(np.arcsin(np.sin(angle) / 1.33))
     assert columns[0] != columns[1]
     assert met == pytest.approx(0.8, abs=0.02)
+
+
+@pytest.mark.parametrize("angle", [61.5, 62.0, 63.0, 66.0])
+def test_what_leaves_by_a_pane_fades_as_fresnel_has_it(angle):
+    """A ray comes in through the front pane, and leaves by the one beside where it came in at more than 61.3 degrees.
+
+    There the pane begins to mirror all of it: without a step, by Fresnel's equations for light without polarisation;
+    where it enters they are Schlick's. What is mirrored by 5 % is let out as a whole.
+    """
+    walls = [Box(center=(1.1, 0.5, -2.1), size=(0.1, 4.0, 6.0), color=color) for color in ("#808080", "#000000")]
+
+    def leaves(turn):
+        at = np.array([0.9, 0.4, 1.0])
+        camera = Camera(eye=tuple(at + 1.5 * np.array([-np.sin(turn), 0.02, np.cos(turn)])), target=tuple(at))
+        seen = []
+        for wall in walls:
+            renderer = Renderer(*SIZE)
+            renderer.render(filled(0.8, (wall,)), camera, view="water")
+            seen.append(download(renderer.buffers.pixels.color)[90, 120])
+        cosi, cost = np.sin(turn) / 1.33, np.sqrt(1.0 - 1.33**2 + np.sin(turn) ** 2)
+        sides = (1.33 * cosi - cost) / (1.33 * cosi + cost), (cosi - 1.33 * cost) / (cosi + 1.33 * cost)
+        out = (1.0 - np.mean(np.square(sides))) / 0.95
+        return (seen[0] - seen[1])[2] / (out * (0.98 - 0.98 * (1.0 - np.cos(turn)) ** 5))
+
+    assert leaves(np.radians(angle)) == pytest.approx(leaves(np.radians(75.0)), rel=0.08)
+
+
+def test_pixels_that_share_a_bent_ray_are_other_pairs_in_every_second_sample():
+    """What is found for two pixels at once must not leave stairs two pixels wide in a picture of many samples."""
+    camera = Camera(eye=(1.9, 1.4, 2.2), target=(0.5, 0.3, 0.5))
+    image = Renderer(*SIZE).render(filled(), camera, view="water", floor="tiles", samples=16).astype(int)
+    steps = np.abs(np.diff(image, axis=1)).sum(axis=(0, 2))
+    within, between = steps[::2].sum(), steps[1::2].sum()
+    assert within == pytest.approx(between, rel=0.02)

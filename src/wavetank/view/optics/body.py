@@ -2,7 +2,8 @@
 
 Between flat panes the way of a ray has a closed form: it ends at the nearest of them, of the floor and of the surface.
 Seen from within, panes and surface mirror totally what meets them at more than 48.6 degrees from their normal, which is
-nearly every ray that came in through a pane beside (Snell). The surface is the one that the sun sees (`SunlitWater`):
+nearly every ray that came in through a pane beside (Snell). Where one leaves it is followed outside, and what is
+mirrored there as well, so that the border of what is mirrored totally is as soft as it is (Fresnel). The surface is the one that the sun sees (`SunlitWater`):
 where the end of a straight piece does not lie below it, the place where it does is found by halving.
 
     code      symbol   meaning                                                        unit
@@ -10,7 +11,8 @@ where the end of a straight piece does not lie below it, the place where it does
     p, ahead           where a straight piece begins, and its direction               m, 1
     s                  its length                                                     m
     n                  normal of what it ends at, out of the water                    1
-    k         cos^2    of the angle outside; negative: total reflection               1
+    share     F        of the light that is mirrored where a ray leaves               1
+    left               radiance and way of what leaves there                          1, m
 
 Solids in the tank are met on the way by their distances, and so are those that the surface mirrors; what the picture
 shows of them is taken from it.
@@ -23,6 +25,9 @@ from wavetank.solids.distance import SolidSet, signed_distance
 from wavetank.view.lens import Lens, to_pixel, to_view, vec2, vec3, vec4
 from wavetank.view.look import Look
 from wavetank.view.optics.fluid import Optics
+from wavetank.view.optics.interface import bent as crossed
+from wavetank.view.optics.interface import index_of_water
+from wavetank.view.optics.interface import mirrored as reflected
 from wavetank.view.optics.maps import margins_inside, picture_at, share_of
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.radiance import environment, smoothstep, surface_radiance
@@ -231,6 +236,12 @@ def solid_radiance(
 
 
 @qd.func
+def faint():
+    """Share of what leaves the water up to which what is mirrored there is not followed."""
+    return 0.05
+
+
+@qd.func
 def through_body(
     depth: qd.template(), picture: qd.template(), first: qd.template(), lens: Lens, sun: Lens, look: Look,
     optics: Optics, inside: Inside, z, at, bent, mirrored, solid: qd.template(),
@@ -248,16 +259,22 @@ def through_body(
     whole = wholeness(sun, first, inside.column, inside.walls, begun, optics.spacing, optics.unit)
     if whole <= 0.0:
         total, done = -1.0, 1
-    # Within, then where solids stand in the way of what leaves, and of what is mirrored.
-    leaves = 0
-    for bounce in range(qd.static(5 if solid else 3)):
+    # Where a ray leaves that is mirrored as well, what leaves first is kept, and what is mirrored there goes on.
+    left, share, waits, turned, again = vec4(0.0, 0.0, 0.0, 0.0), 0.0, 0, p, ahead
+    # Within, then where solids stand in the way of what leaves, and of what is mirrored outside.
+    leaves, within = 0, 0
+    for bounce in range(qd.static(6 if solid else 3)):
         above = 0
         if qd.static(solid):
-            if bounce == 4 and mirrored.y != 0.0:
+            if done == 1 and waits == 1:
+                left = vec4(shown.x, shown.y, shown.z, total)
+                p, ahead, waits, leaves, done = turned, again, 0, 0, 0
+            if bounce == 5 and mirrored.y != 0.0:
                 p, ahead, above, leaves = at, mirrored, 1, 0
-        if (done == 0 and (bounce < 3 or leaves == 1)) or above == 1:
+        if (done == 0 and (within < 3 or leaves == 1) and bounce < 5) or above == 1:
             n, s = vec3(0.0, 1.0, 0.0), 1e3
             if above + leaves == 0:
+                within += 1
                 wall = wall_ahead(inside.walls, p, ahead)
                 n, s = vec3(wall[0], wall[1], wall[2]), wall[3]
                 if not about_wet(sun, first, inside.walls, p + 0.999 * s * ahead, optics.spacing):
@@ -299,25 +316,36 @@ def through_body(
             elif met == 0 and above == 0:
                 total += s
                 p += s * ahead
-                cosi = ahead.dot(n)
-                k = 1.0 - 1.7689 * (1.0 - cosi * cosi)
+                out = crossed(ahead, -n, index_of_water())
+                if ahead.dot(n) <= 0.0:  # a texel's normal, which a bent surface has turned away from the ray
+                    out = vec4(ahead.x, ahead.y, ahead.z, 0.0)
                 if n.y < -0.5:
                     dimly = look.below * qd.exp(-0.6 * optics.usual * optics.absorption)
                     shown, done = seen_at(depth, picture, lens, z, p, dimly, solid), 1
-                elif k > 0.0 or cosi <= 0.0:
-                    out = ahead
-                    if cosi > 0.0:
-                        out = 1.33 * ahead + (qd.sqrt(k) - 1.33 * cosi) * n
+                elif out[3] < 1.0:
+                    turned, again = p, reflected(ahead, -n)
+                    ahead = vec3(out[0], out[1], out[2])
+                    both = qd.max(out[3] - faint(), 0.0) / (1.0 - faint())
                     if qd.static(solid):
-                        leaves, ahead = 1, out
+                        leaves, waits = 1, qd.select(share == 0.0 and both > 0.0, 1, 0)
                     else:
-                        shown, done = environment(look, out), 1
-                        if out.y < -1e-3:
+                        shown, done = environment(look, ahead), 1
+                        if ahead.y < -1e-3:
                             shown = seen_at(
-                                depth, picture, lens, z, p + (qd.max(p.y, 0.0) / -out.y) * out, shown, solid
+                                depth, picture, lens, z, p + (qd.max(p.y, 0.0) / -ahead.y) * ahead, shown, solid
                             )
+                        if share == 0.0 and both > 0.0:
+                            left, done, ahead = vec4(shown.x, shown.y, shown.z, total), 0, again
+                    if share == 0.0:
+                        share = both
                 else:
-                    ahead -= 2.0 * cosi * n
+                    ahead = reflected(ahead, -n)
     if done == 0:
         shown = optics.glow
+    if share > 0.0:
+        # One way for both, with what each of them is swallowed less or more on its own.
+        way = share * total + (1.0 - share) * left[3]
+        shown = share * qd.exp((way - total) * optics.absorption) * shown
+        shown += (1.0 - share) * qd.exp((way - left[3]) * optics.absorption) * vec3(left[0], left[1], left[2])
+        total = way
     return vec4(shown.x, shown.y, shown.z, total), seen_above, whole

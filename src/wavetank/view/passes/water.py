@@ -90,15 +90,16 @@ def lay(
         kept_above, kept_whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
         # A pixel whose samples all show the same is shaded once, in its middle.
         even, even_z, even_normal = 0, 0.0, vec3(0.0, 0.0, 0.0)
-        for index in range((end - begin + beside - 1) // beside * block):
+        for index in range((end - begin + optics.turn + beside - 1) // beside * block):
             part = index % block
-            row, column = band * optics.tall + part // beside, begin + index // block * beside + part % beside
+            row = band * optics.tall + part // beside
+            column = begin - optics.turn + index // block * beside + part % beside
             if qd.static(world >= 100):
                 if part == 0 and optics.under == 0:
                     even, even_z, even_normal = even_pixel(
                         pixels, surface, lens, look, optics, inside.walls, row, column, qd.static(world % 10)
                     )
-            if column < end and (part == 0 or even == 0):
+            if column >= begin and column < end and (part == 0 or even == 0):
                 middle = vec2(column + 0.5, row + 0.5)
                 result = backdrop.behind[row, column]
                 z, back = (
@@ -165,7 +166,7 @@ def lay(
                                     if qd.static(world % 10 == 4):
                                         wide = True
                                     if inside.walls.upper.x < 1e5 and wide:
-                                        pixel = column // optics.samples
+                                        pixel = (column + optics.turn) // optics.samples
                                         near = qd.abs(at - kept_z) < 0.3 * optics.spacing
                                         if pixel != kept_pixel or layer != kept_layer or not near:
                                             ahead = direction.normalized()
