@@ -3,8 +3,9 @@
 Between flat panes the way of a ray has a closed form: it ends at the nearest of them, of the floor and of the surface.
 Seen from within, panes and surface mirror totally what meets them at more than 48.6 degrees from their normal, which is
 nearly every ray that came in through a pane beside (Snell). Where one leaves it is followed outside, and what is
-mirrored there as well, so that the border of what is mirrored totally is as soft as it is (Fresnel). The surface is the one that the sun sees (`SunlitWater`):
-where the end of a straight piece does not lie below it, the place where it does is found by halving.
+mirrored there as well, so that the border of what is mirrored totally is as soft as it is (Fresnel). The surface is the
+one that the sun sees (`SunlitWater`): where the end of a straight piece does not lie below it, the place where it does
+is found by halving.
 
     code      symbol   meaning                                                        unit
     under              depth of a point below the surface along the sun's rays        m
