@@ -185,17 +185,19 @@ def wall_ahead(walls: Box, p, ahead):
 
 
 @qd.func
-def solid_ahead(solids: SolidSet, paints: qd.template(), p, ahead, far, coarse):
-    """(normal, way [m], number) of the first solid that a ray meets within `far` [m]; a way of -1 where it meets none.
+def solid_ahead(solids: SolidSet, paints: qd.template(), p, ahead, far, coarse, wide):
+    """(normal, way [m]), number and share of the first solid that a ray meets within `far` [m]; a share of 0 is none.
 
-    Solids are met to within `coarse` [m], and what a ray begins in is left first; glass is not met. All distances are
-    asked for in one place, because every copy of that code takes seconds to compile.
+    Where it meets none, one that it passes within a cone of the slope `wide` has a share of it. Solids are met to
+    within `coarse` [m], and what a ray begins in is left first; glass is not met. All distances are asked for in one
+    place, because every copy of that code takes seconds to compile.
     """
     hit, which, last = vec4(0.0, 0.0, 0.0, -1.0), -1, far
+    passed, beside, off = hit, -1, 1.0
     for k in range(solids.tank_count, solids.count):
         middle = solids.position[k] - p
         along = middle.dot(ahead)
-        reach = 1.001 * solids.reach[k] + coarse
+        reach = 1.001 * solids.reach[k] + coarse + wide * qd.min(qd.max(along, 0.0), far)
         miss = middle.dot(middle) - along * along
         t, end = 0.0, last
         if solids.reach[k] < 1e4:
@@ -209,13 +211,18 @@ def solid_ahead(solids: SolidSet, paints: qd.template(), p, ahead, far, coarse):
         while steps < 40 and t <= end:
             value = signed_distance(solids, k, p + t * ahead)
             if value.w > coarse:
+                if outside == 1 and value.w - coarse < off * wide * t:
+                    passed, beside, off = vec4(value.x, value.y, value.z, t), k, (value.w - coarse) / (wide * t)
                 outside = 1
             if outside == 1 and value.w <= coarse:
                 hit, which, last = vec4(value.x, value.y, value.z, t), k, t
                 steps = 40
             t += qd.max(qd.abs(value.w), 0.5 * coarse)
             steps += 1
-    return hit, which
+    cover = 1.0
+    if which < 0:
+        hit, which, cover = passed, beside, smoothstep(1.0 - off)
+    return hit, which, cover
 
 
 @qd.func
@@ -243,15 +250,34 @@ def faint():
 
 
 @qd.func
+def crossed_about(ahead, n, wide):
+    """(direction outside, share that is mirrored) of rays out of the water that spread around one of them.
+
+    What Snell and Fresnel say of one is blurred where the square of the cosine outside lies within `wide` of 0.
+    """
+    result = crossed(ahead, -n, index_of_water())
+    cosi = ahead.dot(n)
+    k = 1.0 - 1.7689 * (1.0 - cosi * cosi)
+    if wide > 1e-3 and qd.abs(k) < wide:
+        # As if the angle were one that lets it out.
+        steep = qd.sqrt(1.0 - (1.0 - qd.max(k, 0.5 * wide)) / 1.7689)
+        across = (ahead - cosi * n).normalized(1e-9)
+        result = crossed(steep * n + qd.sqrt(1.0 - steep * steep) * across, -n, index_of_water())
+        result[3] = 1.0 - smoothstep(0.5 + 0.5 * k / wide) * (1.0 - result[3])
+    return result
+
+
+@qd.func
 def through_body(
     depth: qd.template(), picture: qd.template(), first: qd.template(), lens: Lens, sun: Lens, look: Look,
-    optics: Optics, inside: Inside, z, at, bent, mirrored, solid: qd.template(),
+    optics: Optics, inside: Inside, z, at, bent, mirrored, uneven, solid: qd.template(),
 ):  # fmt: skip
     """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, (radiance,
     share) of the solid that the ray which is `mirrored` there meets, and how much of a body the water is.
 
     The way is negative where there is none: less than two spacings of it, or more air than water; nothing is found
-    then but what is mirrored; nothing is where `mirrored` is nought.
+    then but what is mirrored; nothing is where `mirrored` is nought. The standard deviation of the normals where it
+    entered is `uneven`: rays that enter around it spread about as much.
     """
     shown, total, done = vec3(0.0, 0.0, 0.0), 0.0, 0
     seen_above = vec4(0.0, 0.0, 0.0, 0.0)
@@ -295,8 +321,13 @@ def through_body(
                     n = texel_normal(sun, first, p + s * ahead, optics.spacing)
             met = 0
             if qd.static(solid):
-                hit, k = solid_ahead(inside.solids, inside.paints, p, ahead, s, 0.1 * optics.spacing)
-                if k >= 0:
+                hit, k, cover = solid_ahead(
+                    inside.solids, inside.paints, p, ahead, s, 0.1 * optics.spacing,
+                    qd.select(above == 1, 0.0, uneven),
+                )  # fmt: skip
+                if share > 0.0:
+                    cover = qd.select(cover > 0.5, 1.0, 0.0)
+                if cover > 0.0:
                     met, place = 1, p + hit.w * ahead
                     normal = vec3(hit.x, hit.y, hit.z)
                     deep = qd.max(depth_below(sun, first, place), 0.0)
@@ -306,6 +337,10 @@ def through_body(
                     )
                     if above == 1:
                         seen_above = vec4(radiance.x, radiance.y, radiance.z, 1.0)
+                    elif cover < 1.0:
+                        met, share = 0, 1.0 - cover
+                        way = total + qd.select(leaves == 0, hit.w, 0.0)
+                        left = vec4(radiance.x, radiance.y, radiance.z, way)
                     else:
                         shown, done = radiance, 1
                         if leaves == 0:
@@ -317,7 +352,7 @@ def through_body(
             elif met == 0 and above == 0:
                 total += s
                 p += s * ahead
-                out = crossed(ahead, -n, index_of_water())
+                out = crossed_about(ahead, n, 2.0 * uneven)
                 if ahead.dot(n) <= 0.0:  # a texel's normal, which a bent surface has turned away from the ray
                     out = vec4(ahead.x, ahead.y, ahead.z, 0.0)
                 if n.y < -0.5:
