@@ -2,18 +2,15 @@
 
 Between flat panes the way of a ray has a closed form: it ends at the nearest of them, of the floor and of the surface.
 Seen from within, panes and surface mirror totally what meets them at more than 48.6 degrees from their normal, which is
-nearly every ray that came in through a pane beside (Snell). Where one leaves it is followed outside, and what is
-mirrored there as well, so that the border of what is mirrored totally is as soft as it is (Fresnel). The surface is the
-one that the sun sees (`SunlitWater`): where the end of a straight piece does not lie below it, the place where it does
-is found by halving.
+nearly every ray that came in through a pane beside (Snell). The surface is the one that the sun sees (`SunlitWater`):
+where the end of a straight piece does not lie below it, the place where it does is found by halving.
 
     code      symbol   meaning                                                        unit
     under              depth of a point below the surface along the sun's rays        m
     p, ahead           where a straight piece begins, and its direction               m, 1
     s                  its length                                                     m
     n                  normal of what it ends at, out of the water                    1
-    share     F        of the light that is mirrored where a ray leaves               1
-    left               radiance and way of what leaves there                          1, m
+    k         cos^2    of the angle outside; negative: total reflection               1
 
 Solids in the tank are met on the way by their distances, and so are those that the surface mirrors; what the picture
 shows of them is taken from it.
@@ -26,9 +23,6 @@ from wavetank.solids.distance import SolidSet, signed_distance
 from wavetank.view.lens import Lens, to_pixel, to_view, vec2, vec3, vec4
 from wavetank.view.look import Look
 from wavetank.view.optics.fluid import Optics
-from wavetank.view.optics.interface import bent as crossed
-from wavetank.view.optics.interface import index_of_water
-from wavetank.view.optics.interface import mirrored as reflected
 from wavetank.view.optics.maps import margins_inside, picture_at, share_of
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.radiance import environment, smoothstep, surface_radiance
@@ -185,19 +179,17 @@ def wall_ahead(walls: Box, p, ahead):
 
 
 @qd.func
-def solid_ahead(solids: SolidSet, paints: qd.template(), p, ahead, far, coarse, wide):
-    """(normal, way [m]), number and share of the first solid that a ray meets within `far` [m]; a share of 0 is none.
+def solid_ahead(solids: SolidSet, paints: qd.template(), p, ahead, far, coarse):
+    """(normal, way [m], number) of the first solid that a ray meets within `far` [m]; a way of -1 where it meets none.
 
-    Where it meets none, one that it passes within a cone of the slope `wide` has a share of it. Solids are met to
-    within `coarse` [m], and what a ray begins in is left first; glass is not met. All distances are asked for in one
-    place, because every copy of that code takes seconds to compile.
+    Solids are met to within `coarse` [m], and what a ray begins in is left first; glass is not met. All distances are
+    asked for in one place, because every copy of that code takes seconds to compile.
     """
     hit, which, last = vec4(0.0, 0.0, 0.0, -1.0), -1, far
-    passed, beside, off = hit, -1, 1.0
     for k in range(solids.tank_count, solids.count):
         middle = solids.position[k] - p
         along = middle.dot(ahead)
-        reach = 1.001 * solids.reach[k] + coarse + wide * qd.min(qd.max(along, 0.0), far)
+        reach = 1.001 * solids.reach[k] + coarse
         miss = middle.dot(middle) - along * along
         t, end = 0.0, last
         if solids.reach[k] < 1e4:
@@ -211,18 +203,13 @@ def solid_ahead(solids: SolidSet, paints: qd.template(), p, ahead, far, coarse, 
         while steps < 40 and t <= end:
             value = signed_distance(solids, k, p + t * ahead)
             if value.w > coarse:
-                if outside == 1 and value.w - coarse < off * wide * t:
-                    passed, beside, off = vec4(value.x, value.y, value.z, t), k, (value.w - coarse) / (wide * t)
                 outside = 1
             if outside == 1 and value.w <= coarse:
                 hit, which, last = vec4(value.x, value.y, value.z, t), k, t
                 steps = 40
             t += qd.max(qd.abs(value.w), 0.5 * coarse)
             steps += 1
-    cover = 1.0
-    if which < 0:
-        hit, which, cover = passed, beside, smoothstep(1.0 - off)
-    return hit, which, cover
+    return hit, which
 
 
 @qd.func
@@ -244,40 +231,15 @@ def solid_radiance(
 
 
 @qd.func
-def faint():
-    """Share of what leaves the water up to which what is mirrored there is not followed."""
-    return 0.05
-
-
-@qd.func
-def crossed_about(ahead, n, wide):
-    """(direction outside, share that is mirrored) of rays out of the water that spread around one of them.
-
-    What Snell and Fresnel say of one is blurred where the square of the cosine outside lies within `wide` of 0.
-    """
-    result = crossed(ahead, -n, index_of_water())
-    cosi = ahead.dot(n)
-    k = 1.0 - 1.7689 * (1.0 - cosi * cosi)
-    if wide > 1e-3 and qd.abs(k) < wide:
-        # As if the angle were one that lets it out.
-        steep = qd.sqrt(1.0 - (1.0 - qd.max(k, 0.5 * wide)) / 1.7689)
-        across = (ahead - cosi * n).normalized(1e-9)
-        result = crossed(steep * n + qd.sqrt(1.0 - steep * steep) * across, -n, index_of_water())
-        result[3] = 1.0 - smoothstep(0.5 + 0.5 * k / wide) * (1.0 - result[3])
-    return result
-
-
-@qd.func
 def through_body(
     depth: qd.template(), picture: qd.template(), first: qd.template(), lens: Lens, sun: Lens, look: Look,
-    optics: Optics, inside: Inside, z, at, bent, mirrored, uneven, solid: qd.template(),
+    optics: Optics, inside: Inside, z, at, bent, mirrored, solid: qd.template(),
 ):  # fmt: skip
     """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, (radiance,
     share) of the solid that the ray which is `mirrored` there meets, and how much of a body the water is.
 
     The way is negative where there is none: less than two spacings of it, or more air than water; nothing is found
-    then but what is mirrored; nothing is where `mirrored` is nought. The standard deviation of the normals where it
-    entered is `uneven`: rays that enter around it spread about as much.
+    then but what is mirrored; nothing is where `mirrored` is nought.
     """
     shown, total, done = vec3(0.0, 0.0, 0.0), 0.0, 0
     seen_above = vec4(0.0, 0.0, 0.0, 0.0)
@@ -286,22 +248,16 @@ def through_body(
     whole = wholeness(sun, first, inside.column, inside.walls, begun, optics.spacing, optics.unit)
     if whole <= 0.0:
         total, done = -1.0, 1
-    # Where a ray leaves that is mirrored as well, what leaves first is kept, and what is mirrored there goes on.
-    left, share, waits, turned, again = vec4(0.0, 0.0, 0.0, 0.0), 0.0, 0, p, ahead
-    # Within, then where solids stand in the way of what leaves, and of what is mirrored outside.
-    leaves, within = 0, 0
-    for bounce in range(qd.static(6 if solid else 3)):
+    # Within, then where solids stand in the way of what leaves, and of what is mirrored.
+    leaves = 0
+    for bounce in range(qd.static(5 if solid else 3)):
         above = 0
         if qd.static(solid):
-            if done == 1 and waits == 1:
-                left = vec4(shown.x, shown.y, shown.z, total)
-                p, ahead, waits, leaves, done = turned, again, 0, 0, 0
-            if bounce == 5 and mirrored.y != 0.0:
+            if bounce == 4 and mirrored.y != 0.0:
                 p, ahead, above, leaves = at, mirrored, 1, 0
-        if (done == 0 and (within < 3 or leaves == 1) and bounce < 5) or above == 1:
+        if (done == 0 and (bounce < 3 or leaves == 1)) or above == 1:
             n, s = vec3(0.0, 1.0, 0.0), 1e3
             if above + leaves == 0:
-                within += 1
                 wall = wall_ahead(inside.walls, p, ahead)
                 n, s = vec3(wall[0], wall[1], wall[2]), wall[3]
                 if not about_wet(sun, first, inside.walls, p + 0.999 * s * ahead, optics.spacing):
@@ -321,13 +277,8 @@ def through_body(
                     n = texel_normal(sun, first, p + s * ahead, optics.spacing)
             met = 0
             if qd.static(solid):
-                hit, k, cover = solid_ahead(
-                    inside.solids, inside.paints, p, ahead, s, 0.1 * optics.spacing,
-                    qd.select(above == 1, 0.0, uneven),
-                )  # fmt: skip
-                if share > 0.0:
-                    cover = qd.select(cover > 0.5, 1.0, 0.0)
-                if cover > 0.0:
+                hit, k = solid_ahead(inside.solids, inside.paints, p, ahead, s, 0.1 * optics.spacing)
+                if k >= 0:
                     met, place = 1, p + hit.w * ahead
                     normal = vec3(hit.x, hit.y, hit.z)
                     deep = qd.max(depth_below(sun, first, place), 0.0)
@@ -337,10 +288,6 @@ def through_body(
                     )
                     if above == 1:
                         seen_above = vec4(radiance.x, radiance.y, radiance.z, 1.0)
-                    elif cover < 1.0:
-                        met, share = 0, 1.0 - cover
-                        way = total + qd.select(leaves == 0, hit.w, 0.0)
-                        left = vec4(radiance.x, radiance.y, radiance.z, way)
                     else:
                         shown, done = radiance, 1
                         if leaves == 0:
@@ -352,36 +299,25 @@ def through_body(
             elif met == 0 and above == 0:
                 total += s
                 p += s * ahead
-                out = crossed_about(ahead, n, 2.0 * uneven)
-                if ahead.dot(n) <= 0.0:  # a texel's normal, which a bent surface has turned away from the ray
-                    out = vec4(ahead.x, ahead.y, ahead.z, 0.0)
+                cosi = ahead.dot(n)
+                k = 1.0 - 1.7689 * (1.0 - cosi * cosi)
                 if n.y < -0.5:
                     dimly = look.below * qd.exp(-0.6 * optics.usual * optics.absorption)
                     shown, done = seen_at(depth, picture, lens, z, p, dimly, solid), 1
-                elif out[3] < 1.0:
-                    turned, again = p, reflected(ahead, -n)
-                    ahead = vec3(out[0], out[1], out[2])
-                    both = qd.max(out[3] - faint(), 0.0) / (1.0 - faint())
+                elif k > 0.0 or cosi <= 0.0:
+                    out = ahead
+                    if cosi > 0.0:
+                        out = 1.33 * ahead + (qd.sqrt(k) - 1.33 * cosi) * n
                     if qd.static(solid):
-                        leaves, waits = 1, qd.select(share == 0.0 and both > 0.0, 1, 0)
+                        leaves, ahead = 1, out
                     else:
-                        shown, done = environment(look, ahead), 1
-                        if ahead.y < -1e-3:
+                        shown, done = environment(look, out), 1
+                        if out.y < -1e-3:
                             shown = seen_at(
-                                depth, picture, lens, z, p + (qd.max(p.y, 0.0) / -ahead.y) * ahead, shown, solid
+                                depth, picture, lens, z, p + (qd.max(p.y, 0.0) / -out.y) * out, shown, solid
                             )
-                        if share == 0.0 and both > 0.0:
-                            left, done, ahead = vec4(shown.x, shown.y, shown.z, total), 0, again
-                    if share == 0.0:
-                        share = both
                 else:
-                    ahead = reflected(ahead, -n)
+                    ahead -= 2.0 * cosi * n
     if done == 0:
         shown = optics.glow
-    if share > 0.0:
-        # One way for both, with what each of them is swallowed less or more on its own.
-        way = share * total + (1.0 - share) * left[3]
-        shown = share * qd.exp((way - total) * optics.absorption) * shown
-        shown += (1.0 - share) * qd.exp((way - left[3]) * optics.absorption) * vec3(left[0], left[1], left[2])
-        total = way
     return vec4(shown.x, shown.y, shown.z, total), seen_above, whole

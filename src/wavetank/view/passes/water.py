@@ -87,19 +87,18 @@ def lay(
         beside, block = optics.samples, optics.samples * optics.tall
         # What is seen through a body of water is found once for all samples of a pixel, or of two: one after the other.
         kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
-        kept_above, kept_whole, uneven = vec4(0.0, 0.0, 0.0, 0.0), 0.0, 0.0
+        kept_above, kept_whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
         # A pixel whose samples all show the same is shaded once, in its middle.
         even, even_z, even_normal = 0, 0.0, vec3(0.0, 0.0, 0.0)
-        for index in range((end - begin + optics.turn + beside - 1) // beside * block):
+        for index in range((end - begin + beside - 1) // beside * block):
             part = index % block
-            row = band * optics.tall + part // beside
-            column = begin - optics.turn + index // block * beside + part % beside
+            row, column = band * optics.tall + part // beside, begin + index // block * beside + part % beside
             if qd.static(world >= 100):
                 if part == 0 and optics.under == 0:
                     even, even_z, even_normal = even_pixel(
                         pixels, surface, lens, look, optics, inside.walls, row, column, qd.static(world % 10)
                     )
-            if column >= begin and column < end and (part == 0 or even == 0):
+            if column < end and (part == 0 or even == 0):
                 middle = vec2(column + 0.5, row + 0.5)
                 result = backdrop.behind[row, column]
                 z, back = (
@@ -166,18 +165,15 @@ def lay(
                                     if qd.static(world % 10 == 4):
                                         wide = True
                                     if inside.walls.upper.x < 1e5 and wide:
-                                        pixel = (column + optics.turn) // optics.samples
+                                        pixel = column // optics.samples
                                         near = qd.abs(at - kept_z) < 0.3 * optics.spacing
                                         if pixel != kept_pixel or layer != kept_layer or not near:
                                             ahead = direction.normalized()
                                             cosi = qd.max(-n.dot(ahead), 0.05)
-                                            uneven = 0.0
-                                            if layer == 1:
-                                                uneven = unevenness(lens, row, column, z, n, optics, surface.depth)
                                             kept, kept_above, kept_whole = through_body(
                                                 pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
                                                 inside, at, origin + at * direction, refracted(ahead, n, cosi),
-                                                qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), uneven,
+                                                qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0),
                                                 qd.static(world % 10 == 4),
                                             )  # fmt: skip
                                             kept_z, kept_layer, kept_pixel = at, layer, pixel
@@ -189,7 +185,7 @@ def lay(
                                         rough = roughness(lens, row, column, z, n, optics, surface.depth)
                                 result += share * shine(
                                     pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside, middle, at,
-                                    n, origin, direction, body, above, whole, uneven, rough, qd.static(world % 10),
+                                    n, origin, direction, body, above, whole, rough, qd.static(world % 10),
                                     qd.static(world % 100 >= 10),
                                 )  # fmt: skip
                         line = line_cover(pixels.lines[row, column], front, optics.slack)
@@ -245,29 +241,6 @@ def roughness(lens: Lens, row, column, z, n, optics: Optics, depth: qd.template(
 
 
 @qd.func
-def unevenness(lens: Lens, row, column, z, n, optics: Optics, depth: qd.template()):
-    """Standard deviation of the normals of the surface around a pixel, along an axis, within a spacing.
-
-    Where the surface ends to one side, the other one counts; where it does to both, it is broken.
-    """
-    total, pixel = 0.0, lens.pixel * (1.0 + lens.perspective * (z - 1.0))
-    rise = rise_at(row, column, z, 3.0 * optics.spacing, depth)
-    for axis in range(2):
-        away, slope = vec3(1.0, 0.0, 0.0), qd.select(axis == 0, rise.x, rise.y)
-        k = qd.max(qd.cast(optics.spacing / qd.sqrt(pixel * pixel + slope * slope), qd.i32), 1)
-        for turn in range(2):
-            if turn == 0 or away.x == 1.0:
-                step = k * (1 - 2 * turn)
-                r = qd.min(qd.max(row + step * axis, 0), depth.shape[0] - 1)
-                c = qd.min(qd.max(column + step * (1 - axis), 0), depth.shape[1] - 1)
-                there = qd.bit_cast(depth[r, c], qd.f32)
-                if qd.abs(there - z) < 3.0 * optics.spacing:
-                    away = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * optics.spacing, depth)) - n
-        total += away.dot(away)
-    return qd.sqrt(total / 12.0)
-
-
-@qd.func
 def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, start, direction, row, column, z):
     """Radiance along a ray that has left a drop: of the floor or of what stands behind, as far as they are seen."""
     way = qd.min(qd.bit_cast(pixels.depth[row, column], qd.f32) - z, 1e3)
@@ -287,13 +260,12 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
 @qd.func
 def shine(
     pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
-    optics: Optics, inside: Inside, place, z, normal, origin, direction, body, above, whole, uneven, rough,
+    optics: Optics, inside: Inside, place, z, normal, origin, direction, body, above, whole, rough,
     world: qd.template(), many: qd.template(),
 ):  # fmt: skip
     """Radiance of the water that is seen at depth `z` with this normal, at a place (column, row) of the picture.
 
-    `body`, `above` and `whole` are what `through_body` found for it; a negative way where it found none. Rays that
-    spread, because the surface is `uneven`, are as long as the straight one as far as they are not as long as that.
+    `body`, `above` and `whole` are what `through_body` found for it; a negative way where it found none.
     `rough` is the variance of the normals around, see `glint`.
     """
     n, pace = normal, direction.norm()
@@ -336,7 +308,7 @@ def shine(
         glossy = 1.0 - smoothstep((1.6 - layers) / 0.8) * (1.0 - off)
         if body[3] >= 0.0:
             shown += whole * (vec3(body[0], body[1], body[2]) - shown)
-            travel += whole * (1.0 - qd.min(1.5 * uneven, 0.6)) * (body[3] - travel)
+            travel += whole * (body[3] - travel)
             ball *= 1.0 - whole
         if ball > 0.0:
             out = 2.0 * bent.dot(ahead) * bent - ahead
