@@ -9,9 +9,9 @@ and asks anew where it has gone farther than `FARTHEST` of a support. No distanc
 the solid is bent: whoever is farther away than that from all of them touches none, and the others follow their way
 exactly (`boundary.stopped`). What a body is pushed by is summed up by particle and handed over once, at the end.
 
-A film thinner than half a spacing or so bears no body. What is caught between two solids reads the density of water at
-rest where it is half as much: each solid counts as water up to the particle itself. It held a box that was a tenth
-heavier than water 0.6 d above the floor, for ever (docs/notebook/bodies.md, "A box a tenth heavier than water").
+A film thinner than a layer of particles bears less of a body, below 0.8 spacings nothing. What is caught between two
+solids reads the density of water at rest where it is half as much, as each of them counts as water up to the particle.
+It held a box that was a tenth heavier than water 0.6 d above the floor, for ever (docs/notebook/bodies.md).
 
     code     symbol     meaning                                                             unit
     seen     p_0        where distances were asked for                                      m
@@ -175,13 +175,13 @@ def is_clear(i, x, p, scratch: Scratch, solids: SolidSet, c: Coefficients):
 
 @qd.func
 def thinnest():
-    """Thickness over the support up to which a film between two solids bears nothing, a little over half a spacing."""
+    """Thickness over the support up to which a film between two solids bears nothing: 0.8 spacings."""
     return 0.33
 
 
 @qd.func
 def thick():
-    """And from which on it bears all."""
+    """And from which on it bears all: a layer of particles."""
     return 0.45
 
 

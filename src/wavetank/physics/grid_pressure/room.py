@@ -77,7 +77,7 @@ def mostly():
 
 @qd.func
 def narrow():
-    """Room of a node up to which its cell may be a slit."""
+    """Cells that are left between two solids, up to which there is a slit."""
     return 0.5
 
 
@@ -267,7 +267,10 @@ def find_walls(grid: CoarseGrid, thin: qd.template(), solids: SolidSet, piece, l
 
 @qd.func
 def is_slit(grid: CoarseGrid, n):
-    """Whether node `n` has room only between two solids that leave less than half a cell there; rooms in `rhs`."""
+    """Whether node `n` lies between two solids that leave less than half a cell, and no node beside it is open.
+
+    Rooms are in `rhs`.
+    """
     narrowest, widest = 1.0, 0.0
     if grid.rhs[n] > 0.0 and grid.rhs[n] < narrow():
         for axis in qd.static(range(3)):
