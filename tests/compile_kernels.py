@@ -23,6 +23,12 @@ def use(dim: int) -> None:
         if name == f"obstacle-tank{twin}":
             for view in ("water", "particles", "slice", "foam"):
                 wt.render(sim, 64, 36, view=view, supersample=2)
+    if dim == 2:  # no bundled scene has bodies in a plane
+        ball = wt.Sphere(center=(0.7, 0.2), radius=0.1, density=400.0)
+        block = wt.Block(lower=(0.0, 0.0), upper=(0.5, 0.4))
+        sim = wt.Simulation(wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6)), fluids=[block], solids=[ball]))
+        for _ in range(3):
+            sim.step()
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import numpy as np
 
 import wavetank as wt
 
-LONGEST = 5.0  # s of a processor: of any refusal, and of any valid start
+LONGEST = 20.0  # s of a processor: of any refusal, of any valid start; a guard against hangs, four times what a slow one takes
 
 
 def refused(door: Callable[[], Any], words: str = "") -> str:
