@@ -5,6 +5,7 @@ passes them. What the water did to them moves them in the next step, or at once 
 (`coupling.py`).
 """
 
+import contextlib
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -64,6 +65,7 @@ class Bodies(Mapping[str, Body]):
         self.pushes: np.ndarray | None = None  # kg m/s, kg m^2/s: by forces, in the next step
         self._told = np.zeros((0, 2))  # water that goes along with each body, as the engine knows it
         self.density = density
+        self._standing = False
         solids.feeling, solids.passing = {}, None
         numbers = [number for number, solid in enumerate(solids.members) if solid.is_body]
         if not numbers:
@@ -316,7 +318,17 @@ class Bodies(Mapping[str, Body]):
         return True
 
     def _is_held(self, body: Body) -> bool:
-        return body.solid.held or body.number in self.solids.targets
+        return self._standing or body.solid.held or body.number in self.solids.targets
+
+    @contextlib.contextmanager
+    def standing(self) -> Iterator[None]:
+        """Let all bodies stand where they are meanwhile, and keep their velocities."""
+        own, self._standing = self.coupling.velocity.copy(), True
+        try:
+            yield
+        finally:
+            self._standing = False
+            self.coupling.velocity = own
 
     def _hold(self, row: int, held: bool) -> None:
         """Let a body stay where it is, or is moved to; let it go as fast as it was moved."""
