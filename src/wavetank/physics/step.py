@@ -76,7 +76,10 @@ def step(
         carry_on(world, plan.kinds, params, c, stirred=plan.is_stirred)
     update_velocities(world.particles, c, world.count)  # 21, 23
     if plan.is_rubbed:
-        apply_friction(world.particles, world.scratch, world.solids, world.walls, c, world.count, int(plan.on_grid))
+        apply_friction(
+            world.particles, world.scratch, world.solids, world.walls, c, world.count, int(plan.on_grid),
+            int(plan.searched == 2),
+        )  # fmt: skip
     if plan.searched == 2:
         hand_over_pushes(world.scratch, world.particles, world.solids, world.count)
     if plan.is_smoothed or plan.turning:

@@ -34,10 +34,16 @@ def mark_known(grid: CoarseGrid):
 
 
 @qd.kernel(fastcache=True)
-def continue_pressure(grid: CoarseGrid, turn: qd.i32, air: qd.f32):
-    """Continue multipliers by one node, from those that are known since an earlier `turn`; the `air` counts so much."""
+def continue_pressure(grid: CoarseGrid, c: Coefficients, stiffness: qd.f32, turn: qd.i32, air: qd.f32):
+    """Continue multipliers by one node, from those that are known since an earlier `turn`; the `air` counts so much.
+
+    At first they go on straight, farther on as at rest: where a body lies on something, what the water at the mouth of
+    the slit does by chance would grow from node to node.
+    """
     for n in range(grid.nx * grid.ny * grid.nz):
+        at_rest = fall(c) / -stiffness
         if grid.slope_z[n] > turn:
+            edges = vec3(grid.dx, grid.dy, grid.dz)
             lam, weight = 0.0, 0.0
             for axis in qd.static(range(3)):
                 if grid.nz > 1 or axis < 2:
@@ -46,13 +52,17 @@ def continue_pressure(grid: CoarseGrid, turn: qd.i32, air: qd.f32):
                         if nodes > 0:
                             m = beside_on(grid, n, axis, side)
                             if grid.slope_z[m] < turn:
-                                value = grid.lam[m]
-                                if nodes > 1:
-                                    farther = beside_on(grid, m, axis, side)
-                                    if grid.slope_z[farther] < turn:
-                                        value += value - grid.lam[farther]
-                                share = air if grid.room[m] > 0.0 and grid.fill[m] < 0.5 else 1.0
-                                lam += share * value
+                                slope = -side * edges[axis] * at_rest[axis]
+                                if turn == 1:
+                                    slope = 0.0
+                                    if nodes > 1:
+                                        farther = beside_on(grid, m, axis, side)
+                                        if grid.slope_z[farther] < turn:
+                                            slope = grid.lam[m] - grid.lam[farther]
+                                share = 1.0
+                                if grid.lam[m] == 0.0:  # air, or continued from there
+                                    share, slope = air, 0.0
+                                lam += share * (grid.lam[m] + slope)
                                 weight += share
             if weight > 0.0:
                 grid.lam[n] = lam / weight
@@ -119,5 +129,5 @@ def push_on_grid(world: World, stiffness: float, per_lambda: float, c: Coefficie
     assert pieces is not None, "there are no bodies"
     mark_known(grid)
     for turn in range(1, min(FARTHEST, math.ceil(pieces.reach / min(grid.dx, grid.dy)) + 1) + 1):
-        continue_pressure(grid, turn, AIR)
+        continue_pressure(grid, c, stiffness, turn, AIR)
     push_bodies(grid, pieces, world.solids, world.particles, stiffness, per_lambda, c)
