@@ -8,8 +8,10 @@ from worlds import frame_of
 from wavetank import Box, Camera, Scene, Sphere, Tank
 from wavetank.device.compiler import download, qd, upload
 from wavetank.solids.distance import SolidSet
-from wavetank.view.lens import vec2, vec3, vec4
+from wavetank.view.lens import Lens, basis, lens_at, ray_direction, vec2, vec3, vec4, view_ray
 from wavetank.view.optics.body import crossed_about, solid_ahead
+from wavetank.view.optics.normals import normal_of, rise_at
+from wavetank.view.passes.water import unevenness
 from wavetank.view.renderer import Renderer
 
 D = 0.05
@@ -113,32 +115,73 @@ def test_pixels_that_share_a_bent_ray_are_other_pairs_in_every_second_sample():
 
 
 @qd.kernel
-def cross_all(found: qd.types.ndarray(), angles: qd.types.ndarray(), wide: qd.f32, count: qd.i32):
+def cross_all(found: qd.types.ndarray(), angles: qd.types.ndarray(), spread: qd.f32, count: qd.i32):
     for k in range(count):
         up = vec3(0.0, 1.0, 0.0)
-        found[k] = crossed_about(vec3(qd.sin(angles[k]), qd.cos(angles[k]), 0.0), up, wide)
+        found[k] = crossed_about(vec3(qd.sin(angles[k]), qd.cos(angles[k]), 0.0), up, spread)
 
 
-def mirrored(angles, wide):
-    """Share that is mirrored of rays that meet the surface from below at these angles [rad] from the vertical."""
+def crossing(angles, spread):
+    """(Direction outside, share that is mirrored) of rays from below at these angles [rad] from the vertical."""
     found, given = qd.ndarray(vec4, shape=(len(angles),)), qd.ndarray(qd.f32, shape=(len(angles),))
     upload(given, np.asarray(angles, np.float32))
-    cross_all(found, given, wide, len(angles))
+    cross_all(found, given, spread, len(angles))
     rays = download(found).reshape(-1, 4)
     assert np.allclose(np.linalg.norm(rays[rays[:, 3] < 1.0, :3], axis=1), 1.0, atol=1e-4)
-    return rays[:, 3].copy()
+    return rays.copy()
 
 
 def test_total_reflection_begins_gradually_where_rays_spread():
     """A tenth of a degree changes little, the flatter the more is mirrored, and far from there all is exact."""
     angles = np.radians(np.arange(35.0, 60.0, 0.1))
-    exact, blurred = mirrored(angles, 0.0), mirrored(angles, 0.3)
+    exact, blurred = (crossing(angles, spread)[:, 3] for spread in (0.0, 0.3 / 3.9))
     assert np.diff(exact).max() > 0.1
     assert np.diff(blurred).max() < 0.02
     assert np.diff(blurred).min() > -1e-3
     far = np.abs(1.0 - 1.33**2 * np.sin(angles) ** 2) > 0.31
     assert np.array_equal(exact[far], blurred[far])
     assert exact[np.searchsorted(np.sin(angles), 1.0 / 1.33) + 1] == 1.0
+
+
+def test_broken_water_lets_nothing_out_straight_up_that_it_should_mirror():
+    """However much rays spread, those beyond the critical angle leave at 50 degrees from the normal or more."""
+    rays = crossing(np.radians(np.arange(49.0, 85.0, 1.0)), 2.0)
+    out = rays[rays[:, 3] < 1.0]
+    assert len(out) > 10
+    assert out[:, 1].max() < np.cos(np.radians(50.0))
+
+
+@qd.kernel
+def rough_of(found: qd.types.ndarray(), depth: qd.types.ndarray(), lens: Lens, spacing: qd.f32):
+    for row, column in qd.ndrange((40, 41), (40, 41)):
+        z = qd.bit_cast(depth[row, column], qd.f32)
+        n = normal_of(lens, row, column, z, rise_at(row, column, z, 3.0 * spacing, depth))
+        direction = ray_direction(lens, view_ray(lens, row, column))
+        found[0] = unevenness(lens, row, column, z, n, direction, spacing, depth)
+
+
+def uneven(depth_of):
+    """`unevenness` in the middle of a map of 81 x 81 pixels of 0.05 spacings, by a function of u and v [m]."""
+    lens = lens_at(np.zeros(3), basis(np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])), 81, 81, 400.0,
+                   perspective=False, near=0.0)  # fmt: skip
+    u, v = np.meshgrid((np.arange(81) - 40) / 400.0, (40 - np.arange(81)) / 400.0)
+    depth, found = qd.ndarray(qd.i32, shape=(81, 81)), qd.ndarray(qd.f32, shape=(1,))
+    upload(depth, np.asarray(depth_of(u, v), np.float32).view(np.int32))
+    rough_of(found, depth, lens, D)
+    return float(download(found)[0])
+
+
+def test_a_plane_is_even_and_a_ball_as_uneven_as_it_is_round():
+    """On a ball normals a spacing away are turned by spacing / radius: that by the root of 6 is their deviation."""
+
+    def ball(u, v):
+        return 2.0 - np.sqrt(0.25**2 - u * u - v * v)
+
+    assert uneven(lambda u, v: 2.0 + 1.5 * u - 0.7 * v) < 1e-3
+    assert uneven(ball) == pytest.approx(D / 0.25 / np.sqrt(6.0), rel=0.1)
+    # Where the surface ends on one side the other counts, and where it does on both it is broken.
+    assert uneven(lambda u, v: np.where(u > 0.02, 1e38, ball(u, v))) == pytest.approx(uneven(ball), rel=0.1)
+    assert uneven(lambda u, v: np.where(abs(u) > 0.02, 1e38, ball(u, v))) > np.sqrt(1.0 / 12.0)
 
 
 @qd.kernel

@@ -117,13 +117,14 @@ def about_depth(sun: Lens, first: qd.template(), walls: Box, at, spacing):
 
 
 @qd.func
-def wholeness(sun: Lens, first: qd.template(), column: qd.template(), walls: Box, at, spacing, unit):
-    """How much of a body the water around the point `at` is, 0 to 1: broken water leaves air in the sun's way.
+def wholeness(sun: Lens, first: qd.template(), inside: Inside, optics: Optics, at, bent):
+    """How much of a body the water is, 0 to 1, that a `bent` ray has entered at `at`, two spacings farther.
 
-    It is 0 where there is none.
+    Broken water leaves air in the sun's way. It is 0 where there is none.
     """
-    inset = vec3(1.5 * spacing, 0.0, 1.5 * spacing)  # next to a wall the column's discs are cut
-    inner = qd.min(qd.max(at, walls.lower + inset), walls.upper - inset)
+    begun = qd.min(qd.max(at, inside.walls.lower), inside.walls.upper) + 2.0 * optics.spacing * bent
+    inset = 1.5 * optics.spacing * vec3(1.0, 0.0, 1.0)  # next to a wall the column's discs are cut
+    inner = qd.min(qd.max(begun, inside.walls.lower + inset), inside.walls.upper - inset)
     c = to_view(sun, inner)
     # Both maps between the same four texels.
     place = to_pixel(sun, c) - 0.5
@@ -134,14 +135,14 @@ def wholeness(sun: Lens, first: qd.template(), column: qd.template(), walls: Box
     for k in range(4):
         z = qd.bit_cast(first[top + k // 2, left + k % 2], qd.f32)
         share = qd.select(k % 2 == 1, u, 1.0 - u) * qd.select(k // 2 == 1, v, 1.0 - v)
-        water += share * column[top + k // 2, left + k % 2]
+        water += share * inside.column[top + k // 2, left + k % 2]
         if z < 1e30:
             begins += share * z
             weight += share
     under, result = c.z - begins / weight, 0.0
     if under > 0.0 and weight > 0.25:
-        length = qd.min(wall_ahead(walls, inner, sun.forward)[3] + under, 1e3)
-        result = smoothstep((water * unit / length - 0.3) / 0.45)
+        length = qd.min(wall_ahead(inside.walls, inner, sun.forward)[3] + under, 1e3)
+        result = smoothstep((water * optics.unit / length - 0.3) / 0.45)
     return result
 
 
@@ -210,12 +211,14 @@ def faint():
 
 
 @qd.func
-def crossed_about(ahead, n, wide):
+def crossed_about(ahead, n, spread):
     """(direction outside, share that is mirrored) of rays out of the water that spread around one of them.
 
-    What Snell and Fresnel say of one is blurred where the square of the cosine outside lies within `wide` of 0.
+    What Snell and Fresnel say of one is blurred where the square of the cosine outside lies near 0. By the angle it
+    changes by 1.75 per radian there, and 0.45 of the blur's half width is its standard deviation; `spread` [rad] is
+    that of the rays. However broken the surface is, none leave along its normal that would be mirrored as a whole.
     """
-    cosi = ahead.dot(n)
+    cosi, wide = ahead.dot(n), qd.min(3.9 * spread, 0.8)
     k = 1.0 - 1.7689 * (1.0 - cosi * cosi)
     ray, soft = ahead, wide > 1e-3 and qd.abs(k) < wide
     if soft:
@@ -282,22 +285,20 @@ def within_water(sun: Lens, first: qd.template(), walls: Box, p, ahead, spacing)
 @qd.func
 def through_body(
     depth: qd.template(), picture: qd.template(), first: qd.template(), lens: Lens, sun: Lens, look: Look,
-    optics: Optics, inside: Inside, z, at, bent, mirrored, uneven, solid: qd.template(),
+    optics: Optics, inside: Inside, z, at, bent, mirrored, whole, uneven, solid: qd.template(),
 ):  # fmt: skip
-    """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, (radiance,
-    share) of the solid that the ray which is `mirrored` there meets, and how much of a body the water is.
+    """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, and
+    (radiance, share) of the solid that the ray which is `mirrored` there meets.
 
-    The way is negative where there is none: less than two spacings of it, or more air than water; nothing is found
-    then but what is mirrored; nothing is where `mirrored` is nought. The standard deviation of the normals where it
-    entered is `uneven`: rays that enter around it spread about as much.
+    The way is negative where the water is no body, by `wholeness`; nothing is found then but what is mirrored; nothing
+    is where `mirrored` is nought. The standard deviation of the normals where it entered is `uneven`: rays that enter
+    around it spread about as much.
 
     All that a straight piece may meet, and all that it may show, is asked for in one place: compilers copy each
     function to wherever it is called, and the time that they take grows faster than what they get.
     """
     shown, total, seen_above = vec3(0.0, 0.0, 0.0), 0.0, vec4(0.0, 0.0, 0.0, 0.0)
     p, ahead = qd.min(qd.max(at, inside.walls.lower), inside.walls.upper), bent
-    begun = p + 2.0 * optics.spacing * ahead
-    whole = wholeness(sun, first, inside.column, inside.walls, begun, optics.spacing, optics.unit)
     # Where a ray leaves that is mirrored as well, what leaves first is kept, and what is mirrored there goes on.
     left, share, waits, turned, again = vec4(0.0, 0.0, 0.0, 0.0), 0.0, 0, p, ahead
     # A piece of 0 is in the water, of 1 outside where it has left, of 2 outside where it was mirrored at first; where a
@@ -355,11 +356,11 @@ def through_body(
                     usual = look.below * qd.exp(-0.6 * optics.usual * optics.absorption)
                 else:
                     ends = 0
-                    out = crossed_about(ahead, n, 2.0 * uneven)
+                    out = crossed_about(ahead, n, uneven)
                     if ahead.dot(n) <= 0.0:  # a texel's normal, which a bent surface has turned away from the ray
                         out = vec4(ahead.x, ahead.y, ahead.z, 0.0)
                     ahead = reflected(ahead, -n)
-                    if out[3] < 1.0:
+                    if out[3] < qd.select(share == 0.0, 1.0, 0.5):  # divided before, it takes the way of most of it
                         turned, again, piece = p, ahead, 1
                         ahead = vec3(out[0], out[1], out[2])
                         if share == 0.0:
@@ -385,4 +386,4 @@ def through_body(
         shown = share * qd.exp((way - total) * optics.absorption) * shown
         shown += (1.0 - share) * qd.exp((way - left[3]) * optics.absorption) * vec3(left[0], left[1], left[2])
         total = way
-    return vec4(shown.x, shown.y, shown.z, total), seen_above, whole
+    return vec4(shown.x, shown.y, shown.z, total), seen_above

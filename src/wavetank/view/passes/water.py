@@ -29,7 +29,7 @@ from wavetank.view.lens import (
     view_ray,
 )
 from wavetank.view.look import Look
-from wavetank.view.optics.body import Inside, through_body
+from wavetank.view.optics.body import Inside, through_body, wholeness
 from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, refracted
 from wavetank.view.optics.glass import line_cover
@@ -173,17 +173,22 @@ def lay(
                                 half = (look.to_sun - direction.normalized()).normalized(1e-9)
                                 shiny = layer == 1 and n.dot(half) > 0.9
                                 if qd.static(world % 10 >= 3):
-                                    if layer == 1 and (fresh or shiny):
-                                        uneven = unevenness(lens, row, column, z, n, direction, optics, surface.depth)
+                                    ahead, point = direction.normalized(), origin + at * direction
+                                    cosi = qd.max(-n.dot(ahead), 0.05)
+                                    bent = refracted(ahead, n, cosi)
+                                    if fresh:
+                                        kept_whole = wholeness(sun, sunlit.depth, inside, optics, point, bent)
+                                    if layer == 1 and ((fresh and kept_whole > 0.0) or shiny):
+                                        uneven = unevenness(
+                                            lens, row, column, z, n, direction, optics.spacing, surface.depth
+                                        )
                                     elif fresh:
                                         uneven = 0.0
                                     if fresh:
-                                        ahead = direction.normalized()
-                                        cosi = qd.max(-n.dot(ahead), 0.05)
-                                        kept, kept_above, kept_whole = through_body(
+                                        kept, kept_above = through_body(
                                             pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
-                                            inside, at, origin + at * direction, refracted(ahead, n, cosi),
-                                            qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), uneven,
+                                            inside, at, point, bent,
+                                            qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), kept_whole, uneven,
                                             qd.static(world % 10 == 4),
                                         )  # fmt: skip
                                         kept_z, kept_layer, kept_pixel = at, layer, pixel
@@ -234,26 +239,26 @@ def normal_beside(lens: Lens, row, column, z, limit, depth: qd.template()):
 
 
 @qd.func
-def unevenness(lens: Lens, row, column, z, n, direction, optics: Optics, depth: qd.template()):
+def unevenness(lens: Lens, row, column, z, n, direction, spacing, depth: qd.template()):
     """Standard deviation of the normals of the surface around a pixel, along an axis, within a spacing.
 
-    Where the surface ends to one side, the other one counts; where it does to both, it is broken. A mean of two, half
-    of it along each axis, a third of it at the edge is that within.
+    Of both sides the rougher counts, and none beyond which the surface ends; where it does to both, it is broken. A
+    mean of two, half of it along each axis, a third of it at the edge is that within.
     """
     total, pixel = 0.0, lens.pixel * (1.0 + lens.perspective * (z - 1.0))
     steep = qd.max(qd.abs(n.dot(direction)), 1e-3)
     for axis in range(2):
-        away, slope = vec3(1.0, 0.0, 0.0), n.dot(qd.select(axis == 0, lens.right, lens.up)) / steep
-        k = qd.max(qd.cast(optics.spacing / (pixel * qd.sqrt(1.0 + slope * slope)), qd.i32), 1)
-        for turn in range(2):
-            if turn == 0 or away.x == 1.0:
-                step = k * (1 - 2 * turn)
-                r = qd.min(qd.max(row + step * axis, 0), depth.shape[0] - 1)
-                c = qd.min(qd.max(column + step * (1 - axis), 0), depth.shape[1] - 1)
-                there = qd.bit_cast(depth[r, c], qd.f32)
-                if qd.abs(there - z) < 3.0 * optics.spacing:
-                    away = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * optics.spacing, depth)) - n
-        total += away.dot(away)
+        away, slope = -1.0, n.dot(qd.select(axis == 0, lens.right, lens.up)) / steep
+        k = qd.max(qd.cast(spacing / (pixel * qd.sqrt(1.0 + slope * slope)), qd.i32), 1)
+        for side in range(2):
+            step = k * (1 - 2 * side)
+            r = qd.min(qd.max(row + step * axis, 0), depth.shape[0] - 1)
+            c = qd.min(qd.max(column + step * (1 - axis), 0), depth.shape[1] - 1)
+            there = qd.bit_cast(depth[r, c], qd.f32)
+            if qd.abs(there - z) < 3.0 * spacing:
+                other = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * spacing, depth)) - n
+                away = qd.max(away, other.dot(other))
+        total += qd.select(away < 0.0, 1.0, away)
     return qd.sqrt(total / 12.0)
 
 
