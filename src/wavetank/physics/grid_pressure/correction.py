@@ -32,7 +32,8 @@ nothing; of two cells in a row the mean counts, as a single one of four or eight
 
 Slips. The other way round, a row that slides off the one below reads less than the room that it takes. Where a cell is
 full, water that is drawn in for that pushes the row on: it slid ever faster, 0.014 m/s in a tank that had been at rest
-for a minute (docs/notebook/calm.md, "Slow slips"). So a cell draws in no more where it is full.
+for a minute (docs/notebook/calm.md, "Slow slips"). So a cell draws in no more where it is full. (Worlds with
+bodies have their weight by densities, and are left as they were.)
 """
 
 import dataclasses
@@ -93,7 +94,8 @@ FULL = 0.98  # fill that cells without gaps have at least, also where few rows o
 SLIT = 0.7  # fill of a cell that touches a solid, as far as its tents can tell
 CLOSING = 0.5  # of what lacks, in a step
 GAP_SHARE = 6.0  # by which errors are less, of what lacks there
-DRAWN = (0.99, 1.01)  # fill: from where to where a cell that reads too little draws nothing in
+#: Fill from where to where a cell that reads too little draws nothing in, where weight is balanced; never with bodies.
+DRAWN = {True: (0.99, 1.01), False: (1e3, 2e3)}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -314,7 +316,7 @@ def errors(grid: CoarseGrid, params: Parameters, stiffness: float, balanced: boo
         unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness,
         per_way=params.grid_pressure / stiffness, borne_from=BORNE[0], borne_to=BORNE[1], inner_from=INNER[0],
         inner_to=INNER[1], below_from=BELOW[0] * h, below_to=BELOW[1] * h, missing=MISSING, full=FULL,
-        gap_share=GAP_SHARE, drawn_from=DRAWN[0], drawn_to=DRAWN[1], least_open=LEAST_OPEN, slit=SLIT,
-        closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, rough=ROUGH[balanced],
+        gap_share=GAP_SHARE, drawn_from=DRAWN[balanced][0], drawn_to=DRAWN[balanced][1], least_open=LEAST_OPEN,
+        slit=SLIT, closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, rough=ROUGH[balanced],
         thin=FILM[0], thick=FILM[1], spacing=params.spacing,
     ))  # fmt: skip
