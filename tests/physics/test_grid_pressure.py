@@ -11,6 +11,7 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.foundation.materials import Material
 from wavetank.lab.cases.energy import energies
+from wavetank.physics import step as step_of_algorithm
 from wavetank.physics.grid_pressure import coarse_grid, poisson
 from wavetank.physics.grid_pressure import correction as coarse_pressure
 from wavetank.physics.grid_pressure.coarse_grid import new_levels
@@ -224,6 +225,33 @@ def test_rows_that_are_drawn_apart_have_gaps():
     room = level.room.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
     assert (room < 1.0).any()
     assert not gaps[room < 1.0].any()
+
+
+@pytest.mark.parametrize(("spread", "drawn"), [(0.97, 0.0), (1.015, 1.0)])
+def test_full_cells_draw_nothing_in(monkeypatch, spread, drawn):
+    """Conservation of volume: water that reads too little where no room is left has nowhere to take more from.
+
+    Drawn in, it pushed rows that slid off each other on (docs/notebook/calm.md, "Slow slips").
+    """
+    d, error = 0.025, -0.01
+    places = np.stack(np.meshgrid(*[(np.arange(40) + 0.5) * d] * 2), -1).reshape(-1, 2) * np.array([spread, 1.0])
+    tank = wt.Tank(size=(40 * d * spread, 1.2))
+    sim = Simulation(wt.Scene(spacing=d, tank=tank, fluids=[Points(positions=places)], gravity=(0.0, -1e-3)))
+
+    def read(scratch, particles, *args) -> None:
+        scratch.rho.from_numpy(np.full(scratch.rho.shape[0], 1.0 + error, np.float32))
+
+    monkeypatch.setattr(step_of_algorithm, "measure_density", read)
+    sim.step()
+    level = sim.world.levels[0]
+    rhs, gaps, fill = (
+        a.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx) for a in (level.rhs, level.gaps, level.fill)
+    )
+    inner = (slice(3, level.ny // 2), slice(3, -3))
+    np.testing.assert_allclose(fill[inner], 1.0 / spread, atol=0.02)
+    assert not gaps[inner].any()
+    stiffness = rest_lattice(sim.scene.kernel, 2, sim.scene.support).stiffness
+    assert rhs[inner].mean() * stiffness == pytest.approx(drawn * error, rel=0.3, abs=1e-4)
 
 
 def energy_gained(*frames: int) -> np.ndarray:

@@ -21,6 +21,27 @@ def test_no_particle_is_thrown(dim, name, start):
     assert seen.worst < 0.2 * np.sqrt(9.81 * solids_at_rest.SPACING[dim])
 
 
+def test_nobody_is_kicked_out_of_a_crevice():
+    """Before, 0.11 m/s: who crept across the middle between two strands was held by the other one, all at once."""
+    seen = solids_at_rest.watch(solids_at_rest.worlds(3, 2)["knot"], 3, "cpu")
+    assert seen.worst < 0.05 * np.sqrt(9.81 * solids_at_rest.SPACING[3])
+
+
+def test_what_a_solid_pushes_along_turns_round_slowly():
+    """Densities are even between two walls of one solid, 0.9 spacings apart: nothing is pushed in the middle."""
+    gap = 0.045
+    left = wt.Box(center=(0.4 - gap / 2.0, 0.5), size=(0.2, 0.4))
+    right = wt.Box(center=(0.6 + gap / 2.0, 0.5), size=(0.2, 0.4))
+    slopes = []
+    for x in (0.499, 0.501):
+        water, walls = wt.Points(positions=[(x, 0.5)]), wt.Union(parts=[left, right])
+        sim = wt.Simulation(wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 1.0)), fluids=[water], solids=[walls]))
+        sim.advance(1e-2)
+        slopes.append(float(sim.world.scratch.facing.to_numpy()[0, 0]))
+    assert slopes[0] > 0.0 > slopes[1]
+    np.testing.assert_allclose(slopes, 0.0, atol=0.1)
+
+
 def test_the_grid_bears_just_the_weight_around_a_solid():
     """Hydrostatics: grad p = rho g, whatever cuts the cells. Before, it was wrong by 0.15 g beside the disc."""
     disc = wt.Sphere(center=(0.493, 0.117), radius=0.1)

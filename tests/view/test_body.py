@@ -5,7 +5,13 @@ import pytest
 from test_ellipsoids import lattice
 from worlds import frame_of
 
-from wavetank import Box, Camera, Scene, Tank
+from wavetank import Box, Camera, Scene, Sphere, Tank
+from wavetank.device.compiler import download, qd, upload
+from wavetank.solids.distance import SolidSet
+from wavetank.view.lens import Lens, basis, lens_at, ray_direction, vec2, vec3, vec4, view_ray
+from wavetank.view.optics.body import crossed_about, solid_ahead
+from wavetank.view.optics.normals import normal_of, rise_at
+from wavetank.view.passes.water import unevenness
 from wavetank.view.renderer import Renderer
 
 D = 0.05
@@ -72,3 +78,136 @@ def test_the_floor_is_lifted_as_snell_has_it():
     met = 0.5 + slope * (2.0 - 0.6) + 0.6 * np.tan(np.arcsin(np.sin(angle) / 1.33))
     assert columns[0] != columns[1]
     assert met == pytest.approx(0.8, abs=0.02)
+
+
+@pytest.mark.parametrize("angle", [61.5, 62.0, 63.0, 66.0])
+def test_what_leaves_by_a_pane_fades_as_fresnel_has_it(angle):
+    """A ray comes in through the front pane, and leaves by the one beside where it came in at more than 61.3 degrees.
+
+    There the pane begins to mirror all of it: without a step, by Fresnel's equations for light without polarisation;
+    where it enters they are Schlick's. What is mirrored by 5 % is let out as a whole.
+    """
+    walls = [Box(center=(1.1, 0.5, -2.1), size=(0.1, 4.0, 6.0), color=color) for color in ("#808080", "#000000")]
+
+    def leaves(turn):
+        at = np.array([0.9, 0.4, 1.0])
+        camera = Camera(eye=tuple(at + 1.5 * np.array([-np.sin(turn), 0.02, np.cos(turn)])), target=tuple(at))
+        seen = []
+        for wall in walls:
+            renderer = Renderer(*SIZE)
+            renderer.render(filled(0.8, (wall,)), camera, view="water")
+            seen.append(download(renderer.buffers.pixels.color)[90, 120])
+        cosi, cost = np.sin(turn) / 1.33, np.sqrt(1.0 - 1.33**2 + np.sin(turn) ** 2)
+        sides = (1.33 * cosi - cost) / (1.33 * cosi + cost), (cosi - 1.33 * cost) / (cosi + 1.33 * cost)
+        out = (1.0 - np.mean(np.square(sides))) / 0.95
+        return (seen[0] - seen[1])[2] / (out * (0.98 - 0.98 * (1.0 - np.cos(turn)) ** 5))
+
+    assert leaves(np.radians(angle)) == pytest.approx(leaves(np.radians(75.0)), rel=0.08)
+
+
+def test_pixels_that_share_a_bent_ray_are_other_pairs_in_every_second_sample():
+    """What is found for two pixels at once must not leave stairs two pixels wide in a picture of many samples."""
+    camera = Camera(eye=(1.9, 1.4, 2.2), target=(0.5, 0.3, 0.5))
+    image = Renderer(*SIZE).render(filled(), camera, view="water", floor="tiles", samples=16).astype(int)
+    steps = np.abs(np.diff(image, axis=1)).sum(axis=(0, 2))
+    within, between = steps[::2].sum(), steps[1::2].sum()
+    assert within == pytest.approx(between, rel=0.02)
+
+
+@qd.kernel
+def cross_all(found: qd.types.ndarray(), angles: qd.types.ndarray(), spread: qd.f32, count: qd.i32):
+    for k in range(count):
+        up = vec3(0.0, 1.0, 0.0)
+        found[k] = crossed_about(vec3(qd.sin(angles[k]), qd.cos(angles[k]), 0.0), up, spread)
+
+
+def crossing(angles, spread):
+    """(Direction outside, share that is mirrored) of rays from below at these angles [rad] from the vertical."""
+    found, given = qd.ndarray(vec4, shape=(len(angles),)), qd.ndarray(qd.f32, shape=(len(angles),))
+    upload(given, np.asarray(angles, np.float32))
+    cross_all(found, given, spread, len(angles))
+    rays = download(found).reshape(-1, 4)
+    assert np.allclose(np.linalg.norm(rays[rays[:, 3] < 1.0, :3], axis=1), 1.0, atol=1e-4)
+    return rays.copy()
+
+
+def test_total_reflection_begins_gradually_where_rays_spread():
+    """A tenth of a degree changes little, the flatter the more is mirrored, and far from there all is exact."""
+    angles = np.radians(np.arange(35.0, 60.0, 0.1))
+    exact, blurred = (crossing(angles, spread)[:, 3] for spread in (0.0, 0.3 / 3.9))
+    assert np.diff(exact).max() > 0.1
+    assert np.diff(blurred).max() < 0.02
+    assert np.diff(blurred).min() > -1e-3
+    far = np.abs(1.0 - 1.33**2 * np.sin(angles) ** 2) > 0.31
+    assert np.array_equal(exact[far], blurred[far])
+    assert exact[np.searchsorted(np.sin(angles), 1.0 / 1.33) + 1] == 1.0
+
+
+def test_broken_water_lets_nothing_out_straight_up_that_it_should_mirror():
+    """However much rays spread, those beyond the critical angle leave at 50 degrees from the normal or more."""
+    rays = crossing(np.radians(np.arange(49.0, 85.0, 1.0)), 2.0)
+    out = rays[rays[:, 3] < 1.0]
+    assert len(out) > 10
+    assert out[:, 1].max() < np.cos(np.radians(50.0))
+
+
+@qd.kernel
+def rough_of(found: qd.types.ndarray(), depth: qd.types.ndarray(), lens: Lens, spacing: qd.f32):
+    for row, column in qd.ndrange((40, 41), (40, 41)):
+        z = qd.bit_cast(depth[row, column], qd.f32)
+        n = normal_of(lens, row, column, z, rise_at(row, column, z, 3.0 * spacing, depth))
+        direction = ray_direction(lens, view_ray(lens, row, column))
+        found[0] = unevenness(lens, row, column, z, n, direction, spacing, depth)
+
+
+def uneven(depth_of):
+    """`unevenness` in the middle of a map of 81 x 81 pixels of 0.05 spacings, by a function of u and v [m]."""
+    lens = lens_at(np.zeros(3), basis(np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])), 81, 81, 400.0,
+                   perspective=False, near=0.0)  # fmt: skip
+    u, v = np.meshgrid((np.arange(81) - 40) / 400.0, (40 - np.arange(81)) / 400.0)
+    depth, found = qd.ndarray(qd.i32, shape=(81, 81)), qd.ndarray(qd.f32, shape=(1,))
+    upload(depth, np.asarray(depth_of(u, v), np.float32).view(np.int32))
+    rough_of(found, depth, lens, D)
+    return float(download(found)[0])
+
+
+def test_a_plane_is_even_and_a_ball_as_uneven_as_it_is_round():
+    """On a ball normals a spacing away are turned by spacing / radius: that by the root of 6 is their deviation."""
+
+    def ball(u, v):
+        return 2.0 - np.sqrt(0.25**2 - u * u - v * v)
+
+    assert uneven(lambda u, v: 2.0 + 1.5 * u - 0.7 * v) < 1e-3
+    assert uneven(ball) == pytest.approx(D / 0.25 / np.sqrt(6.0), rel=0.1)
+    # Where the surface ends on one side the other counts, and where it does on both it is broken.
+    assert uneven(lambda u, v: np.where(u > 0.02, 1e38, ball(u, v))) == pytest.approx(uneven(ball), rel=0.1)
+    assert uneven(lambda u, v: np.where(abs(u) > 0.02, 1e38, ball(u, v))) > np.sqrt(1.0 / 12.0)
+
+
+@qd.kernel
+def meet(found: qd.types.ndarray(), solids: SolidSet, paints: qd.types.ndarray(), heights: qd.types.ndarray(),
+         wide: qd.f32, count: qd.i32):  # fmt: skip
+    for k in range(count):
+        hit, _, cover = solid_ahead(
+            solids, paints, vec3(0.0, heights[k], 0.5), vec3(1.0, 0.0, 0.0), 2.0, 0.001, wide
+        )  # fmt: skip
+        found[k] = vec2(hit.w, cover)
+
+
+def test_a_solid_beside_rays_that_spread_has_a_share_of_them():
+    """A ball of 0.1 m, a metre away: a single ray meets it or not; a cone of the slope 0.1 meets it 0.1 m beside it."""
+    solids = filled(0.0, (Sphere(center=(1.0, 0.5, 0.5), radius=0.1),)).solids
+    paints, given = qd.ndarray(vec3, shape=(solids.count,)), qd.ndarray(qd.f32, shape=(40,))
+    paints.fill(0.5)
+    heights = np.linspace(0.5, 0.75, 40)
+    upload(given, heights.astype(np.float32))
+    covers = []
+    for wide in (0.0, 0.1):
+        found = qd.ndarray(vec2, shape=(40,))
+        meet(found, solids, paints, given, wide, 40)
+        covers.append(download(found).reshape(-1, 2)[:, 1].copy())
+    inside, outside = heights < 0.599, heights > 0.602
+    assert (covers[0][inside] == 1.0).all() and (covers[0][outside] == 0.0).all()
+    assert (covers[1][inside] == 1.0).all() and (covers[1][heights > 0.71] == 0.0).all()
+    near = covers[1][outside & (heights < 0.695)]
+    assert (np.diff(near) < 0.0).all() and near[0] > 0.9 and near[-1] < 0.1

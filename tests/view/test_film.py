@@ -12,11 +12,11 @@ import pytest
 import wavetank as wt
 from wavetank.device.compiler import download, qd, upload
 from wavetank.view.film import denoise, field, light, paths
-from wavetank.view.film.interface import bent
 from wavetank.view.film.medium import Medium, medium_of
 from wavetank.view.film.samples import Watch
 from wavetank.view.film.tracer import Tracer
 from wavetank.view.lens import vec2, vec3, vec4, vector
+from wavetank.view.optics.interface import bent
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import Style
 

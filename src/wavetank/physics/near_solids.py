@@ -9,6 +9,12 @@ and asks anew where it has gone farther than `FARTHEST` of a support. No distanc
 the solid is bent: whoever is farther away than that from all of them touches none, and the others follow their way
 exactly (`boundary.stopped`). What a body is pushed by is summed up by particle and handed over once, at the end.
 
+The distance to a solid is that to the nearest of its surfaces, and its gradient turns round where another one becomes
+the nearest. A particle between two strands of a knot was held by one of them alone, crept to the middle under what
+pressed it, and was kicked by the whole of that in the step in which the other strand took over. What pushes is the
+density that a solid adds, and that has a kernel's width: so where a solid may have crevices n is the mean slope around
+the particle, which falls to 0 in the middle of one (docs/notebook/calm.md, "Crevices").
+
 A film thinner than a layer of particles bears less of a body, below 0.8 spacings nothing. What is caught between two
 solids reads the density of water at rest where it is half as much, as each of them counts as water up to the particle.
 It held a box that was a tenth heavier than water 0.6 d above the floor, for ever (docs/notebook/bodies.md).
@@ -24,7 +30,7 @@ from wavetank.device.state import Coefficients, Particles, Scratch, Walls
 from wavetank.physics.boundary import add_wall, fall, moves_by, next_near, wall_share
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.reactions import push_back
-from wavetank.solids.distance import SolidSet, image_near, lift, plane_distance, signed_distance, vec3, vec4
+from wavetank.solids.distance import SolidSet, grids, image_near, lift, plane_distance, signed_distance, vec3, vec4
 
 FARTHEST = 0.05  # of a support: from where on a particle asks anew
 
@@ -59,6 +65,42 @@ def facing_at(scratch: Scratch, at, i, p):
 
 
 @qd.func
+def may_be_hollow(solids: SolidSet, k):
+    """Say whether solid `k` may have crevices: a grid or several shapes; a single shape is convex."""
+    first = solids.first[k]
+    return solids.first[k + 1] - first > 1 or solids.op[first] >= grids()
+
+
+@qd.func
+def smoothed():
+    """How far from a particle, over the support, a hollow solid is asked for its slope along x, y and z: 0.4 d."""
+    return 0.2
+
+
+@qd.func
+def in_crevice(slope):
+    """Share of a mean `slope` that counts: none in a right angle, where its length is 0.7; all where it is 0.6."""
+    return qd.min(qd.max(7.0 - 10.0 * slope.norm(), 0.0), 1.0)
+
+
+@qd.func
+def faced(solids: SolidSet, k, p, h):
+    """(gradient, distance) of solid `k` at `p`; in the crevices of a hollow one the gradient is a mean around `p`."""
+    value = signed_distance(solids, k, p)
+    if may_be_hollow(solids, k) and value.w < h:
+        slope = vec3(0.0, 0.0, 0.0)
+        for side in range(6):
+            way = (smoothed() - 2.0 * smoothed() * (side & 1)) * h
+            at = p
+            at[side >> 1] += way
+            slope[side >> 1] += 0.5 * signed_distance(solids, k, at).w / way
+        own = vec3(value.x, value.y, value.z)
+        own += in_crevice(slope) * (slope - own)
+        value = vec4(own.x, own.y, own.z, value.w)
+    return value
+
+
+@qd.func
 def look(i, near, x, p, scratch: Scratch, solids: SolidSet, h):
     """Ask the marked solids for their distances at `p`; past `places`, the farthest goes."""
     number = 0
@@ -69,7 +111,7 @@ def look(i, near, x, p, scratch: Scratch, solids: SolidSet, h):
         away = (image_near(solids, k, p) - solids.position[k]).norm()
         margin = way + solids.sweep[k][0] + solids.sweep[k][1] * qd.min(reach, away)
         if away < reach + margin:
-            value = signed_distance(solids, k, p)
+            value = faced(solids, k, p, h)
             if value.w < margin:
                 slot = number
                 if number >= places():
@@ -110,7 +152,7 @@ def look_again(
                 scratch.seen[i] = p
                 for slot in range(known(scratch, i)):
                     at = place_of(scratch, i, slot)
-                    scratch.facing[at] = signed_distance(solids, scratch.solid[at], p)
+                    scratch.facing[at] = faced(solids, scratch.solid[at], p, c.h)
 
 
 @qd.kernel(fastcache=True)

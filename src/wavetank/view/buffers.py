@@ -83,6 +83,7 @@ class Buffers:
     motion: Motion
     sun_depth: Any  # i32 [texels, texels]: bits of the depth [m] of what the sun sees first
     solid_box: Any  # i32 [4]: first and last column, first and last row that may show a solid
+    streak_box: Any  # i32 [4]: the same of streaks, in pixels of the picture
     paints: Paints  # of solids
     glass_paints: Paints  # of those of glass
     curve: Any  # i32 [entries]: sRGB byte of linear light 0 to 1, in equal steps
@@ -145,6 +146,7 @@ def allocate(width: int, height: int, supersample: int) -> Buffers:
         motion=Motion(sums=qd.ndarray(qd.i32, shape=(*coarser, 3)), way=qd.ndarray(vec2, shape=coarser)),
         sun_depth=qd.ndarray(qd.i32, shape=(texels, texels)),
         solid_box=qd.ndarray(qd.i32, shape=(4,)),
+        streak_box=qd.ndarray(qd.i32, shape=(4,)),
         paints=Paints(),
         glass_paints=Paints(),
         curve=curve,

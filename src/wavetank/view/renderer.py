@@ -127,6 +127,7 @@ class Renderer:
             lit=-1 if style.lit is None else style.lit,
             hasty=style.hasty,
             shutter=float(style.shutter),
+            turn=0,
         )
 
     def _with_ice(self, frame: Frame, style: Style) -> Frame:
@@ -199,6 +200,7 @@ class Renderer:
         to_sun = vector(*(to_sun / np.linalg.norm(to_sun)))
         return dataclasses.replace(
             shot,
+            turn=number % 2,
             lens=dataclasses.replace(shot.lens, middle=shot.lens.middle + vector(across - 0.5, down - 0.5)),
             sun=_sun_lens(shot.extent, to_sun, self.buffers.texels),
             water_sun=_sun_lens(shot.extent, to_sun, sun_texels(shot.extent)),

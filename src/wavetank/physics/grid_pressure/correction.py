@@ -29,6 +29,11 @@ less: the kernel is pointed and counts near ones most. The grid counts the room,
 cells around are less than `FULL`, the rows have gaps that the water around may close, and an error is less by
 `GAP_SHARE` times what is missing there. Near a free surface the cells below are full, so that water at rest is told
 nothing; of two cells in a row the mean counts, as a single one of four or eight particles is never quite even.
+
+Slips. The other way round, a row that slides off the one below reads less than the room that it takes. Where a cell is
+full, water that is drawn in for that pushes the row on: it slid ever faster, 0.014 m/s in a tank that had been at rest
+for a minute (docs/notebook/calm.md, "Slow slips"). So a cell draws in no more where it is full. (Worlds with
+bodies have their weight by densities, and are left as they were.)
 """
 
 import dataclasses
@@ -89,6 +94,9 @@ FULL = 0.98  # fill that cells without gaps have at least, also where few rows o
 SLIT = 0.7  # fill of a cell that touches a solid, as far as its tents can tell
 CLOSING = 0.5  # of what lacks, in a step
 GAP_SHARE = 6.0  # by which errors are less, of what lacks there
+#: Fill from where to where a cell that reads too little draws nothing in, in worlds with bodies or without: beside them
+#: all draw, or a box of half of water's density swings for ever in a plane.
+DRAWN = {True: (1e3, 2e3), False: (0.99, 1.01)}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,6 +116,8 @@ class Errors:
     missing: qd.f32  # share by which the answer of solids is increased
     full: qd.f32  # fill of cells without gaps
     gap_share: qd.f32  # by which errors are less, of what lacks there
+    drawn_from: qd.f32  # fill from which on a cell that reads too little draws in less
+    drawn_to: qd.f32  # and from which on nothing
     least_open: qd.f32  # share of a cell
     slit: qd.f32  # fill from which on there is no slit
     closing: qd.f32  # 1/m^2: what lacks is closed by in a step, over the stiffness M
@@ -257,9 +267,10 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
-        grid.rhs[n] = e.scale * total - e.per_way * flow_out(grid, n, fall(c)) * ramp(
-            grid.fill[n], e.borne_from, e.borne_to
-        )
+        error = e.scale * total
+        drawn = qd.min(error, 0.0) * ramp(grid.fill[n], e.drawn_from, e.drawn_to)
+        borne = ramp(grid.fill[n], e.borne_from, e.borne_to)
+        grid.rhs[n] = error - drawn - e.per_way * flow_out(grid, n, fall(c)) * borne
         if qd.static(searched):
             grid.rhs[n] -= grid.slope_x[n] * e.closing * grid.room[n]
         grid.rhs[n] *= left_to_grid(grid, n, e.thin, e.thick)
@@ -284,7 +295,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     few = int(not is_shared(finest))
     gather(
         finest, world.particles, world.scratch, cells, world.solids, world.walls, c,
-        errors(finest, params, stiffness), count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
+        errors(finest, params, stiffness, bodies=world.pieces is not None), count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
     )  # fmt: skip
     solve_levels(world.levels)
     move_particles(
@@ -296,14 +307,15 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         push_on_grid(world, stiffness, stiffness / acting if acting else 0.0, c)  # nothing is deep without gravity
 
 
-def errors(grid: CoarseGrid, params: Parameters, stiffness: float) -> Errors:
-    """Return the numbers of `gather`."""
+def errors(grid: CoarseGrid, params: Parameters, stiffness: float, *, bodies: bool) -> Errors:
+    """Return the numbers of `gather`, in a world with `bodies` or without."""
     h = params.support * params.spacing
     volume = params.spacing**params.dim / (grid.dx * grid.dy * grid.dz) / UNIT
     return remembered(Errors(
         unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness,
         per_way=params.grid_pressure / stiffness, borne_from=BORNE[0], borne_to=BORNE[1], inner_from=INNER[0],
         inner_to=INNER[1], below_from=BELOW[0] * h, below_to=BELOW[1] * h, missing=MISSING, full=FULL,
-        gap_share=GAP_SHARE, least_open=LEAST_OPEN, slit=SLIT, closing=CLOSING * params.grid_pressure / stiffness,
-        least_theta=LEAST_THETA, thin=FILM[0], thick=FILM[1], spacing=params.spacing,
+        gap_share=GAP_SHARE, drawn_from=DRAWN[bodies][0], drawn_to=DRAWN[bodies][1], least_open=LEAST_OPEN,
+        slit=SLIT, closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, thin=FILM[0],
+        thick=FILM[1], spacing=params.spacing,
     ))  # fmt: skip

@@ -15,7 +15,6 @@ import dataclasses
 
 from wavetank.device.compiler import qd
 from wavetank.view.film.grid import Field, Grid, outward_at, value_at
-from wavetank.view.film.interface import bent, index_of_water, mirrored, through_drop
 from wavetank.view.film.march import World, first_hit, past
 from wavetank.view.film.medium import Medium, absorbed_at, through_water
 from wavetank.view.film.murk import albedo_of, any_way, color_of, is_matte, murk_at
@@ -23,6 +22,7 @@ from wavetank.view.film.sampling import pair, towards
 from wavetank.view.lens import vec3
 from wavetank.view.look import Look
 from wavetank.view.optics.chance import scrambled
+from wavetank.view.optics.interface import bent, index_of_water, mirrored, through_drop
 
 UNIT = 4096.0  # steps of a map in the light of the bare sun
 

@@ -24,7 +24,6 @@ they bring is divided by that square where it is seen in the water.
 import dataclasses
 
 from wavetank.device.compiler import qd
-from wavetank.view.film.interface import bent, index_of_water, mirrored, through_drop
 from wavetank.view.film.light import Photons, floor_light, light_within, solid_light
 from wavetank.view.film.march import World, first_hit, past
 from wavetank.view.film.medium import Medium, absorbed_at, cell_near, through_water
@@ -34,6 +33,7 @@ from wavetank.view.film.sampling import around, disc, pair, towards
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, view_ray
 from wavetank.view.look import Look
 from wavetank.view.optics.chance import scrambled
+from wavetank.view.optics.interface import bent, index_of_water, mirrored, through_drop
 from wavetank.view.optics.radiance import background, smoothstep, sun_disc
 from wavetank.view.optics.rays import Box
 from wavetank.view.passes.floor import joint_cover, sand, stone

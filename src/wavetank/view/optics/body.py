@@ -2,15 +2,18 @@
 
 Between flat panes the way of a ray has a closed form: it ends at the nearest of them, of the floor and of the surface.
 Seen from within, panes and surface mirror totally what meets them at more than 48.6 degrees from their normal, which is
-nearly every ray that came in through a pane beside (Snell). The surface is the one that the sun sees (`SunlitWater`):
-where the end of a straight piece does not lie below it, the place where it does is found by halving.
+nearly every ray that came in through a pane beside (Snell). Where one leaves it is followed outside, and what is
+mirrored there as well, so that the border of what is mirrored totally is as soft as it is (Fresnel). The surface is the
+one that the sun sees (`SunlitWater`): where the end of a straight piece does not lie below it, the place where it does
+is found by halving.
 
     code      symbol   meaning                                                        unit
     under              depth of a point below the surface along the sun's rays        m
     p, ahead           where a straight piece begins, and its direction               m, 1
     s                  its length                                                     m
     n                  normal of what it ends at, out of the water                    1
-    k         cos^2    of the angle outside; negative: total reflection               1
+    share     F        of the light that is mirrored where a ray leaves               1
+    left               radiance and way of what leaves there                          1, m
 
 Solids in the tank are met on the way by their distances, and so are those that the surface mirrors; what the picture
 shows of them is taken from it.
@@ -23,7 +26,10 @@ from wavetank.solids.distance import SolidSet, signed_distance
 from wavetank.view.lens import Lens, to_pixel, to_view, vec2, vec3, vec4
 from wavetank.view.look import Look
 from wavetank.view.optics.fluid import Optics
-from wavetank.view.optics.maps import margins_inside, picture_at, share_of
+from wavetank.view.optics.interface import bent as crossed
+from wavetank.view.optics.interface import index_of_water
+from wavetank.view.optics.interface import mirrored as reflected
+from wavetank.view.optics.maps import margins_inside, picture_at
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.radiance import environment, smoothstep, surface_radiance
 from wavetank.view.optics.rays import Box
@@ -49,7 +55,7 @@ def depth_below(sun: Lens, first: qd.template(), at):
     result = -1.0
     if row >= 0 and column >= 0 and row < first.shape[0] - 1 and column < first.shape[1] - 1:
         total, weight = 0.0, 0.0
-        for k in qd.static(range(4)):
+        for k in range(4):
             z = qd.bit_cast(first[row + k // 2, column + k % 2], qd.f32)
             share = (1.0 - qd.abs(column + k % 2 - place.x)) * (1.0 - qd.abs(row + k // 2 - place.y))
             if z < 1e30:
@@ -98,8 +104,8 @@ def depth_at(sun: Lens, first: qd.template(), walls: Box, at, spacing):
 
 
 @qd.func
-def about_wet(sun: Lens, first: qd.template(), walls: Box, at, spacing):
-    """Whether the point `at` lies in the water, to the nearest texel, for what is seldom near the surface."""
+def about_depth(sun: Lens, first: qd.template(), walls: Box, at, spacing):
+    """The same to the nearest texel, for what is seldom near the surface; where there is no water far below zero."""
     inset = vec3(spacing, spacing, spacing)
     inner = qd.max(at, walls.lower + inset)
     inner = qd.min(inner, vec3(walls.upper.x - spacing, walls.upper.y, walls.upper.z - spacing))
@@ -107,39 +113,18 @@ def about_wet(sun: Lens, first: qd.template(), walls: Box, at, spacing):
     place = to_pixel(sun, c)
     row = qd.min(qd.max(qd.cast(place.y, qd.i32), 0), first.shape[0] - 1)
     column = qd.min(qd.max(qd.cast(place.x, qd.i32), 0), first.shape[1] - 1)
-    return c.z > qd.bit_cast(first[row, column], qd.f32)
+    return c.z - qd.bit_cast(first[row, column], qd.f32)
 
 
 @qd.func
-def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usual, solid: qd.template()):
-    """Radiance that the picture shows at the point `at`, and towards its margins and beyond it what is `usual` there.
+def wholeness(sun: Lens, first: qd.template(), inside: Inside, optics: Optics, at, bent):
+    """How much of a body the water is, 0 to 1, that a `bent` ray has entered at `at`, two spacings farther.
 
-    What stands before the water, nearer than `z` [m], is not behind it; where rays meet each `solid` by themselves,
-    neither is one that hides the point from the eye.
+    Broken water leaves air in the sun's way. It is 0 where there is none.
     """
-    result = usual
-    c = to_view(lens, at)
-    if c.z > lens.near:
-        there = to_pixel(lens, c)
-        inside = margins_inside(depth, there, 0.08)
-        if inside > 0.0:
-            shown = qd.bit_cast(depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32)
-            if qd.static(solid):
-                if shown < 0.97 * c.z:
-                    shown = 0.0
-            if shown > z and shown < 1e30:
-                result += smoothstep(inside) * (picture_at(picture, there) - result)
-    return result
-
-
-@qd.func
-def wholeness(sun: Lens, first: qd.template(), column: qd.template(), walls: Box, at, spacing, unit):
-    """How much of a body the water around the point `at` is, 0 to 1: broken water leaves air in the sun's way.
-
-    It is 0 where there is none.
-    """
-    inset = vec3(1.5 * spacing, 0.0, 1.5 * spacing)  # next to a wall the column's discs are cut
-    inner = qd.min(qd.max(at, walls.lower + inset), walls.upper - inset)
+    begun = qd.min(qd.max(at, inside.walls.lower), inside.walls.upper) + 2.0 * optics.spacing * bent
+    inset = 1.5 * optics.spacing * vec3(1.0, 0.0, 1.0)  # next to a wall the column's discs are cut
+    inner = qd.min(qd.max(begun, inside.walls.lower + inset), inside.walls.upper - inset)
     c = to_view(sun, inner)
     # Both maps between the same four texels.
     place = to_pixel(sun, c) - 0.5
@@ -147,17 +132,17 @@ def wholeness(sun: Lens, first: qd.template(), column: qd.template(), walls: Box
     top = qd.min(qd.max(qd.cast(place.y, qd.i32), 0), first.shape[0] - 2)
     u, v = place.x - left, place.y - top
     begins, water, weight = 0.0, 0.0, 1e-6
-    for k in qd.static(range(4)):
+    for k in range(4):
         z = qd.bit_cast(first[top + k // 2, left + k % 2], qd.f32)
-        share = share_of(k, v, u)
-        water += share * column[top + k // 2, left + k % 2]
+        share = qd.select(k % 2 == 1, u, 1.0 - u) * qd.select(k // 2 == 1, v, 1.0 - v)
+        water += share * inside.column[top + k // 2, left + k % 2]
         if z < 1e30:
             begins += share * z
             weight += share
     under, result = c.z - begins / weight, 0.0
     if under > 0.0 and weight > 0.25:
-        length = qd.min(wall_ahead(walls, inner, sun.forward)[3] + under, 1e3)
-        result = smoothstep((water * unit / length - 0.3) / 0.45)
+        length = qd.min(wall_ahead(inside.walls, inner, sun.forward)[3] + under, 1e3)
+        result = smoothstep((water * optics.unit / length - 0.3) / 0.45)
     return result
 
 
@@ -179,17 +164,19 @@ def wall_ahead(walls: Box, p, ahead):
 
 
 @qd.func
-def solid_ahead(solids: SolidSet, paints: qd.template(), p, ahead, far, coarse):
-    """(normal, way [m], number) of the first solid that a ray meets within `far` [m]; a way of -1 where it meets none.
+def solid_ahead(solids: SolidSet, paints: qd.template(), p, ahead, far, coarse, wide):
+    """(normal, way [m]), number and share of the first solid that a ray meets within `far` [m]; a share of 0 is none.
 
-    Solids are met to within `coarse` [m], and what a ray begins in is left first; glass is not met. All distances are
-    asked for in one place, because every copy of that code takes seconds to compile.
+    Where it meets none, one that it passes within a cone of the slope `wide` has a share of it. Solids are met to
+    within `coarse` [m], and what a ray begins in is left first; glass is not met. All distances are asked for in one
+    place, because every copy of that code takes seconds to compile.
     """
     hit, which, last = vec4(0.0, 0.0, 0.0, -1.0), -1, far
+    passed, beside, off = hit, -1, 1.0
     for k in range(solids.tank_count, solids.count):
         middle = solids.position[k] - p
         along = middle.dot(ahead)
-        reach = 1.001 * solids.reach[k] + coarse
+        reach = 1.001 * solids.reach[k] + coarse + wide * qd.min(qd.max(along, 0.0), far)
         miss = middle.dot(middle) - along * along
         t, end = 0.0, last
         if solids.reach[k] < 1e4:
@@ -203,121 +190,200 @@ def solid_ahead(solids: SolidSet, paints: qd.template(), p, ahead, far, coarse):
         while steps < 40 and t <= end:
             value = signed_distance(solids, k, p + t * ahead)
             if value.w > coarse:
+                if outside == 1 and value.w - coarse < off * wide * t:
+                    passed, beside, off = vec4(value.x, value.y, value.z, t), k, (value.w - coarse) / (wide * t)
                 outside = 1
             if outside == 1 and value.w <= coarse:
                 hit, which, last = vec4(value.x, value.y, value.z, t), k, t
                 steps = 40
             t += qd.max(qd.abs(value.w), 0.5 * coarse)
             steps += 1
-    return hit, which
+    cover = 1.0
+    if which < 0:
+        hit, which, cover = passed, beside, smoothstep(1.0 - off)
+    return hit, which, cover
 
 
 @qd.func
-def solid_radiance(
-    depth: qd.template(), picture: qd.template(), paints: qd.template(), lens: Lens, look: Look, at, n, seen, k, sunny,
-    spacing,
-):  # fmt: skip
-    """Radiance of solid `k` at its point `at`: as the picture shows it, and where that hides it in plain light."""
-    result = surface_radiance(look, paints[k], n, seen, vec2(sunny, 0.8), 0.4 * look.wrap, 0.0)
+def faint():
+    """Share of what leaves the water up to which what is mirrored there is not followed."""
+    return 0.05
+
+
+@qd.func
+def crossed_about(ahead, n, spread):
+    """(direction outside, share that is mirrored) of rays out of the water that spread around one of them.
+
+    What Snell and Fresnel say of one is blurred where the square of the cosine outside lies near 0. By the angle it
+    changes by 1.75 per radian there, and 0.45 of the blur's half width is its standard deviation; `spread` [rad] is
+    that of the rays. However broken the surface is, none leave along its normal that would be mirrored as a whole.
+    """
+    cosi, wide = ahead.dot(n), qd.min(3.9 * spread, 0.8)
+    k = 1.0 - 1.7689 * (1.0 - cosi * cosi)
+    ray, soft = ahead, wide > 1e-3 and qd.abs(k) < wide
+    if soft:
+        # As if the angle were one that lets it out.
+        steep = qd.sqrt(1.0 - (1.0 - qd.max(k, 0.5 * wide)) / 1.7689)
+        ray = steep * n + qd.sqrt(1.0 - steep * steep) * (ahead - cosi * n).normalized(1e-9)
+    result = crossed(ray, -n, index_of_water())
+    if soft:
+        result[3] = 1.0 - smoothstep(0.5 + 0.5 * k / wide) * (1.0 - result[3])
+    return result
+
+
+@qd.func
+def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usual, near, solid: qd.template()):
+    """Radiance that the picture shows at the point `at`, and towards its margins and beyond it what is `usual` there.
+
+    What stands before the water, nearer than `z` [m], is not behind it; where rays meet each `solid` by themselves,
+    neither is one that hides the point from the eye. A point of a solid is shown where the picture's depth is `near`
+    [m] its own; for others that is 0.
+    """
+    result = usual
     c = to_view(lens, at)
     if c.z > lens.near:
         there = to_pixel(lens, c)
-        inside = margins_inside(depth, there, 0.02)
-        if inside > 0.0:
+        share = smoothstep(margins_inside(depth, there, qd.select(near > 0.0, 0.02, 0.08)))
+        if share > 0.0:
             shown = qd.bit_cast(depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32)
-            off = qd.abs(shown - c.z) / (2.0 * spacing)
-            result += smoothstep(inside) * smoothstep(2.0 - off) * (picture_at(picture, there) - result)
+            if near > 0.0:
+                share *= smoothstep(2.0 - qd.abs(shown - c.z) / near)
+            elif shown <= z or shown >= 1e30:
+                share = 0.0
+            elif qd.static(solid):
+                if shown < 0.97 * c.z:
+                    share = 0.0
+            if share > 0.0:
+                result += share * (picture_at(picture, there) - result)
+    return result
+
+
+@qd.func
+def within_water(sun: Lens, first: qd.template(), walls: Box, p, ahead, spacing):
+    """(outward normal, way [m]) of what a ray from a point in the water meets first: a wall, the floor, the surface."""
+    result = wall_ahead(walls, p, ahead)
+    s = result[3]
+    if about_depth(sun, first, walls, p + 0.999 * s * ahead, spacing) <= 0.0:
+        # Three halvings, and between their ends as if the surface were straight.
+        low, over, deep = 0.0, 0.0, 0.0
+        for _ in range(3):
+            middle = 0.5 * (low + s)
+            found = depth_at(sun, first, walls, p + middle * ahead, spacing)
+            if found > 0.0:
+                low, deep = middle, found
+            else:
+                s, over = middle, found
+        if deep > 0.0 and over < 0.0:
+            s = low + (s - low) * deep / (deep - qd.max(over, -deep))
+        else:
+            s = 0.5 * (low + s)
+        n = texel_normal(sun, first, p + s * ahead, spacing)
+        result = vec4(n.x, n.y, n.z, s)
     return result
 
 
 @qd.func
 def through_body(
     depth: qd.template(), picture: qd.template(), first: qd.template(), lens: Lens, sun: Lens, look: Look,
-    optics: Optics, inside: Inside, z, at, bent, mirrored, solid: qd.template(),
+    optics: Optics, inside: Inside, z, at, bent, mirrored, whole, uneven, solid: qd.template(),
 ):  # fmt: skip
-    """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, (radiance,
-    share) of the solid that the ray which is `mirrored` there meets, and how much of a body the water is.
+    """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, and
+    (radiance, share) of the solid that the ray which is `mirrored` there meets.
 
-    The way is negative where there is none: less than two spacings of it, or more air than water; nothing is found
-    then but what is mirrored; nothing is where `mirrored` is nought.
+    The way is negative where the water is no body, by `wholeness`; nothing is found then but what is mirrored; nothing
+    is where `mirrored` is nought. The standard deviation of the normals where it entered is `uneven`: rays that enter
+    around it spread about as much.
+
+    All that a straight piece may meet, and all that it may show, is asked for in one place: compilers copy each
+    function to wherever it is called, and the time that they take grows faster than what they get.
     """
-    shown, total, done = vec3(0.0, 0.0, 0.0), 0.0, 0
-    seen_above = vec4(0.0, 0.0, 0.0, 0.0)
+    shown, total, seen_above = vec3(0.0, 0.0, 0.0), 0.0, vec4(0.0, 0.0, 0.0, 0.0)
     p, ahead = qd.min(qd.max(at, inside.walls.lower), inside.walls.upper), bent
-    begun = p + 2.0 * optics.spacing * ahead
-    whole = wholeness(sun, first, inside.column, inside.walls, begun, optics.spacing, optics.unit)
+    # Where a ray leaves that is mirrored as well, what leaves first is kept, and what is mirrored there goes on.
+    left, share, waits, turned, again = vec4(0.0, 0.0, 0.0, 0.0), 0.0, 0, p, ahead
+    # A piece of 0 is in the water, of 1 outside where it has left, of 2 outside where it was mirrored at first; where a
+    # solid has a share of it, it is looked at again, past that one.
+    piece, past, within, done = 0, 0, 0, 0
     if whole <= 0.0:
         total, done = -1.0, 1
-    # Within, then where solids stand in the way of what leaves, and of what is mirrored.
-    leaves = 0
-    for bounce in range(qd.static(5 if solid else 3)):
-        above = 0
+    for _ in range(qd.static(7 if solid else 5)):
+        if done == 1 and waits == 1:
+            left = vec4(shown.x, shown.y, shown.z, total)
+            p, ahead, waits, piece, done = turned, again, 0, 0, 0
+        if done == 0 and piece == 0 and within == 3:
+            shown, done = optics.glow, 1
         if qd.static(solid):
-            if bounce == 4 and mirrored.y != 0.0:
-                p, ahead, above, leaves = at, mirrored, 1, 0
-        if (done == 0 and (bounce < 3 or leaves == 1)) or above == 1:
+            if done == 1 and piece < 2 and mirrored.y != 0.0:
+                p, ahead, piece, done = at, mirrored, 2, 0
+        if done == 0:
             n, s = vec3(0.0, 1.0, 0.0), 1e3
-            if above + leaves == 0:
-                wall = wall_ahead(inside.walls, p, ahead)
-                n, s = vec3(wall[0], wall[1], wall[2]), wall[3]
-                if not about_wet(sun, first, inside.walls, p + 0.999 * s * ahead, optics.spacing):
-                    # Three halvings, and between their ends as if the surface were straight.
-                    low, over, deep = 0.0, 0.0, 0.0
-                    for _ in range(3):
-                        middle = 0.5 * (low + s)
-                        found = depth_at(sun, first, inside.walls, p + middle * ahead, optics.spacing)
-                        if found > 0.0:
-                            low, deep = middle, found
-                        else:
-                            s, over = middle, found
-                    if deep > 0.0 and over < 0.0:
-                        s = low + (s - low) * deep / (deep - qd.max(over, -deep))
-                    else:
-                        s = 0.5 * (low + s)
-                    n = texel_normal(sun, first, p + s * ahead, optics.spacing)
-            met = 0
+            if piece == 0:
+                met = within_water(sun, first, inside.walls, p, ahead, optics.spacing)
+                n, s = vec3(met[0], met[1], met[2]), met[3]
+            # What it shows: `usual`, or what the picture shows at a `place`, of a solid within `near` of it.
+            shows, place, usual, near, cover = 0, p, vec3(0.0, 0.0, 0.0), 0.0, 0.0
             if qd.static(solid):
-                hit, k = solid_ahead(inside.solids, inside.paints, p, ahead, s, 0.1 * optics.spacing)
-                if k >= 0:
-                    met, place = 1, p + hit.w * ahead
-                    normal = vec3(hit.x, hit.y, hit.z)
-                    deep = qd.max(depth_below(sun, first, place), 0.0)
-                    sunny = qd.select(above + leaves > 0, 1.0, qd.exp(-0.6 * deep * optics.absorption.y))
-                    radiance = solid_radiance(
-                        depth, picture, inside.paints, lens, look, place, normal, -ahead, k, sunny, optics.spacing
-                    )
-                    if above == 1:
-                        seen_above = vec4(radiance.x, radiance.y, radiance.z, 1.0)
-                    else:
-                        shown, done = radiance, 1
-                        if leaves == 0:
-                            total += hit.w
-            if met == 0 and leaves == 1:
-                shown, done = environment(look, ahead), 1
+                if past == 0:
+                    hit, k, found = solid_ahead(
+                        inside.solids, inside.paints, p, ahead, s, 0.1 * optics.spacing,
+                        qd.select(piece == 2, 0.0, uneven),
+                    )  # fmt: skip
+                    cover = found
+                    if share > 0.0:
+                        cover = qd.select(cover > 0.5, 1.0, 0.0)
+                    if cover > 0.0:
+                        shows, place, near, s = 1, p + hit.w * ahead, 2.0 * optics.spacing, hit.w
+                        sunny = 1.0
+                        if piece == 0:
+                            deep = about_depth(sun, first, inside.walls, place, optics.spacing)
+                            sunny = qd.exp(-0.6 * qd.max(deep, 0.0) * optics.absorption.y)
+                        usual = surface_radiance(
+                            look, inside.paints[k], vec3(hit.x, hit.y, hit.z), -ahead, vec2(sunny, 0.8),
+                            0.4 * look.wrap, 0.0,
+                        )  # fmt: skip
+                past = 0
+            ends = 1
+            if cover == 0.0 and piece == 1:
+                usual = environment(look, ahead)
                 if ahead.y < -1e-3:
-                    shown = seen_at(depth, picture, lens, z, p + (qd.max(p.y, 0.0) / -ahead.y) * ahead, shown, solid)
-            elif met == 0 and above == 0:
+                    shows, place = 1, p + (qd.max(p.y, 0.0) / -ahead.y) * ahead
+            elif cover == 0.0 and piece == 0:
+                within += 1
                 total += s
                 p += s * ahead
-                cosi = ahead.dot(n)
-                k = 1.0 - 1.7689 * (1.0 - cosi * cosi)
                 if n.y < -0.5:
-                    dimly = look.below * qd.exp(-0.6 * optics.usual * optics.absorption)
-                    shown, done = seen_at(depth, picture, lens, z, p, dimly, solid), 1
-                elif k > 0.0 or cosi <= 0.0:
-                    out = ahead
-                    if cosi > 0.0:
-                        out = 1.33 * ahead + (qd.sqrt(k) - 1.33 * cosi) * n
-                    if qd.static(solid):
-                        leaves, ahead = 1, out
-                    else:
-                        shown, done = environment(look, out), 1
-                        if out.y < -1e-3:
-                            shown = seen_at(
-                                depth, picture, lens, z, p + (qd.max(p.y, 0.0) / -out.y) * out, shown, solid
-                            )
+                    shows, place = 1, p
+                    usual = look.below * qd.exp(-0.6 * optics.usual * optics.absorption)
                 else:
-                    ahead -= 2.0 * cosi * n
+                    ends = 0
+                    out = crossed_about(ahead, n, uneven)
+                    if ahead.dot(n) <= 0.0:  # a texel's normal, which a bent surface has turned away from the ray
+                        out = vec4(ahead.x, ahead.y, ahead.z, 0.0)
+                    ahead = reflected(ahead, -n)
+                    if out[3] < qd.select(share == 0.0, 1.0, 0.5):  # divided before, it takes the way of most of it
+                        turned, again, piece = p, ahead, 1
+                        ahead = vec3(out[0], out[1], out[2])
+                        if share == 0.0:
+                            share = qd.max(out[3] - faint(), 0.0) / (1.0 - faint())
+                            waits = qd.select(share > 0.0, 1, 0)
+            if ends == 1:
+                if shows == 1:
+                    usual = seen_at(depth, picture, lens, z, place, usual, near, solid)
+                way = total + qd.select(cover > 0.0 and piece == 0, s, 0.0)
+                if piece == 2:
+                    done = 1
+                    if cover > 0.0:
+                        seen_above = vec4(usual.x, usual.y, usual.z, 1.0)
+                elif cover > 0.0 and cover < 1.0:
+                    left, share, past = vec4(usual.x, usual.y, usual.z, way), 1.0 - cover, 1
+                else:
+                    shown, total, done = usual, way, 1
     if done == 0:
         shown = optics.glow
-    return vec4(shown.x, shown.y, shown.z, total), seen_above, whole
+    if share > 0.0:
+        # One way for both, with what each of them is swallowed less or more on its own.
+        way = share * total + (1.0 - share) * left[3]
+        shown = share * qd.exp((way - total) * optics.absorption) * shown
+        shown += (1.0 - share) * qd.exp((way - left[3]) * optics.absorption) * vec3(left[0], left[1], left[2])
+        total = way
+    return vec4(shown.x, shown.y, shown.z, total), seen_above

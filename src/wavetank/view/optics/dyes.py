@@ -30,9 +30,10 @@ def dye_at(dye: qd.template(), place):
     """(dyed part of the thickness [steps], mean linear colour) at a place in texels, between the four nearest."""
     r, c, r1, c1, v, u = corners(place, dye.shape[0], dye.shape[1], 1.001)
     total = vec4(0.0, 0.0, 0.0, 0.0)
-    for k in qd.static(range(4)):
-        top = dye[r, c, k] * (1.0 - u) + dye[r, c1, k] * u
-        total[k] = top + ((dye[r1, c, k] * (1.0 - u) + dye[r1, c1, k] * u) - top) * v
+    for k in range(4):
+        i, j = qd.select(k // 2 == 1, r1, r), qd.select(k % 2 == 1, c1, c)
+        share = qd.select(k % 2 == 1, u, 1.0 - u) * qd.select(k // 2 == 1, v, 1.0 - v)
+        total += share * vec4(dye[i, j, 0], dye[i, j, 1], dye[i, j, 2], dye[i, j, 3])
     part = qd.max(total[0], 1e-6)
     return vec4(total[0], total[1] / part, total[2] / part, total[3] / part)
 

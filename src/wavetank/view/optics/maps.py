@@ -1,6 +1,7 @@
 """Maps and pictures, read between their texels."""
 
 from wavetank.device.compiler import qd
+from wavetank.view.lens import vec3
 
 
 @qd.func
@@ -31,12 +32,20 @@ def thickness_at(thickness: qd.template(), place, scale):
 
 
 @qd.func
+def map_at(map: qd.template(), place, nothing):
+    """What a map holds at a place (column, row), between the four nearest texels; `nothing` is a zero of its kind."""
+    r, c, r1, c1, v, u = corners(place, map.shape[0], map.shape[1], 1.0)
+    result = nothing
+    for k in range(4):
+        share = qd.select(k % 2 == 1, u, 1.0 - u) * qd.select(k // 2 == 1, v, 1.0 - v)
+        result += share * map[qd.select(k // 2 == 1, r1, r), qd.select(k % 2 == 1, c1, c)]
+    return result
+
+
+@qd.func
 def picture_at(picture: qd.template(), place):
     """Radiance at a place (column, row), between the four nearest pixels."""
-    r, c, r1, c1, v, u = corners(place, picture.shape[0], picture.shape[1], 1.0)
-    top = picture[r, c] + u * (picture[r, c1] - picture[r, c])
-    low = picture[r1, c] + u * (picture[r1, c1] - picture[r1, c])
-    return top + v * (low - top)
+    return map_at(picture, place, vec3(0.0, 0.0, 0.0))
 
 
 @qd.func

@@ -5,25 +5,23 @@ from wavetank.view.lens import Lens, from_view, plane_position, vec2, vec3
 
 
 @qd.func
-def rise_along(row, column, down, across, z, limit, depth: qd.template()):
-    """Change of depth [m] to the next pixel of a row or column, taken more from the side where it is less."""
-    total, weight = 0.0, 1e-30
-    for k in range(2):
-        side = 2 * k - 1
+def rise_at(row, column, z, limit, depth: qd.template()):
+    """Change of depth [m] to the next column and to the next row, each taken more from the side where it is less."""
+    total, weight = vec2(0.0, 0.0), vec2(1e-30, 1e-30)
+    for k in range(4):
+        side, down = 2 * (k % 2) - 1, k // 2
         r = qd.min(qd.max(row + side * down, 0), depth.shape[0] - 1)
-        c = qd.min(qd.max(column + side * across, 0), depth.shape[1] - 1)
+        c = qd.min(qd.max(column + side * (1 - down), 0), depth.shape[1] - 1)
         rise = qd.bit_cast(depth[r, c], qd.f32) - z
         if qd.abs(rise) < limit:
             w = 1.0 / (rise * rise + 1e-4 * limit * limit)
-            total += w * side * rise
-            weight += w
+            if down == 0:
+                total.x += w * side * rise
+                weight.x += w
+            else:
+                total.y += w * side * rise
+                weight.y += w
     return total / weight
-
-
-@qd.func
-def rise_at(row, column, z, limit, depth: qd.template()):
-    """Change of depth [m] to the next column and to the next row, from the smoother sides."""
-    return vec2(rise_along(row, column, 0, 1, z, limit, depth), rise_along(row, column, 1, 0, z, limit, depth))
 
 
 @qd.func

@@ -28,7 +28,7 @@ from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_vie
 from wavetank.view.look import Look
 from wavetank.view.optics.fluid import grain_of
 from wavetank.view.optics.glass import line_cover, slack
-from wavetank.view.optics.maps import picture_at
+from wavetank.view.optics.maps import map_at
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import Drops, WaterSurface, water_of
@@ -162,7 +162,7 @@ def smear(
         if moves(motion.way, texel_row, texel_column, rows, columns, shutter.least):
             for row in range(texel_row * grain, qd.min((texel_row + 1) * grain, high)):
                 for column in range(texel_column * grain, qd.min((texel_column + 1) * grain, wide)):
-                    way, mark = 2.0 * picture_at(motion.way, vec2(column + 0.5, row + 0.5) / grain), 0
+                    way, mark = 2.0 * map_at(motion.way, vec2(column + 0.5, row + 0.5) / grain, vec2(0.0, 0.0)), 0
                     length = way.norm()
                     down, across = row * samples, column * samples
                     moving = length > 2.0 * shutter.least

@@ -24,10 +24,9 @@ from wavetank.view.optics.drop import drop_of, motion_of, rough_of, shine, way_o
 from wavetank.view.optics.fluid import Optics, optics_of
 from wavetank.view.optics.glass import line_cover
 from wavetank.view.shot import Shot
+from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import Drops, WaterSurface, water_of
 from wavetank.view.weights import under_water
-
-LONGEST = 0.08  # of the picture's height: half of a streak is not longer
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
@@ -38,12 +37,20 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     frame = shot.frame
     if frame.dim == 2 or frame.count == 0 or shot.shutter <= 0.0 or under_water(shot, buffers):
         return
-    water = water_of(buffers, shot)
+    water, sums, seen = water_of(buffers, shot), buffers.foam, buffers.streak_box
+    drops, optics = water.drops(frame), optics_of(shot, 0, buffers.supersample)
+    motion = motion_of(shot.shutter, buffers.supersample)
+    bound(seen, sums, drops, water.cells, shot.lens, optics, motion, frame.count)
     lay(
-        buffers.pixels, buffers.foam, water.surface, water.drops(frame), water.cells, shot.lens, shot.look,
-        optics_of(shot, 0, buffers.supersample), motion_of(shot.shutter, buffers.supersample),
-        LONGEST * buffers.rows, frame.count,
+        buffers.pixels, sums, water.surface, seen, strips_of(sums.sums), drops, water.cells, shot.lens, shot.look,
+        optics, motion, frame.count,
     )  # fmt: skip
+
+
+@qd.func
+def longest(sums: FoamMaps, samples):
+    """Half of a streak is not longer [computed px]: 0.08 of the picture's height."""
+    return 0.08 * sums.sums.shape[0] * samples
 
 
 @qd.func
@@ -54,16 +61,58 @@ def share_before(x):
 
 
 @qd.kernel(fastcache=True)
+def bound(
+    seen: qd.types.ndarray(), sums: FoamMaps, drops: Drops, cells: Cells, lens: Lens, optics: Optics, motion: vec4,
+    count: qd.i32,
+):  # fmt: skip
+    """Find the box of the picture outside of which there is no streak; `motion` is that of `motion_of`."""
+    samples, rows, columns = optics.samples, sums.sums.shape[0], sums.sums.shape[1]
+    for k in range(4):
+        seen[k] = qd.select(k == 0, columns, qd.select(k == 2, rows, -1))
+    for a in range(count):
+        if drops.lone[a] == 1:
+            way, c = way_of(lens, drops, cells, a, motion[2]), to_view(lens, cells.x[a])
+            # A drop, and what it is torn into, lie within 2.2 spacings of the particle, 1.6 in depth.
+            near = c.z - 1.6 * optics.spacing
+            if way.norm() > motion[3] and c.z + 1.6 * optics.spacing > lens.near:
+                left, right, top, bottom = 0.0, 1.0 * columns, 0.0, 1.0 * rows
+                if near > 2.0 * lens.near:
+                    middle = to_pixel(lens, c)
+                    wide = 2.2 * optics.spacing * pixels_per_metre(lens, near) + 2.0 * samples
+                    wide += qd.min(way.norm(), longest(sums, samples))
+                    wide += lens.perspective * (middle - lens.middle).norm() * 1.6 * optics.spacing / near
+                    left, right = (middle.x - wide) / samples, (middle.x + wide) / samples
+                    top, bottom = (middle.y - wide) / samples, (middle.y + wide) / samples
+                if right >= 0.0 and bottom >= 0.0 and left < columns and top < rows:
+                    qd.atomic_min(seen[0], qd.cast(qd.max(left, 0.0), qd.i32))
+                    qd.atomic_max(seen[1], qd.cast(qd.min(right, columns - 1.0), qd.i32))
+                    qd.atomic_min(seen[2], qd.cast(qd.max(top, 0.0), qd.i32))
+                    qd.atomic_max(seen[3], qd.cast(qd.min(bottom, rows - 1.0), qd.i32))
+
+
+@qd.func
+def strip_seen(strips: Strips, task, seen: qd.template(), rows, columns):
+    """As `strip` has it, but only what lies in the box."""
+    row, first, last = strip(strips, task, rows, columns)
+    first, last = qd.max(first, seen[0]), qd.min(last, seen[1] + 1)
+    if row < seen[2] or row > seen[3]:
+        last = first
+    return row, first, last
+
+
+@qd.kernel(fastcache=True)
 def lay(
-    pixels: Pixels, sums: FoamMaps, surface: WaterSurface, drops: Drops, cells: Cells, lens: Lens, look: Look,
-    optics: Optics, motion: vec4, longest: qd.f32, count: qd.i32,
+    pixels: Pixels, sums: FoamMaps, surface: WaterSurface, seen: qd.types.ndarray(), strips: Strips, drops: Drops,
+    cells: Cells, lens: Lens, look: Look, optics: Optics, motion: vec4, count: qd.i32,
 ):  # fmt: skip
     """Add up the streaks of every pixel, and lay their sum over it; `motion` is that of `motion_of`."""
     samples, rows, columns = optics.samples, sums.sums.shape[0], sums.sums.shape[1]
-    for row, column in qd.ndrange(rows, columns):
-        surface.rim[row * samples, column * samples] = 0
-        for k in qd.static(range(3)):
-            sums.sums[row, column, k] = 0
+    for task in range(strips.count):
+        row, first, last = strip_seen(strips, task, seen, rows, columns)
+        for column in range(first, last):
+            surface.rim[row * samples, column * samples] = 0
+            for k in qd.static(range(3)):
+                sums.sums[row, column, k] = 0
     for a in range(count):
         if drops.lone[a] == 1:
             way = way_of(lens, drops, cells, a, motion[2])
@@ -74,19 +123,18 @@ def lay(
                     if k == 0:  # what it is torn into shows the same
                         low, mid, high = lines(pixels, surface, drops, cells, lens, look, optics, a, drop, way)
                     if drop[3] > 0.0:
-                        add(
-                            pixels, sums, surface, drops, cells, lens, look, optics, a, drop, way, longest, low, mid,
-                            high,
-                        )  # fmt: skip
-    for row, column in qd.ndrange(rows, columns):
-        tau = surface.rim[row * samples, column * samples]
-        if tau > 0:
-            shown = vec3(sums.sums[row, column, 0], sums.sums[row, column, 1], sums.sums[row, column, 2]) / tau
-            cover = 1.0 - qd.exp(-tau / 4096.0)
-            for k in range(samples * samples):
-                r, c = row * samples + k // samples, column * samples + k % samples
-                before = pixels.color[r, c]
-                pixels.color[r, c] = before + cover * (shown - before)
+                        add(pixels, sums, surface, drops, cells, lens, look, optics, a, drop, way, low, mid, high)
+    for task in range(strips.count):
+        row, first, last = strip_seen(strips, task, seen, rows, columns)
+        for column in range(first, last):
+            tau = surface.rim[row * samples, column * samples]
+            if tau > 0:
+                shown = vec3(sums.sums[row, column, 0], sums.sums[row, column, 1], sums.sums[row, column, 2]) / tau
+                cover = 1.0 - qd.exp(-tau / 4096.0)
+                for k in range(samples * samples):
+                    r, c = row * samples + k // samples, column * samples + k % samples
+                    before = pixels.color[r, c]
+                    pixels.color[r, c] = before + cover * (shown - before)
 
 
 @qd.func
@@ -131,7 +179,7 @@ def lines(
 @qd.func
 def add(
     pixels: Pixels, sums: FoamMaps, surface: WaterSurface, drops: Drops, cells: Cells, lens: Lens, look: Look,
-    optics: Optics, a, drop, way, longest, low, mid, high,
+    optics: Optics, a, drop, way, low, mid, high,
 ):  # fmt: skip
     """Add a drop to the pixels of the picture that it passes; `low`, `mid` and `high` are what `lines` found."""
     c, r, samples = to_view(lens, vec3(drop[0], drop[1], drop[2])), drop[3], optics.samples
@@ -139,7 +187,7 @@ def add(
         scale = pixels_per_metre(lens, c.z)  # computed pixels per metre
         middle, long = to_pixel(lens, c), way.norm()
         along = way / long
-        long = qd.min(long, longest)
+        long = qd.min(long, longest(sums, samples))
         wide = qd.max(r * scale, 0.75 * samples)
         faint, key = (r * scale / wide) ** 2, c.z - r
         # The box of both ends.

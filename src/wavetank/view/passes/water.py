@@ -29,7 +29,7 @@ from wavetank.view.lens import (
     view_ray,
 )
 from wavetank.view.look import Look
-from wavetank.view.optics.body import Inside, through_body
+from wavetank.view.optics.body import Inside, through_body, wholeness
 from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, refracted
 from wavetank.view.optics.glass import line_cover
@@ -87,18 +87,19 @@ def lay(
         beside, block = optics.samples, optics.samples * optics.tall
         # What is seen through a body of water is found once for all samples of a pixel, or of two: one after the other.
         kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
-        kept_above, kept_whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
+        kept_above, kept_whole, uneven = vec4(0.0, 0.0, 0.0, 0.0), 0.0, 0.0
         # A pixel whose samples all show the same is shaded once, in its middle.
         even, even_z, even_normal = 0, 0.0, vec3(0.0, 0.0, 0.0)
-        for index in range((end - begin + beside - 1) // beside * block):
+        for index in range((end - begin + optics.turn + beside - 1) // beside * block):
             part = index % block
-            row, column = band * optics.tall + part // beside, begin + index // block * beside + part % beside
+            row = band * optics.tall + part // beside
+            column = begin - optics.turn + index // block * beside + part % beside
             if qd.static(world >= 100):
                 if part == 0 and optics.under == 0:
                     even, even_z, even_normal = even_pixel(
                         pixels, surface, lens, look, optics, inside.walls, row, column, qd.static(world % 10)
                     )
-            if column < end and (part == 0 or even == 0):
+            if column >= begin and column < end and (part == 0 or even == 0):
                 middle = vec2(column + 0.5, row + 0.5)
                 result = backdrop.behind[row, column]
                 z, back = (
@@ -159,33 +160,44 @@ def lay(
                             if share > 0.0:
                                 body = vec4(0.0, 0.0, 0.0, -1.0)
                                 above, whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
+                                bodily, fresh, pixel = False, False, (column + optics.turn) // optics.samples
                                 if qd.static(world % 10 >= 3):
                                     # A tank, and without bent rays to meet them no solid in it.
                                     wide = back > 0.999 * ends[1]
                                     if qd.static(world % 10 == 4):
                                         wide = True
                                     if inside.walls.upper.x < 1e5 and wide:
-                                        pixel = column // optics.samples
+                                        bodily = True
                                         near = qd.abs(at - kept_z) < 0.3 * optics.spacing
-                                        if pixel != kept_pixel or layer != kept_layer or not near:
-                                            ahead = direction.normalized()
-                                            cosi = qd.max(-n.dot(ahead), 0.05)
-                                            kept, kept_above, kept_whole = through_body(
-                                                pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
-                                                inside, at, origin + at * direction, refracted(ahead, n, cosi),
-                                                qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0),
-                                                qd.static(world % 10 == 4),
-                                            )  # fmt: skip
-                                            kept_z, kept_layer, kept_pixel = at, layer, pixel
-                                        body, above, whole = kept, kept_above, kept_whole
-                                rough = 0.0
+                                        fresh = pixel != kept_pixel or layer != kept_layer or not near
+                                half = (look.to_sun - direction.normalized()).normalized(1e-9)
+                                shiny = layer == 1 and n.dot(half) > 0.9
                                 if qd.static(world % 10 >= 3):
-                                    half = (look.to_sun - direction / direction.norm()).normalized(1e-9)
-                                    if layer == 1 and n.dot(half) > 0.9:
-                                        rough = roughness(lens, row, column, z, n, optics, surface.depth)
+                                    ahead, point = direction.normalized(), origin + at * direction
+                                    cosi = qd.max(-n.dot(ahead), 0.05)
+                                    bent = refracted(ahead, n, cosi)
+                                    if fresh:
+                                        kept_whole = wholeness(sun, sunlit.depth, inside, optics, point, bent)
+                                    if layer == 1 and ((fresh and kept_whole > 0.0) or shiny):
+                                        uneven = unevenness(
+                                            lens, row, column, z, n, direction, optics.spacing, surface.depth
+                                        )
+                                    elif fresh:
+                                        uneven = 0.0
+                                    if fresh:
+                                        kept, kept_above = through_body(
+                                            pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
+                                            inside, at, point, bent,
+                                            qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), kept_whole, uneven,
+                                            qd.static(world % 10 == 4),
+                                        )  # fmt: skip
+                                        kept_z, kept_layer, kept_pixel = at, layer, pixel
+                                    if bodily:
+                                        body, above, whole = kept, kept_above, kept_whole
+                                rough = qd.select(shiny, uneven * uneven, 0.0)
                                 result += share * shine(
                                     pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside, middle, at,
-                                    n, origin, direction, body, above, whole, rough, qd.static(world % 10),
+                                    n, origin, direction, body, above, whole, uneven, rough, qd.static(world % 10),
                                     qd.static(world % 100 >= 10),
                                 )  # fmt: skip
                         line = line_cover(pixels.lines[row, column], front, optics.slack)
@@ -227,17 +239,27 @@ def normal_beside(lens: Lens, row, column, z, limit, depth: qd.template()):
 
 
 @qd.func
-def roughness(lens: Lens, row, column, z, n, optics: Optics, depth: qd.template()):
-    """Variance of the normals of the surface around a pixel, along an axis, within a spacing."""
-    total, k = 0.0, qd.cast(2.0 * optics.coarse, qd.i32)
+def unevenness(lens: Lens, row, column, z, n, direction, spacing, depth: qd.template()):
+    """Standard deviation of the normals of the surface around a pixel, along an axis, within a spacing.
+
+    Of both sides the rougher counts, and none beyond which the surface ends; where it does to both, it is broken. A
+    mean of two, half of it along each axis, a third of it at the edge is that within.
+    """
+    total, pixel = 0.0, lens.pixel * (1.0 + lens.perspective * (z - 1.0))
+    steep = qd.max(qd.abs(n.dot(direction)), 1e-3)
     for axis in range(2):
-        r = qd.min(row + k * axis, depth.shape[0] - 1)
-        c = qd.min(column + k * (1 - axis), depth.shape[1] - 1)
-        there, away = qd.bit_cast(depth[r, c], qd.f32), vec3(1.0, 0.0, 0.0)
-        if qd.abs(there - z) < 3.0 * optics.spacing:
-            away = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * optics.spacing, depth)) - n
-        total += away.dot(away)
-    return total / 12.0  # a mean of two, half of it along each axis, a third of it at the edge is that within
+        away, slope = -1.0, n.dot(qd.select(axis == 0, lens.right, lens.up)) / steep
+        k = qd.max(qd.cast(spacing / (pixel * qd.sqrt(1.0 + slope * slope)), qd.i32), 1)
+        for side in range(2):
+            step = k * (1 - 2 * side)
+            r = qd.min(qd.max(row + step * axis, 0), depth.shape[0] - 1)
+            c = qd.min(qd.max(column + step * (1 - axis), 0), depth.shape[1] - 1)
+            there = qd.bit_cast(depth[r, c], qd.f32)
+            if qd.abs(there - z) < 3.0 * spacing:
+                other = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * spacing, depth)) - n
+                away = qd.max(away, other.dot(other))
+        total += qd.select(away < 0.0, 1.0, away)
+    return qd.sqrt(total / 12.0)
 
 
 @qd.func
@@ -260,12 +282,13 @@ def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, star
 @qd.func
 def shine(
     pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
-    optics: Optics, inside: Inside, place, z, normal, origin, direction, body, above, whole, rough,
+    optics: Optics, inside: Inside, place, z, normal, origin, direction, body, above, whole, uneven, rough,
     world: qd.template(), many: qd.template(),
 ):  # fmt: skip
     """Radiance of the water that is seen at depth `z` with this normal, at a place (column, row) of the picture.
 
-    `body`, `above` and `whole` are what `through_body` found for it; a negative way where it found none.
+    `body`, `above` and `whole` are what `through_body` found for it; a negative way where it found none. Rays that
+    spread, because the surface is `uneven`, are as long as the straight one as far as they are not as long as that.
     `rough` is the variance of the normals around, see `glint`.
     """
     n, pace = normal, direction.norm()
@@ -308,7 +331,7 @@ def shine(
         glossy = 1.0 - smoothstep((1.6 - layers) / 0.8) * (1.0 - off)
         if body[3] >= 0.0:
             shown += whole * (vec3(body[0], body[1], body[2]) - shown)
-            travel += whole * (body[3] - travel)
+            travel += whole * (1.0 - qd.min(1.5 * uneven, 0.6)) * (body[3] - travel)
             ball *= 1.0 - whole
         if ball > 0.0:
             out = 2.0 * bent.dot(ahead) * bent - ahead
