@@ -221,8 +221,9 @@ class Bodies(Mapping[str, Body]):
             if is_held or is_held != was_held:
                 self._hold(row, is_held)
         self._held = held
-        for joint in self.joints.values():
-            joint.drive(clock, dt)
+        if not self._standing:
+            for joint in self.joints.values():
+                joint.drive(clock, dt)
         self.begun = [now.position for now in self.solid_views]
         self._move(dt, share)
 

@@ -293,9 +293,10 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         world.has_thin_walls = bool(download(world.thin_walls)[0])
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     few = int(not is_shared(finest))
+    numbers = errors(finest, params, stiffness, bodies=world.pieces is not None)
     gather(
         finest, world.particles, world.scratch, cells, world.solids, world.walls, c,
-        errors(finest, params, stiffness, bodies=world.pieces is not None), count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
+        numbers, count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
     )  # fmt: skip
     solve_levels(world.levels)
     move_particles(
