@@ -230,7 +230,7 @@ class Bodies(Mapping[str, Body]):
     def _move(self, dt: float, share: float) -> None:
         """Let the engine take the step, from where it began, with the velocities that are wanted."""
         self._weigh()
-        slowed = self._slowed(self.coupling.wanted)
+        slowed = self.coupling.slowed(self.fastest)
         for now, velocity in zip(self.views, slowed.tolist(), strict=True):
             now.linvel, now.angvel = velocity[:3], velocity[3:]
         # The engine keeps what it is given, in single precision, but for what it does not move itself.
@@ -339,15 +339,6 @@ class Bodies(Mapping[str, Body]):
             now.body_type = kind
         if held:
             now.set_next_kinematic_position(isometry(self.engine, self.begins[0][row], self.begins[1][row]))
-
-    def _slowed(self, velocities: np.ndarray) -> np.ndarray:
-        """Return the velocities [n, 6] of which no part of a body's surface is faster than the water may get."""
-        speeds = np.sqrt((velocities * velocities).reshape(-1, 2, 3).sum(axis=2))
-        speeds[:, 1] *= self.coupling.reaches
-        slowed: np.ndarray = velocities * np.repeat(
-            np.minimum(1.0, self.fastest / np.maximum(speeds, 1e-30)), 3, axis=1
-        )
-        return slowed
 
     def _stand(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the bodies are: places [n, 3] and rotations [n, 4]."""
