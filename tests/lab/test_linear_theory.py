@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from wavetank.lab.cases.heave import BARGE, passings, sphere_theory
+from wavetank.lab.cases.heave import BARGE, extremes, passings, sphere_theory
 from wavetank.lab.cases.linear_waves import decay
 
 
@@ -25,3 +25,12 @@ def test_a_sphere_swings_as_waves_of_all_frequencies_let_it():
     assert way[0] == pytest.approx(1.0, abs=3e-3)
     assert second - first == pytest.approx(0.3948, abs=1e-3)
     assert math.isclose(way.min(), -0.897, abs_tol=3e-3)
+
+
+def test_extremes_are_found_between_samples():
+    """A damped swing turns where its velocity is zero: tan(w t) = -k / w, half a period apart."""
+    times, k, w = np.arange(0, 80) / 60, 1.3, 7.1
+    trough, crest = extremes(times, np.exp(-k * times) * np.cos(w * times))
+    first = (math.pi - math.atan(k / w)) / w
+    assert trough == pytest.approx(first, abs=5e-4)
+    assert crest - trough == pytest.approx(math.pi / w, abs=1e-3)

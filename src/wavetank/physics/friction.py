@@ -13,6 +13,8 @@ The tank's floor takes it from puddles, a layer at most.
 And all of them, but bodies, take the same share from slow motion towards them and away, from the layer next to them.
 Iterations answer what presses a layer or two together with more than all of it, so that it jumped from step to step.
 
+None of this holds beside a body that comes down on something: a layer that cannot leave would bear it.
+
     code     symbol    meaning                                           unit
     push     delta     displacement that the wall has given              m
     slip     v_t       velocity along the wall, in the wall's motion     m/s
@@ -29,11 +31,12 @@ from wavetank.solids.distance import SolidSet, image_near, lift, plane_distance,
 @qd.kernel(fastcache=True)
 def apply_friction(
     particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, count: qd.i32,
-    on_grid: qd.template(),
+    on_grid: qd.template(), felt: qd.template(),
 ):  # fmt: skip
     """Reduce the velocities along walls and solids, and slow ones towards them and away.
 
-    Where the step was taken `on_grid`, the floor of the tank lets puddles come to rest.
+    Where the step was taken `on_grid`, the floor of the tank lets puddles come to rest. Bodies are `felt` where there
+    are some.
     """
     for i in range(count):
         near = particles.near[i]
@@ -41,6 +44,9 @@ def apply_friction(
             p = lift(predicted(particles, i))
             v = lift(particles.v[i])
             others = known(scratch, i) if near >> solids.tank_count != 0 else 0
+            calm = c.calming_at_solids
+            if qd.static(felt):
+                calm *= 1 - is_squeezed(i, p, others, near, scratch, solids, c)
             for number in range(solids.tank_count + others):
                 at, k = 0, number
                 value = vec4(0.0, 0.0, 0.0, 0.0)
@@ -56,7 +62,7 @@ def apply_friction(
                     relative = v - moving
                     towards = n.dot(relative)
                     if value.w < layer() * c.h and solids.unit[k] == 0.0:
-                        v -= n * (towards * settled(n, towards, c))
+                        v -= n * (towards * settled(n, towards, calm, c))
                     slip = relative - n * towards
                     share = 0.0
                     if solids.friction[k] > 0.0:
@@ -67,9 +73,9 @@ def apply_friction(
                         share = solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12)
                     if k < solids.tank_count:
                         if qd.static(on_grid):
-                            share += calmed(slip.norm_sqr(), c) * qd.max(0.0, -n.dot(down(c))) * scratch.puddle[i]
+                            share += calmed(slip.norm_sqr(), calm, c) * qd.max(0.0, -n.dot(down(c))) * scratch.puddle[i]
                     else:
-                        calming = calmed(slip.norm_sqr(), c)
+                        calming = calmed(slip.norm_sqr(), calm, c)
                         if solids.unit[k] > 0.0:  # a body that is on its way is not held up
                             calming *= qd.max(free(), 1.0 - moving.norm_sqr() * resting() * c.slow_at_solids)
                         share += calming
@@ -81,6 +87,22 @@ def apply_friction(
             for axis in qd.static(range(held.n)):
                 held[axis] = v[axis]
             particles.v[i] = held
+
+
+@qd.func
+def is_squeezed(i, p, others, near, scratch: Scratch, solids: SolidSet, c: Coefficients):
+    """1 where water is beside a body and beside another solid, out of whose way it is to be squeezed; else 0."""
+    bodies, total = 0, 0
+    for number in range(others):
+        at = place_of(scratch, i, number)
+        if facing_at(scratch, at, i, p).w < c.h:
+            total += 1
+            bodies += qd.cast(solids.unit[scratch.solid[at]] > 0.0, qd.i32)
+    if bodies > 0:
+        for k in range(solids.tank_count):
+            if is_near(near, k, solids) == 1 and plane_distance(solids, k, p).w < c.h:
+                total += 1
+    return qd.cast(bodies > 0 and total > 1, qd.i32)
 
 
 @qd.func
@@ -97,15 +119,15 @@ def layer():
 
 
 @qd.func
-def calmed(squared, c: Coefficients):
-    """Share of a speed, `squared` [m^2/s^2], that solids take because it is slow."""
-    return c.calming_at_solids * qd.max(0.0, 1.0 - squared * c.slow_at_solids)
+def calmed(squared, calm, c: Coefficients):
+    """Share of a speed, `squared` [m^2/s^2], that solids take because it is slow: `calm` of what is very slow."""
+    return calm * qd.max(0.0, 1.0 - squared * c.slow_at_solids)
 
 
 @qd.func
-def settled(n, towards, c: Coefficients):
+def settled(n, towards, calm, c: Coefficients):
     """Share of a speed [m/s] along the normal `n` of a solid that it takes; what hangs from a ceiling is left alone."""
-    return calmed(towards * towards, c) * (1.0 - qd.max(0.0, n.dot(down(c))))
+    return calmed(towards * towards, calm, c) * (1.0 - qd.max(0.0, n.dot(down(c))))
 
 
 @qd.func

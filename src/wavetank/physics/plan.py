@@ -46,7 +46,6 @@ class Plan:
     is_smoothed: bool  # velocities are drawn to each other
     is_central: bool  # along the line between particles, which in the open leaves angular momentum alone
     on_grid: bool  # errors of the whole tank are removed on a grid
-    balanced: bool  # and gravity is told to it apart, as it counts faces
     carried: float  # share of that pressure which is carried on
 
 
@@ -75,7 +74,6 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         is_smoothed=params.viscosity > 0.0 or params.calming > 0.0,
         is_central=not (world.levels or kinds.mixed),
         on_grid=on_grid,
-        balanced=on_grid and not world.pieces,
         # What thick fluids carry on has been shortened to their share already.
         carried=carried(dt, params.frame_time) if on_grid else float(thick),
     )

@@ -76,7 +76,10 @@ def step(
         carry_on(world, plan.kinds, params, c, stirred=plan.is_stirred)
     update_velocities(world.particles, c, world.count)  # 21, 23
     if plan.is_rubbed:
-        apply_friction(world.particles, world.scratch, world.solids, world.walls, c, world.count, int(plan.on_grid))
+        apply_friction(
+            world.particles, world.scratch, world.solids, world.walls, c, world.count, int(plan.on_grid),
+            int(plan.searched == 2),
+        )  # fmt: skip
     if plan.searched == 2:
         hand_over_pushes(world.scratch, world.particles, world.solids, world.count)
     if plan.is_smoothed or plan.turning:
@@ -109,9 +112,7 @@ def act_on_fluids(world: World, plan: Plan, params: Parameters, c: Coefficients)
 
 def correct_on_grid(world: World, plan: Plan, params: Parameters, c: Coefficients) -> None:
     """Remove what the densities of the whole tank are off, before the iterations between particles."""
-    grid, of_heaviest = world.grid, 1.0
-    if plan.balanced:
-        c = before_fall(c)
+    grid, of_heaviest, c = world.grid, 1.0, before_fall(c)
     measure_density(
         world.scratch, world.particles, grid, world.solids, world.walls, c, of_heaviest, world.count, plan.method,
     )  # fmt: skip

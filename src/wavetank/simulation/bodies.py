@@ -5,6 +5,7 @@ passes them. What the water did to them moves them in the next step, or at once 
 (`coupling.py`).
 """
 
+import contextlib
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -64,6 +65,7 @@ class Bodies(Mapping[str, Body]):
         self.pushes: np.ndarray | None = None  # kg m/s, kg m^2/s: by forces, in the next step
         self._told = np.zeros((0, 2))  # water that goes along with each body, as the engine knows it
         self.density = density
+        self._standing = False
         solids.feeling, solids.passing = {}, None
         numbers = [number for number, solid in enumerate(solids.members) if solid.is_body]
         if not numbers:
@@ -219,15 +221,16 @@ class Bodies(Mapping[str, Body]):
             if is_held or is_held != was_held:
                 self._hold(row, is_held)
         self._held = held
-        for joint in self.joints.values():
-            joint.drive(clock, dt)
+        if not self._standing:
+            for joint in self.joints.values():
+                joint.drive(clock, dt)
         self.begun = [now.position for now in self.solid_views]
         self._move(dt, share)
 
     def _move(self, dt: float, share: float) -> None:
         """Let the engine take the step, from where it began, with the velocities that are wanted."""
         self._weigh()
-        slowed = self._slowed(self.coupling.wanted)
+        slowed = self.coupling.slowed(self.fastest)
         for now, velocity in zip(self.views, slowed.tolist(), strict=True):
             now.linvel, now.angvel = velocity[:3], velocity[3:]
         # The engine keeps what it is given, in single precision, but for what it does not move itself.
@@ -316,7 +319,17 @@ class Bodies(Mapping[str, Body]):
         return True
 
     def _is_held(self, body: Body) -> bool:
-        return body.solid.held or body.number in self.solids.targets
+        return self._standing or body.solid.held or body.number in self.solids.targets
+
+    @contextlib.contextmanager
+    def standing(self) -> Iterator[None]:
+        """Let all bodies stand where they are meanwhile, and keep their velocities."""
+        own, self._standing = self.coupling.velocity.copy(), True
+        try:
+            yield
+        finally:
+            self._standing = False
+            self.coupling.velocity = own
 
     def _hold(self, row: int, held: bool) -> None:
         """Let a body stay where it is, or is moved to; let it go as fast as it was moved."""
@@ -326,15 +339,6 @@ class Bodies(Mapping[str, Body]):
             now.body_type = kind
         if held:
             now.set_next_kinematic_position(isometry(self.engine, self.begins[0][row], self.begins[1][row]))
-
-    def _slowed(self, velocities: np.ndarray) -> np.ndarray:
-        """Return the velocities [n, 6] of which no part of a body's surface is faster than the water may get."""
-        speeds = np.sqrt((velocities * velocities).reshape(-1, 2, 3).sum(axis=2))
-        speeds[:, 1] *= self.coupling.reaches
-        slowed: np.ndarray = velocities * np.repeat(
-            np.minimum(1.0, self.fastest / np.maximum(speeds, 1e-30)), 3, axis=1
-        )
-        return slowed
 
     def _stand(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the bodies are: places [n, 3] and rotations [n, 4]."""

@@ -223,6 +223,14 @@ class Coupling:
         self.wanted, self._given_way = self.wanted + step, self._given_way + step
         return bool(yielding.any())
 
+    def slowed(self, fastest: float) -> np.ndarray:
+        """Return the velocities `wanted` [n, 6] of which no part of a body's surface is faster than that [m/s]."""
+        speeds = np.sqrt((self.wanted * self.wanted).reshape(-1, 2, 3).sum(axis=2))
+        speeds[:, 1] *= self.reaches
+        shares = np.minimum(1.0, fastest / np.maximum(speeds, 1e-30))
+        slowed: np.ndarray = self.wanted * np.repeat(shares, 3, axis=1)
+        return slowed
+
     def solved(self, rotations: np.ndarray, impulse: np.ndarray, share: float = 1.0) -> np.ndarray:
         """Return the change of velocity [n, 6] by an impulse [n, 6] of bodies and a `share` of the water along."""
         along = share * self.held_by

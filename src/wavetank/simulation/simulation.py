@@ -13,6 +13,7 @@ from wavetank.foundation.params import LIVE, refuse_assignment
 from wavetank.physics import population
 from wavetank.physics.foam.pool import pool_from, pool_rows
 from wavetank.physics.foam.update import load_kernels, update_foam
+from wavetank.physics.plan import has_grid_pressure
 from wavetank.physics.time_step import filled_share, whole
 from wavetank.scene.forces import Force
 from wavetank.scene.forces.images import with_images
@@ -28,6 +29,7 @@ from wavetank.simulation.joints import Joints
 from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.moving_solids import solids_of
 from wavetank.simulation.new_world import new_world
+from wavetank.simulation.settling import settle
 from wavetank.simulation.sources import Sources, check_places
 from wavetank.simulation.states import States
 from wavetank.solids.solid import Solid
@@ -64,6 +66,8 @@ class Simulation(States):
         self.ledger.start_box = (box.min(axis=0), box.max(axis=0))
         self.seconds_per_frame = math.nan  # that the last frame took to compute
         self.time_steps = 1  # of the last frame
+        if self.bodies and self.count:
+            self._settle()
         check_places(self)
 
     def _fill(self, capacity: int) -> None:
@@ -138,15 +142,7 @@ class Simulation(States):
             start, dt = self.time + duration * part / parts, duration / parts
             shares = part / parts, (part + 1) / parts
             scene = self._scene_at(start + 0.5 * dt)
-            acting = self._acting_at(start + 0.5 * dt)
-            if self.bodies:
-                self.bodies.push(acting, dt, start)
-                self.bodies.advance(scene.gravity, dt, shares[1], limit, start + dt + self.scene.start_time)
-            self.world.solids_version = self.solids.move_to(*shares)
-            if self.count:
-                for force in with_images(acting, scene.tank):
-                    force.apply(self.world.particles, self.count, dt, start)
-                self.bodies.step(self.world, scene, dt, limit, shares)
+            self._take_step(scene, self._acting_at(start + 0.5 * dt), start, dt, shares, limit)
         self.solids.passing = None
         self.solids.move_to(0.0, 1.0)
         update_foam(self.world, self._scene_at(self.time + 0.5 * duration), duration, self.frame_number)
@@ -160,6 +156,31 @@ class Simulation(States):
         self.ledger.time += duration
         self.ledger.frame_number += 1
         self._outdated = True
+
+    def _take_step(
+        self, scene: Scene, acting: Sequence[Force], start: float, dt: float, shares: tuple[float, float], limit: float
+    ) -> None:  # fmt: skip
+        """Let bodies, solids and water take a step of `dt` [s] from `start` [s] on, those `shares` of a frame."""
+        if self.bodies:
+            self.bodies.push(acting, dt, start)
+            self.bodies.advance(scene.gravity, dt, shares[1], limit, start + dt + self.scene.start_time)
+        self.world.solids_version = self.solids.move_to(*shares)
+        if self.count:
+            for force in with_images(acting, scene.tank):
+                force.apply(self.world.particles, self.count, dt, start)
+            self.bodies.step(self.world, scene, dt, limit, shares)
+
+    def _settle(self) -> None:
+        """Let the water around bodies find the pressure that it would have had before the start."""
+        scene, duration = self._scene_at(0.0), self.scene.frame_time
+        if not (any(scene.gravity) and has_grid_pressure(self.world, scene)):
+            return
+        dt, limit = duration / whole(self._steps_in(duration)), self._speed_limit(duration)
+        fall = np.array(scene.gravity, np.float32) * np.float32(dt) ** 2
+        with self.bodies.standing():
+            settle(self.world, lambda: self._take_step(scene, (), 0.0, dt, (0.0, 1.0), limit), fall, scene.spacing)
+        self.solids.passing = None
+        self.solids.move_to(0.0, 1.0)
 
     def _let_out(self) -> None:
         """Take what has crossed an open side of the tank out of the world."""

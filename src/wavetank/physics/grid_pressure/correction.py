@@ -56,7 +56,7 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     tents,
 )  # fmt: skip
 from wavetank.physics.grid_pressure.films import left_to_grid
-from wavetank.physics.grid_pressure.poisson import LEAST_THETA, ROUGH, couple_nodes, is_shared, solve_levels
+from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
 from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import (
     LEAST_OPEN,
@@ -94,8 +94,9 @@ FULL = 0.98  # fill that cells without gaps have at least, also where few rows o
 SLIT = 0.7  # fill of a cell that touches a solid, as far as its tents can tell
 CLOSING = 0.5  # of what lacks, in a step
 GAP_SHARE = 6.0  # by which errors are less, of what lacks there
-#: Fill from where to where a cell that reads too little draws nothing in, where weight is balanced; never with bodies.
-DRAWN = {True: (0.99, 1.01), False: (1e3, 2e3)}
+#: Fill from where to where a cell that reads too little draws nothing in, in worlds with bodies or without: beside them
+#: all draw, or a box of half of water's density swings for ever in a plane.
+DRAWN = {True: (1e3, 2e3), False: (0.99, 1.01)}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -121,7 +122,6 @@ class Errors:
     slit: qd.f32  # fill from which on there is no slit
     closing: qd.f32  # 1/m^2: what lacks is closed by in a step, over the stiffness M
     least_theta: qd.f32  # of an edge
-    rough: qd.f32  # room up to which the surface is where the fill crosses one half
     thin: qd.f32  # cells of water that are left to the iterations
     thick: qd.f32  # and from which on the grid does all
     spacing: qd.f32  # m
@@ -276,7 +276,7 @@ def gather(
         grid.rhs[n] *= left_to_grid(grid, n, e.thin, e.thick)
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
-        couple_nodes(grid, piece, e.least_theta, e.rough)
+        couple_nodes(grid, piece, e.least_theta)
 
 
 def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
@@ -293,30 +293,30 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         world.has_thin_walls = bool(download(world.thin_walls)[0])
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     few = int(not is_shared(finest))
-    balanced = c.fallen > 0.0
+    numbers = errors(finest, params, stiffness, bodies=world.pieces is not None)
     gather(
         finest, world.particles, world.scratch, cells, world.solids, world.walls, c,
-        errors(finest, params, stiffness, balanced), count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
+        numbers, count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
     )  # fmt: skip
-    solve_levels(world.levels, balanced=balanced)
+    solve_levels(world.levels)
     move_particles(
         finest, world.particles, world.scratch, cells, world.solids, c, push_of(params, stiffness, c.h), count, few,
         searched, kinds.mixed,
     )  # fmt: skip
     if world.pieces:
         acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2
-        push_on_grid(world, stiffness, stiffness / acting if acting else 0.0)  # nothing is deep without gravity
+        push_on_grid(world, stiffness, stiffness / acting if acting else 0.0, c)  # nothing is deep without gravity
 
 
-def errors(grid: CoarseGrid, params: Parameters, stiffness: float, balanced: bool) -> Errors:
-    """Return the numbers of `gather`, where weight is `balanced` or not."""
+def errors(grid: CoarseGrid, params: Parameters, stiffness: float, *, bodies: bool) -> Errors:
+    """Return the numbers of `gather`, in a world with `bodies` or without."""
     h = params.support * params.spacing
     volume = params.spacing**params.dim / (grid.dx * grid.dy * grid.dz) / UNIT
     return remembered(Errors(
         unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness,
         per_way=params.grid_pressure / stiffness, borne_from=BORNE[0], borne_to=BORNE[1], inner_from=INNER[0],
         inner_to=INNER[1], below_from=BELOW[0] * h, below_to=BELOW[1] * h, missing=MISSING, full=FULL,
-        gap_share=GAP_SHARE, drawn_from=DRAWN[balanced][0], drawn_to=DRAWN[balanced][1], least_open=LEAST_OPEN,
-        slit=SLIT, closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, rough=ROUGH[balanced],
-        thin=FILM[0], thick=FILM[1], spacing=params.spacing,
+        gap_share=GAP_SHARE, drawn_from=DRAWN[bodies][0], drawn_to=DRAWN[bodies][1], least_open=LEAST_OPEN,
+        slit=SLIT, closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, thin=FILM[0],
+        thick=FILM[1], spacing=params.spacing,
     ))  # fmt: skip

@@ -1,11 +1,10 @@
 """The Poisson equation laplace lambda = rhs on the grids of a tank, with lambda <= 0.
 
 At the free surface lambda is 0 (the ghost fluid method, Gibou et al. 2002, 10.1006/jcph.2001.6977): as far from a node
-in the water as the water of its cell and of the next one reaches (`surface.py`; docs/notebook/calm.md), but in worlds
-with bodies at a fill of one half beside solids, where fills are known only roughly. Nothing flows into solids. The
-solution on a grid starts from that of the next coarser one, linearly between its nodes, so that a few sweeps of
-projected over-relaxation are enough on each. It does not start from the time step before: pressures that are carried
-over make water pulse (docs/notebook/solver.md).
+in the water as the water of its cell and of the next one reaches (`surface.py`; docs/notebook/calm.md). Nothing flows
+into solids. The solution on a grid starts from that of the next coarser one, linearly between its nodes, so that a few
+sweeps of projected over-relaxation are enough on each. It does not start from the time step before: pressures that are
+carried over make water pulse (docs/notebook/solver.md).
 
     code    symbol     meaning                                                      unit
     fill    f          water in the tent of a node, over the room that it has       1
@@ -24,11 +23,8 @@ from wavetank.physics.grid_pressure.coarse_grid import coordinates, nearest
 from wavetank.physics.grid_pressure.thin_walls import is_shut
 
 SWEEPS, MOST_SWEEPS = 8, 200  # at once, and of the coarsest level
-#: Sweeps of a level and their relaxation, where weight is balanced or not: eight leave what drives calm water round.
-ON_EACH = {True: (2 * SWEEPS, 1.7), False: (SWEEPS, 1.5)}
+ON_EACH = (2 * SWEEPS, 1.7)  # sweeps of a level and their relaxation: eight leave what drives calm water round
 LEAST_THETA = 0.01  # what is less slants the pressure along a surface that lies at nodes: docs/notebook/calm.md
-#: Room up to which the surface is where the fill crosses one half, where weight is balanced or not: beside bodies.
-ROUGH = {True: 0.0, False: 0.97}
 BLOCK_NODES = 8192  # at most, of a level that one block of a graphics processor sees to
 
 
@@ -69,16 +65,14 @@ def open_area(grid: CoarseGrid, n, m):
 
 
 @qd.func
-def coupling(grid: CoarseGrid, n, m, edge, least_theta, rough, shut):
+def coupling(grid: CoarseGrid, n, m, edge, least_theta, shut):
     """What the face between the nodes `n` and `m` couples them with [1/m^2]: 0 into solids and between air and air.
 
     It is the inverse of the density, that of the heaviest fluid being 1, over the square of the distance.
     """
     a = qd.min(grid.fill[n], 1.0) - 0.5
     b = qd.min(grid.fill[m], 1.0) - 0.5
-    crossed = qd.max(a, b) / qd.max(qd.abs(a - b), 1e-6)
-    to_surface = qd.select(qd.min(grid.room[n], grid.room[m]) < rough, crossed, a + b + 0.5)
-    theta = qd.select(a * b < 0.0, qd.min(qd.max(to_surface, least_theta), 1.0), 1.0)
+    theta = qd.select(a * b < 0.0, qd.min(qd.max(a + b + 0.5, least_theta), 1.0), 1.0)
     # Light fluid gives way more: the inverse of the mean density, and of that of the water where there is air.
     mean = 0.5 * (grid.density[n] + grid.density[m])
     density = qd.select(a <= 0.0, grid.density[m], qd.select(b <= 0.0, grid.density[n], mean))
@@ -87,7 +81,7 @@ def coupling(grid: CoarseGrid, n, m, edge, least_theta, rough, shut):
 
 
 @qd.func
-def couple_nodes(grid: CoarseGrid, piece, least_theta, rough):
+def couple_nodes(grid: CoarseGrid, piece, least_theta):
     """Set the couplings of `width` nodes of a row with the next ones along x, y and z, and what inverts their equation.
 
     The rim of the arrays, where there is no room, stands for what is beyond the tank.
@@ -112,14 +106,14 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta, rough):
         x = first + lane
         n = begin + x
         shut = qd.cast(grid.shut[n], qd.i32)
-        wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, over_x), grid.dx, least_theta, rough, shut & 1)
-        wy = coupling(grid, n, after_y + x, grid.dy, least_theta, rough, shut & 2)
-        wz = coupling(grid, n, after_z + x, grid.dz, least_theta, rough, shut & 4)
+        wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, over_x), grid.dx, least_theta, shut & 1)
+        wy = coupling(grid, n, after_y + x, grid.dy, least_theta, shut & 2)
+        wz = coupling(grid, n, after_z + x, grid.dz, least_theta, shut & 4)
         diagonal = wx + wy + wz
         before = qd.select(x > 0, n - 1, under_x)
-        diagonal += coupling(grid, n, before, grid.dx, least_theta, rough, is_shut(grid, before, 0))
-        diagonal += coupling(grid, n, before_y + x, grid.dy, least_theta, rough, is_shut(grid, before_y + x, 1))
-        diagonal += coupling(grid, n, before_z + x, grid.dz, least_theta, rough, is_shut(grid, before_z + x, 2))
+        diagonal += coupling(grid, n, before, grid.dx, least_theta, is_shut(grid, before, 0))
+        diagonal += coupling(grid, n, before_y + x, grid.dy, least_theta, is_shut(grid, before_y + x, 1))
+        diagonal += coupling(grid, n, before_z + x, grid.dz, least_theta, is_shut(grid, before_z + x, 2))
         is_water = qd.min(grid.fill[n] - 0.5, qd.min(grid.room[n], diagonal)) > 0.0
         found[0, lane] = wx
         found[1, lane] = wy
@@ -316,18 +310,18 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
 
 
 @qd.kernel(fastcache=True)
-def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, rough: qd.f32, shared: qd.template()):
+def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: qd.template()):
     """Set up the equation of a coarser level; `shared` by all threads, or done by one."""
     qd.loop_config(serialize=not shared)
     for n in range(coarse.nx * coarse.ny * coarse.nz):
         average_node(coarse, fine, n)
     qd.loop_config(serialize=not shared)
     for piece in range(coarse.pieces * coarse.ny * coarse.nz):
-        couple_nodes(coarse, piece, least_theta, rough)
+        couple_nodes(coarse, piece, least_theta)
 
 
 @qd.kernel(fastcache=True)
-def restrict_in_block(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, rough: qd.f32, fenced: qd.template()):
+def restrict_in_block(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, fenced: qd.template()):
     """Do what `restrict` does, in one launch of one block on a graphics processor."""
     qd.loop_config(block_dim=block_threads())
     for thread in range(block_threads()):
@@ -338,7 +332,7 @@ def restrict_in_block(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32,
         wait_for_block(fenced)
         piece = thread
         while piece < coarse.pieces * coarse.ny * coarse.nz:
-            couple_nodes(coarse, piece, least_theta, rough)
+            couple_nodes(coarse, piece, least_theta)
             piece += block_threads()
 
 
@@ -370,21 +364,18 @@ def coarsest_relaxation(level: CoarseGrid) -> tuple[int, float]:
     return min(sweeps, MOST_SWEEPS), over_relaxation
 
 
-def solve_levels(levels: list[CoarseGrid], *, balanced: bool = True) -> None:
-    """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set.
-
-    Where faces count the weight, `balanced`, what is left of it must be small.
-    """
+def solve_levels(levels: list[CoarseGrid]) -> None:
+    """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set."""
     fenced = int(current_backend() != "cuda")
     for fine, coarse in itertools.pairwise(levels):
         if in_block(coarse):
-            restrict_in_block(coarse, fine, LEAST_THETA, ROUGH[balanced], fenced)
+            restrict_in_block(coarse, fine, LEAST_THETA, fenced)
         else:
-            restrict(coarse, fine, LEAST_THETA, ROUGH[balanced], int(is_shared(coarse)))
+            restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)))
     coarsest = coarser = levels[-1]
     for level in reversed(levels):
         start = FROM_COARSER
-        sweeps, over_relaxation = ON_EACH[balanced]
+        sweeps, over_relaxation = ON_EACH
         if level is coarsest:
             start = ZERO
             sweeps, over_relaxation = coarsest_relaxation(level)
