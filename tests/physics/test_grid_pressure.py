@@ -25,7 +25,7 @@ from wavetank.simulation.simulation import Simulation
 def couple(level: CoarseGrid, least_theta: qd.f32):
     """Set the couplings of a finest level, as `gather` does."""
     for piece in range(level.pieces * level.ny * level.nz):
-        poisson.couple_nodes(level, piece, least_theta, 0.0)
+        poisson.couple_nodes(level, piece, least_theta)
 
 
 def filled(level, heights) -> None:

@@ -197,7 +197,9 @@ class Bodies(Mapping[str, Body]):
             edge = min(spacing, 2.0 * float(body.wet.axes[3 - self.dim]) / FEWEST)
             cut = Ruler(body.solid, self.dim, spacing).cut(edge)
             inside = cut.volumes > 0.0
-            table[body.number] = (cut.places[inside], cut.edges, cut.volumes[inside] / spacing**self.dim)
+            # However they cut its surface, they are as large as the body, or one of water's density would rise.
+            volumes = cut.volumes[inside] * (body.wet.mass / self.density / cut.volumes.sum())
+            table[body.number] = (cut.places[inside], cut.edges, volumes / spacing**self.dim)
         return new_pieces(table, max(body.solid.reach() for body in self.members))
 
     # --- a step ---
