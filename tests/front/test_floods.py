@@ -43,6 +43,16 @@ def test_who_watches_keeps_half_of_the_pictures(playing, watching, name):
         flood_and_watch(world, watching(world.socket), flooder, FLOODS[name])
 
 
+def best_rate(watcher, enough: float) -> float:
+    """Pictures a second in the best of some tries, no more of them than it takes."""
+    best = 0.0
+    for _ in range(TRIES):
+        best = max(best, watcher.rate(SECONDS))
+        if best >= enough:
+            break
+    return best
+
+
 def flood_and_watch(world, watcher, flooder, tables: list[dict]) -> None:
     flooder.send('{"do": "drive"}')
     watcher.wait_for_pictures()
@@ -65,11 +75,7 @@ def flood_and_watch(world, watcher, flooder, tables: list[dict]) -> None:
     thread = threading.Thread(target=flood, daemon=True)
     thread.start()
     time.sleep(0.5)
-    flooded = 0.0
-    for _ in range(TRIES):
-        flooded = max(flooded, watcher.rate(SECONDS))
-        if flooded >= SHARE * calm:
-            break
+    flooded = best_rate(watcher, SHARE * calm)
     ended.set()
     grown = resident() - before
     assert sent[0] > 100
@@ -132,11 +138,7 @@ def test_downloads_do_not_stop_the_water(playing, watching):
 
     for _ in range(6):
         threading.Thread(target=ask, daemon=True).start()
-    flooded = 0.0
-    for _ in range(TRIES):
-        flooded = max(flooded, watcher.rate(SECONDS))
-        if flooded >= SHARE * calm:
-            break
+    flooded = best_rate(watcher, SHARE * calm)
     ended.set()
     assert codes <= {200, 429} and 200 in codes
     assert flooded >= SHARE * calm, f"{flooded:.1f} of {calm:.1f} pictures a second"

@@ -112,7 +112,8 @@ def act_on_fluids(world: World, plan: Plan, params: Parameters, c: Coefficients)
 
 def correct_on_grid(world: World, plan: Plan, params: Parameters, c: Coefficients) -> None:
     """Remove what the densities of the whole tank are off, before the iterations between particles."""
-    grid, of_heaviest, c = world.grid, 1.0, before_fall(c)
+    grid, of_heaviest = world.grid, 1.0
+    c = before_fall(c)
     measure_density(
         world.scratch, world.particles, grid, world.solids, world.walls, c, of_heaviest, world.count, plan.method,
     )  # fmt: skip

@@ -90,6 +90,13 @@ def check_rows(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
     return rows
 
 
+def by_id(particles: Particles, count: int, name: str) -> np.ndarray:
+    """Return an array of the particles, ordered by id, from the device."""
+    order = np.argsort(download(particles.id)[:count], kind="stable")
+    rows: np.ndarray = download(getattr(particles, name))[:count][order]
+    return rows
+
+
 def put_by_id(particles: Particles, count: int, name: str, values: np.ndarray) -> None:
     """Write an array of the particles, given by id, to the device, where they lie in an order of their own."""
     order = np.argsort(download(particles.id)[:count], kind="stable")

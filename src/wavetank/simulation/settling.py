@@ -18,8 +18,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wavetank.device.compiler import download, upload
 from wavetank.physics.world import World
+from wavetank.simulation.arrays import by_id, put_by_id
 
 STEPS = 8
 FARTHEST = 0.1  # of a spacing, in a step
@@ -27,31 +27,16 @@ FREE = 0.1  # of the fall: particles whose way differs from it by less fall free
 
 
 def settle(world: World, step: Callable[[], None], fall: np.ndarray, spacing: float) -> None:
-    """Let a world whose particles have the ids from 0 on take such steps; `step` takes one, `fall` has shape [dim]."""
-    own = _by_id(world, "v")
+    """Let a world take such steps; `step` takes one, `fall` has shape [dim]."""
+    count = world.count
+    own = by_id(world.particles, count, "v")
     for _ in range(STEPS):
         world.particles.v.fill(0.0)
-        before = _by_id(world, "x")
+        before = by_id(world.particles, count, "x")
         step()
-        way = _by_id(world, "x") - before
+        way = by_id(world.particles, count, "x") - before
         is_free = np.linalg.norm(way - fall, axis=1) < FREE * np.linalg.norm(fall)
         farthest = FARTHEST * spacing / np.maximum(np.linalg.norm(way, axis=1), 1e-30)
         way *= np.where(is_free, 0.0, np.minimum(1.0, farthest))[:, None]
-        _put_by_id(world, "x", before + way)
-    _put_by_id(world, "v", own)
-
-
-def _by_id(world: World, name: str) -> np.ndarray:
-    """Return an array of the particles by id, float32 [count, dim]."""
-    rows = download(getattr(world.particles, name))[: world.count]
-    ordered = np.empty_like(rows)
-    ordered[_ids(world)] = rows
-    return ordered
-
-
-def _put_by_id(world: World, name: str, values: np.ndarray) -> None:
-    upload(getattr(world.particles, name), values[_ids(world)])
-
-
-def _ids(world: World) -> np.ndarray:
-    return download(world.particles.id)[: world.count]
+        put_by_id(world.particles, count, "x", before + way)
+    put_by_id(world.particles, count, "v", own)

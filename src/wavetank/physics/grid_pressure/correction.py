@@ -32,8 +32,8 @@ nothing; of two cells in a row the mean counts, as a single one of four or eight
 
 Slips. The other way round, a row that slides off the one below reads less than the room that it takes. Where a cell is
 full, water that is drawn in for that pushes the row on: it slid ever faster, 0.014 m/s in a tank that had been at rest
-for a minute (docs/notebook/calm.md, "Slow slips"). So a cell draws in no more where it is full. (Worlds with
-bodies have their weight by densities, and are left as they were.)
+for a minute (docs/notebook/calm.md, "Slow slips"). So a cell draws in no more where it is full, but in worlds
+with bodies, see `DRAWN`.
 """
 
 import dataclasses

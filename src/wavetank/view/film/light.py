@@ -23,6 +23,7 @@ from wavetank.view.lens import vec3
 from wavetank.view.look import Look
 from wavetank.view.optics.chance import scrambled
 from wavetank.view.optics.interface import bent, index_of_water, mirrored, through_drop
+from wavetank.view.optics.maps import share_of
 
 UNIT = 4096.0  # steps of a map in the light of the bare sun
 
@@ -129,7 +130,7 @@ def arrive(photons: Photons, at, weight):
     if r >= 0 and c >= 0 and r < photons.floor.shape[0] - 1 and c < photons.floor.shape[1] - 1:
         u, v = x - c, z - r
         for k in range(4):
-            share = qd.select(k % 2 == 1, u, 1.0 - u) * qd.select(k // 2 == 1, v, 1.0 - v)
+            share = share_of(k, v, u)
             amount = 4096.0 * share * photons.power / (texel * texel)
             for color in qd.static(range(3)):
                 qd.atomic_add(
@@ -181,7 +182,7 @@ def floor_light(photons: Photons, at):
     if r >= 0 and c >= 0 and r < photons.floor.shape[0] - 1 and c < photons.floor.shape[1] - 1:
         u, v = x - c, z - r
         for k in range(4):
-            share = qd.select(k % 2 == 1, u, 1.0 - u) * qd.select(k // 2 == 1, v, 1.0 - v) / 4096.0
+            share = share_of(k, v, u) / 4096.0
             for color in qd.static(range(3)):
                 total[color] += share * photons.floor[r + k // 2, c + k % 2, color]
     return total

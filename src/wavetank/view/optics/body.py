@@ -29,7 +29,7 @@ from wavetank.view.optics.fluid import Optics
 from wavetank.view.optics.interface import bent as crossed
 from wavetank.view.optics.interface import index_of_water
 from wavetank.view.optics.interface import mirrored as reflected
-from wavetank.view.optics.maps import margins_inside, picture_at
+from wavetank.view.optics.maps import margins_inside, picture_at, share_of
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.radiance import environment, smoothstep, surface_radiance
 from wavetank.view.optics.rays import Box
@@ -134,7 +134,7 @@ def wholeness(sun: Lens, first: qd.template(), inside: Inside, optics: Optics, a
     begins, water, weight = 0.0, 0.0, 1e-6
     for k in range(4):
         z = qd.bit_cast(first[top + k // 2, left + k % 2], qd.f32)
-        share = qd.select(k % 2 == 1, u, 1.0 - u) * qd.select(k // 2 == 1, v, 1.0 - v)
+        share = share_of(k, v, u)
         water += share * inside.column[top + k // 2, left + k % 2]
         if z < 1e30:
             begins += share * z

@@ -2,7 +2,7 @@
 
 from wavetank.device.compiler import qd
 from wavetank.view.lens import vec3, vec4
-from wavetank.view.optics.maps import corners
+from wavetank.view.optics.maps import corners, share_of
 
 
 @qd.func
@@ -32,8 +32,7 @@ def dye_at(dye: qd.template(), place):
     total = vec4(0.0, 0.0, 0.0, 0.0)
     for k in range(4):
         i, j = qd.select(k // 2 == 1, r1, r), qd.select(k % 2 == 1, c1, c)
-        share = qd.select(k % 2 == 1, u, 1.0 - u) * qd.select(k // 2 == 1, v, 1.0 - v)
-        total += share * vec4(dye[i, j, 0], dye[i, j, 1], dye[i, j, 2], dye[i, j, 3])
+        total += share_of(k, v, u) * vec4(dye[i, j, 0], dye[i, j, 1], dye[i, j, 2], dye[i, j, 3])
     part = qd.max(total[0], 1e-6)
     return vec4(total[0], total[1] / part, total[2] / part, total[3] / part)
 

@@ -17,9 +17,9 @@ def corners(place, rows, columns, inset):
 
 
 @qd.func
-def share_of(k: qd.template(), v, u):
+def share_of(k, v, u):
     """Share of texel `k` of four at a place that lies so far down and across them."""
-    return (u if qd.static(k % 2 == 1) else 1.0 - u) * (v if qd.static(k // 2 == 1) else 1.0 - v)
+    return qd.select(k % 2 == 1, u, 1.0 - u) * qd.select(k // 2 == 1, v, 1.0 - v)
 
 
 @qd.func
@@ -37,8 +37,7 @@ def map_at(map: qd.template(), place, nothing):
     r, c, r1, c1, v, u = corners(place, map.shape[0], map.shape[1], 1.0)
     result = nothing
     for k in range(4):
-        share = qd.select(k % 2 == 1, u, 1.0 - u) * qd.select(k // 2 == 1, v, 1.0 - v)
-        result += share * map[qd.select(k // 2 == 1, r1, r), qd.select(k % 2 == 1, c1, c)]
+        result += share_of(k, v, u) * map[qd.select(k // 2 == 1, r1, r), qd.select(k % 2 == 1, c1, c)]
     return result
 
 
