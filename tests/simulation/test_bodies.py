@@ -457,7 +457,7 @@ def test_a_body_of_waters_density_stays_where_gaps_surround_it():
 
 
 def test_the_start_moves_no_water_that_does_not_stand():
-    """What falls freely is where the scene put it, a dam not a spacing farther; all is as fast as it was to be."""
+    """What falls freely is where the scene put it, and a dam's front, two rows of which once stuck out by 0.8 d."""
     drop = wt.Block(lower=(0.6, 0.5), upper=(0.7, 0.6), velocity=(0.3, -0.4))
     dam = wt.Block(lower=(0, 0), upper=(0.3, 0.3))
     ball = wt.Sphere(name="ball", center=(0.8, 0.1), radius=0.08, density=700, velocity=(0.5, 0.0))
@@ -468,7 +468,8 @@ def test_the_start_moves_no_water_that_does_not_stand():
     assert sim.time == 0.0
     assert np.array_equal(sim.velocities, v.astype(np.float32))
     assert np.abs(sim.positions - x)[falls].max() < 1e-6
-    assert np.linalg.norm(sim.positions - x, axis=1)[~falls].max() < 0.81 * 0.02
+    way = np.linalg.norm(sim.positions - x, axis=1)[~falls] / 0.02
+    assert way[x[~falls, 0] > 0.25].max() < 0.05 and way.max() < 0.5
     assert sim.bodies["ball"].velocity == pytest.approx([0.5, 0.0])
 
 
