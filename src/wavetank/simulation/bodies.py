@@ -27,7 +27,7 @@ from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
 from wavetank.simulation.acting import Acting
-from wavetank.simulation.added_mass import ALONG, added_mass, grip
+from wavetank.simulation.added_mass import ALONG, grip
 from wavetank.simulation.body import Body
 from wavetank.simulation.colliders import shapes_of
 from wavetank.simulation.coupling import DENSITY, Coupling, lengths
@@ -35,8 +35,9 @@ from wavetank.simulation.effort import given
 from wavetank.simulation.engine import import_engine, isometry, keep_in_plane, poses_of, velocities_of
 from wavetank.simulation.joints import Joints, put_joints
 from wavetank.simulation.moving_solids import MovingSolids
+from wavetank.simulation.weighing import weigh
 from wavetank.solids.distance import PARTS
-from wavetank.solids.mass import Inertia, Ruler, inertia_of, water_of
+from wavetank.solids.mass import Inertia, Ruler
 from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
@@ -45,6 +46,7 @@ FAR = 0.3  # of a spacing: bodies that yield by more begin the step anew
 FEWEST = 4.0  # pieces across a body
 IN_JOINTS = 16  # inner iterations of the engine where there are joints: with 1 a motor sagged by 0.3 rad/s under a load
 DRY = 0.5  # Coulomb's coefficient between solids where none is named: wood on wood
+SMALL = 1.5  # spacings: radius of a ball as large as a body that leaves the water within a few steps; twice that is not
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
 
 
@@ -90,7 +92,8 @@ class Bodies(Mapping[str, Body]):
         self.wet_masses = np.array([body.wet.mass for body in self.members])  # kg
         displaced = self.wet_masses / self.density
         self.radii = np.cbrt(0.75 / np.pi * displaced) if self.dim == 3 else np.sqrt(displaced / np.pi)  # m
-        self.coupling.sinks = self.coupling.masses > self.wet_masses
+        self.coupling.small = np.clip(2.0 - self.radii / (SMALL * scene.spacing), 0.0, 1.0)
+        self.coupling.sinks = self.coupling.weights > self.wet_masses
         self.pieces = self._pieces()
         self.sums, self.nothing = Mirror(solids.device.reaction), np.zeros(PARTS * len(solids.members), np.int32)
         self.levers = np.repeat(np.stack([np.ones(len(numbers)), self.coupling.reaches], axis=1), 3, axis=1)  # 1, m
@@ -142,27 +145,18 @@ class Bodies(Mapping[str, Body]):
 
     def _weigh_all(self, numbers: list[int]) -> None:
         """Find how the mass of the bodies lies in them, and the water that goes along with them."""
-        inertias, added = [], []
-        for number in numbers:
-            solid = self.solids.members[number]
-            cut = Ruler(solid, self.dim, self.scene.spacing).cut()
-            dry, wet = inertia_of(solid, cut), water_of(cut, self.density)
-            axes = tuple(map(float, wet.axes[3 - self.dim :]))
-            mass, inertia = added_mass(axes)
-            # Of one that is round nothing goes along, but for what is about an edge or a wall near by.
-            around = 2.0 * float(np.trace(wet.tensor)) / (3.0 if self.dim == 3 else 2.0)
-            added.append((mass * wet.mass, inertia * wet.mass * max(axes) ** 2 + around))
-            inertias.append((dry, wet))
-        masses = np.array([dry.mass for dry, _ in inertias])
-        tensors = np.array([dry.tensor for dry, _ in inertias])
-        reaches = [self.solids.members[number].reach() for number in numbers]
-        self.coupling = Coupling(masses, tensors, np.array(reaches), np.array(added))
-        self.middles = [dry.center.tolist() for dry, _ in inertias]
-        self.moments, frames = np.linalg.eigh(tensors)
+        solids, hung = [self.solids.members[number] for number in numbers], {
+            name for joint in self.scene.joints for name in (joint.first, joint.second)
+        }  # fmt: skip
+        jointed = [place for place, number in enumerate(numbers) if self.solids.names[number] in hung]
+        found = weigh(solids, self.dim, self.scene.spacing, self.density, jointed)
+        self.coupling = Coupling(found.weights, found.masses, found.tensors, found.reaches, found.added)
+        self.middles = [dry.center.tolist() for dry, _ in found.inertias]
+        self.moments, frames = np.linalg.eigh(found.tensors)
         frames[np.linalg.det(frames) < 0.0, :, 0] *= -1.0
         self.frames = [self.engine.Rotation3(*quaternion_of(matrix)) for matrix in frames]
         for row, number in enumerate(numbers):
-            self._put(row, number, *inertias[row])
+            self._put(row, number, *found.inertias[row])
         self._weigh()
 
     def _put(self, row: int, number: int, dry: Inertia, wet: Inertia) -> None:
@@ -292,13 +286,14 @@ class Bodies(Mapping[str, Body]):
         particle = blend(world.materials, self.scene).largest_density * self.scene.spacing**self.dim
         rows, coupling, wet = sums / self.units[:, None], self.coupling, self.wet_masses
         scale = self.levers * (particle / dt)
-        force = carried(dt, self.scene.frame_time) * coupling.carried + rows[:, OF_GRID : OF_GRID + 6] * scale / dt
+        cell = world.levels[0].dy if world.levels else 1.0
+        coupling.immersed = np.minimum(1.0, rows[:, IMMERSION] * particle / (wet * cell))
+        keeps = (carried(dt, self.scene.frame_time) * coupling.keeps)[:, None]
+        force = keeps * coupling.carried + rows[:, OF_GRID : OF_GRID + 6] * scale / dt
         most = LARGEST_CARRIED * float(np.linalg.norm(self.gravity)) * wet
         share = np.minimum(1.0, most / np.maximum(lengths(force[:, :3]), 1e-30))
         coupling.by_grid = force * share[:, None]
         coupling.impulse = rows[:, :6] * scale + force * dt
-        cell = world.levels[0].dy if world.levels else 1.0
-        coupling.immersed = np.minimum(1.0, rows[:, IMMERSION] * particle / (wet * cell))
         if world.remembers_viscosity:
             each, spread = hold_on_bodies(blend(world.materials, self.scene), self.scene, dt)
             coupling.hold(rows[:, RUBBING] / self.scene.spacing * each, self.radii, self.scene.spacing, spread)

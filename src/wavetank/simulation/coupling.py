@@ -86,8 +86,15 @@ def lengths(rows: np.ndarray) -> np.ndarray:
 class Coupling:
     """What bodies have got from the water and what they are still to get; rows are motion and turn."""
 
-    def __init__(self, masses: np.ndarray, tensors: np.ndarray, reaches: np.ndarray, added: np.ndarray) -> None:
-        """Begin at rest: `masses` [n] [kg], `tensors` [n, 3, 3] [kg m^2], `reaches` [n] [m], `added` [n, 2]."""
+    def __init__(
+        self, weights: np.ndarray, masses: np.ndarray, tensors: np.ndarray, reaches: np.ndarray, added: np.ndarray
+    ) -> None:  # fmt: skip
+        """Begin at rest.
+
+        Gravity pulls at `weights` [n] [kg]; `masses` [n] [kg], `tensors` [n, 3, 3] [kg m^2], `reaches` [n] [m] and the
+        `added` [n, 2] are those of `weighing`.
+        """
+        self.weights = weights
         self.masses, self.tensors, self.reaches, self.added = masses, tensors, reaches, added
         count = len(masses)
         self.impulse, self.due, self.given = (np.zeros((count, 6)) for _ in range(3))  # kg m/s, kg m^2/s
@@ -100,6 +107,7 @@ class Coupling:
         self.seen_push = np.zeros((count, 6))  # kg m/s, kg m^2/s
         self.sums = np.zeros((count, 2, 2))
         self.immersed = np.zeros(count)  # share of their volume
+        self._was_immersed = np.zeros(count)
         self._heavy = np.zeros(count)  # N
         self.held = np.zeros(count, bool)  # they have no momentum of their own
         self.lasted = 0.0  # s, of the last step
@@ -109,6 +117,7 @@ class Coupling:
         self._inertias = np.stack([masses, np.linalg.norm(tensors, 2, axis=(1, 2))], axis=1)  # kg, kg m^2
         self._given_way = np.zeros((count, 6))  # m/s, rad/s, by how much they have yielded in this step
         self._so_far, self._to_come = np.zeros((count, 6)), np.zeros((count, 6))  # of `impulse`, in this step
+        self.small = np.zeros(count)  # 1 where a body is hardly larger than a cell of the grid, 0 where it is by far
         self.sinks = np.zeros(count, bool)  # denser than water: what is caught below it on a floor must not throw it
         self._stands: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
         self.is_hit = False  # whether one was so hard that the step has to begin anew
@@ -117,6 +126,24 @@ class Coupling:
     def owed(self) -> np.ndarray:
         """Momentum [n, 6] that bodies are still to get."""
         return np.where(self.held[:, None], 0.0, self.due + self.impulse - self.given)
+
+    @property
+    def keeps(self) -> np.ndarray:
+        """Share [n] of what the grid has carried on for a body that is left.
+
+        Less where a small one leaves the water, within a few steps: the grid takes nothing back from what nothing
+        presses on, and light balls bobbed by half a spacing for ever.
+        """
+        still = np.minimum(1.0, self.immersed / np.maximum(self._was_immersed, 1e-9))
+        share: np.ndarray = 1.0 - self.small * (1.0 - still)
+        return share
+
+    @property
+    def _borne(self) -> np.ndarray:
+        """Share [n] of a body's weight that pushed it, at most all of it."""
+        pushed = lengths(self.impulse[:, :3])
+        share: np.ndarray = np.minimum(1.0, pushed / np.maximum(self._heavy * self.lasted, 1e-30))
+        return share
 
     @property
     def held_by(self) -> np.ndarray:
@@ -140,18 +167,19 @@ class Coupling:
         Besides gravity, forces of the scene give them the momentum `pushes` [n, 6]. Those that were `held` [n] in the
         step before are owed nothing by it.
         """
-        self._heavy = self.masses * np.linalg.norm(gravity)
+        self._heavy = self.weights * np.linalg.norm(gravity)
         self._learn()
         owed, self.held = np.where(held[:, None], 0.0, self.owed), held
         weight = np.zeros_like(owed)
-        weight[:, :3] = self.masses[:, None] * gravity * dt
+        falls = self.masses + self._borne * (self.weights - self.masses)  # in the air as all things do
+        weight[:, :3] = falls[:, None] * gravity * dt
         if pushes is not None:
             weight += pushes
         ratio = dt / (self.lasted or dt)
         self.due = owed + weight
         wanted = AT_ONCE * owed + weight + ratio * (self.impulse + np.repeat(self.along, 3, axis=1) * self.change)
         self.wanted = self.velocity + self.solved(rotations, wanted)
-        self.carried = self.by_grid
+        self.carried, self._was_immersed = self.by_grid, self.immersed
         self._given_way, self._to_come = np.zeros_like(owed), ratio * self.later
 
     def expect(self) -> None:
@@ -191,9 +219,7 @@ class Coupling:
 
         The least is a share of `added`: that of a plate on the surface is a third of a cube's (Lamb 1932, 108).
         """
-        pushed = lengths(self.impulse[:, :3])
-        carried = np.minimum(1.0, pushed / np.maximum(self._heavy * self.lasted, 1e-30))
-        least = np.maximum(self.immersed, AFLOAT * carried)
+        least = np.maximum(self.immersed, AFLOAT * self._borne)
         return np.clip(along, least[:, None] * self.added, MOST * self.added)
 
     def yields(self, rotations: np.ndarray, slow: float, farthest: float) -> bool:
