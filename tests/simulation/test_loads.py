@@ -50,6 +50,24 @@ def test_a_hinge_without_a_motor_has_no_power_to_be_shown():
     assert powers(sim.bodies) == {} and abs(sim.stats()["joints.hip.effort"]) < 0.1
 
 
+def test_between_two_fluids_each_has_its_share(tmp_path):
+    """Archimedes in layers: the lower fluid is 1000, the upper 850 kg/m^3; drag was -8 % of the weight at rest."""
+    block = {"spacing": 0.02, "tank": wt.Tank(size=(0.8, 0.8)), "materials": [{"name": "light", "density": 850.0}]}
+    layers = [
+        wt.Block(lower=(0, 0), upper=(0.8, 0.3)), wt.Block(lower=(0, 0.3), upper=(0.8, 0.54), material="light")
+    ]  # fmt: skip
+    box = wt.Box(name="box", center=(0.4, 0.3), size=(0.24, 0.15), density=925)
+    sim = wt.Simulation(wt.Scene(fluids=layers, solids=[box], **block))
+    sim.advance(2.0)
+    found = sim.bodies["box"]
+    displaced = 9.81 * 0.24 * 0.15 * 925.0  # half in each
+    assert found.buoyancy[1] == pytest.approx(displaced, rel=0.02)
+    assert found.force[1] == pytest.approx(displaced, rel=0.02)
+    assert found.position[1] == pytest.approx(0.3, abs=0.1 * 0.02)
+    sim.save(tmp_path / "state.npz")
+    assert wt.Simulation.restore(tmp_path / "state.npz").bodies["box"].buoyancy[1] == found.buoyancy[1]
+
+
 def test_force_is_buoyancy_and_drag():
     scene = pool(solids=[wt.Box(name="crate", center=(0.4, 0.2, 0.4), size=(0.2, 0.2, 0.2), density=800, held=True)])
     sim = wt.Simulation(scene)

@@ -9,7 +9,8 @@ can press on it allows (`simulation/bodies.py`).
     code      meaning                                                                unit
     push      way that a particle was moved by, times its mass                       m, heaviest particle's mass
     reaction  sums for each solid, `PARTS` numbers: push, turn, the grid's push      1/unit
-              and turn, the share of the solid that is under water, and how viscous fluids hold it
+              and turn, the share of the solid that is under water, how viscous fluids hold it,
+              and what of them it displaces
 """
 
 from wavetank.device.compiler import qd
@@ -34,7 +35,13 @@ def rubbing():
     return 13
 
 
-OF_GRID, IMMERSION, RUBBING = (number.fn() for number in (of_grid, immersion, rubbing))
+@qd.func
+def displacing():
+    """Where the share under water is, times the density of what is around over that of the heaviest fluid."""
+    return 14
+
+
+OF_GRID, IMMERSION, RUBBING, DISPLACING = (number.fn() for number in (of_grid, immersion, rubbing, displacing))
 
 
 @qd.func

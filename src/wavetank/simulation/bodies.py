@@ -20,7 +20,7 @@ from wavetank.physics.bodies import Pieces, new_pieces
 from wavetank.physics.dynamic_viscosity.implicit_viscosity import hold_on_bodies
 from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED, carried
 from wavetank.physics.mixture import blend
-from wavetank.physics.reactions import IMMERSION, OF_GRID, RUBBING
+from wavetank.physics.reactions import DISPLACING, IMMERSION, OF_GRID, RUBBING
 from wavetank.physics.retry import Retry
 from wavetank.physics.step import step as take_step
 from wavetank.physics.world import World
@@ -288,6 +288,7 @@ class Bodies(Mapping[str, Body]):
         scale = self.levers * (particle / dt)
         cell = world.levels[0].dy if world.levels else 1.0
         coupling.immersed = np.minimum(1.0, rows[:, IMMERSION] * particle / (wet * cell))
+        coupling.displaces = np.minimum(1.0, rows[:, DISPLACING] * particle / (wet * cell))
         keeps = (carried(dt, self.scene.frame_time) * coupling.keeps)[:, None]
         force = keeps * coupling.carried + rows[:, OF_GRID : OF_GRID + 6] * scale / dt
         most = LARGEST_CARRIED * float(np.linalg.norm(self.gravity)) * wet

@@ -77,8 +77,8 @@ class Body:
 
     @property
     def buoyancy(self) -> np.ndarray:
-        """What of `force` water at rest would push with [N], shape [dim]: the weight of what it displaces."""
-        lifted: np.ndarray = -self.wet.mass * self.immersed * self.gravity()[: self.dim]
+        """What of `force` fluids at rest would push with [N], shape [dim]: the weight of what it displaces."""
+        lifted: np.ndarray = -self.wet.mass * self.coupling.displaces[self.row] * self.gravity()[: self.dim]
         return lifted
 
     @property

@@ -107,6 +107,7 @@ class Coupling:
         self.seen_push = np.zeros((count, 6))  # kg m/s, kg m^2/s
         self.sums = np.zeros((count, 2, 2))
         self.immersed = np.zeros(count)  # share of their volume
+        self.displaces = np.zeros(count)  # mass of fluid, over that of as much of the heaviest as the body is large
         self._was_immersed = np.zeros(count)
         self._heavy = np.zeros(count)  # N
         self.held = np.zeros(count, bool)  # they have no momentum of their own
@@ -288,6 +289,7 @@ class Coupling:
         rest[:, 0], rest[:, 1], rest[:, 2:4], rest[:, 4] = self.immersed, self.lasted, self.along, self.held
         rest[:, 5] = self.rubbed[:, 0]
         sums = np.pad(self.sums.reshape(-1, 4), ((0, 0), (0, 2)))
+        sums[:, 5] = self.displaces
         return np.stack([*(getattr(self, name) for name in ROWS), rest, sums], axis=1)
 
     def recall(self, number: int, memory: np.ndarray) -> None:
@@ -300,4 +302,4 @@ class Coupling:
         mass = self.rubbed[:, 0].copy()
         mass[number] = rest[5]
         self._rub(mass)
-        self.sums[number] = memory[-1][:4].reshape(2, 2)
+        self.sums[number], self.displaces[number] = memory[-1][:4].reshape(2, 2), memory[-1][5]

@@ -65,7 +65,7 @@ def grids():
 @qd.func
 def parts():
     """Numbers that each solid has in `SolidSet.reaction`."""
-    return 14
+    return 15
 
 
 @qd.func

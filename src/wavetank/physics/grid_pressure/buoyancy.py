@@ -18,7 +18,7 @@ from wavetank.physics.bodies import Pieces
 from wavetank.physics.boundary import fall, flattened
 from wavetank.physics.grid_pressure.coarse_grid import beside_on, corners, in_cells, tents
 from wavetank.physics.grid_pressure.surface import nodes_beyond
-from wavetank.physics.reactions import add_to_body, immersion, of_grid
+from wavetank.physics.reactions import add_to_body, displacing, immersion, of_grid
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, parts, rotate, vec3
 
@@ -34,17 +34,20 @@ def mark_known(grid: CoarseGrid):
 
 
 @qd.kernel(fastcache=True)
-def continue_pressure(grid: CoarseGrid, c: Coefficients, stiffness: qd.f32, turn: qd.i32, air: qd.f32):
+def continue_pressure(
+    grid: CoarseGrid, c: Coefficients, stiffness: qd.f32, turn: qd.i32, air: qd.f32, mixed: qd.template()
+):  # fmt: skip
     """Continue multipliers by one node, from those that are known since an earlier `turn`; the `air` counts so much.
 
-    At first they go on straight, farther on as at rest: where a body lies on something, what the water at the mouth of
-    the slit does by chance would grow from node to node.
+    Where fluids are `mixed`, so are their densities. At first they go on straight, farther on as at rest: where a body
+    lies on something, what the water at the mouth of the slit does by chance would grow from node to node.
     """
     for n in range(grid.nx * grid.ny * grid.nz):
         at_rest = fall(c) / -stiffness
         if grid.slope_z[n] > turn:
             edges = vec3(grid.dx, grid.dy, grid.dz)
             lam, weight = 0.0, 0.0
+            mass, filled = 0.0, 0.0
             for axis in qd.static(range(3)):
                 if grid.nz > 1 or axis < 2:
                     for side in qd.static((-1, 1)):
@@ -64,9 +67,35 @@ def continue_pressure(grid: CoarseGrid, c: Coefficients, stiffness: qd.f32, turn
                                     share, slope = air, 0.0
                                 lam += share * (grid.lam[m] + slope)
                                 weight += share
+                                if qd.static(mixed):
+                                    mass += filled_at(grid, m) * grid.density[m]
+                                    filled += filled_at(grid, m)
             if weight > 0.0:
                 grid.lam[n] = lam / weight
+                if qd.static(mixed):
+                    grid.density[n] = mass / filled if filled > 0.0 else 1.0
                 grid.slope_z[n] = turn
+
+
+@qd.func
+def filled_at(grid: CoarseGrid, n):
+    """How full of fluid node `n` is; all, where the fluid is continued into a body."""
+    return qd.min(grid.fill[n], 1.0) if grid.slope_z[n] == 0.0 else 1.0
+
+
+@qd.func
+def density_at(grid: CoarseGrid, at, x: qd.template()):
+    """The density of the fluid around a place in the world, over that of the heaviest."""
+    dim = qd.static(x.n)
+    s = in_cells(grid, flattened(at, x))
+    nodes = corners(grid, qd.floor(s, qd.i32), dim)
+    weights = tents(s - qd.floor(s), dim)
+    mass, filled = 0.0, 0.0
+    for c in qd.static(range(2**dim)):
+        share = weights[c] * filled_at(grid, nodes[c])
+        mass += share * grid.density[nodes[c]]
+        filled += share
+    return mass / filled if filled > 0.0 else 1.0
 
 
 @qd.func
@@ -94,7 +123,7 @@ def multiplier_at(grid: CoarseGrid, at, x: qd.template()):
 @qd.kernel(fastcache=True)
 def push_bodies(
     grid: CoarseGrid, pieces: Pieces, solids: SolidSet, particles: Particles, stiffness: qd.f32,
-    per_lambda: qd.f32, c: Coefficients,
+    per_lambda: qd.f32, c: Coefficients, mixed: qd.template(),
 ):  # fmt: skip
     """Push each piece of each body as the water that it took the place of, by the difference between its faces.
 
@@ -121,13 +150,16 @@ def push_bodies(
         # In metres, as the pushes are that the body's unit is for: times the edge of a cell.
         wet = qd.min(qd.max(2.0 * depth / grid.dy, 0.0), 1.0) * pieces.volume[number] * grid.dy
         qd.atomic_add(solids.reaction[parts() * k + immersion()], qd.cast(qd.round(solids.unit[k] * wet), qd.i32))
+        if qd.static(mixed):
+            wet *= density_at(grid, fallen, particles.x[0])
+        qd.atomic_add(solids.reaction[parts() * k + displacing()], qd.cast(qd.round(solids.unit[k] * wet), qd.i32))
 
 
-def push_on_grid(world: World, stiffness: float, per_lambda: float, c: Coefficients) -> None:
+def push_on_grid(world: World, stiffness: float, per_lambda: float, c: Coefficients, *, mixed: int) -> None:
     """Let the pressure that the finest grid has push the bodies; a body is no deeper than `FARTHEST` nodes."""
     grid, pieces = world.levels[0], world.pieces
     assert pieces is not None, "there are no bodies"
     mark_known(grid)
     for turn in range(1, min(FARTHEST, math.ceil(pieces.reach / min(grid.dx, grid.dy)) + 1) + 1):
-        continue_pressure(grid, c, stiffness, turn, AIR)
-    push_bodies(grid, pieces, world.solids, world.particles, stiffness, per_lambda, c)
+        continue_pressure(grid, c, stiffness, turn, AIR, mixed)
+    push_bodies(grid, pieces, world.solids, world.particles, stiffness, per_lambda, c, mixed)

@@ -305,7 +305,8 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     )  # fmt: skip
     if world.pieces:
         acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2
-        push_on_grid(world, stiffness, stiffness / acting if acting else 0.0, c)  # nothing is deep without gravity
+        per_lambda = stiffness / acting if acting else 0.0  # nothing is deep without gravity
+        push_on_grid(world, stiffness, per_lambda, c, mixed=kinds.mixed)
 
 
 def errors(grid: CoarseGrid, params: Parameters, stiffness: float, *, bodies: bool) -> Errors:
