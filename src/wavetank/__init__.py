@@ -11,6 +11,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.materials import Material
 from wavetank.foundation.params import PARAMETERS, PRESETS
 from wavetank.foundation.version import VERSION
 from wavetank.scene.drains import Drain
@@ -43,11 +44,11 @@ __version__ = VERSION
 
 __all__ = [
     "PARAMETERS", "PRESETS", "Ball", "BallJoint", "Block", "Box", "Camera", "Capsule", "Cylinder", "Difference",
-    "Drain", "Emitter", "Filled", "Gauge", "HalfSpace", "HeightField", "Hinge", "Intersection", "Keyframe", "Mesh",
-    "Motion", "Points", "Polygon", "Recording", "Rope", "Scene", "Session", "Simulation", "Slider", "Sphere",
-    "Spring", "Tank", "Union", "WavetankError", "Weld", "__version__", "bundled_scenes", "commands",
-    "load_dualsphysics", "load_mjcf", "load_robot", "load_splishsplash", "load_urdf", "render", "replay", "sampled",
-    "show",
+    "Drain", "Emitter", "Filled", "Gauge", "HalfSpace", "HeightField", "Hinge", "Intersection", "Keyframe",
+    "Material", "Mesh", "Motion", "Points", "Polygon", "Recording", "Rope", "Scene", "Session", "Simulation",
+    "Slider", "Sphere", "Spring", "Tank", "Union", "WavetankError", "Weld", "__version__", "bundled_scenes",
+    "commands", "load_dualsphysics", "load_mjcf", "load_robot", "load_splishsplash", "load_urdf", "render",
+    "replay", "sampled", "show",
 ]  # fmt: skip
 
 #: what needs the kernels' sources is imported when it is first used: data alone should load fast

@@ -198,3 +198,11 @@ def test_every_number_of_a_scene_is_a_length_or_known_not_to_be():
             assert not has_numbers or model.is_length(field) != bool({name, f"{kind.__name__}.{name}"} & others), (
                 f"{kind.__name__}.{name}"
             )
+
+
+def test_materials_in_python_are_those_of_a_file():
+    text = 'spacing = 0.02\n[tank]\nsize = [1, 1]\n[[materials]]\nname = "oil"\ndensity = 850\n'
+    made = wt.Scene(spacing=0.02, tank=wt.Tank(size=(1, 1)), materials=[wt.Material(name="oil", density=850)])
+    assert made.materials == wt.Scene.from_text(text).materials
+    with pytest.raises(wt.WavetankError, match="density"):
+        wt.Material(name="oil", density=-1)
