@@ -336,3 +336,17 @@ def test_honey_at_rest_does_not_creep_up_its_walls():
     moved = np.linalg.norm(sim.positions - start, axis=1) / 2.0
     assert moved.max() < 0.002
     assert sim.positions[:, 1].mean() == pytest.approx(height, rel=2e-3)
+
+
+def test_a_sheet_of_honey_does_not_hop():
+    """What its floor bore in one step it bears in the next, where nothing moves (hydrostatics): 0.006 m/s rms before."""
+    sim = Simulation(wt.Scene.parse({
+        "spacing": 0.0015, "rest_density": 1400.0, "dynamic_viscosity": 70.0, "tank": {"size": [0.06, 0.03]},
+        "fluids": [{"lower": [0, 0], "upper": [0.03, 0.00675], "velocity": [0.01, -0.3]}],
+    }))  # fmt: skip
+    sim.advance(5.0)
+    speeds = []
+    for _ in range(60):
+        sim.advance(1.0 / 60.0)
+        speeds.append(np.sqrt((sim.velocities.astype(float) ** 2).sum(axis=1).mean()))
+    assert np.mean(speeds) < 0.002

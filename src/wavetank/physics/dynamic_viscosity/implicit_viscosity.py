@@ -42,7 +42,9 @@ Where we differ, and why:
   three spacings does not sink through fluid of two thirds of its density, not even through water (docs/bodies.md).
   Walls hold what pressure is still to act on as if it had: fluid that begins its step falling pulled bodies down.
 - At rest nearly all of it is carried on (`CALM`). With a fifth left out, honey began each step falling; as walls hold
-  that back, they bore a third of its weight: it crept up them, and down between them, for ever.
+  that back, they bore a third of its weight: it crept up them, and down between them, for ever. And it lasts where
+  nothing moves (`LASTS`): the push that remains is a fiftieth of gravity's. Where it was none for a step, as single
+  particles stood a thousandth too high, all was forgotten; they fell, were pressed, rose, and a sheet hopped for ever.
 """
 
 import dataclasses
@@ -79,6 +81,7 @@ TOUCHING = 0.5  # d: closer to a wall than at rest, what strikes it is held back
 SLIPS = 1e-9  # least share of the drag along a wall, where there should be none
 WITH_BODIES = 4.0  # `thickness` in a step, at most, where bodies are in the fluid
 CALM = 0.9  # share of what is not carried on that is, where nothing moves
+LASTS = 0.95  # of what was carried on that is again where nothing moves, whatever pressed
 PUSHED = 0.1  # of its own speed and of sqrt(2 g h): the speed that a push gives where solids move through
 
 
@@ -155,6 +158,7 @@ class Carrying:
     half: qd.f32  # thickness with half of that share
     largest: qd.f32  # m/s^2
     calm: qd.f32  # share of what is not carried on that is, where nothing moves
+    lasts: qd.f32  # of what there was, that is carried on anyway where nothing moves
     again: qd.f32  # of the push of this step: what has left the floor is not pushed any more
     own: qd.f32  # of its own speed: that which a push gives, at most, beside
     falling: qd.f32  # m/s
@@ -173,10 +177,12 @@ def carry_pressure(particles: Particles, rows: qd.types.ndarray(), c: Coefficien
         a = particles.a[i] + pushed / (c.dt * c.dt)
         thick = carrying.rate * row[0] * row[1]
         way = predicted(particles, i) - particles.x[i]
-        passed = 1.0 - carrying.calm * qd.max(0.0, 1.0 - way.norm_sqr() * c.slow / (c.dt * c.dt))
+        calm = qd.max(0.0, 1.0 - way.norm_sqr() * c.slow / (c.dt * c.dt))
+        passed = 1.0 - carrying.calm * calm
         share = 1.0 - (1.0 - carrying.most) * passed
         share *= thick / (carrying.half + thick)
         limit = qd.min(carrying.largest, carrying.again / passed * pushed.norm() / (c.dt * c.dt))
+        limit = qd.max(limit, carrying.lasts * calm * particles.a[i].norm())
         particles.a[i] = a * (share * qd.min(1.0, limit / qd.max(a.norm(), 1e-12)))
         most = (carrying.own * particles.v[i].norm() + carrying.falling) * (carrying.half + thick) / qd.max(thick, 1e-6)
         if pushed.norm() > c.dt * most:
@@ -267,7 +273,8 @@ def carry_on(world: World, kinds: Blend, params: Parameters, c: Coefficients, *,
     rate, gravity = thickness(1.0 / kinds.largest_density, params, c.dt), math.hypot(*params.gravity)
     own, falling = (PUSHED, PUSHED * math.sqrt(2.0 * gravity * c.h)) if stirred else (0.0, ANY)
     carrying = remembered(Carrying(
-        rate=rate, most=CARRIED, half=HALF, largest=LARGEST * gravity, again=AGAIN, calm=CALM, own=own, falling=falling
+        rate=rate, most=CARRIED, half=HALF, largest=LARGEST * gravity, again=AGAIN, calm=CALM, lasts=LASTS, own=own,
+        falling=falling,
     ))  # fmt: skip
     carry_pressure(world.particles, world.fluids.rows, c, carrying, world.count)
 
