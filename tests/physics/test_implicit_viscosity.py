@@ -339,7 +339,7 @@ def test_honey_at_rest_does_not_creep_up_its_walls():
 
 
 def test_a_sheet_of_honey_does_not_hop():
-    """What its floor bore in one step it bears in the next, where nothing moves (hydrostatics): 0.006 m/s rms before."""
+    """What its floor bore in one step it bears in the next, where nothing moves (hydrostatics): 0.006 m/s before."""
     sim = Simulation(wt.Scene.parse({
         "spacing": 0.0015, "rest_density": 1400.0, "dynamic_viscosity": 70.0, "tank": {"size": [0.06, 0.03]},
         "fluids": [{"lower": [0, 0], "upper": [0.03, 0.00675], "velocity": [0.01, -0.3]}],

@@ -85,9 +85,9 @@ def test_a_film_on_a_floor_lies_still(layers):
     assert np.sqrt((speeds**2).mean()) < 0.01 * np.sqrt(9.81 * d)
 
 
-@pytest.mark.parametrize(("walls", "shift"), [(0.6, 0.013), (1.25, 0.0), (2.0, 0.027)])
+@pytest.mark.parametrize(("walls", "shift"), [(0.6, 0.013), (1.25, 0.013), (2.0, 0.027), (3.0, 0.013), (3.0, 0.027)])
 def test_water_in_a_thin_cup_rests(walls, shift):
-    """Hydrostatics. The pressure ended in the air behind the wall, and water went round at 0.3 to 1.2 m/s."""
+    """Hydrostatics. The pressure ended in the air behind the wall, and water went round at 0.18 to 1.2 m/s."""
     d, width, height = 0.02, 0.24, 0.3
     t, x, y = walls * d, 0.3 + shift, 0.11 + 0.7 * shift
     right = x + width + 2 * t
@@ -98,7 +98,7 @@ def test_water_in_a_thin_cup_rests(walls, shift):
     sim = wt.Simulation(wt.Scene(spacing=d, tank=tank, fluids=[block], solids=[cup], foam=0.0))
     sim.advance(8.0)
     speeds = np.array([np.linalg.norm(frame.velocities, axis=1) for frame in sim.frames(seconds=1.0)])
-    assert speeds.max() < 0.1 * np.sqrt(9.81 * d)
+    assert speeds.max() < 0.02 * np.sqrt(9.81 * d)
     assert np.sqrt((speeds**2).mean()) < 0.01 * np.sqrt(9.81 * d)
     assert np.all((sim.positions[:, 0] > x + t) & (sim.positions[:, 0] < right - t) & (sim.positions[:, 1] > y + t))
 

@@ -84,6 +84,29 @@ def goes_on(grid: CoarseGrid, solids: SolidSet, around: qd.template(), surface, 
 
 
 @qd.func
+def straight_across(grid: CoarseGrid, solids: SolidSet, around: qd.template(), at, edge):
+    """The one axis on which a place `at` inside of a wall is free on both sides, towards the nearer; 0 if no one is.
+
+    In the middle of a wall that a grid of distances hardly resolves these tell no direction.
+    """
+    found, axes = vec3(0.0, 0.0, 0.0), 0
+    for axis in range(3 if grid.nz > 1 else 2):
+        free, nearer = 0.0, 0.0  # how much of a solid is on both sides; by how much it is deeper ahead
+        for number in range(4):  # asked in one place of the code: what a kernel takes to compile grows with these
+            side = 1.0 - 2.0 * (number % 2)
+            way = vec3(0.0, 0.0, 0.0)
+            way[axis] = side * (0.5 if number < 2 else 0.15) * thickest() * edge
+            depth = depth_in_solids(solids, around, at + way)
+            free += depth if number < 2 else 0.0
+            nearer += 0.0 if number < 2 else side * depth
+        if free == 0.0:
+            axes += 1
+            found = vec3(0.0, 0.0, 0.0)
+            found[axis] = 1.0 if nearer <= 0.0 else -1.0
+    return found * (1.0 if axes == 1 else 0.0)
+
+
+@qd.func
 def keep_thin(grid: CoarseGrid, solids: SolidSet, around: qd.template(), n, wall):
     """Keep the plane of a thin `wall`, (gradient, distance [m]), that node `n` lies at; return 1 if there is one.
 
@@ -100,6 +123,10 @@ def keep_thin(grid: CoarseGrid, solids: SolidSet, around: qd.template(), n, wall
         close = narrowed(solids, around, surface, 1.1 * most)  # no place that is asked for is farther away than `most`
         is_thin = depth_in_solids(solids, close, surface - outward * most) == 0.0
         is_thin = is_thin or depth_in_solids(solids, close, surface - outward * (0.5 * most)) == 0.0
+        if wall.w <= 0.0 and not is_thin:
+            outward = straight_across(grid, solids, close, center_of(grid, n), edge)
+            surface = center_of(grid, n) - outward * wall.w
+            is_thin = outward.norm() > 0.0
         if is_thin and goes_on(grid, solids, close, surface, outward, edge):
             found = 1
             if wall.w <= 0.0:
@@ -121,8 +148,18 @@ def way_from(grid: CoarseGrid, low, k: qd.template(), s):
 
 
 @qd.func
+def is_through(grid: CoarseGrid, n, m):
+    """Say whether the nodes `n` and `m` lie in one wall, each nearer to another side of it.
+
+    Surfaces are as the search for walls left them, see `room.kept_wall`.
+    """
+    facing = grid.slope_x[n] * grid.slope_x[m] + grid.slope_y[n] * grid.slope_y[m] + grid.slope_z[n] * grid.slope_z[m]
+    return qd.max(grid.lam[n], grid.lam[m]) < 0.0 and facing < -0.3
+
+
+@qd.func
 def mark_shut(grid: CoarseGrid, n):
-    """Find in which faces of node `n` to the next nodes a thin wall lies."""
+    """Find in which faces of node `n` to the next nodes a wall lies, of thin ones and of those a little thicker."""
     edges = vec3(grid.dx, grid.dy, grid.dz)
     bits = 0
     for axis in qd.static(range(3)):
@@ -131,7 +168,7 @@ def mark_shut(grid: CoarseGrid, n):
         m = nearest(grid, ahead)
         way = vec3(0.0, 0.0, 0.0)
         way[axis] = edges[axis]
-        if m != n and (behind(grid, n, way) or behind(grid, m, -way)):
+        if m != n and (behind(grid, n, way) or behind(grid, m, -way) or is_through(grid, n, m)):
             bits |= 1 << axis
     grid.shut[n] = bits
 
