@@ -192,7 +192,10 @@ def lay(
                                             )
                                         near = qd.abs(at - kept_z) < 0.3 * optics.spacing
                                         fresh = pixel != kept_pixel or layer != kept_layer or not near
-                                        fresh = fresh and not lies
+                                        # What has less than half of the water shows what the rest or the pixel before did.
+                                        minor = share < 0.5 * (first + second + cover)
+                                        known = minor and qd.abs(kept_pixel - pixel) <= 1
+                                        fresh = fresh and not lies and not known
                                 half = (look.to_sun - direction.normalized()).normalized(1e-9)
                                 shiny = layer == 1 and n.dot(half) > 0.9
                                 if qd.static(world % 10 >= 3):
