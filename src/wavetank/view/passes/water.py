@@ -192,7 +192,7 @@ def lay(
                                             )
                                         near = qd.abs(at - kept_z) < 0.3 * optics.spacing
                                         fresh = pixel != kept_pixel or layer != kept_layer or not near
-                                        # What has less than half of the water shows what the rest or the pixel before did.
+                                        # Less than half of the water shows what the rest did.
                                         minor = share < 0.5 * (first + second + cover)
                                         known = minor and qd.abs(kept_pixel - pixel) <= 1
                                         fresh = fresh and not lies and not known
