@@ -14,7 +14,7 @@ from typing import Any
 from wavetank.device.compiler import qd, threads
 
 LEAST_TASKS = 512  # that the compiler gives to a processor's thread, whatever they cost
-WHOLE = 24  # a strip is as wide as pairs of pixels of 1 to 4 samples: what these share depends on no thread
+WHOLE = 48  # a strip is as wide as groups of pixels of 1 to 4 samples: what these share depends on no thread
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -233,13 +233,14 @@ def crossed_about(ahead, n, spread):
 
 @qd.func
 def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usual, near, solid: qd.template()):
-    """Radiance that the picture shows at the point `at`, and towards its margins and beyond it what is `usual` there.
+    """Radiance that the picture shows at the point `at`, and towards its margins and beyond it what is `usual` there;
+    and (column, row, share of the picture).
 
     What stands before the water, nearer than `z` [m], is not behind it; where rays meet each `solid` by themselves,
     neither is one that hides the point from the eye. A point of a solid is shown where the picture's depth is `near`
     [m] its own; for others that is 0.
     """
-    result = usual
+    result, found = usual, vec3(0.0, 0.0, 0.0)
     c = to_view(lens, at)
     if c.z > lens.near:
         there = to_pixel(lens, c)
@@ -255,7 +256,8 @@ def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usu
                     share = 0.0
             if share > 0.0:
                 result += share * (picture_at(picture, there) - result)
-    return result
+                found = vec3(there.x, there.y, share)
+    return result, found
 
 
 @qd.func
@@ -288,7 +290,9 @@ def through_body(
     optics: Optics, inside: Inside, z, at, bent, mirrored, whole, uneven, solid: qd.template(),
 ):  # fmt: skip
     """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, and
-    (radiance, share) of the solid that the ray which is `mirrored` there meets.
+    (radiance, share) of the solid that the ray which is `mirrored` there meets, and (column, row, kind) of the place
+    of the picture that is all it shows; where rays beside it have the same kind, their places lie between. A kind of 0
+    is none.
 
     The way is negative where the water is no body, by `wholeness`; nothing is found then but what is mirrored; nothing
     is where `mirrored` is nought. The standard deviation of the normals where it entered is `uneven`: rays that enter
@@ -298,6 +302,7 @@ def through_body(
     function to wherever it is called, and the time that they take grows faster than what they get.
     """
     shown, total, seen_above = vec3(0.0, 0.0, 0.0), 0.0, vec4(0.0, 0.0, 0.0, 0.0)
+    lead = vec3(0.0, 0.0, 0.0)
     p, ahead = qd.min(qd.max(at, inside.walls.lower), inside.walls.upper), bent
     # Where a ray leaves that is mirrored as well, what leaves first is kept, and what is mirrored there goes on.
     left, share, waits, turned, again = vec4(0.0, 0.0, 0.0, 0.0), 0.0, 0, p, ahead
@@ -367,8 +372,9 @@ def through_body(
                             share = qd.max(out[3] - faint(), 0.0) / (1.0 - faint())
                             waits = qd.select(share > 0.0, 1, 0)
             if ends == 1:
+                there = vec3(0.0, 0.0, 0.0)
                 if shows == 1:
-                    usual = seen_at(depth, picture, lens, z, place, usual, near, solid)
+                    usual, there = seen_at(depth, picture, lens, z, place, usual, near, solid)
                 way = total + qd.select(cover > 0.0 and piece == 0, s, 0.0)
                 if piece == 2:
                     done = 1
@@ -378,6 +384,8 @@ def through_body(
                     left, share, past = vec4(usual.x, usual.y, usual.z, way), 1.0 - cover, 1
                 else:
                     shown, total, done = usual, way, 1
+                    if there.z > 0.999 and cover == 0.0:
+                        lead = vec3(there.x, there.y, 1.0 + piece + 2.0 * within)
     if done == 0:
         shown = optics.glow
     if share > 0.0:
@@ -386,4 +394,6 @@ def through_body(
         shown = share * qd.exp((way - total) * optics.absorption) * shown
         shown += (1.0 - share) * qd.exp((way - left[3]) * optics.absorption) * vec3(left[0], left[1], left[2])
         total = way
-    return vec4(shown.x, shown.y, shown.z, total), seen_above
+    if share > 0.0 or seen_above[3] > 0.0:
+        lead.z = 0.0
+    return vec4(shown.x, shown.y, shown.z, total), seen_above, lead

@@ -32,3 +32,44 @@ def normal_of(lens: Lens, row, column, z, rise):
     # Cross product of the ways along the surface: (wide + u right, v right, right), (u below, v below - wide, below).
     n = vec3(rise.x, -rise.y, -wide - uv.x * rise.x + uv.y * rise.y)
     return from_view(lens, n).normalized(1e-20)
+
+
+@qd.func
+def normal_beside(lens: Lens, row, column, z, limit, depth: qd.template()):
+    """Normal of the surface at about the depth `z` that a neighbouring pixel shows; towards the eye where none does."""
+    best, r, c = limit, row, column
+    for k in qd.static(range(4)):
+        i = qd.min(qd.max(row + qd.static((0, 0, 1, -1)[k]), 0), depth.shape[0] - 1)
+        j = qd.min(qd.max(column + qd.static((1, -1, 0, 0)[k]), 0), depth.shape[1] - 1)
+        off = qd.abs(qd.bit_cast(depth[i, j], qd.f32) - z)
+        if off < best:
+            best, r, c = off, i, j
+    n = -lens.forward
+    if best < limit:
+        there = qd.bit_cast(depth[r, c], qd.f32)
+        n = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * limit, depth))
+    return n
+
+
+@qd.func
+def unevenness(lens: Lens, row, column, z, n, direction, spacing, depth: qd.template()):
+    """Standard deviation of the normals of the surface around a pixel, along an axis, within a spacing.
+
+    Of both sides the rougher counts, and none beyond which the surface ends; where it does to both, it is broken. A
+    mean of two, half of it along each axis, a third of it at the edge is that within.
+    """
+    total, pixel = 0.0, lens.pixel * (1.0 + lens.perspective * (z - 1.0))
+    steep = qd.max(qd.abs(n.dot(direction)), 1e-3)
+    for axis in range(2):
+        away, slope = -1.0, n.dot(qd.select(axis == 0, lens.right, lens.up)) / steep
+        k = qd.max(qd.cast(spacing / (pixel * qd.sqrt(1.0 + slope * slope)), qd.i32), 1)
+        for side in range(2):
+            step = k * (1 - 2 * side)
+            r = qd.min(qd.max(row + step * axis, 0), depth.shape[0] - 1)
+            c = qd.min(qd.max(column + step * (1 - axis), 0), depth.shape[1] - 1)
+            there = qd.bit_cast(depth[r, c], qd.f32)
+            if qd.abs(there - z) < 3.0 * spacing:
+                other = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * spacing, depth)) - n
+                away = qd.max(away, other.dot(other))
+        total += qd.select(away < 0.0, 1.0, away)
+    return qd.sqrt(total / 12.0)

@@ -29,6 +29,7 @@ from wavetank.view.lens import (
     view_ray,
 )
 from wavetank.view.look import Look
+from wavetank.view.optics.between import GROUP, alike, group, seen_between, turn_of
 from wavetank.view.optics.body import Inside, through_body, wholeness
 from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, refracted
@@ -36,7 +37,7 @@ from wavetank.view.optics.glass import line_cover
 from wavetank.view.optics.maps import margins_inside, picture_at, thickness_at
 from wavetank.view.optics.marks import rim_cover, rim_key
 from wavetank.view.optics.mixture import mixed, murky
-from wavetank.view.optics.normals import normal_of, rise_at
+from wavetank.view.optics.normals import normal_beside, normal_of, rise_at, unevenness
 from wavetank.view.optics.panes import share_behind, tank_interval
 from wavetank.view.optics.radiance import environment, glint, smoothstep
 from wavetank.view.optics.rays import box
@@ -56,7 +57,6 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         thick = vector(0.0, 0.0, 10.0 * shot.extent.spacing)
         walls = box(walls.lower - thick, walls.upper + thick)
     solids = shot.frame.solids
-    together = max(buffers.supersample, 2)
     # Solids are met by bent rays in a tank only: in the open there is no body of water.
     world, among = shot.frame.dim, solids.count > solids.tank_count
     if among and (world == 2 or shot.frame.scene.tank):
@@ -65,8 +65,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water, buffers.sun_depth)
     lay(
         pixels, water.surface, water.thickness, water.backdrop, water.sunlit,
-        strips_of(pixels.depth, together, buffers.supersample), shot.lens, shot.water_sun, shot.look,
-        optics_of(shot, under_water(shot, buffers), together, buffers.supersample), inside,
+        strips_of(pixels.depth, GROUP * buffers.supersample, buffers.supersample), shot.lens, shot.water_sun, shot.look,
+        optics_of(shot, under_water(shot, buffers), buffers.supersample, buffers.supersample), inside,
         100 * int(buffers.supersample > 1) + 10 * int(water.thickness.fluids > 0) + world,
     )  # fmt: skip
 
@@ -83,23 +83,35 @@ def lay(
     with several fluids, and a hundred more where pixels have several samples.
     """
     for task in range(strips.count):
-        band, begin, end = strip(strips, task, pixels.depth.shape[0] // optics.tall, pixels.depth.shape[1])
+        band, begin, last = strip(strips, task, pixels.depth.shape[0] // optics.tall, pixels.depth.shape[1])
         beside, block = optics.samples, optics.samples * optics.tall
-        # What is seen through a body of water is found once for all samples of a pixel, or of two: one after the other.
+        # What is seen through a body of water is found once for all samples of a pixel, or of two pixels of one sample,
+        # and not at all where it lies between the ends of two groups of pixels (`optics/between.py`).
         kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
         kept_above, kept_whole, uneven = vec4(0.0, 0.0, 0.0, 0.0), 0.0, 0.0
+        before, before_above, before_layer = kept, kept_above, -1
+        end, end_above, end_layer, end_pixel = kept, kept_above, -1, -1
+        # (column, row, kind) of what these ends show, and (depth, wholeness, unevenness, column) of where they do.
+        old, old_of = vec3(0.0, 0.0, 0.0), vec4(-1.0, 0.0, 0.0, 0.0)
+        new, new_of = old, old_of
         # A pixel whose samples all show the same is shaded once, in its middle.
         even, even_z, even_normal = 0, 0.0, vec3(0.0, 0.0, 0.0)
-        for index in range((end - begin + optics.turn + beside - 1) // beside * block):
-            part = index % block
+        start, wide_group = begin - optics.turn, beside * group()
+        count = qd.select(last > begin, (last - start + wide_group - 1) // wide_group * group() + 1, 0)
+        for index in range(count * block):
+            part, number = index % block, turn_of(index // block)
+            at_end = (number + 1) % group() == 0
             row = band * optics.tall + part // beside
-            column = begin - optics.turn + index // block * beside + part % beside
+            column = start + number * beside + part % beside
+            if at_end and part == 0:
+                before, before_above, before_layer, old, old_of = end, end_above, end_layer, new, new_of
+                end_layer, end_pixel, kept_pixel = -1, -1, -1
             if qd.static(world >= 100):
-                if part == 0 and optics.under == 0:
+                if part == 0 and optics.under == 0 and column >= 0 and column < pixels.depth.shape[1]:
                     even, even_z, even_normal = even_pixel(
                         pixels, surface, lens, look, optics, inside.walls, row, column, qd.static(world % 10)
                     )
-            if column >= begin and column < end and (part == 0 or even == 0):
+            if column >= 0 and column < pixels.depth.shape[1] and (part == 0 or even == 0):
                 middle = vec2(column + 0.5, row + 0.5)
                 result = backdrop.behind[row, column]
                 z, back = (
@@ -160,7 +172,8 @@ def lay(
                             if share > 0.0:
                                 body = vec4(0.0, 0.0, 0.0, -1.0)
                                 above, whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
-                                bodily, fresh, pixel = False, False, (column + optics.turn) // optics.samples
+                                bodily, fresh, lies, between = False, False, False, 0.0
+                                pixel = (number + 2 * group()) // (2 if beside == 1 else 1)
                                 if qd.static(world % 10 >= 3):
                                     # A tank, and without bent rays to meet them no solid in it.
                                     wide = back > 0.999 * ends[1]
@@ -168,8 +181,21 @@ def lay(
                                         wide = True
                                     if inside.walls.upper.x < 1e5 and wide:
                                         bodily = True
+                                        if pixel == end_pixel and kept_pixel != pixel:
+                                            kept, kept_above, kept_layer, kept_pixel = end, end_above, end_layer, pixel
+                                            kept_z, kept_whole, uneven = new_of[0], new_of[1], new_of[2]
+                                        if not at_end and layer == before_layer and layer == end_layer:
+                                            between = (middle.x - old_of[3]) / (new_of[3] - old_of[3])
+                                            off = qd.abs(at - old_of[0] - between * (new_of[0] - old_of[0]))
+                                            lies = off < 0.3 * optics.spacing and alike(
+                                                before, before_above, old, end, end_above, new, 6.0 * wide_group
+                                            )
                                         near = qd.abs(at - kept_z) < 0.3 * optics.spacing
                                         fresh = pixel != kept_pixel or layer != kept_layer or not near
+                                        # Less than half of the water shows what the rest did.
+                                        minor = share < 0.5 * (first + second + cover)
+                                        known = minor and qd.abs(kept_pixel - pixel) <= 1
+                                        fresh = fresh and not lies and not known
                                 half = (look.to_sun - direction.normalized()).normalized(1e-9)
                                 shiny = layer == 1 and n.dot(half) > 0.9
                                 if qd.static(world % 10 >= 3):
@@ -184,15 +210,24 @@ def lay(
                                         )
                                     elif fresh:
                                         uneven = 0.0
+                                    elif lies:
+                                        uneven = old_of[2] + between * (new_of[2] - old_of[2])
                                     if fresh:
-                                        kept, kept_above = through_body(
+                                        kept, kept_above, lead = through_body(
                                             pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
                                             inside, at, point, bent,
                                             qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), kept_whole, uneven,
                                             qd.static(world % 10 == 4),
                                         )  # fmt: skip
                                         kept_z, kept_layer, kept_pixel = at, layer, pixel
-                                    if bodily:
+                                        if at_end and share > 0.5:
+                                            end, end_above, end_layer, end_pixel = kept, kept_above, layer, pixel
+                                            new, new_of = lead, vec4(at, kept_whole, uneven, middle.x)
+                                    if lies:
+                                        body = seen_between(backdrop.behind, between, before, old, end, new)
+                                        above = before_above + between * (end_above - before_above)
+                                        whole = old_of[1] + between * (new_of[1] - old_of[1])
+                                    elif bodily:
                                         body, above, whole = kept, kept_above, kept_whole
                                 rough = qd.select(shiny, uneven * uneven, 0.0)
                                 result += share * shine(
@@ -206,11 +241,12 @@ def lay(
                             front = 1.7e38
                     else:
                         front = 1.7e38
-                key = qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
-                for k in range(qd.select(even > 0, block, 1)):
-                    r, c = row + k // beside, column + k % beside
-                    pixels.color[r, c] = result
-                    surface.nearest[r, c] = qd.min(key, pixels.depth[r, c])
+                if column >= begin and column < last:  # what lies in other strips is only followed
+                    key = qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
+                    for k in range(qd.select(even > 0, block, 1)):
+                        r, c = row + k // beside, column + k % beside
+                        pixels.color[r, c] = result
+                        surface.nearest[r, c] = qd.min(key, pixels.depth[r, c])
 
 
 @qd.func
@@ -219,47 +255,6 @@ def from_within(thickness: qd.template(), lens: Lens, optics: Optics, row, colum
     tau = thickness_at(thickness, vec2(column + 0.5, row + 0.5) / optics.coarse, optics.unit)
     travel = qd.min(tau, back * ray_direction(lens, view_ray(lens, row, column)).norm())
     return dimmed(radiance, travel, optics.absorption, optics.scattering, optics.glow)
-
-
-@qd.func
-def normal_beside(lens: Lens, row, column, z, limit, depth: qd.template()):
-    """Normal of the surface at about the depth `z` that a neighbouring pixel shows; towards the eye where none does."""
-    best, r, c = limit, row, column
-    for k in qd.static(range(4)):
-        i = qd.min(qd.max(row + qd.static((0, 0, 1, -1)[k]), 0), depth.shape[0] - 1)
-        j = qd.min(qd.max(column + qd.static((1, -1, 0, 0)[k]), 0), depth.shape[1] - 1)
-        off = qd.abs(qd.bit_cast(depth[i, j], qd.f32) - z)
-        if off < best:
-            best, r, c = off, i, j
-    n = -lens.forward
-    if best < limit:
-        there = qd.bit_cast(depth[r, c], qd.f32)
-        n = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * limit, depth))
-    return n
-
-
-@qd.func
-def unevenness(lens: Lens, row, column, z, n, direction, spacing, depth: qd.template()):
-    """Standard deviation of the normals of the surface around a pixel, along an axis, within a spacing.
-
-    Of both sides the rougher counts, and none beyond which the surface ends; where it does to both, it is broken. A
-    mean of two, half of it along each axis, a third of it at the edge is that within.
-    """
-    total, pixel = 0.0, lens.pixel * (1.0 + lens.perspective * (z - 1.0))
-    steep = qd.max(qd.abs(n.dot(direction)), 1e-3)
-    for axis in range(2):
-        away, slope = -1.0, n.dot(qd.select(axis == 0, lens.right, lens.up)) / steep
-        k = qd.max(qd.cast(spacing / (pixel * qd.sqrt(1.0 + slope * slope)), qd.i32), 1)
-        for side in range(2):
-            step = k * (1 - 2 * side)
-            r = qd.min(qd.max(row + step * axis, 0), depth.shape[0] - 1)
-            c = qd.min(qd.max(column + step * (1 - axis), 0), depth.shape[1] - 1)
-            there = qd.bit_cast(depth[r, c], qd.f32)
-            if qd.abs(there - z) < 3.0 * spacing:
-                other = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * spacing, depth)) - n
-                away = qd.max(away, other.dot(other))
-        total += qd.select(away < 0.0, 1.0, away)
-    return qd.sqrt(total / 12.0)
 
 
 @qd.func
