@@ -8,9 +8,9 @@ import wavetank as wt
 pytest.importorskip("rapier3d")
 
 
-def test_light_bodies_that_fall_on_each_other_come_to_rest():
-    """The second law: eighteen boxes and balls, lighter than water, swim at less than 0.3 m/s two seconds later."""
-    rng, bodies = np.random.default_rng(1), []
+def rained_on_each_other(start):
+    """Eighteen boxes and balls, lighter than water: their speeds from the second second on, half a second long."""
+    rng, bodies = np.random.default_rng(start), []
     for k in range(18):
         x, z = 0.12 + 0.19 * (k % 3) + 0.02 * rng.random(), 0.12 + 0.19 * (k // 3 % 3)
         about = {"name": f"b{k}", "center": (x, 0.5 + 0.2 * (k // 9), z), "density": rng.choice([150.0, 300.0, 600.0])}
@@ -22,7 +22,13 @@ def test_light_bodies_that_fall_on_each_other_come_to_rest():
         sim.step()
         if frame >= 120:
             speeds.append([np.linalg.norm(body.velocity) for body in sim.bodies.values()])
-    assert np.sqrt(np.mean(np.square(speeds))) < 0.15
-    assert np.max(speeds) < 0.6
     heights = [body.position[1] for body in sim.bodies.values()]
     assert min(heights) > 0.0 and max(heights) < 0.8, "inside, and none on its way up"
+    return np.array(speeds)
+
+
+def test_light_bodies_that_fall_on_each_other_come_to_rest():
+    """The second law: they swim at less than 0.1 m/s two seconds later, but for one that still slides off another."""
+    speeds = [rained_on_each_other(start) for start in (1, 2, 3)]
+    assert np.median([np.sqrt(np.mean(found**2)) for found in speeds]) < 0.1
+    assert np.median([found.max() for found in speeds]) < 0.6

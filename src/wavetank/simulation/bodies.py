@@ -45,6 +45,7 @@ MOST_TRIES = 4  # of a step
 FAR = 0.3  # of a spacing: bodies that yield by more begin the step anew
 FEWEST = 4.0  # pieces across a body
 IN_JOINTS = 16  # inner iterations of the engine where there are joints: with 1 a motor sagged by 0.3 rad/s under a load
+IN_CONTACTS = 2  # where there are none: with 1 a heavy box that lay on the floor had 5 mm/s, by which it did not move
 DRY = 0.5  # Coulomb's coefficient between solids where none is named: wood on wood
 SMALL = 1.5  # spacings: radius of a ball as large as a body that leaves the water within a few steps; twice that is not
 LAYERS = 16.0  # particles that can press on a body at once, over those of a layer around its ball
@@ -235,7 +236,7 @@ class Bodies(Mapping[str, Body]):
             pose = isometry(self.engine, *self.solids.between(number, share))
             self.solid_views[number].set_next_kinematic_position(pose)
         self.world.integration_parameters.dt = dt
-        self.world.integration_parameters.num_internal_pgs_iterations = IN_JOINTS if self.joints else 1
+        self.world.integration_parameters.num_internal_pgs_iterations = IN_JOINTS if self.joints else IN_CONTACTS
         self.world.step()
         if self.dim == 2:
             keep_in_plane(self.engine, self.views)

@@ -47,9 +47,9 @@ def alike(seen, above, place, other_seen, other_above, other_place, apart):
         result = place[2] > 0.0 and place[2] == other_place[2] and off < apart
         if not result:
             away = qd.abs(other_seen - seen)
-            result = qd.max(away[0], away[1], away[2]) < 0.12
+            result = qd.max(away[0], away[1], away[2]) < 0.05
     step = qd.abs(other_above - above)
-    return result and qd.max(step[0], step[1], step[2], step[3]) < 0.12
+    return result and qd.max(step[0], step[1], step[2], step[3]) < 0.05
 
 
 @qd.func
