@@ -109,16 +109,3 @@ def test_a_puddle_on_the_floor_stops():
     sim = wt.Simulation(wt.Scene(spacing=0.02, tank=wt.Tank(size=(1.0, 0.4, 0.6)), fluids=[drop], foam=0.0))
     sim.advance(6.0)
     assert np.linalg.norm(sim.velocities, axis=1).max() < 0.01
-
-
-@pytest.mark.parametrize("shift", [0.0, 0.0135, 0.021])
-def test_a_ball_beside_the_surface_is_no_roof(shift):
-    """A cell at the surface is as full as those beside it; it counted as full below one of which a ball takes 4 %."""
-    ball = wt.Sphere(center=(0.5 + shift, 0.32), radius=0.06)
-    block = wt.Block(lower=(0, 0), upper=(1.0, 0.29))
-    sim = wt.Simulation(wt.Scene(spacing=0.02, tank=wt.Tank(size=(1.0, 0.7)), fluids=[block], solids=[ball], foam=0.0))
-    sim.advance(1.0 / 60.0)
-    grid = sim.world.levels[0]
-    fill, room = (a.to_numpy()[: grid.nx * grid.ny].reshape(grid.ny, grid.nx) for a in (grid.fill, grid.room))
-    row = int(0.29 / grid.dy)
-    assert fill[row, room[row] > 0.9].max() < fill[row, 0] + 0.2
