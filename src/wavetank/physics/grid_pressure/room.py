@@ -51,18 +51,6 @@ def is_water(fill):
 
 
 @qd.func
-def mostly():
-    """Room of a node that a solid takes so little of that its fill can be told."""
-    return 0.75
-
-
-@qd.func
-def is_roof(room):
-    """How surely what takes a node all but its `room` closes the cell below: a wall or a ball aside of it does not."""
-    return qd.min(qd.max(4.0 * (mostly() - room), 0.0), 1.0)
-
-
-@qd.func
 def below_roof(grid: CoarseGrid, n, c: Coefficients):
     """How surely what lacks at an open node `n` is a slit between water below and a solid above, against gravity."""
     surely = 0.0
@@ -76,9 +64,15 @@ def below_roof(grid: CoarseGrid, n, c: Coefficients):
                 place[axis] -= 2 * side
                 water = nearest(grid, place)
                 is_above = -side * gravity[axis] > 0.7 * gravity.norm()
-                if is_above and grid.room[water] >= whole():
-                    surely = qd.max(surely, is_roof(grid.room[roof]) * is_water(grid.fill[water]))
+                if is_above and grid.room[roof] < whole() and grid.room[water] >= whole():
+                    surely = qd.max(surely, is_water(grid.fill[water]))
     return surely
+
+
+@qd.func
+def mostly():
+    """Room of a node that a solid takes so little of that its fill can be told."""
+    return 0.75
 
 
 @qd.func
