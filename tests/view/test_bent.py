@@ -126,6 +126,6 @@ def test_strips_cut_no_pixel_on_any_number_of_threads(samples):
         for threads in (0, 1, 2, 3, 8):  # 0: a graphics processor
             rows, columns = height * samples, width * samples
             cut = _strips(rows, columns, threads, 4 * samples)
-            assert cut.width % (4 * samples) == 0 or cut.parts == 1
+            assert cut.width % samples == 0 and (cut.width % (4 * samples) == 0 or cut.parts == 1)
             assert cut.parts * cut.width >= columns > (cut.parts - 1) * cut.width
             assert cut.count >= rows * cut.parts

@@ -146,9 +146,8 @@ class Bodies(Mapping[str, Body]):
 
     def _weigh_all(self, numbers: list[int]) -> None:
         """Find how the mass of the bodies lies in them, and the water that goes along with them."""
-        solids, hung = [self.solids.members[number] for number in numbers], {
-            name for joint in self.scene.joints for name in (joint.first, joint.second)
-        }  # fmt: skip
+        solids = [self.solids.members[number] for number in numbers]
+        hung = {name for joint in self.scene.joints for name in (joint.first, joint.second)}
         jointed = [place for place, number in enumerate(numbers) if self.solids.names[number] in hung]
         found = weigh(solids, self.dim, self.scene.spacing, self.density, jointed)
         self.coupling = Coupling(found.weights, found.masses, found.tensors, found.reaches, found.added)
