@@ -38,6 +38,7 @@ __all__ = [
 #: Names a user may pass as ``arch``; ``gpu`` means the best one present.
 BACKENDS = ("cpu", "gpu", "cuda", "vulkan", "metal", "amdgpu")
 _GPU_ORDER = ("cuda", "metal", "amdgpu", "vulkan")
+_BY_LLVM = ("cpu", "cuda", "amdgpu")
 LANES = 8
 FEW = 50_000
 _current: str | None = None
@@ -88,7 +89,7 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
             "one process has one back end, start another process for another one."
         )
     options: dict[str, object] = {"arch": getattr(qd, wanted), "enable_fallback": False, "log_level": "error"}
-    if wanted == "cpu":
+    if wanted in _BY_LLVM:
         # LLVM does again what this pass does, in a fraction of the time: kernels are as fast without it.
         options["cfg_optimization"] = False
     if threads is not None:
