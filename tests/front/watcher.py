@@ -19,8 +19,8 @@ class Watcher:
         self._ended = False
         self._stack = ExitStack()
         self.socket = self._stack.enter_context(connect(url, max_size=None))
-        self._thread = threading.Thread(target=self._look, daemon=True)
-        self._thread.start()
+        self.thread = threading.Thread(target=self._look, daemon=True)
+        self.thread.start()
 
     def _look(self) -> None:
         while not self._ended:
@@ -40,12 +40,6 @@ class Watcher:
     def send(self, table: dict) -> None:
         """Send a command."""
         self.socket.send(json.dumps(table))
-
-    def rate(self, seconds: float) -> float:
-        """Pictures a second."""
-        before = self.pictures
-        time.sleep(seconds)
-        return (self.pictures - before) / seconds
 
     def wait_for_pictures(self, count: int = 5, seconds: float = 120.0) -> None:
         """Wait until so many were shown."""

@@ -195,9 +195,13 @@ def list_group(group, particles: Particles, grid: Grid, h2, count):
         low_cell = grid.cell[grid.order[begin_run]]
         cells = 3
         end_run = begin_run + 1
-        while end_run < last and goes_on(grid, grid.cell[grid.order[end_run]], low_cell, cells):
-            cells = grid.cell[grid.order[end_run]] - low_cell + 3
-            end_run += 1
+        going = True
+        while end_run < last and going:
+            cell = grid.cell[grid.order[end_run]]
+            going = goes_on(grid, cell, low_cell, cells)
+            if going:
+                cells = cell - low_cell + 3
+                end_run += 1
         run = places_of(particles, first, begin_run, end_run)
         earlier = places_of(particles, first, first, begin_run)
         for row in range(qd.static(9 if dim == 3 else 3)):
