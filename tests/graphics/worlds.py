@@ -14,7 +14,8 @@ from wavetank.physics.grid_pressure import poisson
 
 def compile_kernels() -> None:
     """Some frames, the last of each scene with a line before it in the driver's book, and pictures."""
-    for name, size in (("obstacle-tank", 8000), ("obstacle-tank-2d", 1500), ("honey", 1500), ("oil-and-water", 3000)):
+    sizes = {"obstacle-tank": 8000, "obstacle-tank-2d": 1500, "honey": 1500, "oil-and-water": 3000, "crates": 3000}
+    for name, size in sizes.items():
         sim = wt.Simulation(sized(wt.Scene.load(name), size), arch="cuda")
         sim.step()
         sim.step()

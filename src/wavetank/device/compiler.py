@@ -25,6 +25,7 @@ os.environ.setdefault("QD_ENABLE_PYBUF", "0")  # no kernel prints, and none need
 # The compiler prints a banner on import; a library should be silent.
 with contextlib.redirect_stdout(io.StringIO()), patches.short_frames():
     import quadrants as qd
+    from quadrants.lang.util import to_numpy_type
 
 patches.apply_all()
 # A damaged cache of kernels costs time; nobody needs to hear of it.
@@ -32,7 +33,7 @@ warnings.filterwarnings("ignore", module=r"quadrants\.lang\._fast_caching")
 
 __all__ = [
     "BACKENDS", "LANES", "Mirror", "available_backends", "cache_folder", "current_backend", "download", "lanes", "qd",
-    "start", "synchronize", "threads", "upload", "watched", "worth_sharing",
+    "shares_memory", "start", "synchronize", "threads", "upload", "watched", "worth_sharing",
 ]  # fmt: skip
 
 #: Names a user may pass as ``arch``; ``gpu`` means the best one present.
@@ -161,15 +162,21 @@ def download(array: Any) -> np.ndarray:
     return values
 
 
+def shares_memory() -> bool:
+    """Whether what the host writes to an array of the device is there at once."""
+    return _current == "cpu"
+
+
 def upload(array: Any, values: Any) -> None:
     """Write `values` to the front of a device array; what is beyond becomes zero."""
     # A kernel that copies takes tens of milliseconds to load, one for each type and number of axes.
-    shares = _current == "cpu"
-    memory = download(array) if shares else np.zeros_like(array.to_numpy())
+    memory = (
+        download(array) if shares_memory() else np.zeros(tuple(array.arr.total_shape()), to_numpy_type(array.dtype))
+    )
     memory[len(values) :] = 0
     if len(values):
         memory[: len(values)] = values
-    if not shares:
+    if not shares_memory():
         array.from_numpy(memory)
 
 
@@ -182,7 +189,7 @@ class Mirror:
 
     def __init__(self, array: Any) -> None:
         self._array = array
-        self._memory: np.ndarray | None = download(array) if _current == "cpu" else None
+        self._memory: np.ndarray | None = download(array) if shares_memory() else None
 
     def read(self) -> np.ndarray:
         """Return what the array holds, to be read at once."""
@@ -195,6 +202,13 @@ class Mirror:
         else:
             self._memory[: len(values)] = values
             self._memory[len(values) :] = 0
+
+    def clear(self) -> None:
+        """Make it all zero."""
+        if self._memory is None:
+            self._array.fill(0)
+        else:
+            self._memory[:] = 0
 
 
 @contextlib.contextmanager

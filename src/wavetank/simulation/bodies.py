@@ -96,7 +96,7 @@ class Bodies(Mapping[str, Body]):
         self.coupling.small = np.clip(2.0 - self.radii / (SMALL * scene.spacing), 0.0, 1.0)
         self.coupling.sinks = self.coupling.weights > self.wet_masses
         self.pieces = self._pieces()
-        self.sums, self.nothing = Mirror(solids.device.reaction), np.zeros(PARTS * len(solids.members), np.int32)
+        self.sums = Mirror(solids.device.reaction)
         self.levers = np.repeat(np.stack([np.ones(len(numbers)), self.coupling.reaches], axis=1), 3, axis=1)  # 1, m
 
     @override
@@ -272,7 +272,7 @@ class Bodies(Mapping[str, Body]):
 
         while True:
             synchronize()
-            self.sums.write(self.nothing)
+            self.sums.clear()
             if take_step(world, scene, dt, fastest, settle):
                 break
             self.retry.restore(world)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.device.compiler import Mirror, synchronize, upload
+from wavetank.device.compiler import synchronize, upload
 from wavetank.device.periods import NONE, Periods
 from wavetank.device.state import Particles
 from wavetank.foundation.errors import WavetankError
@@ -18,11 +18,11 @@ from wavetank.scene.scene import Scene
 from wavetank.simulation.courses import Courses
 from wavetank.solids import shapes
 from wavetank.solids.motion import Pose
+from wavetank.solids.placing import Placing
 from wavetank.solids.seams import seen_periods
 from wavetank.solids.solid import Solid
 
 SMALLEST = 0.02  # size at which a growing solid starts, of its full size
-PLACED = ("old_position", "old_rotation", "position", "rotation", "center", "plane", "sweep")  # of `SolidSet`
 PARTS = 4  # of a frame, in which the speed of a solid on a course is looked at
 Rows = tuple[np.ndarray, np.ndarray]  # places [n, 3] and rotations [n, 4]
 _versions = itertools.count(1)
@@ -62,7 +62,7 @@ class MovingSolids:
         reaches = [solid.span() for solid in chosen]
         repeats = self.periods.axes, seen_periods(chosen, self.periods, self.spacing)
         self.device = shapes.build(chosen, self.tank_count, self.friction, self.spacing, repeats)
-        self._placed = {name: Mirror(getattr(self.device, name)) for name in PLACED}
+        self._placing = Placing(self.device, len(chosen))
         self.members, self.reaches = chosen, reaches
         self.has_friction = self.friction > 0.0 or any(solid.friction for solid in chosen)
         self.walls = [solid.program()[0] for solid in chosen[: self.tank_count]]
@@ -233,10 +233,9 @@ class MovingSolids:
             return
         (old_at, old_turn), (at, turn) = (self._instant(share, last) for last, share in enumerate((begin, end)))
         sweep = np.stack([np.linalg.norm(at - old_at, axis=1), 2.0 * np.linalg.norm(turn - old_turn, axis=1)], axis=1)
-        values = old_at, old_turn, at, turn, self._centers(at, turn), self._planes(at, turn), sweep
+        centers, planes = self._centers(at, turn), self._planes(at, turn)
         synchronize()
-        for mirror, rows in zip(self._placed.values(), values, strict=True):
-            mirror.write(rows)
+        self._placing.write(old_at, old_turn, at, turn, centers, planes, sweep)
 
     def between(self, number: int, share: float) -> Pose:
         """Return where a solid is after a share of the present frame: on its course, or on the straight way."""
