@@ -40,6 +40,7 @@ from wavetank.view.optics.glass import line_cover, slack
 from wavetank.view.optics.maps import corners, gap_at
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
+from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import SunlitWater, water_of
 
 DEEPEST = 5.0  # d: depth below the surface at which foam is no longer seen
@@ -108,13 +109,14 @@ def lay(shot: Shot, buffers: Buffers, depth: Any, sunk: float, shutter: float) -
         return
     froth = froth_of(shot, buffers, sunk, shutter)
     rows, columns = (int(size) // int(froth.grain) + 2 for size in maps.sums.shape[:2])
-    clear(maps, rows, columns)
+    maps.sums.fill(0)
+    maps.relief.fill(0)
     splat(
         maps, frame.diffuse, depth, pixels.depth, buffers.sun_depth, shot.lens, shot.sun, shot.walls, froth,
         frame.dim, frame.foam_count,
     )  # fmt: skip
     shape(maps, shot.lens, shot.look, rows, columns, frame.dim)
-    blend(pixels, maps, depth, froth)
+    blend(pixels, maps, depth, strips_of(maps.sums), froth)
 
 
 def froth_of(shot: Shot, buffers: Buffers, sunk: float, shutter: float) -> Froth:
@@ -130,16 +132,6 @@ def froth_of(shot: Shot, buffers: Buffers, sunk: float, shutter: float) -> Froth
         line_strength=look.line_strength if frame.scene.tank else 0.0, slack=slack(shot), samples=buffers.supersample,
         grain=grain_of(shot, buffers.supersample), parts=PARTS, most_parts=MOST_PARTS, flat=int(flat),
     ))  # fmt: skip
-
-
-@qd.kernel(fastcache=True)
-def clear(maps: FoamMaps, rows: qd.i32, columns: qd.i32):
-    """No foam anywhere."""
-    for row, column in qd.ndrange(maps.sums.shape[0], maps.sums.shape[1]):
-        for k in qd.static(range(3)):
-            maps.sums[row, column, k] = 0
-    for row, column in qd.ndrange(rows, columns):
-        maps.relief[row, column] = 0
 
 
 @qd.func
@@ -347,30 +339,34 @@ def shape(maps: FoamMaps, lens: Lens, look: Look, rows: qd.i32, columns: qd.i32,
 
 
 @qd.kernel(fastcache=True)
-def blend(pixels: Pixels, maps: FoamMaps, depth: qd.types.ndarray(), froth: Froth):
+def blend(pixels: Pixels, maps: FoamMaps, depth: qd.types.ndarray(), strips: Strips, froth: Froth):
     """Lay the sums over the picture: what sun and sky give them or, over nothing, what it is in air."""
-    samples = froth.samples
-    for foam_row, foam_column in qd.ndrange(maps.sums.shape[0], maps.sums.shape[1]):
-        tau = maps.sums[foam_row, foam_column, 0]
-        if tau > 0:
-            per = 1.0 / qd.cast(tau, qd.f32)
-            place = vec2(foam_column + 0.5, foam_row + 0.5) / qd.cast(froth.grain, qd.f32)
-            r, c, r1, c1, v, u = corners(place, maps.light.shape[0], maps.light.shape[1], 1.001)
-            top = maps.light[r, c] + u * (maps.light[r, c1] - maps.light[r, c])
-            low = maps.light[r1, c] + u * (maps.light[r1, c1] - maps.light[r1, c])
-            share = top + v * (low - top)
-            # Froth scatters: a fifth of the sun comes around whatever is in the way.
-            sun = share.x * (0.2 + 0.8 * maps.sums[foam_row, foam_column, 1] * per)
-            under = qd.exp(-maps.sums[foam_row, foam_column, 2] * per * froth.swallow)
-            white = under * (sun * froth.in_sun + share.y * froth.in_sky)
-            most = 1.0 - qd.exp(-tau / 4096.0)
-            for row in range(foam_row * samples, foam_row * samples + samples):
-                for column in range(foam_column * samples, foam_column * samples + samples):
-                    light, cover = white, most
-                    if froth.flat == 1 and depth[row, column] == 0x7F000000:  # FARTHEST
-                        light = froth.in_air
-                    if froth.line_strength > 0.0:  # the tank's edges stay in front
-                        here = qd.bit_cast(depth[row, column], qd.f32)
-                        cover *= 1.0 - froth.line_strength * line_cover(pixels.lines[row, column], here, froth.slack)
-                    before = pixels.color[row, column]
-                    pixels.color[row, column] = before + cover * (light - before)  # += would be atomic
+    for task in range(strips.count):
+        foam_row, first, last = strip(strips, task, maps.sums.shape[0], maps.sums.shape[1])
+        samples = froth.samples
+        for foam_column in range(first, last):
+            tau = maps.sums[foam_row, foam_column, 0]
+            if tau > 0:
+                per = 1.0 / qd.cast(tau, qd.f32)
+                place = vec2(foam_column + 0.5, foam_row + 0.5) / qd.cast(froth.grain, qd.f32)
+                r, c, r1, c1, v, u = corners(place, maps.light.shape[0], maps.light.shape[1], 1.001)
+                top = maps.light[r, c] + u * (maps.light[r, c1] - maps.light[r, c])
+                low = maps.light[r1, c] + u * (maps.light[r1, c1] - maps.light[r1, c])
+                share = top + v * (low - top)
+                # Froth scatters: a fifth of the sun comes around whatever is in the way.
+                sun = share.x * (0.2 + 0.8 * maps.sums[foam_row, foam_column, 1] * per)
+                under = qd.exp(-maps.sums[foam_row, foam_column, 2] * per * froth.swallow)
+                white = under * (sun * froth.in_sun + share.y * froth.in_sky)
+                most = 1.0 - qd.exp(-tau / 4096.0)
+                for row in range(foam_row * samples, foam_row * samples + samples):
+                    for column in range(foam_column * samples, foam_column * samples + samples):
+                        light, cover = white, most
+                        if froth.flat == 1 and depth[row, column] == 0x7F000000:  # FARTHEST
+                            light = froth.in_air
+                        if froth.line_strength > 0.0:  # the tank's edges stay in front
+                            here = qd.bit_cast(depth[row, column], qd.f32)
+                            cover *= 1.0 - froth.line_strength * line_cover(
+                                pixels.lines[row, column], here, froth.slack
+                            )
+                        before = pixels.color[row, column]
+                        pixels.color[row, column] = before + cover * (light - before)  # += would be atomic
