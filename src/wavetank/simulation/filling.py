@@ -1,7 +1,8 @@
 """Packs particles into the shapes that a scene wants filled: closely, at rest, outside of all that is in the way.
 
 A shape has as many particles as its volume asks for, V / d^dim, where V is what solids, the tank and fluids before
-leave of it. They start on the lattice, the deepest ones first, and are packed by the solver itself: the shape turned
+leave of it. They start on a lattice that leaves so many of them room, the deepest ones first, and are packed by the
+solver itself: the shape turned
 inside out is a container whose walls count as water, and in it, without gravity and with all motion taken away after
 each step, density errors are removed until they are even. What lies along the surface of the shape then lies as water
 at rest lies along a wall, half a spacing from it, with no gaps and nothing squeezed.
@@ -14,6 +15,8 @@ Packing particles by their own density errors: Colagrossi et al. 2012, "Particle
     cell      edge of the lattice on which the volume is measured    m
 """
 
+import dataclasses
+import itertools
 from collections.abc import Callable
 from typing import Protocol
 
@@ -68,13 +71,10 @@ def fill(scene: Scene, simulate: Callable[[Scene], Water]) -> Scene:
 
 def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulate: Callable[[Scene], Water]) -> Filled:
     obstacles = [*scene.solids, *(_as_solid(other) for other in before if not isinstance(other, Points))]
-    volume = _volume(name, fluid, scene, obstacles)
-    number = round(volume / scene.spacing**scene.dim)
-    lower, upper = fluid.bounds()
-    lattice = plain_lattice(lower, upper, scene.spacing, 1)
-    s = _depths(fluid, lattice, scene, obstacles)
-    chosen = np.sort(np.argsort(s, kind="stable")[:number])
-    if len(chosen) < number:
+    measured = _measure(name, fluid, scene, obstacles)
+    number = round(measured.volume / scene.spacing**scene.dim)
+    places = measured.places(number)
+    if len(places) < number:
         raise WavetankError(
             f"{name} has no room for its {number:,} particles; use a smaller spacing or a larger shape."
         )
@@ -83,7 +83,7 @@ def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulat
              "angular_velocity": None}  # fmt: skip
     solids = [solid.model_copy(update=fixed) for solid in (*obstacles, container)]
     world = scene.model_copy(update={
-        "fluids": [Points(positions=lattice[chosen])], "solids": solids, "forces": [], "materials": [], "goal": None,
+        "fluids": [Points(positions=places)], "solids": solids, "forces": [], "materials": [], "goal": None,
         "joints": [], "emitters": [], "drains": [],
         "gravity": (0.0,) * scene.dim, "surface_tension": 0.0, "grid_pressure": 0.0, "vorticity": 0.0, "foam": 0.0,
         "friction": 0.0, "frame_time": 1.0 / 60.0,
@@ -98,8 +98,34 @@ def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulat
     return fluid.packed(water.positions.astype(float))
 
 
-def _volume(name: str, fluid: Filled, scene: Scene, obstacles: list[Solid]) -> float:
-    """Return what is to be filled [m^dim]; raises `WavetankError` where that is nothing, or outside of the tank."""
+@dataclasses.dataclass(frozen=True)
+class Measured:
+    """What is to be filled, on a lattice some times finer than that of the particles."""
+
+    volume: float  # m^dim, of what has a place for particles
+    points: np.ndarray  # [nx, ny, (nz,) dim], m
+    s: np.ndarray  # the same without the last axis
+    finer: int
+
+    def places(self, number: int) -> np.ndarray:
+        """Return the deepest places, [number or fewer, dim] [m], of a lattice of particles within this one.
+
+        Of these it is the one whose places lie deepest: on another one some may begin in walls, which push them out on
+        whichever side is nearer, and there they would be lost.
+        """
+        best, least = np.zeros((0, self.points.shape[-1])), np.inf
+        for first in itertools.product(range(self.finer), repeat=self.s.ndim):
+            part = tuple(slice(k, None, self.finer) for k in first)
+            s = self.s[part].ravel()
+            chosen = np.argsort(s, kind="stable")[:number]
+            depth = s[chosen[-1]] if len(chosen) == number > 0 else np.inf
+            if depth < least:
+                best, least = self.points[part].reshape(-1, self.s.ndim)[np.sort(chosen)], depth
+        return best
+
+
+def _measure(name: str, fluid: Filled, scene: Scene, obstacles: list[Solid]) -> Measured:
+    """Measure what is to be filled; raises `WavetankError` where that is nothing, or outside of the tank."""
     lower, upper = fluid.bounds()
     d, dim = scene.spacing, scene.dim
     few = np.prod((upper - lower) / d + 1.0) * FINE**dim <= MOST_POINTS
@@ -130,11 +156,7 @@ def _volume(name: str, fluid: Filled, scene: Scene, obstacles: list[Solid]) -> f
             f"{name}: its shape is too thin for spacing = {d:g} m, or nothing of it is outside of solids and fluids: "
             f"{held:.3g} of {whole:.3g} m^{dim} have room for particles; use a smaller spacing or a larger shape."
         )
-    return held
-
-
-def _depths(fluid: Filled, points: np.ndarray, scene: Scene, obstacles: list[Solid]) -> np.ndarray:
-    return np.maximum(nearest_distances([fluid.inside], points, scene.spacing), _to_others(points, scene, obstacles))
+    return Measured(held, points.reshape(*counts, dim), s.reshape(counts), finest)
 
 
 def _to_others(points: np.ndarray, scene: Scene, obstacles: list[Solid]) -> np.ndarray:
