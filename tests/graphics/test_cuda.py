@@ -16,7 +16,7 @@ FRAMES = {
     "obstacle-tank-2d": {"steps": 1, "launch": 85, "wait": 4},
     "honey": {"steps": 2, "launch": 211, "wait": 10},
     "oil-and-water": {"steps": 1, "launch": 90, "wait": 4},
-    "crates": {"steps": 1, "launch": 130, "wait": 18},
+    "crates": {"steps": 1, "launch": 130, "wait": 15},
 }
 
 
