@@ -53,9 +53,9 @@ class Pace:
     def __init__(self, watcher, others: list[threading.Thread]) -> None:
         self.watcher, self.others = watcher, [watcher.thread, *others]
 
-    def measure(self, seconds: float = SECONDS) -> tuple[float, float]:
+    def measure(self) -> tuple[float, float]:
         shown, began, work = self.watcher.pictures, time.monotonic(), self._work()
-        time.sleep(seconds)
+        time.sleep(SECONDS)
         came = self.watcher.pictures - shown
         return came / (time.monotonic() - began), came / max(self._work() - work, 1e-3)
 

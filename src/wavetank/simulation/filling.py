@@ -2,10 +2,9 @@
 
 A shape has as many particles as its volume asks for, V / d^dim, where V is what solids, the tank and fluids before
 leave of it. They start on a lattice that leaves so many of them room, the deepest ones first, and are packed by the
-solver itself: the shape turned
-inside out is a container whose walls count as water, and in it, without gravity and with all motion taken away after
-each step, density errors are removed until they are even. What lies along the surface of the shape then lies as water
-at rest lies along a wall, half a spacing from it, with no gaps and nothing squeezed.
+solver itself: the shape turned inside out is a container whose walls count as water, and in it, without gravity and
+with all motion taken away after each step, density errors are removed until they are even. What lies along the surface
+of the shape then lies as water at rest lies along a wall, half a spacing from it, with no gaps and nothing squeezed.
 
 Packing particles by their own density errors: Colagrossi et al. 2012, "Particle packing algorithm for SPH schemes"
 (10.1016/j.cpc.2012.02.032); where we differ: corrections of positions (Eq. 6) instead of forces.
