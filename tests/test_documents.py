@@ -4,6 +4,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -56,3 +57,13 @@ def test_studies_that_take_hours_still_begin(script):
         [sys.executable, ROOT / "tests" / script, "--help"], capture_output=True, text=True, check=False
     )
     assert asked.returncode == 0, asked.stderr[-500:]
+
+
+def test_readme_gives_a_reason_for_each_dependency():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    extras = {name: needs for name, needs in project["optional-dependencies"].items() if name not in ("all", "dev")}
+    needed = {re.match(r"[\w.-]+", need)[0] for needs in (project["dependencies"], *extras.values()) for need in needs}
+    cells = re.findall(r"^\| ([^|\n]+) \| [^|\n]+ \|$", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE)
+    named = {name for cell in cells for name in re.findall(r"[\w.-]+", cell)}
+    missing = needed - named
+    assert not missing
