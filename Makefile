@@ -1,9 +1,10 @@
-# Two commands: `make demo` and `make test`. Both build .venv by themselves.
+# Two commands: `make demo` and `make test`. Both build .venv by themselves. CI runs `make test` and `make slow`.
 
 PYTHON ?= python3
 BIN := .venv/bin
+PYTEST := $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist worksteal
 
-.PHONY: demo test lint figures gallery validation fuzz promises blender soak lowest newest clean
+.PHONY: demo test slow lint figures gallery validation fuzz promises blender soak lowest newest clean
 
 demo: .venv/demo-ready
 	$(BIN)/wavetank run obstacle-tank --seconds 4 --fps 30 --size 1280x720 --video --name demo --out out
@@ -18,7 +19,12 @@ demo: .venv/demo-ready
 test: export QD_CPU_MAX_NUM_THREADS = 1
 test: lint
 	$(BIN)/python tests/compile_kernels.py
-	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist worksteal
+	$(PYTEST) -m "not slow"
+
+# The tests that take long (tests/slow.txt): whole studies, runs that are killed, other back ends, every scene.
+slow: export QD_CPU_MAX_NUM_THREADS = 1
+slow: .venv/test-ready
+	$(PYTEST) -m slow
 
 lint: .venv/test-ready
 	$(BIN)/ruff format --check src tests examples

@@ -1,11 +1,22 @@
-"""Every test computes on the CPU back end, started once."""
+"""Every test computes on the CPU back end, started once. What takes long is marked as such, by the list in slow.txt."""
 
+import pathlib
 import subprocess
 
 import pytest
 
 from wavetank import cli
 from wavetank.device import compiler
+
+
+#: Names of files, of tests, for all that they are tried with, or of tests with one of that in brackets.
+SLOW = frozenset(pathlib.Path(__file__).with_name("slow.txt").read_text("utf-8").splitlines())
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if not SLOW.isdisjoint((item.nodeid, item.nodeid.split("[")[0], item.nodeid.split("::")[0])):
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -251,3 +251,11 @@ def test_kernels_read_no_constants_of_modules(path):
             chosen_from = bool(entries) and all(callable(entry) for entry in entries)
             constant = isinstance(value, bool | int | float | str | tuple | list | dict | set) and not chosen_from
             assert not constant, f"{node.name} reads {name} = {value}"
+
+
+def test_tests_that_are_called_slow_are_there():
+    names = (ROOT / "tests" / "slow.txt").read_text("utf-8").splitlines()
+    assert names == sorted(set(names))
+    for name in names:
+        file, _, test = name.partition("::")
+        assert f"def {test.split('[')[0]}(" in (ROOT / file).read_text("utf-8") if test else (ROOT / file).is_file(), name
