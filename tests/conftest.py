@@ -8,7 +8,6 @@ import pytest
 from wavetank import cli
 from wavetank.device import compiler
 
-
 #: Names of files, of tests, for all that they are tried with, or of tests with one of that in brackets.
 SLOW = frozenset(pathlib.Path(__file__).with_name("slow.txt").read_text("utf-8").splitlines())
 

@@ -209,7 +209,7 @@ def test_the_aim_lies_on_the_water_and_lights_what_would_be_taken(person):
     person.look(0.2)
     x, y = (round(side) for side in stage.box[:2])
     screen = person.window.screenshot().astype(int)
-    ring = np.array(stage._aim["ring"]) * (width, height)  # the water has moved on meanwhile, and with it what lies on it
+    ring = np.array(stage._aim["ring"]) * (width, height)  # it lies on water, which has moved on meanwhile
     u, v = (round(float(side)) for side in ring[len(ring) // 4])
     around = screen[y + v - 3 : y + v + 4, x + u - 3 : x + u + 4]
     assert np.ptp(around.max(axis=2)) > 60, "a bright line with a dark rim"
