@@ -53,6 +53,17 @@ def alike(seen, above, place, other_seen, other_above, other_place, apart):
 
 
 @qd.func
+def shaded_alike(share, added, other_share, other_added):
+    """Whether the surface between two pixels shines as what lies between them.
+
+    Of each it is told which share of what is behind it lets through, negative where that is not known, and what is
+    mirrored and scattered on top. Both may be up to 0.15 apart.
+    """
+    apart = qd.max(qd.abs(other_share - share).max(), qd.abs(other_added - added).max())
+    return qd.min(share[0], other_share[0]) >= 0.0 and apart < 0.15
+
+
+@qd.func
 def seen_between(picture: qd.template(), share, seen, place, other_seen, other_place):
     """(radiance, way) of a ray between two, by its share of the way from the first to the other."""
     result = seen + share * (other_seen - seen)

@@ -84,11 +84,17 @@ def straighten(
         for block in range(first // lanes, (last + lanes - 1) // lanes):
             begin = block * lanes
             if begin + lanes <= depth.shape[1]:
-                keys = qd.Matrix.zero(qd.i32, 1, lanes)
+                keys, least = qd.Matrix.zero(qd.i32, 1, lanes), 0x7F000000  # FARTHEST
                 for lane in qd.static(range(lanes)):
                     keys[0, lane] = depth[row, begin + lane]
-                for lane in range(lanes):
-                    keys[0, lane] = straight(keys[0, lane], lens, walls, margin, row, begin + lane)
+                    least = qd.min(least, keys[0, lane])
+                if least == 0x7F000000:
+                    dry = straight(least, lens, walls, margin, row, begin)
+                    for lane in range(lanes):
+                        keys[0, lane] = dry
+                else:
+                    for lane in range(lanes):
+                        keys[0, lane] = straight(keys[0, lane], lens, walls, margin, row, begin + lane)
                 for lane in range(qd.max(first - begin, 0), qd.min(last - begin, lanes)):
                     depth[row, begin + lane] = keys[0, lane]
             else:

@@ -29,7 +29,7 @@ from wavetank.view.lens import (
     view_ray,
 )
 from wavetank.view.look import Look
-from wavetank.view.optics.between import GROUP, alike, group, seen_between, turn_of
+from wavetank.view.optics.between import GROUP, alike, group, seen_between, shaded_alike, turn_of
 from wavetank.view.optics.body import Inside, through_body, wholeness
 from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, refracted
@@ -94,6 +94,9 @@ def lay(
         # (column, row, kind) of what these ends show, and (depth, wholeness, unevenness, column) of where they do.
         old, old_of = vec3(0.0, 0.0, 0.0), vec4(-1.0, 0.0, 0.0, 0.0)
         new, new_of = old, old_of
+        # How much of what a ray shows is seen at these ends, and what is added to it; a share of -1 is not known.
+        old_share, old_added = vec3(-1.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+        new_share, new_added = old_share, old_added
         # A pixel whose samples all show the same is shaded once, in its middle.
         even, even_z, even_normal = 0, 0.0, vec3(0.0, 0.0, 0.0)
         start, wide_group = begin - optics.turn, beside * group()
@@ -105,6 +108,7 @@ def lay(
             column = start + number * beside + part % beside
             if at_end and part == 0:
                 before, before_above, before_layer, old, old_of = end, end_above, end_layer, new, new_of
+                old_share, old_added, new_share.x = new_share, new_added, -1.0
                 end_layer, end_pixel, kept_pixel = -1, -1, -1
             if qd.static(world >= 100):
                 if part == 0 and optics.under == 0 and column >= 0 and column < pixels.depth.shape[1]:
@@ -131,15 +135,15 @@ def lay(
                     front = qd.max(z, ends[0])
                     if ends[0] <= ends[1] and front < back:
                         # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
-                        wet, there, cover, edge, rise = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0)
+                        wet, there, cover, edge, rise, risen = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0), False
                         if even > 0:
                             wet = even - 1.0
                         elif qd.static(world % 10 >= 3):
                             at_pane = ends[0] > lens.near and wall.y == 0.0  # not through the open top
                             if at_pane and z < ends[0] - optics.spacing:
                                 wet = 1.0
-                            else:
-                                rise = rise_at(row, column, z, 3.0 * optics.spacing, surface.depth)
+                            elif (at_pane and z < ends[0] + optics.spacing) or z > ends[1] - optics.spacing:
+                                rise, risen = rise_at(row, column, z, 3.0 * optics.spacing, surface.depth), True
                                 if at_pane and z < ends[0] + optics.spacing:
                                     wet = 1.0 - share_behind(z, ends[0], rise, vec2(turns.x, turns.y))
                                 if z > ends[1] - optics.spacing:
@@ -157,18 +161,11 @@ def lay(
                         first, second = there * (1.0 - cover) * wet, there * (1.0 - cover) * (1.0 - wet)
                         result *= 1.0 - (first + second + cover)
                         for layer in range(3):
-                            share, n, at = first, wall, front
+                            share, at = first, front
                             if layer == 1:
                                 share = second
-                                if even > 0:
-                                    n = even_normal
-                                elif qd.static(world % 10 >= 3):
-                                    n = normal_of(lens, row, column, z, rise)
                             elif layer == 2:
                                 share, at = cover, edge
-                                if qd.static(world % 10 >= 3):
-                                    if share > 0.0:
-                                        n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
                             if share > 0.0:
                                 body = vec4(0.0, 0.0, 0.0, -1.0)
                                 above, whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
@@ -196,9 +193,29 @@ def lay(
                                         minor = share < 0.5 * (first + second + cover)
                                         known = minor and qd.abs(kept_pixel - pixel) <= 1
                                         fresh = fresh and not lies and not known
+                                between_all = lies and share == 1.0 and shaded_alike(
+                                    old_share, old_added, new_share, new_added
+                                )  # fmt: skip
+                                n = wall
+                                if layer == 1 and not between_all:
+                                    if even > 0:
+                                        n = even_normal
+                                    elif qd.static(world % 10 >= 3):
+                                        if not risen:
+                                            rise = rise_at(row, column, z, 3.0 * optics.spacing, surface.depth)
+                                        n = normal_of(lens, row, column, z, rise)
+                                if qd.static(world % 10 >= 3):
+                                    if layer == 2:
+                                        n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
                                 half = (look.to_sun - direction.normalized()).normalized(1e-9)
                                 shiny = layer == 1 and n.dot(half) > 0.9
-                                if qd.static(world % 10 >= 3):
+                                is_end = False
+                                if between_all:
+                                    body = seen_between(backdrop.behind, between, before, old, end, new)
+                                    passed = old_share + between * (new_share - old_share)
+                                    result = passed * vec3(body[0], body[1], body[2])
+                                    result += old_added + between * (new_added - old_added)
+                                elif qd.static(world % 10 >= 3):
                                     ahead, point = direction.normalized(), origin + at * direction
                                     cosi = qd.max(-n.dot(ahead), 0.05)
                                     bent = refracted(ahead, n, cosi)
@@ -221,6 +238,7 @@ def lay(
                                         )  # fmt: skip
                                         kept_z, kept_layer, kept_pixel = at, layer, pixel
                                         if at_end and share > 0.5:
+                                            is_end = True
                                             end, end_above, end_layer, end_pixel = kept, kept_above, layer, pixel
                                             new, new_of = lead, vec4(at, kept_whole, uneven, middle.x)
                                     if lies:
@@ -229,12 +247,16 @@ def lay(
                                         whole = old_of[1] + between * (new_of[1] - old_of[1])
                                     elif bodily:
                                         body, above, whole = kept, kept_above, kept_whole
-                                rough = qd.select(shiny, uneven * uneven, 0.0)
-                                result += share * shine(
-                                    pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside, middle, at,
-                                    n, origin, direction, body, above, whole, uneven, rough, qd.static(world % 10),
-                                    qd.static(world % 100 >= 10),
-                                )  # fmt: skip
+                                if not between_all:
+                                    rough = qd.select(shiny, uneven * uneven, 0.0)
+                                    shone, passed = shine(
+                                        pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside, middle,
+                                        at, n, origin, direction, body, above, whole, uneven, rough,
+                                        qd.static(world % 10), qd.static(world % 100 >= 10),
+                                    )  # fmt: skip
+                                    result += share * shone
+                                    if is_end and whole > 0.999 and not shiny:
+                                        new_share, new_added = passed, shone - passed * vec3(body[0], body[1], body[2])
                         line = line_cover(pixels.lines[row, column], front, optics.slack)
                         result += look.line_strength * there * line * (look.line - result)
                         if there < 0.5:
@@ -280,7 +302,8 @@ def shine(
     optics: Optics, inside: Inside, place, z, normal, origin, direction, body, above, whole, uneven, rough,
     world: qd.template(), many: qd.template(),
 ):  # fmt: skip
-    """Radiance of the water that is seen at depth `z` with this normal, at a place (column, row) of the picture.
+    """Radiance of the water that is seen at depth `z` with this normal, at a place (column, row) of the picture, and
+    the share in it of what is behind.
 
     `body`, `above` and `whole` are what `through_body` found for it; a negative way where it found none. Rays that
     spread, because the surface is `uneven`, are as long as the straight one as far as they are not as long as that.
@@ -345,7 +368,8 @@ def shine(
             swallow = swallowed_by(found, swallow, optics.usual)
             tint += found[0] * (look.glow * vec3(found[1], found[2], found[3]) - tint)
             color += found[0] * (vec3(found[1], found[2], found[3]) - color)
-    result = dimmed(shown, travel, swallow, optics.scattering, tint)
+    passed = qd.exp(-travel * swallow)
+    result = passed * shown + (1.0 - qd.exp(-travel * optics.scattering)) * tint
     if qd.static(many):
         if hidden + cover > 0.0:
             lit = murky(
@@ -362,6 +386,7 @@ def shine(
                 qd.static(world <= 2),
             )
             result += hidden * (lit * qd.exp(-0.3 * tau * swallow) - result)
+            passed *= (1.0 - hidden) * (1.0 - cover)
             if cover > 0.0:
                 lit = murky(sunlit, inside.shade, sun, look, optics, color, glow, at, n, -ahead, qd.static(world <= 2))
                 result += cover * (lit - result)
@@ -375,6 +400,7 @@ def shine(
         mirrored = environment(look, ahead + 2.0 * cosi * n)
         mirrored += above[3] * (vec3(above[0], above[1], above[2]) - mirrored)
         result += mirror * (mirrored - result)
+        passed *= 1.0 - mirror
         half = (look.to_sun - ahead).normalized(1e-9)
         result += glint(look, n.dot(half), rough)
-    return result
+    return result, passed
