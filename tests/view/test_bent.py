@@ -129,3 +129,18 @@ def test_strips_cut_no_pixel_on_any_number_of_threads(samples):
             assert cut.width % samples == 0 and (cut.width % (4 * samples) == 0 or cut.parts == 1)
             assert cut.parts * cut.width >= columns > (cut.parts - 1) * cut.width
             assert cut.count >= rows * cut.parts
+
+
+def test_a_thin_rod_in_water_has_no_gaps():
+    """Rays that lie between two others do not see what neither met: of eight pixels to a group, rods lost pieces."""
+    rod = Box(center=(0.56, 0.2, 0.25), size=(0.015, 0.4, 0.015), color="#c02020")
+    x = lattice((0.0, 0.0, 0.0), (1.5, 0.38, 0.5))
+    frame = frame_of(Scene(spacing=D, tank=Tank(size=(1.5, 0.7, 0.5)), solids=[rod]), x)
+    camera = Camera(eye=(0.75, 0.45, 2.6), target=(0.75, 0.2, 0.25))
+    image = Renderer(640, 360).render(frame, camera, view="water").astype(int)
+    ends = camera.project([(0.56, 0.05, 0.5), (0.56, 0.32, 0.5)], 640, 360)
+    top, bottom, middle = int(ends[1, 1]), int(ends[0, 1]), int(ends[:, 0].mean())
+    rows = image[top:bottom, middle - 20 : middle + 20]
+    darkest = rows[..., 2].min(axis=1)
+    assert len(darkest) > 40
+    assert (darkest < 0.75 * np.median(rows[..., 2])).all(), darkest

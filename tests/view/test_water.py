@@ -311,3 +311,15 @@ def test_a_drop_on_the_glass_is_nearly_as_clear_as_the_glass(make_frame):
     change = np.abs(with_drop - without).max(axis=-1)
     assert change[24, 26:30].max() < 20  # what lies flat on the glass: 46 when it mirrored
     assert change.max() > 15  # its bulge on the other side is seen, though there are no lamps that it could mirror
+
+
+def test_the_filter_is_the_same_for_one_pixel_as_for_eight(monkeypatch):
+    """Pixels go together where all take the same steps; edges, far water and what is left of a row go alone."""
+    field = slanted(columns=123) + 0.1 * D * np.sin(0.7 * np.arange(90))[:, None] * np.sin(0.8 * np.arange(123))
+    field[20:40, 31:60] -= 0.5
+    field[60:, 90:] = 1.7e38
+    together = smoothed(field)
+    monkeypatch.setattr(flatten, "lanes", lambda: 1)
+    alone = smoothed(field)
+    assert np.abs(alone - field)[field < 1e30].max() > 0.05 * D
+    np.testing.assert_allclose(together, alone, rtol=3e-6)

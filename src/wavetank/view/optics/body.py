@@ -82,19 +82,6 @@ def normal_above(sun: Lens, first: qd.template(), at, spacing):
 
 
 @qd.func
-def texel_normal(sun: Lens, first: qd.template(), at, spacing):
-    """The same of the nearest texel, in a quarter of the time: for what is seen through water."""
-    place = to_pixel(sun, to_view(sun, at))
-    row = qd.min(qd.max(qd.cast(place.y, qd.i32), 0), first.shape[0] - 1)
-    column = qd.min(qd.max(qd.cast(place.x, qd.i32), 0), first.shape[1] - 1)
-    z = qd.bit_cast(first[row, column], qd.f32)
-    n = vec3(0.0, 1.0, 0.0)
-    if z < 1e30:
-        n = normal_of(sun, row, column, z, rise_at(row, column, z, 3.0 * spacing, first))
-    return n
-
-
-@qd.func
 def depth_at(sun: Lens, first: qd.template(), walls: Box, at, spacing):
     """Depth [m] of the point `at` below the surface, judged a spacing off panes and floor, where the map has edges."""
     inset = vec3(spacing, spacing, spacing)
@@ -279,7 +266,7 @@ def within_water(sun: Lens, first: qd.template(), walls: Box, p, ahead, spacing)
             s = low + (s - low) * deep / (deep - qd.max(over, -deep))
         else:
             s = 0.5 * (low + s)
-        n = texel_normal(sun, first, p + s * ahead, spacing)
+        n = normal_above(sun, first, p + s * ahead, spacing)
         result = vec4(n.x, n.y, n.z, s)
     return result
 
@@ -362,7 +349,7 @@ def through_body(
                 else:
                     ends = 0
                     out = crossed_about(ahead, n, uneven)
-                    if ahead.dot(n) <= 0.0:  # a texel's normal, which a bent surface has turned away from the ray
+                    if ahead.dot(n) <= 0.0:  # the normal of a bent surface, which is turned away from the ray
                         out = vec4(ahead.x, ahead.y, ahead.z, 0.0)
                     ahead = reflected(ahead, -n)
                     if out[3] < qd.select(share == 0.0, 1.0, 0.5):  # divided before, it takes the way of most of it
