@@ -23,7 +23,7 @@ from wavetank.view.optics.fluid import Optics, dimmed, refracted
 from wavetank.view.optics.maps import margins_inside, picture_at
 from wavetank.view.optics.mixture import color_of_fluid, swallow_of
 from wavetank.view.optics.radiance import environment, glint, smoothstep, surface_radiance
-from wavetank.view.water_buffers import Drops, WaterSurface
+from wavetank.view.water_buffers import Backdrop, Drops, WaterSurface
 
 CALM, TORN = 0.7, 2.5  # m/s: speeds up to which a drop is one, and from which on it has flown apart
 LEAST = 1.0  # px: way while the shutter opens from which on a drop is a streak
@@ -68,6 +68,23 @@ def way_of(lens: Lens, drops: Drops, cells: Cells, a, open):
 def rough_of(wide):
     """Variance of the normals within a pixel of a ball that is so `wide` [px]."""
     return 1.0 / (12.0 * wide * wide)
+
+
+@qd.func
+def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, start, direction, row, column, z):
+    """Radiance along a ray that has left a drop: of the floor or of what stands behind, as far as they are seen."""
+    way = qd.min(qd.bit_cast(pixels.depth[row, column], qd.f32) - z, 1e3)
+    if direction.y < -1e-3:
+        way = qd.min(way, qd.max(start.y, 0.0) / -direction.y)
+    result = environment(look, direction)
+    c = to_view(lens, start + way * direction)
+    if c.z > lens.near:
+        there = to_pixel(lens, c)
+        inside = margins_inside(pixels.depth, there, 0.1)
+        if inside > 0.0:
+            if qd.bit_cast(pixels.depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32) > z:
+                result += smoothstep(inside) * (picture_at(backdrop.behind, there) - result)
+    return result
 
 
 @qd.func

@@ -31,10 +31,11 @@ from wavetank.view.lens import (
 from wavetank.view.look import Look
 from wavetank.view.optics.between import GROUP, alike, group, seen_between, shaded_alike, turn_of
 from wavetank.view.optics.body import Inside, through_body, wholeness
+from wavetank.view.optics.drop import behind_drop
 from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, refracted
 from wavetank.view.optics.glass import line_cover
-from wavetank.view.optics.maps import margins_inside, picture_at, thickness_at
+from wavetank.view.optics.maps import picture_at, thickness_at
 from wavetank.view.optics.marks import rim_cover, rim_key
 from wavetank.view.optics.mixture import mixed, murky
 from wavetank.view.optics.normals import normal_beside, normal_of, rise_at, unevenness
@@ -277,23 +278,6 @@ def from_within(thickness: qd.template(), lens: Lens, optics: Optics, row, colum
     tau = thickness_at(thickness, vec2(column + 0.5, row + 0.5) / optics.coarse, optics.unit)
     travel = qd.min(tau, back * ray_direction(lens, view_ray(lens, row, column)).norm())
     return dimmed(radiance, travel, optics.absorption, optics.scattering, optics.glow)
-
-
-@qd.func
-def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, start, direction, row, column, z):
-    """Radiance along a ray that has left a drop: of the floor or of what stands behind, as far as they are seen."""
-    way = qd.min(qd.bit_cast(pixels.depth[row, column], qd.f32) - z, 1e3)
-    if direction.y < -1e-3:
-        way = qd.min(way, qd.max(start.y, 0.0) / -direction.y)
-    result = environment(look, direction)
-    c = to_view(lens, start + way * direction)
-    if c.z > lens.near:
-        there = to_pixel(lens, c)
-        inside = margins_inside(pixels.depth, there, 0.1)
-        if inside > 0.0:
-            if qd.bit_cast(pixels.depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32) > z:
-                result += smoothstep(inside) * (picture_at(backdrop.behind, there) - result)
-    return result
 
 
 @qd.func
