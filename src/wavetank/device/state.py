@@ -97,6 +97,9 @@ class CoarseGrid:
     sums: qd.types.ndarray()  # i32 [parts * nodes]: of the tents of particles, then of these times density errors
     mass_sums: qd.types.ndarray()  # i32 [parts * nodes]: of the tents times densities, where these differ
     room: qd.types.ndarray()  # f32 [nodes]: share of the cell that no solid takes, 0 where next to nothing is left
+    facing_x: qd.types.ndarray()  # f32 [nodes]: outward normal of the solid nearest to a node, up where none is near
+    facing_y: qd.types.ndarray()  # likewise
+    facing_z: qd.types.ndarray()  # likewise
     clear: qd.types.ndarray()  # f32 [nodes]: 1 where no solid is within two cells, else 0
     # Thin walls, see `grid_pressure/thin_walls.py`: outward normal of the one that a node lies at, 0 where there is
     # none, its distance [m], and bits of the faces to the next nodes along x, y and z that one lies in.

@@ -58,16 +58,8 @@ from wavetank.physics.grid_pressure.coarse_grid import (
 from wavetank.physics.grid_pressure.films import left_to_grid
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
 from wavetank.physics.grid_pressure.push import move_particles, push_of
-from wavetank.physics.grid_pressure.room import (
-    LEAST_OPEN,
-    below_roof,
-    close_slit,
-    find_room,
-    gaps_at,
-    in_part,
-    open_tents,
-    whole,
-)  # fmt: skip
+from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, gaps_at, open_tents
+from wavetank.physics.grid_pressure.slits import below_roof, close_slit, in_part, mostly, openness
 from wavetank.physics.grid_pressure.surface import depth_at
 from wavetank.physics.grid_pressure.weight import BORNE, flow_out
 from wavetank.physics.mixture import Blend
@@ -246,12 +238,15 @@ def gather(
     if qd.static(searched):
         qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):
-            surely = below_roof(grid, n, c) if grid.room[n] >= whole() else 0.0
+            surely = below_roof(grid, n, c) if grid.room[n] >= mostly() else 0.0
             grid.gaps[n] = grid.fill[n] + surely * qd.max(1.0 - grid.fill[n], 0.0)
             grid.slope_y[n] = surely
         qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):
-            surely = in_part(grid, n) if grid.room[n] > 0.0 and grid.room[n] < whole() else grid.slope_y[n]
+            surely = grid.slope_y[n]
+            if grid.room[n] > 0.0 and grid.room[n] < 1.0:
+                is_open = openness(grid, n)
+                surely = is_open * surely + (1.0 - is_open) * in_part(grid, n)
             close_slit(grid, n, surely, e.slit)
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):

@@ -8,9 +8,10 @@ pressure there is continued from around instead (`buoyancy.py`), and what such a
 """
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import CoarseGrid, Coefficients
+from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, corners, nearest, on_axis, tents
 from wavetank.physics.grid_pressure.listed_solids import listed, solids_near
+from wavetank.physics.grid_pressure.slits import mostly
 from wavetank.physics.grid_pressure.thin_walls import behind, farthest, keep_thin, mark_shut, way_from
 from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec3, vec4
 
@@ -39,76 +40,9 @@ def gaps_at(grid: CoarseGrid, n, full):
 
 
 @qd.func
-def whole():
-    """Room of a node that no solid takes a part of; sums of tents beside walls are nearly one."""
-    return 0.97
-
-
-@qd.func
-def is_water(fill):
-    """How surely there is water without air at a node, from 0 to 1, by its fill."""
-    return qd.min(qd.max(5.0 * (fill - 0.7), 0.0), 1.0)
-
-
-@qd.func
-def below_roof(grid: CoarseGrid, n, c: Coefficients):
-    """How surely what lacks at an open node `n` is a slit between water below and a solid above, against gravity."""
-    surely = 0.0
-    gravity = vec3(c.gravity_x, c.gravity_y, c.gravity_z)
-    for axis in qd.static(range(3)):
-        if grid.nz > 1 or axis < 2:
-            for side in qd.static((-1, 1)):
-                place = coordinates(grid, n)
-                place[axis] += side
-                roof = nearest(grid, place)
-                place[axis] -= 2 * side
-                water = nearest(grid, place)
-                is_above = -side * gravity[axis] > 0.7 * gravity.norm()
-                if is_above and grid.room[roof] < whole() and grid.room[water] >= whole():
-                    surely = qd.max(surely, is_water(grid.fill[water]))
-    return surely
-
-
-@qd.func
-def mostly():
-    """Room of a node that a solid takes so little of that its fill can be told."""
-    return 0.75
-
-
-@qd.func
 def narrow():
     """Cells that are left between two solids, up to which there is a slit."""
     return 0.5
-
-
-@qd.func
-def in_part(grid: CoarseGrid, n):
-    """The same for a node whose cell a solid takes a part of: where all open nodes beside it, see `gaps`, are full.
-
-    Where none is open, as below a roof near the face of a cell, those count that are mostly so.
-    """
-    emptiest, emptiest_most = 2.0, 2.0
-    for axis in qd.static(range(3)):
-        if grid.nz > 1 or axis < 2:
-            for side in qd.static((-1, 1)):
-                c = coordinates(grid, n)
-                c[axis] += side
-                at = nearest(grid, c)
-                if grid.room[at] >= whole():
-                    emptiest = qd.min(emptiest, grid.gaps[at])
-                elif grid.room[at] >= mostly() and at != n:
-                    emptiest_most = qd.min(emptiest_most, grid.gaps[at])
-    if emptiest == 2.0 and grid.room[n] < mostly():
-        emptiest = emptiest_most
-    return is_water(emptiest) if emptiest < 2.0 else 0.0
-
-
-@qd.func
-def close_slit(grid: CoarseGrid, n, surely, full):
-    """Count node `n` as full, as far as it is `surely` water, and keep what lacks up to `full` in `slope_x`."""
-    fill = grid.fill[n]
-    grid.slope_x[n] = surely * qd.max(full - fill, 0.0)
-    grid.fill[n] = fill + surely * qd.max(1.0 - fill, 0.0)
 
 
 @qd.func
@@ -259,6 +193,7 @@ def find_walls(grid: CoarseGrid, thin: qd.template(), solids: SolidSet, piece, l
     for n in range(begin, begin + nodes):
         wall = nearest_wall(grid, solids, around, n)
         grid.slope_x[n], grid.slope_y[n], grid.slope_z[n], grid.lam[n] = wall.x, wall.y, wall.z, wall.w
+        grid.facing_x[n], grid.facing_y[n], grid.facing_z[n] = wall.x, wall.y, wall.z
         grid.room[n] = qd.cast(open_share(grid, n) >= least_open, qd.f32)
         if keep_thin(grid, solids, around, n, wall) == 1:
             qd.atomic_add(thin[0], 1)
