@@ -59,6 +59,15 @@ def test_an_interrupt_leaves_a_complete_file(tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.mp4"]
 
 
+@pytest.fixture
+def interrupts():
+    """Interrupts are what they are in a terminal: what runs in the background of a script is born without."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interrupts")
 def test_a_second_interrupt_keeps_what_the_encoder_holds_back(tmp_path):
     """Five pictures lie in the encoder and there is no file yet: an interrupt while they are encoded loses none."""
     path = tmp_path / "a.mp4"
