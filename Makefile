@@ -21,7 +21,7 @@ test: lint
 	$(BIN)/python tests/compile_kernels.py
 	$(PYTEST) -m "not slow"
 
-# The tests that take long (tests/slow.txt): whole studies, runs that are killed, other back ends, every scene.
+# The tests that take long (tests/slow.txt): whole studies, runs that are killed, other back ends, most examples and large scenes.
 slow: export QD_CPU_MAX_NUM_THREADS = 1
 slow: .venv/test-ready
 	$(PYTEST) -m slow

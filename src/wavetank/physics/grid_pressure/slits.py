@@ -40,6 +40,12 @@ def openness(grid: CoarseGrid, n):
 
 
 @qd.func
+def mostly_open(grid: CoarseGrid, n):
+    """How surely a node is open for the most part."""
+    return ramp(grid.room[n], mostly() - 0.05, mostly() + 0.05)
+
+
+@qd.func
 def is_water(fill):
     """How surely there is water without air at a node, from 0 to 1, by its fill."""
     return qd.min(qd.max(5.0 * (fill - 0.7), 0.0), 1.0)
@@ -92,10 +98,10 @@ def in_part(grid: CoarseGrid, n):
                     is_open = openness(grid, at)
                     all_open = qd.min(all_open, 1.0 - is_open * lacks)
                     most_open = qd.max(most_open, is_open)
-                    is_open = ramp(grid.room[at], mostly() - 0.05, mostly() + 0.05)
+                    is_open = mostly_open(grid, at)
                     all_mostly = qd.min(all_mostly, 1.0 - is_open * lacks)
                     most_mostly = qd.max(most_mostly, is_open)
-    cut = 1.0 - ramp(grid.room[n], mostly() - 0.05, mostly() + 0.05)
+    cut = 1.0 - mostly_open(grid, n)
     return all_open * most_open + (1.0 - most_open) * all_mostly * most_mostly * cut
 
 

@@ -23,7 +23,7 @@ from wavetank.view.optics.fluid import Optics, dimmed, refracted
 from wavetank.view.optics.maps import margins_inside, picture_at
 from wavetank.view.optics.mixture import color_of_fluid, swallow_of
 from wavetank.view.optics.radiance import environment, glint, smoothstep, surface_radiance
-from wavetank.view.water_buffers import Backdrop, Drops, WaterSurface
+from wavetank.view.water_buffers import Drops, WaterSurface
 
 CALM, TORN = 0.7, 2.5  # m/s: speeds up to which a drop is one, and from which on it has flown apart
 LEAST = 1.0  # px: way while the shutter opens from which on a drop is a streak
@@ -71,19 +71,26 @@ def rough_of(wide):
 
 
 @qd.func
-def behind_drop(pixels: Pixels, backdrop: Backdrop, lens: Lens, look: Look, start, direction, row, column, z):
-    """Radiance along a ray that has left a drop: of the floor or of what stands behind, as far as they are seen."""
-    way = qd.min(qd.bit_cast(pixels.depth[row, column], qd.f32) - z, 1e3)
+def behind_drop(
+    solid: qd.template(), first: qd.template(), picture: qd.template(), lens: Lens, look: Look, start, direction, row,
+    column, z,
+):  # fmt: skip
+    """Radiance along a ray that has left a drop: of the floor or of what stands behind, as far as they are seen.
+
+    That is in the `picture`, at the nearer of the depths `solid` and `first`; the drop is at the depth `z` [m].
+    """
+    way = qd.min(qd.bit_cast(qd.min(first[row, column], solid[row, column]), qd.f32) - z, 1e3)
     if direction.y < -1e-3:
         way = qd.min(way, qd.max(start.y, 0.0) / -direction.y)
     result = environment(look, direction)
-    c = to_view(lens, start + way * direction)
-    if c.z > lens.near:
-        there = to_pixel(lens, c)
-        inside = margins_inside(pixels.depth, there, 0.1)
+    p = to_view(lens, start + way * direction)
+    if p.z > lens.near:
+        there = to_pixel(lens, p)
+        inside = margins_inside(solid, there, 0.1)
         if inside > 0.0:
-            if qd.bit_cast(pixels.depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32) > z:
-                result += smoothstep(inside) * (picture_at(backdrop.behind, there) - result)
+            i, j = qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)
+            if qd.bit_cast(qd.min(first[i, j], solid[i, j]), qd.f32) > z:
+                result += smoothstep(inside) * (picture_at(picture, there) - result)
     return result
 
 
@@ -113,19 +120,7 @@ def shine(
     start = middle + r * n + chord * bent
     down = qd.min(qd.max(qd.cast(row, qd.i32), 0), pixels.depth.shape[0] - 1)
     across = qd.min(qd.max(qd.cast(column, qd.i32), 0), pixels.depth.shape[1] - 1)
-    seen = qd.min(surface.depth[down, across], pixels.depth[down, across])
-    way = qd.min(qd.bit_cast(seen, qd.f32) - c.z, 1e3)
-    if out.y < -1e-3:
-        way = qd.min(way, qd.max(start.y, 0.0) / -out.y)
-    shown = environment(look, out)
-    p = to_view(lens, start + way * out)
-    if p.z > lens.near:
-        there = to_pixel(lens, p)
-        inside = margins_inside(pixels.depth, there, 0.1)
-        if inside > 0.0:
-            i, j = qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)
-            if qd.bit_cast(qd.min(surface.depth[i, j], pixels.depth[i, j]), qd.f32) > c.z:
-                shown += smoothstep(inside) * (picture_at(pixels.color, there) - shown)
+    shown = behind_drop(pixels.depth, surface.depth, pixels.color, lens, look, start, out, down, across, c.z)
     swallow, murk = optics.absorption, 0.0
     own = drops.dye[cells.order[a]]
     body, kind = optics.glow, drops.material[cells.order[a]]

@@ -337,7 +337,9 @@ def shine(
             ball *= 1.0 - whole
         if ball > 0.0:
             out = 2.0 * bent.dot(ahead) * bent - ahead
-            far = behind_drop(pixels, backdrop, lens, look, at + travel * bent, out, row, column, z)
+            far = behind_drop(
+                pixels.depth, pixels.depth, backdrop.behind, lens, look, at + travel * bent, out, row, column, z
+            )  # fmt: skip
             shown += ball * (far - shown)
     swallow, tint, cover, hidden = optics.absorption, optics.glow, 0.0, 0.0
     color, glow, behind = optics.glow, vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
