@@ -30,8 +30,13 @@ from wavetank.view.style import quality_options
 
 DOCS = Path(__file__).parent
 VALIDATION = DOCS.parent / "validation"
-#: name -> eye of the gallery's picture [m], where the usual one looks at a wall, or through a corner of water
-SEEN_FROM = {"ducks": (0.9, 1.5, 1.5), "mountain-lake": (4.3, 4.4, 3.8), "still-tank": (1.9, 1.0, 1.5)}
+#: name -> eye of the gallery's picture, and what it looks at [m], where the usual one looks at a wall, or from afar
+SEEN_FROM: dict[str, tuple[tuple[float, ...], ...]] = {
+    "ducks": ((0.9, 1.5, 1.5),),
+    "mountain-lake": ((3.9, 3.7, 2.6), (1.75, 0.35, 0.0)),
+    "still-tank": ((1.9, 1.0, 1.5),),
+    "vase": ((1.5, 1.3, 2.15), (0.08, 0.44, 0.0)),
+}
 LARGEST = 80_000  # bytes of a picture there
 VALIDATION_HEAD = """# Validation
 
@@ -59,9 +64,11 @@ SHOTS: dict[str, tuple[wt.Scene, float, dict[str, Any]]] = {
     "weightless-drop": (wt.Scene.load("weightless-drop"), 0.5, {}),
 }
 WHOLE_LAYERS = {"still-tank": 0.025, "still-tank-2d": 0.01}  # m: with others there is a gap, and the water sloshes
-TRACED = {"rain": 32, "jug": 32}  # samples of those whose metal and glass only paths of light show
-#: the finest spacing of a picture of the gallery, in m per m of the tank's diagonal
+#: samples of those whose metal, glass and honey only paths of light show
+TRACED = {"honey": 32, "jug": 32, "rain": 32, "vase": 32}
+#: the finest spacing of a picture of the gallery, in m per m of the tank's diagonal, and of scenes that need finer ones
 GALLERY_SPACING = {2: 0.005, 3: 0.0125}
+FINER = {"honey": 0.0012, "mountain-lake": 0.022}  # m
 #: The report's Figure 1, without and with foam, and what the diffuse particles make of the same moment.
 FOAM_LOOKS = ((0.0, "#2482d0"), (0.0, "foam"), (1.0, "#2482d0"))
 
@@ -130,7 +137,7 @@ def gallery(names: list[str]) -> None:
     for name in wt.bundled_scenes():
         scene = wt.Scene.load(name)
         size = sum(edge**2 for edge in scene.tank.size) ** 0.5 if scene.tank else 1.0
-        fine = WHOLE_LAYERS.get(name, round(GALLERY_SPACING[scene.dim] * size, 4))
+        fine = {**WHOLE_LAYERS, **FINER}.get(name, round(GALLERY_SPACING[scene.dim] * size, 4))
         scene = scene.changed(spacing=min(scene.spacing, fine))
         moment, count = SHOWN_AT.get(name, USUAL_TIME), len(scene.particles()[0])
         # What is in the way of fluids is known to a simulation.
@@ -140,11 +147,12 @@ def gallery(names: list[str]) -> None:
             sim = wt.Simulation(scene)
             sim.advance(moment)
             usual = Camera.framing_extent(extent_of_water(sim.frame()), 16 / 9)
-            camera = dataclasses.replace(usual, eye=SEEN_FROM.get(name, usual.eye))
+            camera = dataclasses.replace(usual, **dict(zip(("eye", "target"), SEEN_FROM.get(name, ()), strict=False)))
             how = {"quality": "film", "samples": TRACED[name]} if name in TRACED else {}
             picture(sim, folder / f"{name}.jpg", 960, 540, camera=camera, **how)
             print(name, count, flush=True)
-        eye = f" --eye {','.join(map(str, SEEN_FROM[name]))}" if name in SEEN_FROM else ""
+        seen = zip(("eye", "target"), SEEN_FROM.get(name, ()), strict=False)
+        eye = "".join(f" --{key} {','.join(map(str, point))}" for key, point in seen)
         quality = f"film --samples {TRACED[name]}" if name in TRACED else "high"
         rows.append(
             f"## {scene.title}\n\n![{scene.title}](gallery/{name}.jpg)\n\n"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wavetank import Box, HalfSpace, Scene, Sphere, Tank
+from wavetank import Box, HalfSpace, Mesh, Scene, Sphere, Tank
 from wavetank.view.buffers import SOLID
 from wavetank.view.camera import Camera
 from wavetank.view.passes import nothing, solids, spheres
@@ -110,6 +110,18 @@ def test_the_eye_inside_a_solid_sees_its_inside(make_frame):
     pixels = buffers_of(make_frame(scene, [(0.5, 0.5, 0.1)]), camera).pixels
     assert (pixels.surface.to_numpy() == SOLID).all()
     assert (pixels.normal.to_numpy()[..., 2] > 0.5).all()  # it faces the eye
+
+
+def test_the_near_side_of_a_container_is_left_away(make_frame):
+    """What is seen of a vase is its inside, from the far side: rays stopped at the near one, a step within the hollow."""
+    vase = Mesh(path="wavetank/vase.obj", center=(0.5, 0.5, 0.5), size=0.9, invert=True)
+    pixels = buffers_of(make_frame(world(vase), []), FRONT).pixels
+    depth = pixels.depth.to_numpy().view(np.float32)
+    x, y = pixel_points()
+    hollow = np.hypot((x - 0.5) / 0.22, (y - 0.4) / 0.1) < 1.0  # its belly, 0.3 m wide
+    assert (pixels.surface.to_numpy()[hollow] == SOLID).all()
+    assert (depth[hollow] > 2.55).all()
+    assert (pixels.normal.to_numpy()[hollow][:, 2] > 0.3).all()  # it faces the eye
 
 
 def test_the_box_of_solids_is_empty_when_they_are_out_of_sight(make_frame):

@@ -110,8 +110,9 @@ def meet(solids: SolidSet, k, origin, direction, first, last, bevel):
     pace, reach = direction.norm(), grain(solids, k)
     t, inner, steps, probe = first, first, 0, -1  # probe: which of the six places is asked for, -1 on the way there
     hit, n = vec4(0.0, 0.0, 0.0, -1.0), vec3(0.0, 0.0, 0.0)
-    # Of a ray that begins in the solid, and leaves it until it is surely out of it.
-    leaving = qd.select(bevel < 0.0 and first < 1e-4, 1.0, 0.0)
+    # Of a ray that begins in the solid and leaves it, or in a container: its near side is left away, so that what it
+    # holds is seen. It is left until it is surely out of it, by more than what counts as met.
+    leaving = (bevel < 0.0 and first < 1e-4) or solids.reach[k] >= around()
     is_going = True
     while is_going:
         side = vec3(0.0, 0.0, 0.0)
@@ -127,8 +128,7 @@ def meet(solids: SolidSet, k, origin, direction, first, last, bevel):
                 n = n.normalized(1e-9)
                 hit = vec4(n.x, n.y, n.z, t)
                 is_going = False
-        elif t == inner and value.w <= leaving * (2e-4 * t + 2e-6) and (solids.reach[k] >= around() or leaving > 0.0):
-            # The near side of a container is left away, so that what it holds is seen.
+        elif leaving and t == inner and value.w <= 2e-4 * t + 2e-6:
             t += qd.max(-value.w, 1e-4 * t + 1e-6) / pace
             inner = t
             steps += 1
