@@ -41,6 +41,20 @@ def test_water_does_not_fade_towards_the_edges_of_a_pane(x):
     assert change[0] > 0.5 * change[1] > 15
 
 
+@pytest.mark.parametrize("eye", [(-1.6, 1.3, 2.9), (-1.2, 1.5, 2.2)])
+def test_a_block_that_ends_before_the_tank_has_its_upper_corner(eye):
+    """The sun's way through it ends in air, long before the tank's wall: its colour was 0.26 and 0.22 of the middle's."""
+    scene = Scene(spacing=D, tank=Tank(size=(2.4, 1.2, 1.0)))
+    frame = frame_of(scene, lattice((0, 0, 0), (1.0, 1.0, 1.0)))
+    bare = frame_of(scene, np.zeros((0, 3)))
+    camera = Camera(eye=eye, target=(0.6, 0.5, 0.5))
+    wet, dry = picture(frame, camera), picture(bare, camera)
+    corner, middle = (
+        np.abs(around(wet, camera, p) - around(dry, camera, p)).mean() for p in ((0.85, 0.85, 1.0), (0.4, 0.5, 1.0))
+    )
+    assert corner > 0.45 * middle > 15
+
+
 def test_a_pane_mirrors_totally_what_comes_in_through_the_one_beside():
     """A red wall behind the right pane is not seen through the front pane: sin^2 + sin^2 > 1 for both angles (Snell).
 

@@ -105,9 +105,11 @@ def about_depth(sun: Lens, first: qd.template(), walls: Box, at, spacing):
 
 @qd.func
 def wholeness(sun: Lens, first: qd.template(), inside: Inside, optics: Optics, at, bent):
-    """How much of a body the water is, 0 to 1, that a `bent` ray has entered at `at`, two spacings farther.
+    """How much of a body the water is, 0 to 1, that a `bent` ray has entered at `at`, two spacings farther; and how
+    much of one it is where its surface is calm, see `calm`.
 
-    Broken water leaves air in the sun's way. It is 0 where there is none.
+    Broken water leaves air in the sun's way. It is 0 where there is none. A block that ends before the tank does
+    leaves air there as well: below a calm surface no more is asked for than eight spacings of water.
     """
     begun = qd.min(qd.max(at, inside.walls.lower), inside.walls.upper) + 2.0 * optics.spacing * bent
     inset = 1.5 * optics.spacing * vec3(1.0, 0.0, 1.0)  # next to a wall the column's discs are cut
@@ -126,11 +128,19 @@ def wholeness(sun: Lens, first: qd.template(), inside: Inside, optics: Optics, a
         if z < 1e30:
             begins += share * z
             weight += share
-    under, result = c.z - begins / weight, 0.0
+    under, result = c.z - begins / weight, vec2(0.0, 0.0)
     if under > 0.0 and weight > 0.25:
         length = qd.min(wall_ahead(inside.walls, inner, sun.forward)[3] + under, 1e3)
-        result = smoothstep((water * optics.unit / length - 0.3) / 0.45)
+        found = water * optics.unit
+        result.x = smoothstep((found / length - 0.3) / 0.45)
+        result.y = smoothstep((found / qd.min(length, 8.0 * optics.spacing) - 0.3) / 0.45)
     return result
+
+
+@qd.func
+def calm(uneven):
+    """How calm a surface is, 0 to 1, whose normals have the standard deviation `uneven`."""
+    return 1.0 - smoothstep((uneven - 0.1) / 0.3)
 
 
 @qd.func

@@ -30,7 +30,7 @@ from wavetank.view.lens import (
 )
 from wavetank.view.look import Look
 from wavetank.view.optics.between import GROUP, alike, group, seen_between, shaded_alike, turn_of
-from wavetank.view.optics.body import Inside, through_body, wholeness
+from wavetank.view.optics.body import Inside, calm, through_body, wholeness
 from wavetank.view.optics.drop import behind_drop
 from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, refracted
@@ -220,9 +220,10 @@ def lay(
                                     ahead, point = direction.normalized(), origin + at * direction
                                     cosi = qd.max(-n.dot(ahead), 0.05)
                                     bent = refracted(ahead, n, cosi)
+                                    found = vec2(0.0, 0.0)
                                     if fresh:
-                                        kept_whole = wholeness(sun, sunlit.depth, inside, optics, point, bent)
-                                    if layer == 1 and ((fresh and kept_whole > 0.0) or shiny):
+                                        found = wholeness(sun, sunlit.depth, inside, optics, point, bent)
+                                    if layer == 1 and (found.y > 0.0 or shiny):
                                         uneven = unevenness(
                                             lens, row, column, z, n, direction, optics.spacing, surface.depth
                                         )
@@ -231,6 +232,7 @@ def lay(
                                     elif lies:
                                         uneven = old_of[2] + between * (new_of[2] - old_of[2])
                                     if fresh:
+                                        kept_whole = found.x + calm(uneven) * (found.y - found.x)
                                         kept, kept_above, lead = through_body(
                                             pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
                                             inside, at, point, bent,
