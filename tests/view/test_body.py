@@ -43,7 +43,7 @@ def test_water_does_not_fade_towards_the_edges_of_a_pane(x):
 
 @pytest.mark.parametrize("eye", [(-1.6, 1.3, 2.9), (-1.2, 1.5, 2.2)])
 def test_a_block_that_ends_before_the_tank_has_its_upper_corner(eye):
-    """The sun's way through it ends in air, long before the tank's wall: its colour was 0.26 and 0.22 of the middle's."""
+    """The sun's way through it ends in air, before the tank's wall: its colour was 0.26 and 0.22 of the middle's."""
     scene = Scene(spacing=D, tank=Tank(size=(2.4, 1.2, 1.0)))
     frame = frame_of(scene, lattice((0, 0, 0), (1.0, 1.0, 1.0)))
     bare = frame_of(scene, np.zeros((0, 3)))

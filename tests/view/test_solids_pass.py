@@ -113,7 +113,7 @@ def test_the_eye_inside_a_solid_sees_its_inside(make_frame):
 
 
 def test_the_near_side_of_a_container_is_left_away(make_frame):
-    """What is seen of a vase is its inside, from the far side: rays stopped at the near one, a step within the hollow."""
+    """What is seen of a vase is its inside, from the far side: rays stopped a step within the near one."""
     vase = Mesh(path="wavetank/vase.obj", center=(0.5, 0.5, 0.5), size=0.9, invert=True)
     pixels = buffers_of(make_frame(world(vase), []), FRONT).pixels
     depth = pixels.depth.to_numpy().view(np.float32)
