@@ -12,6 +12,7 @@ from wavetank.device.state import CoarseGrid
 from wavetank.foundation.materials import Material
 from wavetank.lab.cases.energy import energies
 from wavetank.physics import step as step_of_algorithm
+from wavetank.physics.coefficients import coefficients
 from wavetank.physics.grid_pressure import coarse_grid, poisson
 from wavetank.physics.grid_pressure import correction as coarse_pressure
 from wavetank.physics.grid_pressure.coarse_grid import new_levels
@@ -358,7 +359,8 @@ def test_the_room_that_solids_leave_follows_them():
         level = sim.world.levels[0]
         kept = level.room.to_numpy()
         args = coarse_pressure.LEAST_OPEN, coarse_pressure.UNIT, int(sim.world.has_solids), 3
-        coarse_pressure.find_room(level, sim.world.thin_walls, sim.world.solids, *args)
+        c = coefficients(sim.scene, 1.0 / 60.0)
+        coarse_pressure.find_room(level, sim.world.thin_walls, sim.world.solids, c, *args)
         np.testing.assert_array_equal(level.room.to_numpy(), kept)
         return kept
 
@@ -412,7 +414,8 @@ def test_solids_together_leave_the_room_that_their_union_does(count):
         sim = Simulation(scene)
         level = sim.world.levels[0]
         args = coarse_pressure.LEAST_OPEN, coarse_pressure.UNIT, int(sim.world.has_solids), 3
-        coarse_pressure.find_room(level, sim.world.thin_walls, sim.world.solids, *args)
+        c = coefficients(sim.scene, 1.0 / 60.0)
+        coarse_pressure.find_room(level, sim.world.thin_walls, sim.world.solids, c, *args)
         nodes = level.nx * level.ny * level.nz
         return level.room.to_numpy()[:nodes], level.thin_s.to_numpy()[:nodes]
 

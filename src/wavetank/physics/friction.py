@@ -13,7 +13,10 @@ The tank's floor takes it from puddles, a layer at most.
 And all of them, but bodies, take the same share from slow motion towards them and away, from the layer next to them.
 Iterations answer what presses a layer or two together with more than all of it, so that it jumped from step to step.
 
-None of this holds beside a body that comes down on something: a layer that cannot leave would bear it.
+A body takes none of it where water lies between it and another solid. The other takes none where that water is squeezed
+out: by a body that is on its way, between two of them, and where one lies above the other. A layer that cannot leave
+would bear it. Beside upright sides of bodies that rest walls do as elsewhere: without that, water there was thrown to
+and fro without end (docs/notebook/calm.md, "Upright slits").
 
     code     symbol    meaning                                           unit
     push     delta     displacement that the wall has given              m
@@ -23,6 +26,7 @@ None of this holds beside a body that comes down on something: a layer that cann
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Particles, Scratch, Walls
 from wavetank.physics.boundary import is_near, wall_share
+from wavetank.physics.grid_pressure.coarse_grid import ramp
 from wavetank.physics.near_solids import facing_at, known, place_of
 from wavetank.physics.predicted_positions import predicted
 from wavetank.solids.distance import SolidSet, image_near, lift, plane_distance, rotate, to_local, vec3, vec4
@@ -44,9 +48,11 @@ def apply_friction(
             p = lift(predicted(particles, i))
             v = lift(particles.v[i])
             others = known(scratch, i) if near >> solids.tank_count != 0 else 0
-            calm = c.calming_at_solids
+            calm, beside_body = c.calming_at_solids, c.calming_at_solids
             if qd.static(felt):
-                calm *= 1 - is_squeezed(i, p, others, near, scratch, solids, c)
+                if is_between(i, p, others, near, scratch, solids, c) == 1:
+                    calm *= 1.0 - squeezed(i, p, others, near, scratch, solids, c)
+                    beside_body = 0.0
             for number in range(solids.tank_count + others):
                 at, k = 0, number
                 value = vec4(0.0, 0.0, 0.0, 0.0)
@@ -75,9 +81,9 @@ def apply_friction(
                         if qd.static(on_grid):
                             share += calmed(slip.norm_sqr(), calm, c) * qd.max(0.0, -n.dot(down(c))) * scratch.puddle[i]
                     else:
-                        calming = calmed(slip.norm_sqr(), calm, c)
+                        calming = calmed(slip.norm_sqr(), beside_body if solids.unit[k] > 0.0 else calm, c)
                         if solids.unit[k] > 0.0:  # a body that is on its way is not held up
-                            calming *= qd.max(free(), 1.0 - moving.norm_sqr() * resting() * c.slow_at_solids)
+                            calming *= qd.max(free(), at_rest(moving, c))
                         share += calming
                     change = slip * qd.min(solids.grip[k], share)
                     v -= change
@@ -90,8 +96,8 @@ def apply_friction(
 
 
 @qd.func
-def is_squeezed(i, p, others, near, scratch: Scratch, solids: SolidSet, c: Coefficients):
-    """1 where water is beside a body and beside another solid, out of whose way it is to be squeezed; else 0."""
+def is_between(i, p, others, near, scratch: Scratch, solids: SolidSet, c: Coefficients):
+    """1 where water is beside a body and beside another solid; else 0."""
     bodies, total = 0, 0
     for number in range(others):
         at = place_of(scratch, i, number)
@@ -103,6 +109,34 @@ def is_squeezed(i, p, others, near, scratch: Scratch, solids: SolidSet, c: Coeff
             if is_near(near, k, solids) == 1 and plane_distance(solids, k, p).w < c.h:
                 total += 1
     return qd.cast(bodies > 0 and total > 1, qd.i32)
+
+
+@qd.func
+def squeezed(i, p, others, near, scratch: Scratch, solids: SolidSet, c: Coefficients):
+    """How surely what is between a body and another solid is to leave, from 0 to 1; see `is_between`.
+
+    So it is where the body is on its way, where there are two bodies, and where one of the two lies above the other:
+    surfaces that lean by 60 degrees and more do not, below 30 they do.
+    """
+    bodies = 0
+    on_its_way, above, below = 0.0, 0.0, 0.0
+    for number in range(others):
+        at = place_of(scratch, i, number)
+        k = scratch.solid[at]
+        value = facing_at(scratch, at, i, p)
+        if value.w < c.h:
+            if solids.unit[k] > 0.0:
+                bodies += 1
+                on_its_way = qd.max(on_its_way, 1.0 - at_rest(surface_velocity(solids, k, p, c.dt), c))
+            leans = vec3(value.x, value.y, value.z).dot(down(c))
+            above, below = qd.max(above, leans), qd.max(below, -leans)
+    for k in range(solids.tank_count):
+        value = plane_distance(solids, k, p)
+        if is_near(near, k, solids) == 1 and value.w < c.h:
+            leans = vec3(value.x, value.y, value.z).dot(down(c))
+            above, below = qd.max(above, leans), qd.max(below, -leans)
+    surely = qd.max(on_its_way, ramp(above, 0.5, 0.85) * ramp(below, 0.5, 0.85))
+    return surely if bodies == 1 else 1.0
 
 
 @qd.func
@@ -134,6 +168,12 @@ def settled(n, towards, calm, c: Coefficients):
 def resting():
     """Inverse square of the speed up to which a body is taken for one at rest, over that of slow sliding."""
     return 36.0
+
+
+@qd.func
+def at_rest(moving, c: Coefficients):
+    """How surely a body is at rest whose surface has the velocity `moving` [m/s], from 0 to 1."""
+    return qd.max(0.0, 1.0 - moving.norm_sqr() * resting() * c.slow_at_solids)
 
 
 @qd.func

@@ -44,6 +44,7 @@ class World:
     frozen: int = 0  # particles that are ice
     solids_version: int = 0  # changes with each motion of the solids
     room_version: int = -1  # of the solids when the grid was last told which room they leave
+    room_gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m/s^2: at that time, which says what lies above what
     thin_walls: Any = dataclasses.field(default_factory=lambda: integers(1))  # i32 [1]: nodes of the grid at thin walls
     has_thin_walls: bool = False
     solid_speed: float = 0.0  # m/s: the fastest that any solid moves in this frame

@@ -281,10 +281,11 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     they leave is what it was.
     """
     finest, cells, count, searched = world.levels[0], world.grid, world.count, int(world.has_solids)
-    if world.room_version != world.solids_version:
+    gravity = (c.gravity_x, c.gravity_y, c.gravity_z)
+    if world.room_version != world.solids_version or (world.pieces and world.room_gravity != gravity):
         world.thin_walls.fill(0)
-        find_room(finest, world.thin_walls, world.solids, LEAST_OPEN, UNIT, world.searched, params.dim)
-        world.room_version = world.solids_version
+        find_room(finest, world.thin_walls, world.solids, c, LEAST_OPEN, UNIT, world.searched, params.dim)
+        world.room_version, world.room_gravity = world.solids_version, gravity
         world.has_thin_walls = bool(download(world.thin_walls)[0])
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     few = int(not is_shared(finest))

@@ -8,7 +8,7 @@ pressure there is continued from around instead (`buoyancy.py`), and what such a
 """
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import CoarseGrid
+from wavetank.device.state import CoarseGrid, Coefficients
 from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, corners, nearest, on_axis, tents
 from wavetank.physics.grid_pressure.listed_solids import listed, solids_near
 from wavetank.physics.grid_pressure.slits import mostly
@@ -201,15 +201,16 @@ def find_walls(grid: CoarseGrid, thin: qd.template(), solids: SolidSet, piece, l
 
 
 @qd.func
-def is_slit(grid: CoarseGrid, n):
+def is_slit(grid: CoarseGrid, n, gravity):
     """Whether node `n` lies between two solids that leave less than half a cell, and no node beside it is open.
 
-    Rooms are in `rhs`.
+    One lies above the other: what stands upright beside a wall is open to the air above, and pressed on by nothing.
+    Rooms are in `rhs`, `gravity` is a vector of any length; without it all slits count.
     """
     narrowest, widest = 1.0, 0.0
     if grid.rhs[n] > 0.0 and grid.rhs[n] < narrow():
         for axis in qd.static(range(3)):
-            if grid.nz > 1 or axis < 2:
+            if (grid.nz > 1 or axis < 2) and qd.abs(gravity[axis]) >= 0.7 * gravity.norm():
                 width = grid.rhs[n]
                 for side in qd.static((-1, 1)):
                     place = coordinates(grid, n)
@@ -228,7 +229,7 @@ def is_slit(grid: CoarseGrid, n):
 
 @qd.kernel(fastcache=True)
 def find_room(
-    grid: CoarseGrid, thin: qd.types.ndarray(), solids: SolidSet, least_open: qd.f32, unit: qd.f32,
+    grid: CoarseGrid, thin: qd.types.ndarray(), solids: SolidSet, c: Coefficients, least_open: qd.f32, unit: qd.f32,
     searched: qd.template(), dim: qd.template(),
 ):  # fmt: skip
     """Find which room each node has for water where solids are `searched`; else the tank ends where the cells do.
@@ -271,7 +272,7 @@ def find_room(
             grid.rhs[n] = grid.room[n]
         if qd.static(searched == 2):
             for n in range(grid.nx * grid.ny * grid.nz):
-                if is_slit(grid, n):
+                if is_slit(grid, n, vec3(c.gravity_x, c.gravity_y, c.gravity_z)):
                     grid.room[n] = 0.0
         for n in range(grid.nx * grid.ny * grid.nz):
             grid.rhs[n] = qd.abs(grid.room[n] - 1.0)
