@@ -50,9 +50,9 @@ def apply_friction(
             others = known(scratch, i) if near >> solids.tank_count != 0 else 0
             calm, beside_body = c.calming_at_solids, c.calming_at_solids
             if qd.static(felt):
-                if is_between(i, p, others, near, scratch, solids, c) == 1:
-                    calm *= 1.0 - squeezed(i, p, others, near, scratch, solids, c)
-                    beside_body = 0.0
+                found = between(i, p, others, near, scratch, solids, c)
+                beside_body *= 1.0 - found[0]
+                calm *= 1.0 - found[1]
             for number in range(solids.tank_count + others):
                 at, k = 0, number
                 value = vec4(0.0, 0.0, 0.0, 0.0)
@@ -96,47 +96,35 @@ def apply_friction(
 
 
 @qd.func
-def is_between(i, p, others, near, scratch: Scratch, solids: SolidSet, c: Coefficients):
-    """1 where water is beside a body and beside another solid; else 0."""
-    bodies, total = 0, 0
-    for number in range(others):
-        at = place_of(scratch, i, number)
-        if facing_at(scratch, at, i, p).w < c.h:
-            total += 1
-            bodies += qd.cast(solids.unit[scratch.solid[at]] > 0.0, qd.i32)
-    if bodies > 0:
-        for k in range(solids.tank_count):
-            if is_near(near, k, solids) == 1 and plane_distance(solids, k, p).w < c.h:
-                total += 1
-    return qd.cast(bodies > 0 and total > 1, qd.i32)
+def between(i, p, others, near, scratch: Scratch, solids: SolidSet, c: Coefficients):
+    """(whether water is beside a body and beside another solid, how surely it is to leave from between), from 0 to 1.
 
-
-@qd.func
-def squeezed(i, p, others, near, scratch: Scratch, solids: SolidSet, c: Coefficients):
-    """How surely what is between a body and another solid is to leave, from 0 to 1; see `is_between`.
-
-    So it is where the body is on its way, where there are two bodies, and where one of the two lies above the other:
-    surfaces that lean by 60 degrees and more do not, below 30 they do.
+    It is to leave where the body is on its way, where there are two bodies, and where one of the two lies above the
+    other: surfaces that lean by 60 degrees and more do not, below 30 they do.
     """
-    bodies = 0
+    bodies, total = 0, 0
     on_its_way, above, below = 0.0, 0.0, 0.0
     for number in range(others):
         at = place_of(scratch, i, number)
         k = scratch.solid[at]
         value = facing_at(scratch, at, i, p)
         if value.w < c.h:
+            total += 1
             if solids.unit[k] > 0.0:
                 bodies += 1
                 on_its_way = qd.max(on_its_way, 1.0 - at_rest(surface_velocity(solids, k, p, c.dt), c))
             leans = vec3(value.x, value.y, value.z).dot(down(c))
             above, below = qd.max(above, leans), qd.max(below, -leans)
-    for k in range(solids.tank_count):
-        value = plane_distance(solids, k, p)
-        if is_near(near, k, solids) == 1 and value.w < c.h:
-            leans = vec3(value.x, value.y, value.z).dot(down(c))
-            above, below = qd.max(above, leans), qd.max(below, -leans)
-    surely = qd.max(on_its_way, ramp(above, 0.5, 0.85) * ramp(below, 0.5, 0.85))
-    return surely if bodies == 1 else 1.0
+    if bodies > 0:
+        for k in range(solids.tank_count):
+            value = plane_distance(solids, k, p)
+            if is_near(near, k, solids) == 1 and value.w < c.h:
+                total += 1
+                leans = vec3(value.x, value.y, value.z).dot(down(c))
+                above, below = qd.max(above, leans), qd.max(below, -leans)
+    is_between = qd.cast(bodies > 0 and total > 1, qd.f32)
+    leaves = qd.max(on_its_way, ramp(above, 0.5, 0.85) * ramp(below, 0.5, 0.85)) if bodies == 1 else 1.0
+    return qd.Vector([is_between, is_between * leaves])
 
 
 @qd.func
