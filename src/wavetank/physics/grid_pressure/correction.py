@@ -25,10 +25,8 @@ modes that are much stiffer than a step are stopped at once, as without it. No m
 is carried, so that water that hits a wall does not bounce.
 
 Gaps. Particles in rows, near in one direction and far in the other, read the density of water at rest where there is
-less: the kernel is pointed and counts near ones most. The grid counts the room, so it knows. Where even the fullest
-cells around are less than `FULL`, the rows have gaps that the water around may close, and an error is less by
-`GAP_SHARE` times what is missing there. Near a free surface the cells below are full, so that water at rest is told
-nothing; of two cells in a row the mean counts, as a single one of four or eight particles is never quite even.
+less. Where even the fullest cells around are less than `FULL` (`gaps.py`), the rows have gaps that the water around may
+close, and an error is less by `GAP_SHARE` times what is missing there.
 
 Slips. The other way round, a row that slides off the one below reads less than the room that it takes. Where a cell is
 full, water that is drawn in for that pushes the row on: it slid ever faster, 0.014 m/s in a tank that had been at rest
@@ -56,9 +54,10 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     tents,
 )  # fmt: skip
 from wavetank.physics.grid_pressure.films import left_to_grid
+from wavetank.physics.grid_pressure.gaps import across, gaps_at
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
 from wavetank.physics.grid_pressure.push import move_particles, push_of
-from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, gaps_at, open_tents
+from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, open_tents, spread_along
 from wavetank.physics.grid_pressure.slits import below_roof, close_slit, in_part, mostly, openness
 from wavetank.physics.grid_pressure.surface import depth_at
 from wavetank.physics.grid_pressure.weight import BORNE, flow_out
@@ -249,8 +248,20 @@ def gather(
                 surely = is_open * surely + (1.0 - is_open) * in_part(grid, n)
             close_slit(grid, n, surely, e.slit)
     qd.loop_config(serialize=bool(few))
+    for row in range(grid.ny * grid.nz):
+        spread_along(grid.rhs, grid.fill, grid, row, 0, across())
+        spread_along(grid.slope_y, grid.fill, grid, row, 1, across())
+    qd.loop_config(serialize=bool(few))
+    for row in range(grid.ny * grid.nz):
+        spread_along(grid.slope_z, grid.rhs, grid, row, 1, across())
+        spread_along(grid.depth, grid.rhs, grid, row, 2, across())
+        spread_along(grid.gaps, grid.slope_y, grid, row, 2, across())
+    qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
-        grid.gaps[n] = gaps_at(grid, n, e.full)
+        grid.rhs[n] = gaps_at(grid, grid.gaps, grid.depth, grid.slope_z, n, e.full)
+    qd.loop_config(serialize=bool(few))
+    for n in range(grid.nx * grid.ny * grid.nz):
+        grid.gaps[n] = grid.rhs[n]
         grid.depth[n] = depth_at(grid, n)
         grid.slope_y[n] = inside_at(grid, n, e)
     for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):

@@ -1,4 +1,4 @@
-"""Which room the cells of a tank have for water, and which share of it is gaps between rows of particles.
+"""Which room the cells of a tank have for water.
 
 Where there are bodies, the slits between them and what they lie on have none. The layer that a body comes down on is a
 lone row of particles in less than half a cell, and all that its densities are off had to leave through the length of
@@ -19,30 +19,15 @@ LEAST_OPEN = 0.1  # a cell that is less open is solid
 
 
 @qd.func
-def gaps_at(grid: CoarseGrid, n, full):
-    """How far even the fullest two cells in a row are from `full`, of those around node `n`.
-
-    0 near solids, since what room these leave is known only roughly.
-    """
-    fullest = 0.0
-    if grid.clear[n] > 0.0:
-        for axis in qd.static(range(3)):
-            for side in qd.static((-1, 1)):
-                if grid.nz > 1 or axis < 2:
-                    c = coordinates(grid, n)
-                    before = grid.fill[n]
-                    for _ in qd.static(range(2)):
-                        c[axis] += side
-                        at = nearest(grid, c)
-                        fullest = qd.max(fullest, 0.5 * (before + grid.fill[at]))
-                        before = grid.fill[at]
-    return qd.max(full - fullest, 0.0) if grid.clear[n] > 0.0 else 0.0
-
-
-@qd.func
 def narrow():
     """Cells that are left between two solids, up to which there is a slit."""
     return 0.5
+
+
+@qd.func
+def tent_beside():
+    """Share of a free cell that counts at the node of the next one along an axis, see `add_tents`."""
+    return 0.125
 
 
 @qd.func
@@ -169,18 +154,20 @@ def largest_along(
 
 
 @qd.func
-def spread_along(to: qd.template(), values: qd.template(), grid: CoarseGrid, row, axis: qd.template()):
-    """Put what the free cells beside a node count there along an axis, see `add_tents`, to the nodes of a row."""
+def spread_along(
+    to: qd.template(), values: qd.template(), grid: CoarseGrid, row, axis: qd.template(), share: qd.template()
+):
+    """Put mean values along an axis, in which each node beside has that `share`, to the nodes of a row."""
     first = grid.nx * row
     if qd.static(axis == 0):
         for x in range(grid.nx):
             around = values[first + on_axis(grid, x - 1, 0)] + values[first + on_axis(grid, x + 1, 0)]
-            to[first + x] = 0.75 * values[first + x] + 0.125 * around
+            to[first + x] = (1.0 - 2.0 * share) * values[first + x] + share * around
     else:
         before, behind_it = row_beside(grid, row, axis, -1), row_beside(grid, row, axis, 1)
         for x in range(grid.nx):
             around = values[before + x] + values[behind_it + x]
-            to[first + x] = 0.75 * values[first + x] + 0.125 * around
+            to[first + x] = (1.0 - 2.0 * share) * values[first + x] + share * around
 
 
 @qd.func
@@ -260,11 +247,11 @@ def find_room(
             if grid.rhs[n] == 0.0 and grid.lam[n] > -edge:
                 add_tents(grid, n, unit, dim)
         for row in range(grid.ny * grid.nz):
-            spread_along(grid.depth, grid.rhs, grid, row, 0)
+            spread_along(grid.depth, grid.rhs, grid, row, 0, tent_beside())
         for row in range(grid.ny * grid.nz):
-            spread_along(grid.gaps, grid.depth, grid, row, 1)
+            spread_along(grid.gaps, grid.depth, grid, row, 1, tent_beside())
         for row in range(grid.ny * grid.nz):
-            spread_along(grid.rhs, grid.gaps, grid, row, 2)
+            spread_along(grid.rhs, grid.gaps, grid, row, 2, tent_beside())
         for n in range(grid.nx * grid.ny * grid.nz):
             if grid.room[n] > 0.0 and grid.lam[n] < 2.0 * longest_edge(grid):
                 grid.room[n] = grid.sums[n] / unit + grid.rhs[n]
