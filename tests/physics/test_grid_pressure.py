@@ -10,7 +10,6 @@ from wavetank.device import compiler
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.foundation.materials import Material
-from wavetank.lab.cases.energy import energies
 from wavetank.physics import step as step_of_algorithm
 from wavetank.physics.coefficients import coefficients
 from wavetank.physics.grid_pressure import coarse_grid, poisson
@@ -194,40 +193,6 @@ def test_layers_of_different_density_rest():
     assert sim.time_steps == 1
 
 
-@pytest.mark.parametrize("height", [0.4, 0.41, 0.425, 0.45, 0.475])
-def test_water_at_rest_has_no_gaps(height):
-    """Wherever its surface lies between the nodes, and however well rows fit the tank."""
-    block = wt.Block(lower=(0, 0), upper=(1.03, height))
-    sim = Simulation(wt.Scene(spacing=0.025, tank=wt.Tank(size=(1.03, 0.9)), fluids=[block]))
-    sim.advance(1.0)
-    level = sim.world.levels[0]
-    nodes = level.nx * level.ny
-    gaps, fill = level.gaps.to_numpy()[:nodes], level.fill.to_numpy()[:nodes]
-    assert gaps[fill > 0.85].mean() < 1e-3
-    assert gaps[fill > 0.85].max() < 0.03
-    assert level.lam.to_numpy()[:nodes].any()
-
-
-def test_rows_that_are_drawn_apart_have_gaps():
-    """A lattice an eighth wider leaves 1 - 1 / 1.125 of the room free, most of which is told; none next to a solid."""
-    d = 0.025
-    places = np.stack(np.meshgrid((np.arange(40) + 0.5) * 1.125 * d, (np.arange(40) + 0.5) * d), -1).reshape(-1, 2)
-    scene = wt.Scene(
-        spacing=d, tank=wt.Tank(size=(1.125, 1.2)), fluids=[Points(positions=places)], gravity=(0.0, -1e-3),
-        solids=[wt.Box(center=(1.05, 0.05), size=(0.1, 0.1))],
-    )  # fmt: skip
-    sim = Simulation(scene)
-    sim.step()
-    level = sim.world.levels[0]
-    gaps = level.gaps.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
-    inner = gaps[3 : level.ny // 2, 2 : level.nx // 2]
-    free = coarse_pressure.FULL - 1.0 / 1.125
-    assert 0.5 * free < inner.mean() < 1.05 * free
-    room = level.room.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
-    assert (room < 1.0).any()
-    assert not gaps[room < 1.0].any()
-
-
 @pytest.mark.parametrize(("spread", "drawn"), [(0.97, 0.0), (1.015, 1.0)])
 def test_full_cells_draw_nothing_in(monkeypatch, spread, drawn):
     """Conservation of volume: water that reads too little where no room is left has nowhere to take more from.
@@ -253,24 +218,6 @@ def test_full_cells_draw_nothing_in(monkeypatch, spread, drawn):
     assert not gaps[inner].any()
     stiffness = rest_lattice(sim.scene.kernel, 2, sim.scene.support).stiffness
     assert rhs[inner].mean() * stiffness == pytest.approx(drawn * error, rel=0.3, abs=1e-4)
-
-
-def energy_gained(*frames: int) -> np.ndarray:
-    """What a block of water that falls apart into a lower pool has of its energy after `frames`, over the start's."""
-    fluids = [wt.Block(lower=(0, 0), upper=(0.4, 0.6)), wt.Block(lower=(0.4, 0), upper=(1.2, 0.3))]
-    scene = wt.Scene(spacing=0.025, tank=wt.Tank(size=(1.2, 0.8)), fluids=fluids)
-    _, kinetic, potential = energies(scene, "cpu", max(frames) / 60.0)
-    total = kinetic + potential
-    return total[[*frames]] / total[0] - 1.0
-
-
-def test_a_block_that_runs_into_a_pool_does_not_gain_height(monkeypatch):
-    """Conservation of energy; docs/notebook/grid-pressure.md, "Rows that are drawn apart"."""
-    early, late = energy_gained(24, 36)
-    assert early < 0.03
-    assert late < 0.0
-    monkeypatch.setattr(coarse_pressure, "FULL", 0.0)
-    assert energy_gained(24)[0] > 0.06
 
 
 def test_the_grid_is_for_gravity():

@@ -270,7 +270,7 @@ def gather(
             add_errors(
                 grid, particles, scratch, solids, walls, c, e, cells, team, grid.alone * part_of(turn), count, searched
             )
-    qd.loop_config(serialize=bool(few))
+    # By all threads even where nodes are few: one thread's loop is compiled to other last digits.
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
         error = e.scale * total
