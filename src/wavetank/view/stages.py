@@ -92,8 +92,10 @@ def sun_and_solids(shot: Shot) -> tuple[Any, ...]:
 def eye_and_style(shot: Shot) -> tuple[Any, ...]:
     """Return all of eye and style that what is not water depends on, likewise."""
     paints = "".join(solid.finish + (solid.color or "-") for solid in shot.frame.scene.solids)
-    look = (shot.look.sun_size, shot.look.paving, shot.look.sun, shot.look.sky, shot.look.floor, shot.radius)
-    return *_bytes(_numbers(shot.lens), look), paints, shot.lit
+    look = shot.look
+    light = (look.sun_size, look.paving, look.sun, look.sky, look.floor, shot.radius)
+    tank = (look.glass, look.pane, look.line, look.line_strength)
+    return *_bytes(_numbers(shot.lens), light, tank), paints, shot.lit
 
 
 def _numbers(lens: Lens) -> list[Any]:

@@ -14,7 +14,7 @@ from typing import Any
 from wavetank.device.compiler import qd, threads
 
 LEAST_TASKS = 512  # that the compiler gives to a processor's thread, whatever they cost
-WHOLE = 48  # a strip is as wide as groups of pixels of 1 to 4 samples: what these share depends on no thread
+WHOLE = 96  # a strip is as wide as eight pixels of 1 to 4 samples: what these share depends on no thread
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.device.compiler import qd, threads, upload
+from wavetank.device.compiler import lanes, qd, threads, upload
 from wavetank.simulation.frame import Frame
 from wavetank.view.buffers import Buffers, Light, new_light
 from wavetank.view.cells import Cells, new_cells
@@ -57,6 +57,9 @@ class SunlitWater:
 
     depth: qd.types.ndarray()  # i32: bits of the depth [m] at which the sun's rays meet the water
     spare: qd.types.ndarray()  # i32: the same while it is being smoothed; then optical depth of foam in 1 / 4096
+    wet: (
+        qd.types.ndarray()
+    )  # i32 [CELLS, CELLS]: 1 where water or caustics are in or beside a cell, see `optics/wet.py`
     caustic: qd.types.ndarray()  # i32: light that refraction brings or takes, and foam keeps, in 1 / 4096 of the sun's
 
 
@@ -83,6 +86,7 @@ class Backdrop:
     in_sun: qd.types.ndarray()  # what comes from the sun
     in_sky: qd.types.ndarray()  # and what comes from elsewhere, both without any water
     behind: qd.types.ndarray()  # both as far as the water lets them through
+    known: qd.types.ndarray()  # i32 [rows, columns] of what comes together: what `optics/wet.py` knows of it, or 0
 
 
 @dataclasses.dataclass(eq=False)
@@ -126,6 +130,7 @@ REACH = 2.2  # d: radius of the neighbourhood of a particle or a point
 LIGHT_STEP = 2  # floor and solids are smooth
 MOST_PARTS, MOST_SUMS = 8, 1 << 23  # of particles whose discs are added apart; numbers that are kept for that
 MOST_KNOWN = 16  # sets of a simulation's arrays, which take turns
+CELLS = 127  # of the sun's view of the water to a side, for which it is known whether they are dry
 UNIT = 4096.0  # steps of thickness in a spacing
 
 
@@ -153,14 +158,14 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
     else:
         fields = {
             "surface": WaterSurface(*_maps(3, qd.i32, rows, columns)),
-            "backdrop": Backdrop(*_maps(3, vec3, rows, columns)),
+            "backdrop": _backdrop(rows, columns, buffers.supersample),
             "light": new_light(rows, columns, LIGHT_STEP),
             "thickness": _thickness(rows // 2 + 1, columns // 2 + 1, shared, seen=True),
         }
     buffers.water = WaterBuffers(
         cells=new_cells(frame, extent, REACH * extent.spacing),
         ellipsoids=_ellipsoids(capacity),
-        sunlit=SunlitWater(*_maps(3, qd.i32, texels, texels)),
+        sunlit=_sunlit(texels),
         sun_thickness=_thickness(texels, texels, shared, seen=False),
         key=key, **fields,
     )  # fmt: skip
@@ -169,6 +174,18 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
 
 def _maps(number: int, kind: Any, rows: int, columns: int) -> list[Any]:
     return [qd.ndarray(kind, shape=(rows, columns)) for _ in range(number)]
+
+
+def _backdrop(rows: int, columns: int, samples: int) -> Backdrop:
+    """Allocate the backdrop; where pixels come one by one nothing is known of them."""
+    shape = (rows // samples, max(columns // (samples * lanes()), 1)) if lanes() > 1 else (1, 1)
+    in_sun, in_sky, behind = _maps(3, vec3, rows, columns)
+    return Backdrop(in_sun=in_sun, in_sky=in_sky, behind=behind, known=qd.ndarray(qd.i32, shape=shape))
+
+
+def _sunlit(texels: int) -> SunlitWater:
+    depth, spare, caustic = _maps(3, qd.i32, texels, texels)
+    return SunlitWater(depth=depth, spare=spare, wet=qd.ndarray(qd.i32, shape=(CELLS, CELLS)), caustic=caustic)
 
 
 def _thickness(rows: int, columns: int, shared: dict[str, Any], seen: bool) -> Thickness:

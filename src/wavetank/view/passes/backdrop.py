@@ -1,21 +1,21 @@
 """What is not water, finished: floor and solids in their light, and the background; the water refracts this picture.
 
 code       symbol   meaning                                                          unit
-tau                 water along the sun's ray before it reaches a point              m
-through             share of the sun that is left, per colour                        1
+shared              share of the sun that the water leaves, per colour               1
+together            whether all samples of a pixel have that of its middle           1
 """
 
-from wavetank.device.compiler import qd
+from wavetank.device.compiler import lanes, qd
 from wavetank.view.buffers import Buffers, Light, Pixels
-from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec2, vec3, vector, view_ray
+from wavetank.view.lens import Lens, ray_direction, ray_origin, to_view, vec2, vec3, vector, view_ray
 from wavetank.view.look import Look
-from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, optics_of
 from wavetank.view.optics.glass import with_tank
-from wavetank.view.optics.maps import share_of, thickness_at
-from wavetank.view.optics.mixture import along_sun
+from wavetank.view.optics.maps import share_of
 from wavetank.view.optics.radiance import background, smoothstep, sun_disc, surface_radiance
-from wavetank.view.optics.rays import Box
+from wavetank.view.optics.rays import Box, box_interval
+from wavetank.view.optics.sunlight import sun_through_together, sun_through_water
+from wavetank.view.optics.wet import cells_between, find_wet, holds_dry, is_dry, noted
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import Backdrop, SunlitWater, Thickness, water_of
@@ -24,6 +24,7 @@ from wavetank.view.water_buffers import Backdrop, SunlitWater, Thickness, water_
 def prepare(shot: Shot, buffers: Buffers) -> None:
     """Fill the radiance that sun and sky each give where there is no water."""
     water, pixels, extent = water_of(buffers, shot), buffers.pixels, shot.extent
+    water.backdrop.known.fill(0)
     divide(
         water.backdrop, pixels, water.light, strips_of(pixels.depth), shot.lens, shot.look,
         vector(extent.middle[0], 0.0, extent.middle[2]), extent.radius,
@@ -34,10 +35,12 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     """Fill the radiance behind the water: what was prepared, in the light that the water leaves."""
     water, pixels, frame = water_of(buffers, shot), buffers.pixels, shot.frame
     samples = buffers.supersample
+    if frame.dim == 3 and lanes() > 1:
+        find_wet(water.sunlit, water.sun_thickness.water)
     paint(
         water.backdrop, pixels, water.sunlit, water.sun_thickness, strips_of(pixels.depth, samples, samples), shot.lens,
         shot.water_sun, shot.look, optics_of(shot, 0, samples, samples), shot.box,
-        int(frame.scene.tank is not None), 10 * int(samples > 1) + frame.dim,
+        int(frame.scene.tank is not None), 100 * lanes() + 10 * int(samples > 1) + frame.dim,
     )  # fmt: skip
 
 
@@ -55,47 +58,6 @@ def light_at(light: Light, depth: qd.template(), row, column, z):
         total += w * light.share[rr, cc]
         weight += w
     return total / weight
-
-
-@qd.func
-def sun_through_water(sunlit: SunlitWater, thickness: Thickness, sun: Lens, look: Look, optics: Optics, at):
-    """Share of the sun, per colour, that reaches the point `at` through the water."""
-    c = to_view(sun, at)
-    place = to_pixel(sun, c)
-    through = vec3(1.0, 1.0, 1.0)
-    texels = sunlit.depth.shape[0]
-    if qd.min(place.x, place.y) > 2.0 and qd.max(place.x, place.y) < texels - 2.0:
-        whole = thickness_at(thickness.water, place, optics.unit)
-        gathered = thickness_at(sunlit.caustic, place, 1.0 / 4096.0)
-        nearest, wide = 1e30, 0.0
-        if whole > 0.0:
-            nearest = qd.bit_cast(sunlit.depth[qd.cast(place.y, qd.i32), qd.cast(place.x, qd.i32)], qd.f32)
-            if nearest < 1e30:  # far behind the water its light is as blurred as the sun is wide
-                wide = 2.0 * look.sun_size * qd.max(c.z - nearest - whole, 0.0) * sun.focal
-        if wide > 0.5:
-            for k in range(4):
-                off = wide * vec2((k % 2) * 1.6 - 0.8, (k // 2) * 1.6 - 0.8)
-                whole += thickness_at(thickness.water, place + off, optics.unit)
-                gathered += thickness_at(sunlit.caustic, place + off, 1.0 / 4096.0)
-            whole *= 0.2
-            gathered *= 0.2
-        light = 1.0 + look.caustic * qd.min(gathered, 3.0)
-        tau = whole
-        if tau > 0.0:
-            if nearest < 1e30:  # what lies above the water is in the full sun
-                within = qd.max(c.z - nearest, 0.0)
-                light = 1.0 + (light - 1.0) * qd.min(within / tau, 1.0)
-                tau = qd.min(tau, within)
-        if tau > 0.0 or light != 1.0:
-            swallow, murk = optics.absorption, 0.0
-            if thickness.fluids > 0 and whole > 0.0:
-                found = along_sun(thickness, optics, place)
-                swallow, murk = vec3(found[0], found[1], found[2]), found[3]
-            if thickness.stained[0] == 1 and whole > 0.0:
-                swallow = swallowed_by(dye_in(thickness.dye, place, whole / optics.unit), swallow, optics.usual)
-            veil = look.veil * (1.0 - qd.exp(-tau * (optics.absorption.x + optics.absorption.y)))
-            through = light * (1.0 - veil) * qd.exp(-tau * (0.6 * swallow + murk))
-    return through
 
 
 @qd.kernel(fastcache=True)
@@ -146,40 +108,165 @@ def paint(
     """Put sun and sky together as far as the water leaves them, and lay the tank over it.
 
     Samples of a pixel that lie within a texel of the sun's view take as much of the sun as its middle does. `world` is
-    2 or 3, its dimensions, ten more where pixels have several samples.
+    2 or 3, its dimensions, ten more where pixels have several samples, and a hundred for each of the pixels of a row
+    that come together as vectors. These are left as they are where no water is in their way, nor was last time.
     """
     for task in range(strips.count):
         across, tall = 1, 1
-        if qd.static(world >= 10):
+        if qd.static(world % 100 >= 10):
             across, tall = optics.samples, optics.tall
         band, first, last = strip(strips, task, pixels.depth.shape[0] // tall, pixels.depth.shape[1])
-        for pixel in range(first // across, last // across):
-            together, middle, shared = 0, 0.0, vec3(1.0, 1.0, 1.0)
-            if qd.static(world == 13):
+        begin, end = first // across, last // across
+        if qd.static(world >= 200 and world % 10 == 3):
+            lanes = qd.static(world // 100)
+            for block in range(begin // lanes, end // lanes):
+                known = backdrop.known[band, block]
+                dry = is_dry(sunlit.wet, known)
+                if not dry or not holds_dry(known):
+                    backdrop.known[band, block] = paint_together(
+                        backdrop, pixels, sunlit, thickness, lens, sun, look, optics, box, has_tank, band,
+                        block * lanes, known, dry, qd.static(world % 100), lanes,
+                    )  # fmt: skip
+            begin = end // lanes * lanes
+        for pixel in range(begin, end):
+            paint_pixel(
+                backdrop, pixels, sunlit, thickness, lens, sun, look, optics, box, has_tank, band * tall,
+                pixel * across, across, tall, qd.static(world % 100),
+            )  # fmt: skip
+
+
+@qd.func
+def paint_pixel(
+    backdrop: Backdrop, pixels: Pixels, sunlit: SunlitWater, thickness: Thickness, lens: Lens, sun: Lens, look: Look,
+    optics: Optics, box: Box, has_tank, top, left, across, tall, world: qd.template(),
+):  # fmt: skip
+    """Do this for all samples of a pixel, the first of which lies at row `top` and column `left`."""
+    together, middle, shared = 0, 0.0, vec3(1.0, 1.0, 1.0)
+    if qd.static(world == 13):
+        low, high = 1e30, 0.0
+        for k in range(across * tall):
+            z = qd.bit_cast(pixels.depth[top + k // across, left + k % across], qd.f32)
+            low, high = qd.min(low, z), qd.max(high, z)
+        together, middle = qd.cast(high < 1e30 and high - low < 0.7 * sun.pixel, qd.i32), 0.5 * (low + high)
+    for k in range(across * tall):
+        row, column = top + k // across, left + k % across
+        ray = view_ray(lens, row, column)
+        origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
+        z = qd.bit_cast(pixels.depth[row, column], qd.f32)
+        in_sun, in_sky = backdrop.in_sun[row, column], backdrop.in_sky[row, column]
+        result = in_sun + in_sky
+        if qd.static(world % 10 == 3):
+            if z < 1e30:
+                if k == 0 or together == 0:
+                    at = origin + z * direction
+                    if together == 1:
+                        ray = view_ray(lens, row + 0.5 * (tall - 1), column + 0.5 * (across - 1))
+                        at = ray_origin(lens, ray) + middle * ray_direction(lens, ray)
+                    shared = sun_through_water(sunlit, thickness, sun, look, optics, at)
+                if shared.x != 1.0 or shared.z != 1.0:
+                    # The sky comes from everywhere; water above takes some of it.
+                    result = shared * in_sun + (0.45 + 0.55 * qd.min(shared, 1.0)) * in_sky
+        if has_tank == 1:
+            line = pixels.lines[row, column]
+            result = with_tank(lens, look, box, origin, direction, z, line, result)
+        backdrop.behind[row, column] = result
+
+
+@qd.func
+def paint_together(
+    backdrop: Backdrop, pixels: Pixels, sunlit: SunlitWater, thickness: Thickness, lens: Lens, sun: Lens, look: Look,
+    optics: Optics, box: Box, has_tank, band, begin, known, dry, world: qd.template(), lanes: qd.template(),
+):  # fmt: skip
+    """Do this for `lanes` pixels of a row from `begin` on, and return what is then known of them.
+
+    Where it is known that they are `dry` the sun is all there.
+    """
+    across, tall = 1, 1
+    # Of each pixel: depth of its middle, whether its samples lie together; of a sample: its depth, what a line covers.
+    own, lines = qd.Matrix.zero(qd.f32, 3, lanes), qd.Matrix.zero(qd.i32, 1, lanes)
+    shared = qd.Matrix.zero(qd.f32, 3, lanes)  # of the sun, by colour
+    points = qd.Matrix.zero(qd.f32, 4, lanes)  # (column, row) in the sun's view, depth [m] there, and whether it counts
+    share = qd.Matrix.zero(qd.f32, 3, lanes)
+    colors = qd.Matrix.zero(qd.f32, 6, lanes)  # what the sun gives, what the sky gives
+    some, others = 0.0, 1.0
+    for lane in range(lanes):
+        for channel in qd.static(range(3)):
+            shared[channel, lane] = 1.0
+    if qd.static(world >= 10):
+        across, tall = optics.samples, optics.tall
+        some, others = 0.0, 0.0
+        if not dry:
+            for lane in qd.static(range(lanes)):
                 low, high = 1e30, 0.0
                 for k in range(across * tall):
-                    z = qd.bit_cast(pixels.depth[band * tall + k // across, pixel * across + k % across], qd.f32)
+                    key = pixels.depth[band * tall + k // across, (begin + lane) * across + k % across]
+                    z = qd.bit_cast(key, qd.f32)
                     low, high = qd.min(low, z), qd.max(high, z)
-                together, middle = qd.cast(high < 1e30 and high - low < 0.7 * sun.pixel, qd.i32), 0.5 * (low + high)
-            for k in range(across * tall):
-                row, column = band * tall + k // across, pixel * across + k % across
-                ray = view_ray(lens, row, column)
-                origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
-                z = qd.bit_cast(pixels.depth[row, column], qd.f32)
+                alike = qd.cast(high < 1e30 and high - low < 0.7 * sun.pixel, qd.f32)
+                own[0, lane], own[1, lane] = 0.5 * (low + high), alike
+                some, others = qd.max(some, alike), qd.max(others, 1.0 - alike)
+    if dry:
+        others = 0.0
+    lowest, highest = vec2(1e9, 1e9), vec2(-1e9, -1e9)
+    for k in range(qd.static(-1 if world >= 10 else 0), across * tall):
+        # The middle of a pixel comes first, as sample -1.
+        row, off = band * tall + qd.max(k, 0) // across, qd.max(k, 0) % across
+        middle, down, aside = qd.select(k < 0, 1.0, 0.0), 0.0, 0.0
+        if k < 0:
+            down, aside = 0.5 * (tall - 1), 0.5 * (across - 1)
+        else:
+            for lane in qd.static(range(lanes)):
+                column = (begin + lane) * across + off
+                own[2, lane] = qd.bit_cast(pixels.depth[row, column], qd.f32)
+                lines[0, lane] = pixels.lines[row, column]
                 in_sun, in_sky = backdrop.in_sun[row, column], backdrop.in_sky[row, column]
-                result = in_sun + in_sky
-                if qd.static(world % 10 == 3):
-                    if z < 1e30:
-                        if k == 0 or together == 0:
-                            at = origin + z * direction
-                            if together == 1:
-                                ray = view_ray(lens, row + 0.5 * (tall - 1), column + 0.5 * (across - 1))
-                                at = ray_origin(lens, ray) + middle * ray_direction(lens, ray)
-                            shared = sun_through_water(sunlit, thickness, sun, look, optics, at)
-                        if shared.x != 1.0 or shared.z != 1.0:
-                            # The sky comes from everywhere; water above takes some of it.
-                            result = shared * in_sun + (0.45 + 0.55 * qd.min(shared, 1.0)) * in_sky
+                for channel in qd.static(range(3)):
+                    colors[channel, lane], colors[3 + channel, lane] = in_sun[channel], in_sky[channel]
+        if qd.select(k < 0, some, others) > 0.0:
+            for lane in range(lanes):
+                z = middle * own[0, lane] + (1.0 - middle) * own[2, lane]
+                counts = qd.select(z < 1e30, 1.0 - qd.abs(middle - own[1, lane]), 0.0)
+                ray = view_ray(lens, row + down, (begin + lane) * across + off + aside)
+                at = ray_origin(lens, ray) + qd.select(z < 1e30, z, 0.0) * ray_direction(lens, ray)
+                c = to_view(sun, at)
+                points[0, lane], points[1, lane] = sun.middle.x + sun.focal * c.x, sun.middle.y - sun.focal * c.y
+                points[2, lane], points[3, lane] = c.z, counts
+            sun_through_together(share, points, sunlit, thickness, sun, look, optics, lanes)
+            for lane in range(lanes):
+                counts = points[3, lane]
+                for channel in qd.static(range(3)):
+                    shared[channel, lane] = qd.select(counts > 0.0, share[channel, lane], shared[channel, lane])
+            if known == 0:
+                for lane in qd.static(range(lanes)):
+                    if points[3, lane] > 0.0:
+                        lowest = qd.min(lowest, vec2(points[0, lane], points[1, lane]))
+                        highest = qd.max(highest, vec2(points[0, lane], points[1, lane]))
+        if k >= 0:
+            for lane in range(lanes):
+                column, z = (begin + lane) * across + off, own[2, lane]
+                glass, line = vec2(0.0, 0.0), 0.0
                 if has_tank == 1:
-                    line = pixels.lines[row, column]
-                    result = with_tank(lens, look, box, origin, direction, z, line, result)
-                backdrop.behind[row, column] = result
+                    line = look.line_strength * ((qd.max(lines[0, lane], 0) >> 23) / 255.0)
+                    if look.glass > 0.0:
+                        ray = view_ray(lens, row, column)
+                        panes = box_interval(ray_origin(lens, ray), ray_direction(lens, ray), box)
+                        seen = qd.select(panes[0] <= panes[1], look.glass, 0.0)
+                        for pane in qd.static(range(2)):
+                            between = qd.min(panes[pane] - lens.near, z - panes[pane])
+                            glass[pane] = qd.select(between > 0.0, seen, 0.0)
+                for channel in qd.static(range(3)):
+                    sunny = shared[channel, lane]
+                    # The sky comes from everywhere; water above takes some of it.
+                    result = sunny * colors[channel, lane]
+                    result += (0.45 + 0.55 * qd.min(sunny, 1.0)) * colors[3 + channel, lane]
+                    for pane in qd.static(range(2)):
+                        result += glass[pane] * (look.pane[channel] - result)
+                    colors[channel, lane] = result + line * (look.line[channel] - result)
+            for lane in qd.static(range(lanes)):
+                backdrop.behind[row, (begin + lane) * across + off] = vec3(
+                    colors[0, lane], colors[1, lane], colors[2, lane]
+                )  # fmt: skip
+    place = known
+    if known == 0:
+        place = cells_between(lowest, highest, sunlit.depth.shape[0], sunlit.wet.shape[0])
+    return noted(place, dry)
