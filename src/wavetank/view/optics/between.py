@@ -26,15 +26,6 @@ GROUP = group.fn()
 
 
 @qd.func
-def turn_of(index):
-    """Number of the pixel that comes at the place `index`, from 0 on: the last of the group before, -1, comes first."""
-    number = index - 1
-    if number >= 0:
-        number = number // group() * group() + (number + group() - 1) % group()
-    return number
-
-
-@qd.func
 def alike(seen, above, place, other_seen, other_above, other_place, apart):
     """Whether what two rays show has what is between them in between.
 

@@ -8,42 +8,23 @@ takes the finished backdrop where that point is seen.
     code      symbol   meaning                                                         unit
     n                  normal of the surface, towards the eye                          1
     cosi               cosine between it and the line of sight                         1
-    mirror    F        share of light that is reflected                                1
     bent               direction of the ray within the water                           1
-    travel    s        its way to the exit point                                       m
-    swallow   sigma_a  absorption per colour, dye included                             1/m
 """
 
 from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers, Pixels
-from wavetank.view.lens import (
-    Lens,
-    ray_direction,
-    ray_origin,
-    to_pixel,
-    to_view,
-    vec2,
-    vec3,
-    vec4,
-    vector,
-    view_ray,
-)
+from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, vec4, vector, view_ray
 from wavetank.view.look import Look
-from wavetank.view.optics.between import GROUP, alike, group, seen_between, shaded_alike, turn_of
+from wavetank.view.optics.between import GROUP, alike, group, seen_between, shaded_alike
 from wavetank.view.optics.body import Inside, calm, through_body, wholeness
-from wavetank.view.optics.drop import behind_drop
-from wavetank.view.optics.dyes import dye_in, swallowed_by
-from wavetank.view.optics.fluid import Optics, above_floor, dimmed, optics_of, refracted
+from wavetank.view.optics.fluid import Optics, optics_of, refracted
 from wavetank.view.optics.glass import line_cover
-from wavetank.view.optics.maps import picture_at, thickness_at
 from wavetank.view.optics.marks import rim_cover, rim_key
-from wavetank.view.optics.mixture import mixed, murky
 from wavetank.view.optics.normals import normal_beside, normal_of, rise_at, unevenness
 from wavetank.view.optics.panes import share_behind, tank_interval
-from wavetank.view.optics.radiance import environment, glint, smoothstep
 from wavetank.view.optics.rays import box
 from wavetank.view.optics.resolve import even_pixel
-from wavetank.view.optics.sheet import sheet_at, sheet_normal
+from wavetank.view.optics.shading import from_within, shine
 from wavetank.view.paints import colors_of
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
@@ -85,7 +66,7 @@ def lay(
     """
     for task in range(strips.count):
         band, begin, last = strip(strips, task, pixels.depth.shape[0] // optics.tall, pixels.depth.shape[1])
-        beside, block = optics.samples, optics.samples * optics.tall
+        beside, pair = optics.samples, qd.cast(optics.samples == 1, qd.i32)
         # What is seen through a body of water is found once for all samples of a pixel, or of two pixels of one sample,
         # and not at all where it lies between the ends of two groups of pixels (`optics/between.py`).
         kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
@@ -101,294 +82,238 @@ def lay(
         # A pixel whose samples all show the same is shaded once, in its middle.
         even, even_z, even_normal = 0, 0.0, vec3(0.0, 0.0, 0.0)
         start, wide_group = begin - optics.turn, beside * group()
-        count = qd.select(last > begin, (last - start + wide_group - 1) // wide_group * group() + 1, 0)
-        for index in range(count * block):
-            part, number = index % block, turn_of(index // block)
-            at_end = (number + 1) % group() == 0
-            row = band * optics.tall + part // beside
-            column = start + number * beside + part % beside
-            if at_end and part == 0:
-                before, before_above, before_layer, old, old_of = end, end_above, end_layer, new, new_of
-                old_share, old_added, new_share.x = new_share, new_added, -1.0
-                end_layer, end_pixel, kept_pixel = -1, -1, -1
-            if qd.static(world >= 100):
-                if part == 0 and optics.under == 0 and column >= 0 and column < pixels.depth.shape[1]:
-                    even, even_z, even_normal = even_pixel(
-                        pixels, surface, lens, look, optics, inside.walls, row, column, qd.static(world % 10)
+        groups = qd.select(last > begin, (last - start + wide_group - 1) // wide_group + 1, 0)
+        for turn in range(groups):
+            before, before_above, before_layer, old, old_of = end, end_above, end_layer, new, new_of
+            old_share, old_added, new_share.x = new_share, new_added, -1.0
+            end_layer, end_pixel, kept_pixel = -1, -1, -1
+            # Whether what both ends show, and how they are shaded, is alike: -1 is not known yet.
+            same, same_shade = -1, -1
+            # The last pixel of the group before the first comes first, by itself.
+            leading, many = turn * group() - group(), qd.select(turn == 0, 1, group())
+            if turn > 0 and copied_dry(
+                pixels, surface, backdrop.behind, optics, band, start + leading * beside, wide_group, begin, last
+            ):
+                many = 0
+            place, down, aside = 0, 0, 0
+            for _ in range(many * beside * optics.tall):
+                # The last of a group comes first.
+                at_end, number = place == 0, leading + qd.select(place == 0, group() - 1, place - 1)
+                part, row, column = down + aside, band * optics.tall + down, start + number * beside + aside
+                if qd.static(world >= 100):
+                    if part == 0 and optics.under == 0 and column >= 0 and column < pixels.depth.shape[1]:
+                        even, even_z, even_normal = even_pixel(
+                            pixels, surface, lens, look, optics, inside.walls, row, column, qd.static(world % 10)
+                        )  # fmt: skip
+                if column >= 0 and column < pixels.depth.shape[1] and (part == 0 or even == 0):
+                    middle = vec2(column + 0.5, row + 0.5)
+                    result = backdrop.behind[row, column]
+                    z, back = (
+                        qd.bit_cast(surface.depth[row, column], qd.f32),
+                        qd.bit_cast(pixels.depth[row, column], qd.f32),
                     )
-            if column >= 0 and column < pixels.depth.shape[1] and (part == 0 or even == 0):
-                middle = vec2(column + 0.5, row + 0.5)
-                result = backdrop.behind[row, column]
-                z, back = (
-                    qd.bit_cast(surface.depth[row, column], qd.f32),
-                    qd.bit_cast(pixels.depth[row, column], qd.f32),
-                )
-                if even > 0:
-                    middle += 0.5 * (vec2(beside, optics.tall) - 1.0)
-                    z = even_z
-                front = 1.7e38
-                if optics.under == 1:
-                    result = from_within(thickness.water, lens, optics, row, column, back, result)
-                elif z < 1e30:
-                    ray = view_ray(lens, middle.y - 0.5, middle.x - 0.5)
-                    origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
-                    ends, turns, wall = tank_interval(lens, origin, direction, inside.walls)
-                    front = qd.max(z, ends[0])
-                    if ends[0] <= ends[1] and front < back:
-                        # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
-                        wet, there, cover, edge, rise, risen = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0), False
-                        if even > 0:
-                            wet = even - 1.0
-                        elif qd.static(world % 10 >= 3):
-                            at_pane = ends[0] > lens.near and wall.y == 0.0  # not through the open top
-                            if at_pane and z < ends[0] - optics.spacing:
-                                wet = 1.0
-                            elif (at_pane and z < ends[0] + optics.spacing) or z > ends[1] - optics.spacing:
-                                rise, risen = rise_at(row, column, z, 3.0 * optics.spacing, surface.depth), True
-                                if at_pane and z < ends[0] + optics.spacing:
-                                    wet = 1.0 - share_behind(z, ends[0], rise, vec2(turns.x, turns.y))
-                                if z > ends[1] - optics.spacing:
-                                    there = 1.0 - share_behind(z, ends[1], rise, vec2(turns.z, turns.w))
-                        rim = surface.rim[row, column]
-                        if rim > 0:
-                            edge = qd.bit_cast(rim_key(rim), qd.f32)
-                            cover = rim_cover(rim)
-                            if edge + optics.spacing > z:
-                                there *= qd.select(wet < 1.0, cover, 1.0)
-                                cover = 0.0
-                            else:
-                                stands = qd.min((z - edge) / optics.spacing - 1.0, 1.0)
-                                cover *= qd.select(edge > ends[0], stands, 0.0)
-                        first, second = there * (1.0 - cover) * wet, there * (1.0 - cover) * (1.0 - wet)
-                        result *= 1.0 - (first + second + cover)
-                        for layer in range(3):
-                            share, at = first, front
-                            if layer == 1:
-                                share = second
-                            elif layer == 2:
-                                share, at = cover, edge
-                            if share > 0.0:
-                                body = vec4(0.0, 0.0, 0.0, -1.0)
-                                above, whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
-                                bodily, fresh, lies, between = False, False, False, 0.0
-                                pixel = (number + 2 * group()) // (2 if beside == 1 else 1)
-                                if qd.static(world % 10 >= 3):
-                                    # A tank, and without bent rays to meet them no solid in it.
-                                    wide = back > 0.999 * ends[1]
-                                    if qd.static(world % 10 == 4):
-                                        wide = True
-                                    if inside.walls.upper.x < 1e5 and wide:
-                                        bodily = True
-                                        if pixel == end_pixel and kept_pixel != pixel:
-                                            kept, kept_above, kept_layer, kept_pixel = end, end_above, end_layer, pixel
-                                            kept_z, kept_whole, uneven = new_of[0], new_of[1], new_of[2]
-                                        if not at_end and layer == before_layer and layer == end_layer:
-                                            between = (middle.x - old_of[3]) / (new_of[3] - old_of[3])
-                                            off = qd.abs(at - old_of[0] - between * (new_of[0] - old_of[0]))
-                                            lies = off < 0.3 * optics.spacing and alike(
-                                                before, before_above, old, end, end_above, new, 6.0 * wide_group
-                                            )
-                                        near = qd.abs(at - kept_z) < 0.3 * optics.spacing
-                                        fresh = pixel != kept_pixel or layer != kept_layer or not near
-                                        # Less than half of the water shows what the rest did.
-                                        minor = share < 0.5 * (first + second + cover)
-                                        known = minor and qd.abs(kept_pixel - pixel) <= 1
-                                        fresh = fresh and not lies and not known
-                                between_all = lies and share == 1.0 and shaded_alike(
-                                    old_share, old_added, new_share, new_added
-                                )  # fmt: skip
-                                n = wall
-                                if layer == 1 and not between_all:
-                                    if even > 0:
-                                        n = even_normal
-                                    elif qd.static(world % 10 >= 3):
-                                        if not risen:
-                                            rise = rise_at(row, column, z, 3.0 * optics.spacing, surface.depth)
-                                        n = normal_of(lens, row, column, z, rise)
-                                if qd.static(world % 10 >= 3):
-                                    if layer == 2:
-                                        n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
-                                half = (look.to_sun - direction.normalized()).normalized(1e-9)
-                                shiny = layer == 1 and n.dot(half) > 0.9
-                                is_end = False
-                                if between_all:
-                                    body = seen_between(backdrop.behind, between, before, old, end, new)
-                                    passed = old_share + between * (new_share - old_share)
-                                    result = passed * vec3(body[0], body[1], body[2])
-                                    result += old_added + between * (new_added - old_added)
-                                elif qd.static(world % 10 >= 3):
-                                    ahead, point = direction.normalized(), origin + at * direction
-                                    cosi = qd.max(-n.dot(ahead), 0.05)
-                                    bent = refracted(ahead, n, cosi)
-                                    found = vec2(0.0, 0.0)
-                                    if fresh:
-                                        found = wholeness(sun, sunlit.depth, inside, optics, point, bent)
-                                    if layer == 1 and (found.y > 0.0 or shiny):
-                                        uneven = unevenness(
-                                            lens, row, column, z, n, direction, optics.spacing, surface.depth
+                    if even > 0:
+                        middle += 0.5 * (vec2(beside, optics.tall) - 1.0)
+                        z = even_z
+                    front = 1.7e38
+                    if optics.under == 1:
+                        result = from_within(thickness.water, lens, optics, row, column, back, result)
+                    elif z < 1e30:
+                        ray = view_ray(lens, middle.y - 0.5, middle.x - 0.5)
+                        origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
+                        ends, turns, wall = tank_interval(lens, origin, direction, inside.walls)
+                        front = qd.max(z, ends[0])
+                        if ends[0] <= ends[1] and front < back:
+                            # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
+                            wet, there, cover, edge, rise, risen = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0), False
+                            if even > 0:
+                                wet = even - 1.0
+                            elif qd.static(world % 10 >= 3):
+                                at_pane = ends[0] > lens.near and wall.y == 0.0  # not through the open top
+                                if at_pane and z < ends[0] - optics.spacing:
+                                    wet = 1.0
+                                elif (at_pane and z < ends[0] + optics.spacing) or z > ends[1] - optics.spacing:
+                                    rise, risen = (
+                                        rise_at(row, column, z, 3.0 * optics.spacing, surface.depth),
+                                        True,
+                                    )
+                                    if at_pane and z < ends[0] + optics.spacing:
+                                        wet = 1.0 - share_behind(z, ends[0], rise, vec2(turns.x, turns.y))
+                                    if z > ends[1] - optics.spacing:
+                                        there = 1.0 - share_behind(z, ends[1], rise, vec2(turns.z, turns.w))
+                            rim = surface.rim[row, column]
+                            if rim > 0:
+                                edge = qd.bit_cast(rim_key(rim), qd.f32)
+                                cover = rim_cover(rim)
+                                if edge + optics.spacing > z:
+                                    there *= qd.select(wet < 1.0, cover, 1.0)
+                                    cover = 0.0
+                                else:
+                                    stands = qd.min((z - edge) / optics.spacing - 1.0, 1.0)
+                                    cover *= qd.select(edge > ends[0], stands, 0.0)
+                            first, second = there * (1.0 - cover) * wet, there * (1.0 - cover) * (1.0 - wet)
+                            result *= 1.0 - (first + second + cover)
+                            for layer in range(3):
+                                share, at = first, front
+                                if layer == 1:
+                                    share = second
+                                elif layer == 2:
+                                    share, at = cover, edge
+                                if share > 0.0:
+                                    body = vec4(0.0, 0.0, 0.0, -1.0)
+                                    above, whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
+                                    bodily, fresh, lies, between = False, False, False, 0.0
+                                    pixel = (number + 2 * group()) >> pair
+                                    if qd.static(world % 10 >= 3):
+                                        # A tank, and without bent rays to meet them no solid in it.
+                                        wide = back > 0.999 * ends[1]
+                                        if qd.static(world % 10 == 4):
+                                            wide = True
+                                        if inside.walls.upper.x < 1e5 and wide:
+                                            bodily = True
+                                            if pixel == end_pixel and kept_pixel != pixel:
+                                                kept, kept_above, kept_layer, kept_pixel = (
+                                                    end,
+                                                    end_above,
+                                                    end_layer,
+                                                    pixel,
+                                                )
+                                                kept_z, kept_whole, uneven = new_of[0], new_of[1], new_of[2]
+                                            if not at_end and layer == before_layer and layer == end_layer:
+                                                between = (middle.x - old_of[3]) / (new_of[3] - old_of[3])
+                                                off = qd.abs(at - old_of[0] - between * (new_of[0] - old_of[0]))
+                                                if same < 0:
+                                                    same = qd.cast(
+                                                        alike(before, before_above, old, end, end_above, new,
+                                                              6.0 * wide_group), qd.i32,
+                                                    )  # fmt: skip
+                                                lies = off < 0.3 * optics.spacing and same == 1
+                                            near = qd.abs(at - kept_z) < 0.3 * optics.spacing
+                                            fresh = pixel != kept_pixel or layer != kept_layer or not near
+                                            # Less than half of the water shows what the rest did.
+                                            minor = share < 0.5 * (first + second + cover)
+                                            known = minor and qd.abs(kept_pixel - pixel) <= 1
+                                            fresh = fresh and not lies and not known
+                                    if lies and share == 1.0 and same_shade < 0:
+                                        same_shade = qd.cast(
+                                            shaded_alike(old_share, old_added, new_share, new_added), qd.i32
                                         )
-                                    elif fresh:
-                                        uneven = 0.0
-                                    elif lies:
-                                        uneven = old_of[2] + between * (new_of[2] - old_of[2])
-                                    if fresh:
-                                        kept_whole = found.x + calm(uneven) * (found.y - found.x)
-                                        kept, kept_above, lead = through_body(
-                                            pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
-                                            inside, at, point, bent,
-                                            qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), kept_whole, uneven,
-                                            qd.static(world % 10 == 4),
-                                        )  # fmt: skip
-                                        kept_z, kept_layer, kept_pixel = at, layer, pixel
-                                        if at_end and share > 0.5:
-                                            is_end = True
-                                            end, end_above, end_layer, end_pixel = kept, kept_above, layer, pixel
-                                            new, new_of = lead, vec4(at, kept_whole, uneven, middle.x)
-                                    if lies:
+                                    between_all = lies and share == 1.0 and same_shade == 1
+                                    n = wall
+                                    if layer == 1 and not between_all:
+                                        if even > 0:
+                                            n = even_normal
+                                        elif qd.static(world % 10 >= 3):
+                                            if not risen:
+                                                rise = rise_at(row, column, z, 3.0 * optics.spacing, surface.depth)
+                                            n = normal_of(lens, row, column, z, rise)
+                                    if qd.static(world % 10 >= 3):
+                                        if layer == 2:
+                                            n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
+                                    half = (look.to_sun - direction.normalized()).normalized(1e-9)
+                                    shiny = layer == 1 and n.dot(half) > 0.9
+                                    is_end = False
+                                    if between_all:
                                         body = seen_between(backdrop.behind, between, before, old, end, new)
-                                        above = before_above + between * (end_above - before_above)
-                                        whole = old_of[1] + between * (new_of[1] - old_of[1])
-                                    elif bodily:
-                                        body, above, whole = kept, kept_above, kept_whole
-                                if not between_all:
-                                    rough = qd.select(shiny, uneven * uneven, 0.0)
-                                    shone, passed = shine(
-                                        pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside, middle,
-                                        at, n, origin, direction, body, above, whole, uneven, rough,
-                                        qd.static(world % 10), qd.static(world % 100 >= 10),
-                                    )  # fmt: skip
-                                    result += share * shone
-                                    if is_end and whole > 0.999 and not shiny:
-                                        new_share, new_added = passed, shone - passed * vec3(body[0], body[1], body[2])
-                        line = line_cover(pixels.lines[row, column], front, optics.slack)
-                        result += look.line_strength * there * line * (look.line - result)
-                        if there < 0.5:
+                                        passed = old_share + between * (new_share - old_share)
+                                        result = passed * vec3(body[0], body[1], body[2])
+                                        result += old_added + between * (new_added - old_added)
+                                    elif qd.static(world % 10 >= 3):
+                                        ahead, point = direction.normalized(), origin + at * direction
+                                        cosi = qd.max(-n.dot(ahead), 0.05)
+                                        bent = refracted(ahead, n, cosi)
+                                        found = vec2(0.0, 0.0)
+                                        if fresh:
+                                            found = wholeness(sun, sunlit.depth, inside, optics, point, bent)
+                                        if layer == 1 and (found.y > 0.0 or shiny):
+                                            uneven = unevenness(
+                                                lens,
+                                                row,
+                                                column,
+                                                z,
+                                                n,
+                                                direction,
+                                                optics.spacing,
+                                                surface.depth,
+                                            )
+                                        elif fresh:
+                                            uneven = 0.0
+                                        elif lies:
+                                            uneven = old_of[2] + between * (new_of[2] - old_of[2])
+                                        if fresh:
+                                            kept_whole = found.x + calm(uneven) * (found.y - found.x)
+                                            kept, kept_above, lead = through_body(
+                                                pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
+                                                inside, at, point, bent,
+                                                qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), kept_whole, uneven,
+                                                qd.static(world % 10 == 4),
+                                            )  # fmt: skip
+                                            kept_z, kept_layer, kept_pixel = at, layer, pixel
+                                            if at_end and share > 0.5:
+                                                is_end = True
+                                                end, end_above, end_layer, end_pixel = (
+                                                    kept,
+                                                    kept_above,
+                                                    layer,
+                                                    pixel,
+                                                )
+                                                new, new_of = lead, vec4(at, kept_whole, uneven, middle.x)
+                                        if lies:
+                                            body = seen_between(backdrop.behind, between, before, old, end, new)
+                                            above = before_above + between * (end_above - before_above)
+                                            whole = old_of[1] + between * (new_of[1] - old_of[1])
+                                        elif bodily:
+                                            body, above, whole = kept, kept_above, kept_whole
+                                    if not between_all:
+                                        rough = qd.select(shiny, uneven * uneven, 0.0)
+                                        shone, passed = shine(
+                                            pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside,
+                                            middle, at, n, origin, direction, body, above, whole, uneven, rough,
+                                            qd.static(world % 10), qd.static(world % 100 >= 10),
+                                        )  # fmt: skip
+                                        result += share * shone
+                                        if is_end and whole > 0.999 and not shiny:
+                                            new_share, new_added = (
+                                                passed,
+                                                shone - passed * vec3(body[0], body[1], body[2]),
+                                            )
+                            line = line_cover(pixels.lines[row, column], front, optics.slack)
+                            result += look.line_strength * there * line * (look.line - result)
+                            if there < 0.5:
+                                front = 1.7e38
+                        else:
                             front = 1.7e38
-                    else:
-                        front = 1.7e38
-                if column >= begin and column < last:  # what lies in other strips is only followed
-                    key = qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
-                    for k in range(qd.select(even > 0, block, 1)):
-                        r, c = row + k // beside, column + k % beside
-                        pixels.color[r, c] = result
-                        surface.nearest[r, c] = qd.min(key, pixels.depth[r, c])
+                    if column >= begin and column < last:  # what lies in other strips is only followed
+                        key = qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
+                        for r in range(row, row + qd.select(even > 0, optics.tall, 1)):
+                            for c in range(column, column + qd.select(even > 0, beside, 1)):
+                                pixels.color[r, c] = result
+                                surface.nearest[r, c] = qd.min(key, pixels.depth[r, c])
+                aside += 1
+                if aside == beside:
+                    aside, down = 0, down + 1
+                if down == optics.tall:
+                    down, place = 0, place + 1
 
 
 @qd.func
-def from_within(thickness: qd.template(), lens: Lens, optics: Optics, row, column, back, radiance):
-    """Radiance as seen from within the water: there is no surface, water dims and tints what is behind it."""
-    tau = thickness_at(thickness, vec2(column + 0.5, row + 0.5) / optics.coarse, optics.unit)
-    travel = qd.min(tau, back * ray_direction(lens, view_ray(lens, row, column)).norm())
-    return dimmed(radiance, travel, optics.absorption, optics.scattering, optics.glow)
-
-
-@qd.func
-def shine(
-    pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
-    optics: Optics, inside: Inside, place, z, normal, origin, direction, body, above, whole, uneven, rough,
-    world: qd.template(), many: qd.template(),
+def copied_dry(
+    pixels: Pixels, surface: WaterSurface, behind: qd.template(), optics: Optics, band, first, wide, begin, last
 ):  # fmt: skip
-    """Radiance of the water that is seen at depth `z` with this normal, at a place (column, row) of the picture, and
-    the share in it of what is behind.
-
-    `body`, `above` and `whole` are what `through_body` found for it; a negative way where it found none. Rays that
-    spread, because the surface is `uneven`, are as long as the straight one as far as they are not as long as that.
-    `rough` is the variance of the normals around, see `glint`.
+    """Copy the backdrop to the pixels from the column `first` on, `wide` of them, if no water is seen there, and say
+    whether that is so; those from `begin` to `last` are written.
     """
-    n, pace = normal, direction.norm()
-    ahead, at = direction / pace, origin + z * direction
-    row, column = qd.cast(place.y, qd.i32), qd.cast(place.x, qd.i32)
-    tau, raw = 0.0, 0.0
-    if qd.static(world <= 2):
-        tau = sheet_at(thickness.water, lens, optics, inside, place, qd.static(world == 1))
-        raw = thickness_at(thickness.water, place / optics.coarse, optics.unit)
-        n = sheet_normal(thickness.water, lens, optics, inside, place, qd.static(world == 1))
-    else:
-        tau = thickness_at(thickness.water, place / optics.coarse, optics.unit)
-    cosi = qd.max(-n.dot(ahead), 0.05)
-    bent = refracted(ahead, n, cosi)
-    if qd.static(world >= 3):
-        raw = tau
-    # The least that a drop is thick; in a plane the rim keeps half of the colour.
-    tau = qd.max(tau, qd.static(0.15 if world >= 3 else 0.55) * optics.spacing)
-    travel = qd.min(tau, (qd.bit_cast(pixels.depth[row, column], qd.f32) - z) * pace)
-    if qd.static(world >= 3):
-        travel = above_floor(travel, at, bent)
-    c = to_view(lens, at + travel * bent)
-    shown = backdrop.behind[row, column]
-    if c.z > lens.near and whole < 1.0:
-        there = to_pixel(lens, c)
-        r = qd.min(qd.max(qd.cast(there.y, qd.i32), 0), pixels.depth.shape[0] - 1)
-        e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), pixels.depth.shape[1] - 1)
-        if qd.bit_cast(pixels.depth[r, e], qd.f32) > z:  # not what stands in front of the water
-            shown = picture_at(backdrop.behind, there)
-    glossy = 1.0
-    if qd.static(world >= 3):
-        # Less water than in a sheet of single particles is a drop: a ball turns a ray twice by the same angle. Against
-        # the glass drops and films are flat, and mirror no more than the glass around them.
-        layers, gap = (
-            tau / optics.spacing,
-            qd.min((at - inside.walls.lower).min(), (inside.walls.upper - at).min()) / optics.spacing,
-        )
-        off = smoothstep((gap - 0.05) / 0.2)
-        ball = smoothstep((0.75 - layers) / 0.3) * off
-        glossy = 1.0 - smoothstep((1.6 - layers) / 0.8) * (1.0 - off)
-        if body[3] >= 0.0:
-            shown += whole * (vec3(body[0], body[1], body[2]) - shown)
-            travel += whole * (1.0 - qd.min(1.5 * uneven, 0.6)) * (body[3] - travel)
-            ball *= 1.0 - whole
-        if ball > 0.0:
-            out = 2.0 * bent.dot(ahead) * bent - ahead
-            far = behind_drop(
-                pixels.depth, pixels.depth, backdrop.behind, lens, look, at + travel * bent, out, row, column, z
-            )  # fmt: skip
-            shown += ball * (far - shown)
-    swallow, tint, cover, hidden = optics.absorption, optics.glow, 0.0, 0.0
-    color, glow, behind = optics.glow, vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
-    if qd.static(many):
-        swallow, tint, color, cover, glow, hidden, behind = mixed(
-            thickness, look, optics, place, tau, qd.static(world <= 2)
-        )
-    if thickness.stained[0] == 1:
-        # Of what the map holds: a wall takes as much of the dye's discs as of the water's.
-        found = dye_in(thickness.dye, place / optics.coarse, qd.max(raw, 0.15 * optics.spacing) / optics.unit)
-        if found[0] > 0.0:
-            swallow = swallowed_by(found, swallow, optics.usual)
-            tint += found[0] * (look.glow * vec3(found[1], found[2], found[3]) - tint)
-            color += found[0] * (vec3(found[1], found[2], found[3]) - color)
-    passed = qd.exp(-travel * swallow)
-    result = passed * shown + (1.0 - qd.exp(-travel * optics.scattering)) * tint
-    if qd.static(many):
-        if hidden + cover > 0.0:
-            lit = murky(
-                sunlit,
-                inside.shade,
-                sun,
-                look,
-                optics,
-                behind,
-                vec3(0.0, 0.0, 0.0),
-                at,
-                vec3(0.0, 1.0, 0.0),
-                -ahead,
-                qd.static(world <= 2),
-            )
-            result += hidden * (lit * qd.exp(-0.3 * tau * swallow) - result)
-            passed *= (1.0 - hidden) * (1.0 - cover)
-            if cover > 0.0:
-                lit = murky(sunlit, inside.shade, sun, look, optics, color, glow, at, n, -ahead, qd.static(world <= 2))
-                result += cover * (lit - result)
-    if qd.static(world <= 2):  # the rim of the sheet catches the light, and on paper there is nothing to mirror
-        # Light comes from above left, and less of it reaches the bottom.
-        high = (at.y - inside.walls.lower.y) / (inside.walls.upper.y - inside.walls.lower.y)
-        result *= (0.75 + 0.3 * qd.max(n.dot(look.to_sun), 0.0)) * (0.78 + 0.4 * qd.min(high, 1.0))
-        result += 0.35 * look.lamp * smoothstep((0.85 - tau / optics.spacing) / 0.3)
-    else:
-        mirror = glossy * (0.02 + 0.98 * (1.0 - cosi) ** 5)
-        mirrored = environment(look, ahead + 2.0 * cosi * n)
-        mirrored += above[3] * (vec3(above[0], above[1], above[2]) - mirrored)
-        result += mirror * (mirrored - result)
-        passed *= 1.0 - mirror
-        half = (look.to_sun - ahead).normalized(1e-9)
-        result += glint(look, n.dot(half), rough)
-    return result, passed
+    low, high = qd.max(first, 0), qd.min(first + wide, pixels.depth.shape[1])
+    dry = optics.under == 0
+    if dry:
+        least = 0x7F000000  # FARTHEST
+        for row in range(band * optics.tall, (band + 1) * optics.tall):
+            for column in range(low, high):
+                least = qd.min(least, surface.depth[row, column])
+        dry = qd.bit_cast(least, qd.f32) >= 1e30
+    if dry:
+        for row in range(band * optics.tall, (band + 1) * optics.tall):
+            for column in range(qd.max(low, begin), qd.min(high, last)):
+                pixels.color[row, column] = behind[row, column]
+                surface.nearest[row, column] = qd.min(0x7F000000, pixels.depth[row, column])  # FARTHEST
+    return dry
