@@ -186,29 +186,36 @@ def fill_ellipse(
             at = middle.x + lean * v - 0.5
             base = c.z + (gx * lean + gy) * v
             left, right = pixels_between(at - wide, at + wide, columns)
-            for column in range(left, right + 1):
-                u = column - at  # from the middle of the row
-                inside = reach - pxx * u * u
-                tried = depth[row, column] > nearest
-                if qd.static(part == 2):
-                    tried = inside < inner
-                if tried:
-                    front = base + gx * u - half * qd.sqrt(qd.max(inside, 0.0))
-                    key = qd.bit_cast(front, qd.i32)
-                    if key > 0 and key < depth[row, column]:
-                        cover = 1.0
-                        if qd.static(part != 0):
-                            if inside < inner:
-                                # Distance to the outline [px]: p - 1 over its gradient.
-                                slope = 2.0 * vec2(pxx * u, pxy * (u + lean * v) + pyy * v)
-                                cover = qd.min(0.5 + qd.min(inside / qd.max(slope.norm(), 1e-6), narrow), 1.0)
-                        if cover >= 1.0:
-                            if qd.static(part != 2):
-                                qd.atomic_min(depth[row, column], key)
-                        elif cover > 0.0 and qd.bit_cast(depth[row, column], qd.f32) > front + limits.gap:
-                            left_over = 1
-                            if qd.static(part == 2):
-                                qd.atomic_max(rim[row, column], rim_mark(cover, key))
+            # What an outline covers in part lies at both ends of a row.
+            before, after = right, right + 1
+            if qd.static(part == 2):
+                whole = qd.sqrt(qd.max((reach - inner) * per, 0.0))
+                before = qd.min(qd.cast(qd.floor(qd.max(at - whole, left - 2.0)), qd.i32) + 1, right)
+                after = qd.max(qd.cast(qd.floor(qd.min(at + whole, right + 1.0)), qd.i32), before + 1)
+            for side in range(qd.static(2 if part == 2 else 1)):
+                for column in range(qd.select(side == 0, left, after), qd.select(side == 0, before, right) + 1):
+                    u = column - at  # from the middle of the row
+                    inside = reach - pxx * u * u
+                    tried = depth[row, column] > nearest
+                    if qd.static(part == 2):
+                        tried = inside < inner
+                    if tried:
+                        front = base + gx * u - half * qd.sqrt(qd.max(inside, 0.0))
+                        key = qd.bit_cast(front, qd.i32)
+                        if key > 0 and key < depth[row, column]:
+                            cover = 1.0
+                            if qd.static(part != 0):
+                                if inside < inner:
+                                    # Distance to the outline [px]: p - 1 over its gradient.
+                                    slope = 2.0 * vec2(pxx * u, pxy * (u + lean * v) + pyy * v)
+                                    cover = qd.min(0.5 + qd.min(inside / qd.max(slope.norm(), 1e-6), narrow), 1.0)
+                            if cover >= 1.0:
+                                if qd.static(part != 2):
+                                    qd.atomic_min(depth[row, column], key)
+                            elif cover > 0.0 and qd.bit_cast(depth[row, column], qd.f32) > front + limits.gap:
+                                left_over = 1
+                                if qd.static(part == 2):
+                                    qd.atomic_max(rim[row, column], rim_mark(cover, key))
     return left_over
 
 
