@@ -83,217 +83,218 @@ def lay(
         even, even_z, even_normal = 0, 0.0, vec3(0.0, 0.0, 0.0)
         start, wide_group = begin - optics.turn, beside * group()
         groups = qd.select(last > begin, (last - start + wide_group - 1) // wide_group + 1, 0)
-        for turn in range(groups):
-            before, before_above, before_layer, old, old_of = end, end_above, end_layer, new, new_of
-            old_share, old_added, new_share.x = new_share, new_added, -1.0
-            end_layer, end_pixel, kept_pixel = -1, -1, -1
-            # Whether what both ends show, and how they are shaded, is alike: -1 is not known yet.
-            same, same_shade = -1, -1
-            # The last pixel of the group before the first comes first, by itself.
-            leading, many = turn * group() - group(), qd.select(turn == 0, 1, group())
-            if turn > 0 and copied_dry(
-                pixels, surface, backdrop.behind, optics, band, start + leading * beside, wide_group, begin, last
-            ):
-                many = 0
-            place, down, aside = 0, 0, 0
-            for _ in range(many * beside * optics.tall):
-                # The last of a group comes first.
-                at_end, number = place == 0, leading + qd.select(place == 0, group() - 1, place - 1)
-                part, row, column = down + aside, band * optics.tall + down, start + number * beside + aside
-                if qd.static(world >= 100):
-                    if part == 0 and optics.under == 0 and column >= 0 and column < pixels.depth.shape[1]:
-                        even, even_z, even_normal = even_pixel(
-                            pixels, surface, lens, look, optics, inside.walls, row, column, qd.static(world % 10)
-                        )  # fmt: skip
-                if column >= 0 and column < pixels.depth.shape[1] and (part == 0 or even == 0):
-                    middle = vec2(column + 0.5, row + 0.5)
-                    result = backdrop.behind[row, column]
-                    z, back = (
-                        qd.bit_cast(surface.depth[row, column], qd.f32),
-                        qd.bit_cast(pixels.depth[row, column], qd.f32),
-                    )
-                    if even > 0:
-                        middle += 0.5 * (vec2(beside, optics.tall) - 1.0)
-                        z = even_z
-                    front = 1.7e38
-                    if optics.under == 1:
-                        result = from_within(thickness.water, lens, optics, row, column, back, result)
-                    elif z < 1e30:
-                        ray = view_ray(lens, middle.y - 0.5, middle.x - 0.5)
-                        origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
-                        ends, turns, wall = tank_interval(lens, origin, direction, inside.walls)
-                        front = qd.max(z, ends[0])
-                        if ends[0] <= ends[1] and front < back:
-                            # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
-                            wet, there, cover, edge, rise, risen = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0), False
-                            if even > 0:
-                                wet = even - 1.0
-                            elif qd.static(world % 10 >= 3):
-                                at_pane = ends[0] > lens.near and wall.y == 0.0  # not through the open top
-                                if at_pane and z < ends[0] - optics.spacing:
-                                    wet = 1.0
-                                elif (at_pane and z < ends[0] + optics.spacing) or z > ends[1] - optics.spacing:
-                                    rise, risen = (
-                                        rise_at(row, column, z, 3.0 * optics.spacing, surface.depth),
-                                        True,
+        # The last pixel of the group before the first comes first, by itself.
+        leading, place, down, aside, same, same_shade, dry = -group(), 0, 0, 0, -1, -1, 0
+        for _ in range(qd.select(groups > 0, (groups - 1) * group() + 1, 0) * beside * optics.tall):
+            # The last of a group comes first.
+            at_end, number = place == 0, leading + qd.select(place == 0, group() - 1, place - 1)
+            part, row, column = down + aside, band * optics.tall + down, start + number * beside + aside
+            if at_end and part == 0:
+                before, before_above, before_layer, old, old_of = end, end_above, end_layer, new, new_of
+                old_share, old_added, new_share.x = new_share, new_added, -1.0
+                end_layer, end_pixel, kept_pixel = -1, -1, -1
+                # Whether what both ends show, and how they are shaded, is alike: -1 is not known yet.
+                same, same_shade, dry = -1, -1, 0
+                if leading >= 0 and copied_dry(
+                    pixels, surface, backdrop.behind, optics, band, start + leading * beside, wide_group, begin, last
+                ):
+                    dry = 1
+            if qd.static(world >= 100):
+                if part == 0 and dry + optics.under == 0 and column >= 0 and column < pixels.depth.shape[1]:
+                    even, even_z, even_normal = even_pixel(
+                        pixels, surface, lens, look, optics, inside.walls, row, column, qd.static(world % 10)
+                    )  # fmt: skip
+            if dry == 0 and column >= 0 and column < pixels.depth.shape[1] and (part == 0 or even == 0):
+                middle = vec2(column + 0.5, row + 0.5)
+                result = backdrop.behind[row, column]
+                z, back = (
+                    qd.bit_cast(surface.depth[row, column], qd.f32),
+                    qd.bit_cast(pixels.depth[row, column], qd.f32),
+                )
+                if even > 0:
+                    middle += 0.5 * (vec2(beside, optics.tall) - 1.0)
+                    z = even_z
+                front = 1.7e38
+                if optics.under == 1:
+                    result = from_within(thickness.water, lens, optics, row, column, back, result)
+                elif z < 1e30:
+                    ray = view_ray(lens, middle.y - 0.5, middle.x - 0.5)
+                    origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
+                    ends, turns, wall = tank_interval(lens, origin, direction, inside.walls)
+                    front = qd.max(z, ends[0])
+                    if ends[0] <= ends[1] and front < back:
+                        # Up to three surfaces share a pixel: at a pane, in the tank, and an outline before them.
+                        wet, there, cover, edge, rise, risen = 0.0, 1.0, 0.0, z, vec2(0.0, 0.0), False
+                        if even > 0:
+                            wet = even - 1.0
+                        elif qd.static(world % 10 >= 3):
+                            at_pane = ends[0] > lens.near and wall.y == 0.0  # not through the open top
+                            if at_pane and z < ends[0] - optics.spacing:
+                                wet = 1.0
+                            elif (at_pane and z < ends[0] + optics.spacing) or z > ends[1] - optics.spacing:
+                                rise, risen = (
+                                    rise_at(row, column, z, 3.0 * optics.spacing, surface.depth),
+                                    True,
+                                )
+                                if at_pane and z < ends[0] + optics.spacing:
+                                    wet = 1.0 - share_behind(z, ends[0], rise, vec2(turns.x, turns.y))
+                                if z > ends[1] - optics.spacing:
+                                    there = 1.0 - share_behind(z, ends[1], rise, vec2(turns.z, turns.w))
+                        rim = surface.rim[row, column]
+                        if rim > 0:
+                            edge = qd.bit_cast(rim_key(rim), qd.f32)
+                            cover = rim_cover(rim)
+                            if edge + optics.spacing > z:
+                                there *= qd.select(wet < 1.0, cover, 1.0)
+                                cover = 0.0
+                            else:
+                                stands = qd.min((z - edge) / optics.spacing - 1.0, 1.0)
+                                cover *= qd.select(edge > ends[0], stands, 0.0)
+                        first, second = there * (1.0 - cover) * wet, there * (1.0 - cover) * (1.0 - wet)
+                        result *= 1.0 - (first + second + cover)
+                        for layer in range(3):
+                            share, at = first, front
+                            if layer == 1:
+                                share = second
+                            elif layer == 2:
+                                share, at = cover, edge
+                            if share > 0.0:
+                                body = vec4(0.0, 0.0, 0.0, -1.0)
+                                above, whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
+                                bodily, fresh, lies, between = False, False, False, 0.0
+                                pixel = (number + 2 * group()) >> pair
+                                if qd.static(world % 10 >= 3):
+                                    # A tank, and without bent rays to meet them no solid in it.
+                                    wide = back > 0.999 * ends[1]
+                                    if qd.static(world % 10 == 4):
+                                        wide = True
+                                    if inside.walls.upper.x < 1e5 and wide:
+                                        bodily = True
+                                        if pixel == end_pixel and kept_pixel != pixel:
+                                            kept, kept_above, kept_layer, kept_pixel = (
+                                                end,
+                                                end_above,
+                                                end_layer,
+                                                pixel,
+                                            )
+                                            kept_z, kept_whole, uneven = new_of[0], new_of[1], new_of[2]
+                                        if not at_end and layer == before_layer and layer == end_layer:
+                                            between = (middle.x - old_of[3]) / (new_of[3] - old_of[3])
+                                            off = qd.abs(at - old_of[0] - between * (new_of[0] - old_of[0]))
+                                            if same < 0:
+                                                same = qd.cast(
+                                                    alike(before, before_above, old, end, end_above, new,
+                                                          6.0 * wide_group), qd.i32,
+                                                )  # fmt: skip
+                                            lies = off < 0.3 * optics.spacing and same == 1
+                                        near = qd.abs(at - kept_z) < 0.3 * optics.spacing
+                                        fresh = pixel != kept_pixel or layer != kept_layer or not near
+                                        # Less than half of the water shows what the rest did.
+                                        minor = share < 0.5 * (first + second + cover)
+                                        known = minor and qd.abs(kept_pixel - pixel) <= 1
+                                        fresh = fresh and not lies and not known
+                                if lies and share == 1.0 and same_shade < 0:
+                                    same_shade = qd.cast(
+                                        shaded_alike(old_share, old_added, new_share, new_added), qd.i32
                                     )
-                                    if at_pane and z < ends[0] + optics.spacing:
-                                        wet = 1.0 - share_behind(z, ends[0], rise, vec2(turns.x, turns.y))
-                                    if z > ends[1] - optics.spacing:
-                                        there = 1.0 - share_behind(z, ends[1], rise, vec2(turns.z, turns.w))
-                            rim = surface.rim[row, column]
-                            if rim > 0:
-                                edge = qd.bit_cast(rim_key(rim), qd.f32)
-                                cover = rim_cover(rim)
-                                if edge + optics.spacing > z:
-                                    there *= qd.select(wet < 1.0, cover, 1.0)
-                                    cover = 0.0
-                                else:
-                                    stands = qd.min((z - edge) / optics.spacing - 1.0, 1.0)
-                                    cover *= qd.select(edge > ends[0], stands, 0.0)
-                            first, second = there * (1.0 - cover) * wet, there * (1.0 - cover) * (1.0 - wet)
-                            result *= 1.0 - (first + second + cover)
-                            for layer in range(3):
-                                share, at = first, front
-                                if layer == 1:
-                                    share = second
-                                elif layer == 2:
-                                    share, at = cover, edge
-                                if share > 0.0:
-                                    body = vec4(0.0, 0.0, 0.0, -1.0)
-                                    above, whole = vec4(0.0, 0.0, 0.0, 0.0), 0.0
-                                    bodily, fresh, lies, between = False, False, False, 0.0
-                                    pixel = (number + 2 * group()) >> pair
-                                    if qd.static(world % 10 >= 3):
-                                        # A tank, and without bent rays to meet them no solid in it.
-                                        wide = back > 0.999 * ends[1]
-                                        if qd.static(world % 10 == 4):
-                                            wide = True
-                                        if inside.walls.upper.x < 1e5 and wide:
-                                            bodily = True
-                                            if pixel == end_pixel and kept_pixel != pixel:
-                                                kept, kept_above, kept_layer, kept_pixel = (
-                                                    end,
-                                                    end_above,
-                                                    end_layer,
-                                                    pixel,
-                                                )
-                                                kept_z, kept_whole, uneven = new_of[0], new_of[1], new_of[2]
-                                            if not at_end and layer == before_layer and layer == end_layer:
-                                                between = (middle.x - old_of[3]) / (new_of[3] - old_of[3])
-                                                off = qd.abs(at - old_of[0] - between * (new_of[0] - old_of[0]))
-                                                if same < 0:
-                                                    same = qd.cast(
-                                                        alike(before, before_above, old, end, end_above, new,
-                                                              6.0 * wide_group), qd.i32,
-                                                    )  # fmt: skip
-                                                lies = off < 0.3 * optics.spacing and same == 1
-                                            near = qd.abs(at - kept_z) < 0.3 * optics.spacing
-                                            fresh = pixel != kept_pixel or layer != kept_layer or not near
-                                            # Less than half of the water shows what the rest did.
-                                            minor = share < 0.5 * (first + second + cover)
-                                            known = minor and qd.abs(kept_pixel - pixel) <= 1
-                                            fresh = fresh and not lies and not known
-                                    if lies and share == 1.0 and same_shade < 0:
-                                        same_shade = qd.cast(
-                                            shaded_alike(old_share, old_added, new_share, new_added), qd.i32
-                                        )
-                                    between_all = lies and share == 1.0 and same_shade == 1
-                                    n = wall
-                                    if layer == 1 and not between_all:
-                                        if even > 0:
-                                            n = even_normal
-                                        elif qd.static(world % 10 >= 3):
-                                            if not risen:
-                                                rise = rise_at(row, column, z, 3.0 * optics.spacing, surface.depth)
-                                            n = normal_of(lens, row, column, z, rise)
-                                    if qd.static(world % 10 >= 3):
-                                        if layer == 2:
-                                            n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
-                                    half = (look.to_sun - direction.normalized()).normalized(1e-9)
-                                    shiny = layer == 1 and n.dot(half) > 0.9
-                                    is_end = False
-                                    if between_all:
-                                        body = seen_between(backdrop.behind, between, before, old, end, new)
-                                        passed = old_share + between * (new_share - old_share)
-                                        result = passed * vec3(body[0], body[1], body[2])
-                                        result += old_added + between * (new_added - old_added)
+                                between_all = lies and share == 1.0 and same_shade == 1
+                                n = wall
+                                if layer == 1 and not between_all:
+                                    if even > 0:
+                                        n = even_normal
                                     elif qd.static(world % 10 >= 3):
-                                        ahead, point = direction.normalized(), origin + at * direction
-                                        cosi = qd.max(-n.dot(ahead), 0.05)
-                                        bent = refracted(ahead, n, cosi)
-                                        found = vec2(0.0, 0.0)
-                                        if fresh:
-                                            found = wholeness(sun, sunlit.depth, inside, optics, point, bent)
-                                        if layer == 1 and (found.y > 0.0 or shiny):
-                                            uneven = unevenness(
-                                                lens,
-                                                row,
-                                                column,
-                                                z,
-                                                n,
-                                                direction,
-                                                optics.spacing,
-                                                surface.depth,
-                                            )
-                                        elif fresh:
-                                            uneven = 0.0
-                                        elif lies:
-                                            uneven = old_of[2] + between * (new_of[2] - old_of[2])
-                                        if fresh:
-                                            kept_whole = found.x + calm(uneven) * (found.y - found.x)
-                                            kept, kept_above, lead = through_body(
-                                                pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
-                                                inside, at, point, bent,
-                                                qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), kept_whole, uneven,
-                                                qd.static(world % 10 == 4),
-                                            )  # fmt: skip
-                                            kept_z, kept_layer, kept_pixel = at, layer, pixel
-                                            if at_end and share > 0.5:
-                                                is_end = True
-                                                end, end_above, end_layer, end_pixel = (
-                                                    kept,
-                                                    kept_above,
-                                                    layer,
-                                                    pixel,
-                                                )
-                                                new, new_of = lead, vec4(at, kept_whole, uneven, middle.x)
-                                        if lies:
-                                            body = seen_between(backdrop.behind, between, before, old, end, new)
-                                            above = before_above + between * (end_above - before_above)
-                                            whole = old_of[1] + between * (new_of[1] - old_of[1])
-                                        elif bodily:
-                                            body, above, whole = kept, kept_above, kept_whole
-                                    if not between_all:
-                                        rough = qd.select(shiny, uneven * uneven, 0.0)
-                                        shone, passed = shine(
-                                            pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside,
-                                            middle, at, n, origin, direction, body, above, whole, uneven, rough,
-                                            qd.static(world % 10), qd.static(world % 100 >= 10),
+                                        if not risen:
+                                            rise = rise_at(row, column, z, 3.0 * optics.spacing, surface.depth)
+                                        n = normal_of(lens, row, column, z, rise)
+                                if qd.static(world % 10 >= 3):
+                                    if layer == 2:
+                                        n = normal_beside(lens, row, column, edge, optics.spacing, surface.depth)
+                                half = (look.to_sun - direction.normalized()).normalized(1e-9)
+                                shiny = layer == 1 and n.dot(half) > 0.9
+                                is_end = False
+                                if between_all:
+                                    body = seen_between(backdrop.behind, between, before, old, end, new)
+                                    passed = old_share + between * (new_share - old_share)
+                                    result = passed * vec3(body[0], body[1], body[2])
+                                    result += old_added + between * (new_added - old_added)
+                                elif qd.static(world % 10 >= 3):
+                                    ahead, point = direction.normalized(), origin + at * direction
+                                    cosi = qd.max(-n.dot(ahead), 0.05)
+                                    bent = refracted(ahead, n, cosi)
+                                    found = vec2(0.0, 0.0)
+                                    if fresh:
+                                        found = wholeness(sun, sunlit.depth, inside, optics, point, bent)
+                                    if layer == 1 and (found.y > 0.0 or shiny):
+                                        uneven = unevenness(
+                                            lens,
+                                            row,
+                                            column,
+                                            z,
+                                            n,
+                                            direction,
+                                            optics.spacing,
+                                            surface.depth,
+                                        )
+                                    elif fresh:
+                                        uneven = 0.0
+                                    elif lies:
+                                        uneven = old_of[2] + between * (new_of[2] - old_of[2])
+                                    if fresh:
+                                        kept_whole = found.x + calm(uneven) * (found.y - found.x)
+                                        kept, kept_above, lead = through_body(
+                                            pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
+                                            inside, at, point, bent,
+                                            qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), kept_whole, uneven,
+                                            qd.static(world % 10 == 4),
                                         )  # fmt: skip
-                                        result += share * shone
-                                        if is_end and whole > 0.999 and not shiny:
-                                            new_share, new_added = (
-                                                passed,
-                                                shone - passed * vec3(body[0], body[1], body[2]),
+                                        kept_z, kept_layer, kept_pixel = at, layer, pixel
+                                        if at_end and share > 0.5:
+                                            is_end = True
+                                            end, end_above, end_layer, end_pixel = (
+                                                kept,
+                                                kept_above,
+                                                layer,
+                                                pixel,
                                             )
-                            line = line_cover(pixels.lines[row, column], front, optics.slack)
-                            result += look.line_strength * there * line * (look.line - result)
-                            if there < 0.5:
-                                front = 1.7e38
-                        else:
+                                            new, new_of = lead, vec4(at, kept_whole, uneven, middle.x)
+                                    if lies:
+                                        body = seen_between(backdrop.behind, between, before, old, end, new)
+                                        above = before_above + between * (end_above - before_above)
+                                        whole = old_of[1] + between * (new_of[1] - old_of[1])
+                                    elif bodily:
+                                        body, above, whole = kept, kept_above, kept_whole
+                                if not between_all:
+                                    rough = qd.select(shiny, uneven * uneven, 0.0)
+                                    shone, passed = shine(
+                                        pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside,
+                                        middle, at, n, origin, direction, body, above, whole, uneven, rough,
+                                        qd.static(world % 10), qd.static(world % 100 >= 10),
+                                    )  # fmt: skip
+                                    result += share * shone
+                                    if is_end and whole > 0.999 and not shiny:
+                                        new_share, new_added = (
+                                            passed,
+                                            shone - passed * vec3(body[0], body[1], body[2]),
+                                        )
+                        line = line_cover(pixels.lines[row, column], front, optics.slack)
+                        result += look.line_strength * there * line * (look.line - result)
+                        if there < 0.5:
                             front = 1.7e38
-                    if column >= begin and column < last:  # what lies in other strips is only followed
-                        key = qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
-                        for r in range(row, row + qd.select(even > 0, optics.tall, 1)):
-                            for c in range(column, column + qd.select(even > 0, beside, 1)):
-                                pixels.color[r, c] = result
-                                surface.nearest[r, c] = qd.min(key, pixels.depth[r, c])
-                aside += 1
-                if aside == beside:
-                    aside, down = 0, down + 1
-                if down == optics.tall:
-                    down, place = 0, place + 1
+                    else:
+                        front = 1.7e38
+                if column >= begin and column < last:  # what lies in other strips is only followed
+                    key = qd.select(front < 1e30, qd.bit_cast(front, qd.i32), 0x7F000000)  # FARTHEST
+                    for r in range(row, row + qd.select(even > 0, optics.tall, 1)):
+                        for c in range(column, column + qd.select(even > 0, beside, 1)):
+                            pixels.color[r, c] = result
+                            surface.nearest[r, c] = qd.min(key, pixels.depth[r, c])
+            aside += 1
+            if aside == beside:
+                aside, down = 0, down + 1
+            if down == optics.tall:
+                down, place = 0, place + 1
+            if place == group() or (leading < 0 and place == 1):
+                place, leading = 0, leading + group()
 
 
 @qd.func
