@@ -10,6 +10,8 @@ from typing_extensions import override
 from wavetank.foundation.model import FARTHEST, METRES, Length, Model, Place, Vector, register_model
 from wavetank.scene.lattice import fitted, plain_lattice, touching
 from wavetank.scene.tank import Tank
+from wavetank.solids.shapes import Box
+from wavetank.solids.solid import Solid
 
 
 class Fluid(Model):
@@ -41,8 +43,10 @@ class Fluid(Model):
         x = plain_lattice(lower, upper, spacing)
         return x[self.contains(x)]
 
-    def placed(self, spacing: float, tank: Tank | None, fluids: Sequence["Fluid"]) -> np.ndarray:
-        """Positions [n, dim] of this fluid's particles where it lies in a `tank` beside all the scene's `fluids`."""
+    def placed(
+        self, spacing: float, tank: Tank | None, fluids: Sequence["Fluid"], solids: Sequence[Solid]
+    ) -> np.ndarray:  # fmt: skip
+        """Positions [n, dim] of this fluid's particles where it lies in a `tank` beside a scene's `fluids`, `solids`."""
         return self.particles(spacing)
 
 
@@ -76,12 +80,17 @@ class Block(Fluid):
         return np.all((points > lower) & (points < upper), axis=1)
 
     @override
-    def placed(self, spacing: float, tank: Tank | None, fluids: Sequence[Fluid]) -> np.ndarray:
+    def placed(
+        self, spacing: float, tank: Tank | None, fluids: Sequence[Fluid], solids: Sequence[Solid]
+    ) -> np.ndarray:  # fmt: skip
         lower, upper = self.bounds()
         touched = np.zeros((2, len(lower)), bool) if tank is None else tank.touched_by(lower, upper, spacing)
         for other in fluids:
             if isinstance(other, Block) and other is not self:
                 touched |= touching(lower, upper, *other.bounds(), spacing)
+        for solid in solids:
+            if isinstance(solid, Box) and (corners := solid.corners()) is not None:
+                touched |= touching(lower, upper, *corners, spacing)
         return fitted(lower, upper, spacing, touched[0] & touched[1], tank.rings if tank else [])
 
 

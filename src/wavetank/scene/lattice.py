@@ -1,8 +1,8 @@
 """Lattices of blocks that fit between what holds them, so that still water is still from its first frame on.
 
 Rows that are a whole spacing apart leave up to one free beside the last, and the block falls into it: a tank of a metre
-at d = 2.4 cm began at 0.45 m/s. Rows therefore fill the way between two walls, or to another block, or around a world
-that repeats. Along the other axes they lie as much farther apart or closer as keeps a particle its volume.
+at d = 2.4 cm began at 0.45 m/s. Rows therefore fill the way between two walls, or to a gate or another block, or around
+a world that repeats. Along the other axes they lie as much farther apart or closer as keeps a particle its volume.
 """
 
 import numpy as np

@@ -240,7 +240,7 @@ class Scene(Timetable, Parameters):
         """Positions and velocities of each fluid."""
         parts = []
         for number, fluid in enumerate(self.fluids):
-            x = fluid.placed(self.spacing, self.tank, self.fluids)
+            x = fluid.placed(self.spacing, self.tank, self.fluids, self.solids)
             x = x.reshape(-1, self.dim)  # none at all have no width of their own
             v = np.zeros_like(x) if fluid.velocity is None else np.tile(np.array(fluid.velocity, float), (len(x), 1))
             if isinstance(fluid, Points):

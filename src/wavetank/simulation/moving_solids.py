@@ -15,6 +15,7 @@ from wavetank.foundation.rotations import interpolate, matrix_of, turned, unit_q
 from wavetank.physics.population import Clearance, free_places
 from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene
+from wavetank.simulation.carving import outside
 from wavetank.simulation.courses import Courses
 from wavetank.solids import shapes
 from wavetank.solids.motion import Pose
@@ -120,20 +121,33 @@ class MovingSolids:
         self.targets, self.growing, self.feeling = without(self.targets), without(self.growing), {}
         self.rebuild()
 
-    def find_free_places(self, scene: Scene, places: np.ndarray, particles: Particles) -> np.ndarray:
+    def find_free_places(self, scene: Scene, places: np.ndarray, particles: Particles, *, clear: bool) -> np.ndarray:
         """Say which `places` [n, dim] of a scene's fluids are outside of solids, bool [n]; those of `Points` stay.
 
+        Either what is as far from all as water stays, `clear`, or as much as there is room for, some of it nearer.
         Raises `WavetankError` where none is.
         """
-        boxes = [fluid.bounds() for fluid in scene.fluids if not isinstance(fluid, Points)]
-        if not any(_touch(solid, *box) for solid in self.members[self.tank_count :] for box in boxes):
+        if not self.reaches_into(scene):
             return np.ones(len(places), bool)
-        wall = scene.wall_gap * scene.spacing
-        clearance = Clearance(0.0, wall, self.tank_count)
-        free = free_places(places, particles, self.device, 0, clearance) | scene.has_own_place()
+        if clear:
+            clearance = Clearance(0.0, scene.wall_gap * scene.spacing, self.tank_count)
+            free = free_places(places, particles, self.device, 0, clearance)
+        else:
+            free = outside(scene, places, self.device, self.tank_count)
+        free |= scene.has_own_place()
         if not free.any():
             raise WavetankError("the fluids of this scene are inside of its solids; move them, or make them larger.")
         return free
+
+    def reaches_into(self, scene: Scene) -> bool:
+        """Say whether a solid may reach into fluids of a scene that are filled by rows."""
+        boxes = [fluid.bounds() for fluid in scene.fluids if not isinstance(fluid, Points)]
+        return any(self._touches(number, *box) for number in range(self.tank_count, len(self.members)) for box in boxes)
+
+    def _touches(self, number: int, lower: np.ndarray, upper: np.ndarray) -> bool:
+        """Say whether the ball around a solid reaches into a box [m]."""
+        center = self.poses[number][0][: len(lower)]
+        return bool(np.linalg.norm(center - np.clip(center, lower, upper)) < self.members[number].reach())
 
     def find(self, name: str) -> int:
         """Return the number of a solid; raise `WavetankError` for an unknown name."""
@@ -297,9 +311,3 @@ def solids_of(scene: Scene, walls: Sequence[Solid], others: Sequence[Solid]) -> 
 
 def _equal(a: Pose, b: Pose) -> bool:
     return np.array_equal(a[0], b[0]) and np.array_equal(a[1], b[1])
-
-
-def _touch(solid: Solid, lower: np.ndarray, upper: np.ndarray) -> bool:
-    """Say whether the ball around a solid reaches into a box [m]."""
-    center = solid.origin[: len(lower)]
-    return bool(np.linalg.norm(center - np.clip(center, lower, upper)) < solid.reach())

@@ -1,11 +1,12 @@
-"""The start of a world with bodies: water that stands has the pressure of water that has always stood.
+"""The start of a world with solids in it: water that stands has the pressure of water that has always stood.
 
 Water begins as a lattice, with gaps beside solids and everywhere some thousandths less dense than it will stand. The
 first step would close that at once and take the way for a velocity: a jolt, on which a body of water's density glides
 for seconds (docs/notebook/bodies.md). So before the first step the water takes some in which solids and bodies stand
 and no velocity stays, but the pressure that the grid carries on from step to step: what stands is as dense as its
-weight makes it, and is borne. No particle moves by more than `FARTHEST` in each. Where water still moves after them it
-does not stand: it begins where it was, so that the front of a dam is a plane.
+weight makes it, and is borne. No particle moves by more than `FARTHEST` in each. What falls freely stays where it is
+meanwhile. Where the water still moves after all steps, what moves does not stand: it begins where it was, so that the
+front of a dam is a plane.
 
     code     meaning                                               unit
     own      velocities by id                                      m/s
@@ -22,20 +23,24 @@ import numpy as np
 from wavetank.physics.world import World
 from wavetank.simulation.arrays import by_id, put_by_id
 
-FEWEST, MOST = 8, 24  # steps
-CALM = 0.04  # of the fall: mean way in a step from which on no more are taken
+FEWEST, MOST = 8, 60  # steps
+CALM = 0.04  # of the fall: mean way in a step of what does not fall freely; where it is less water stands
 CALMER = 0.98  # mean way over that in the step before: where it falls by less, water runs and will not stand
 FARTHEST = 0.1  # of a spacing, in a step
 FREE = 0.1  # of the fall: particles whose way differs from it by less fall freely
 STANDING = 0.3  # of the fall: water whose way in the last step is less stands; with twice that it does not
+LIVELY = 0.002  # of the particles: where fewer move by more than that, steps end
 
 
-def settle(world: World, step: Callable[[], None], fall: np.ndarray, spacing: float) -> None:
-    """Let a world take such steps; `step` takes one, `fall` has shape [dim]."""
+def settle(world: World, step: Callable[[], None], fall: np.ndarray, spacing: float) -> bool:
+    """Let a world take such steps, and say whether the water stands; `step` takes one, `fall` has shape [dim].
+
+    What does not stand begins where it was.
+    """
     count = world.count
     own, begun = by_id(world.particles, count, "v"), by_id(world.particles, count, "x")
     free_way = max(float(np.linalg.norm(fall)), 1e-30)
-    stands, mean = np.zeros(count), np.inf
+    length, is_free, mean = np.zeros(count), np.zeros(count, bool), np.inf
     for number in range(MOST):
         world.particles.v.fill(0.0)
         before = by_id(world.particles, count, "x")
@@ -43,12 +48,15 @@ def settle(world: World, step: Callable[[], None], fall: np.ndarray, spacing: fl
         way = by_id(world.particles, count, "x") - before
         length = np.linalg.norm(way, axis=1)
         is_free = np.linalg.norm(way - fall, axis=1) < FREE * free_way
-        stands = np.clip(2.0 - length / (STANDING * free_way), 0.0, 1.0)
         way *= np.where(is_free, 0.0, np.minimum(1.0, FARTHEST * spacing / np.maximum(length, 1e-30)))[:, None]
         put_by_id(world.particles, count, "x", before + way)
-        mean, last = float(length.mean()) / free_way, mean
-        if number + 1 >= FEWEST and (mean < CALM or mean > CALMER * last):
+        mean, last = float(length[~is_free].sum()) / max(count - is_free.sum(), 1) / free_way, mean
+        lively = np.count_nonzero(length[~is_free] > STANDING * free_way) / count
+        if number + 1 >= FEWEST and ((mean < CALM and lively < LIVELY) or mean > CALMER * last):
             break
-    settled = begun + stands[:, None] * (by_id(world.particles, count, "x") - begun)
-    put_by_id(world.particles, count, "x", settled)
+    is_calm = bool(mean < CALM and 2 * np.count_nonzero(is_free) < count)
+    if not is_calm:
+        stands = np.clip(2.0 - length / (STANDING * free_way), 0.0, 1.0)[:, None]
+        put_by_id(world.particles, count, "x", begun + stands * (by_id(world.particles, count, "x") - begun))
     put_by_id(world.particles, count, "v", own)
+    return is_calm

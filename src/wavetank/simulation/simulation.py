@@ -51,24 +51,29 @@ class Simulation(States):
         """Put everything back to the start of the scene."""
         check_cost(self.scene)
         start, scene = fill(self.scene, lambda scene: type(self)(scene, self.arch or "cpu")), self.scene
-        positions, velocities = start.particles()
         self.solids = solids_of(scene, self._walls(), scene.solids)
         self.sources, self.notes = Sources(scene), []
         self.gravity_by_hand = None
         self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
         self.pushed: list[Force] = []  # these in the next one only
-        self.ledger = Ledger()
-        self.bodies = Bodies(self.scene, self.solids)
+        self.seconds_per_frame = math.nan  # that the last frame took to compute
+        self.time_steps = 1  # of the last frame
+        if self._begin(start, clear=False) and not self._settle():
+            self._begin(start, clear=True)
+            if self.bodies:
+                self._settle()
+        check_places(self)
+
+    def _begin(self, start: Scene, *, clear: bool) -> bool:
+        """Put the water of `start` where solids leave it room, see `find_free_places`; say whether any of them does."""
+        positions, velocities = start.particles()
+        self.ledger, self.bodies = Ledger(), Bodies(self.scene, self.solids)
         self._fill(len(positions))
-        free = self.solids.find_free_places(start, positions, self.world.particles)
+        free = self.solids.find_free_places(start, positions, self.world.particles, clear=clear)
         self.add(positions[free], velocities[free], materials=start.kinds()[free])
         box = positions[free] if free.any() else np.zeros((1, self.scene.dim))
         self.ledger.start_box = (box.min(axis=0), box.max(axis=0))
-        self.seconds_per_frame = math.nan  # that the last frame took to compute
-        self.time_steps = 1  # of the last frame
-        if self.bodies and self.count:
-            self._settle()
-        check_places(self)
+        return bool(free.any()) and (bool(self.bodies) or self.solids.reaches_into(start))
 
     def _fill(self, capacity: int) -> None:
         """Make an empty world with room for `capacity` particles."""
@@ -170,17 +175,20 @@ class Simulation(States):
                 force.apply(self.world.particles, self.count, dt, start)
             self.bodies.step(self.world, scene, dt, limit, shares)
 
-    def _settle(self) -> None:
-        """Let the water around bodies find the pressure that it would have had before the start."""
+    def _settle(self) -> bool:
+        """Let the water around solids find the pressure that it would have had before the start; say if it stands."""
         scene, duration = self._scene_at(0.0), self.scene.frame_time
         if not (any(scene.gravity) and has_grid_pressure(self.world, scene)):
-            return
+            return False
         dt, limit = duration / whole(self._steps_in(duration)), self._speed_limit(duration)
         fall = np.array(scene.gravity, np.float32) * np.float32(dt) ** 2
         with self.bodies.standing():
-            settle(self.world, lambda: self._take_step(scene, (), 0.0, dt, (0.0, 1.0), limit), fall, scene.spacing)
+            stands = settle(
+                self.world, lambda: self._take_step(scene, (), 0.0, dt, (0.0, 1.0), limit), fall, scene.spacing
+            )
         self.solids.passing = None
         self.solids.move_to(0.0, 1.0)
+        return stands
 
     def _let_out(self) -> None:
         """Take what has crossed an open side of the tank out of the world."""

@@ -71,6 +71,13 @@ class Box(Solid):
     def reach(self) -> float:
         return 0.5 * float(np.linalg.norm(self.size))
 
+    def corners(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the lower and the upper corner [m], float64 [dim]; None of a box that is turned."""
+        if not np.array_equal(self.quaternion, (1.0, 0.0, 0.0, 0.0)):
+            return None
+        center, half = np.array(self.center, float), 0.5 * np.array(self.size, float)
+        return center - half, center + half
+
     @override
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
         return [("center", self.center), ("size", self.size)]
