@@ -20,6 +20,7 @@ from wavetank.simulation.courses import Courses
 from wavetank.solids import shapes
 from wavetank.solids.motion import Pose
 from wavetank.solids.placing import Placing
+from wavetank.solids.sampling import nearest_of
 from wavetank.solids.seams import seen_periods
 from wavetank.solids.solid import Solid
 
@@ -138,6 +139,10 @@ class MovingSolids:
         if not free.any():
             raise WavetankError("the fluids of this scene are inside of its solids; move them, or make them larger.")
         return free
+
+    def nearer(self, places: np.ndarray, way: float) -> np.ndarray:
+        """Say which `places` [n, dim] are nearer than `way` [m] to a solid, or in it, bool [n]."""
+        return nearest_of(self.device, self.tank_count, places)[0] < way
 
     def reaches_into(self, scene: Scene) -> bool:
         """Say whether a solid may reach into fluids of a scene that are filled by rows."""

@@ -24,7 +24,8 @@ from wavetank.physics.world import World
 from wavetank.simulation.arrays import by_id, put_by_id
 
 FEWEST, MOST = 8, 60  # steps
-CALM = 0.04  # of the fall: mean way in a step of what does not fall freely; where it is less water stands
+CALM = 0.04  # of the fall: mean way in a step of what does not fall freely; where it is less all water stands
+RUNS = 0.1  # of the fall, the same: where it is more water runs
 CALMER = 0.98  # mean way over that in the step before: where it falls by less, water runs and will not stand
 FARTHEST = 0.1  # of a spacing, in a step
 FREE = 0.1  # of the fall: particles whose way differs from it by less fall freely
@@ -32,10 +33,13 @@ STANDING = 0.3  # of the fall: water whose way in the last step is less stands; 
 LIVELY = 0.002  # of the particles: where fewer move by more than that, steps end
 
 
-def settle(world: World, step: Callable[[], None], fall: np.ndarray, spacing: float) -> bool:
+def settle(
+    world: World, step: Callable[[], None], fall: np.ndarray, spacing: float, near: Callable[[np.ndarray], np.ndarray]
+) -> bool:
     """Let a world take such steps, and say whether the water stands; `step` takes one, `fall` has shape [dim].
 
-    What does not stand begins where it was.
+    What moves where not all is calm begins where it was, but for what began too near to a solid: `near` says of places
+    [n, dim] which are, bool [n].
     """
     count = world.count
     own, begun = by_id(world.particles, count, "v"), by_id(world.particles, count, "x")
@@ -54,9 +58,8 @@ def settle(world: World, step: Callable[[], None], fall: np.ndarray, spacing: fl
         lively = np.count_nonzero(length[~is_free] > STANDING * free_way) / count
         if number + 1 >= FEWEST and ((mean < CALM and lively < LIVELY) or mean > CALMER * last):
             break
-    is_calm = bool(mean < CALM and 2 * np.count_nonzero(is_free) < count)
-    if not is_calm:
-        stands = np.clip(2.0 - length / (STANDING * free_way), 0.0, 1.0)[:, None]
+    if mean >= CALM:
+        stands = np.where(near(begun), 1.0, np.clip(2.0 - length / (STANDING * free_way), 0.0, 1.0))[:, None]
         put_by_id(world.particles, count, "x", begun + stands * (by_id(world.particles, count, "x") - begun))
     put_by_id(world.particles, count, "v", own)
-    return is_calm
+    return bool(mean < RUNS and 2 * np.count_nonzero(is_free) < count)

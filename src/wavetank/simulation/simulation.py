@@ -34,6 +34,8 @@ from wavetank.simulation.sources import Sources, check_places
 from wavetank.simulation.states import States
 from wavetank.solids.solid import Solid
 
+NEAR = 0.99  # of what water keeps from walls: what is nearer than that to a solid at the start is led out of it
+
 
 class Simulation(States):
     """Water that moves. See `Scene` for what it is made of."""
@@ -184,8 +186,9 @@ class Simulation(States):
         fall = np.array(scene.gravity, np.float32) * np.float32(dt) ** 2
         with self.bodies.standing():
             stands = settle(
-                self.world, lambda: self._take_step(scene, (), 0.0, dt, (0.0, 1.0), limit), fall, scene.spacing
-            )
+                self.world, lambda: self._take_step(scene, (), 0.0, dt, (0.0, 1.0), limit), fall, scene.spacing,
+                lambda places: self.solids.nearer(places, NEAR * scene.wall_gap * scene.spacing),
+            )  # fmt: skip
         self.solids.passing = None
         self.solids.move_to(0.0, 1.0)
         return stands

@@ -16,7 +16,7 @@ def measure_nearest(
     distances: qd.types.ndarray(), numbers: qd.types.ndarray(), points: qd.types.ndarray(), solids: SolidSet,
     first: qd.i32, count: qd.i32,
 ):  # fmt: skip
-    """Write which of the solids from number `first` on is nearest to each point, and how far: negative inside of any."""
+    """Write which of the solids from number `first` on is nearest to each point, and how far: negative inside."""
     for i in range(count):
         nearest, number = 1e9, -1
         for k in range(first, solids.count):

@@ -34,6 +34,7 @@ RESERVOIR, LENGTH, TOP, DEPTH = 0.6, 1.61, 0.9, 0.15  # m
 LIFT = {0.3: 3.46, 0.6: 4.53}  # m/s, of the gate for each height [m]
 PROBES = {"H1": 0.3, "H2": 0.865, "H3": 1.114, "H4": 1.3625}  # m from the back wall
 GRAVITY = 9.81  # m/s^2
+STANDS = 0.25  # s, behind the gate, before it rises
 FAST, SLOW = 240.0, 60.0  # frames a second until the water is at the wall, and afterwards
 ARRIVED = 2.8  # T when it surely is
 RETURNS = 5.0  # T until which nothing has come back from the far wall to the last probe
@@ -82,22 +83,25 @@ def scene(height: float, d: float, dim: int, *, gate: bool) -> Scene:
 
 
 def follow(height: float, d: float, dim: int, until: float, arch: str, *, gate: bool) -> Run:
-    """Let the column go until T = `until`."""
+    """Let the column stand for `STANDS`, if it has a gate, and then go until T = `until`."""
     sim, rate = Simulation(scene(height, d, dim, gate=gate), arch), math.sqrt(GRAVITY / height)
     across, area = round(DEPTH / d) if dim == 3 else 1, 4 * d * DEPTH ** (dim - 2)
     T: list[float] = []
     X: list[float] = []
     levels: dict[str, list[float]] = {name: [] for name in PROBES}
+    while gate and sim.time < STANDS - 0.5 / FAST:
+        sim.advance(1.0 / FAST)
+    begins = sim.time
     while not T or T[-1] < until:
-        x = sim.positions
-        T.append(sim.time * rate)
+        x, time = sim.positions, sim.time - begins
+        T.append(time * rate)
         X.append((front(x, d, across) - RESERVOIR) / height)
         for name, place in PROBES.items():
             inside = np.count_nonzero(np.abs(x[:, 0] - place) < 2 * d)
             levels[name].append(inside * d**dim / area / height)
         frame = 1.0 / (FAST if T[-1] < ARRIVED else SLOW)
         if "gate" in sim.solids.names:
-            lifted = LIFT[height] * (sim.time + frame)
+            lifted = LIFT[height] * (time + frame)
             if lifted > height + 2 * d:
                 sim.remove_solid("gate")
             else:
