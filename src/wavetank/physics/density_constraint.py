@@ -205,7 +205,8 @@ def correct_positions(
                                 p = flattened(stopped(x, lift(p), near, solids, c.wall_gap, mass), p)
                             if qd.static(searched == 2):
                                 push, free = scratch.dlam[i] * short, 1.0 - scratch.wall[i].w
-                                press_back(i, before, near, free, push, scratch, solids, walls, c)
+                                if push != 0.0:
+                                    press_back(i, before, near, free, push, scratch, solids, walls, c)
                 predict_at(corrected, i, p)
 
 

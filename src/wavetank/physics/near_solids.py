@@ -209,8 +209,8 @@ def is_clear(i, x, p, scratch: Scratch, solids: SolidSet, c: Coefficients):
     length, moved = (p - x).norm(), (p - scratch.seen[i]).norm()
     for slot in range(known(scratch, i)):
         at = place_of(scratch, i, slot)
-        least = qd.max(c.wall_gap, moves_by(scratch.solid[at], length, p, solids))
-        if scratch.facing[at].w - moved <= least:
+        left = scratch.facing[at].w - moved
+        if left <= c.wall_gap or left <= moves_by(scratch.solid[at], length, p, solids):
             clear = False
     return clear
 

@@ -123,6 +123,8 @@ class Bodies(Mapping[str, Body]):
 
     def _see(self) -> None:
         """Look at the engine's world, which is another one."""
+        # Its threads wait for each other longer than they work, above all where something else runs.
+        self.world.set_num_threads(1)
         self.solid_views = [self.world.rigid_bodies[handle] for handle in self.handles]
         self.views = [self.solid_views[number] for number in self.numbers]
         self._told = np.full((len(self.numbers), 2), np.nan)

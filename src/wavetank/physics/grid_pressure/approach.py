@@ -33,15 +33,22 @@ def approached(
         if near >> solids.tank_count != 0:
             for slot in range(known(scratch, i)):
                 at = place_of(scratch, i, slot)
-                k = scratch.solid[at]
-                before = image_near(solids, k, x)
-                own = to_local(solids.old_position[k], solids.old_rotation[k], before)
-                moved = solids.position[k] + rotate(solids.rotation[k], own) - before
                 value = facing_at(scratch, at, i, p)
-                if solids.sweep[k].norm_sqr() > 0.0:
-                    added += free * not_answered(value, moved - driven, walls, c, missing, spacing)
-                add_approach(added, free, value, p - x - moved, walls, c, missing)
+                if value.w < qd.max(c.h, farthest() * spacing):  # else nothing of it counts
+                    k = scratch.solid[at]
+                    before = image_near(solids, k, x)
+                    own = to_local(solids.old_position[k], solids.old_rotation[k], before)
+                    moved = solids.position[k] + rotate(solids.rotation[k], own) - before
+                    if solids.sweep[k].norm_sqr() > 0.0:
+                        added += free * not_answered(value, moved - driven, walls, c, missing, spacing)
+                    add_approach(added, free, value, p - x - moved, walls, c, missing)
     return added
+
+
+@qd.func
+def farthest():
+    """Spacings from a solid up to which particles have to make room for it."""
+    return 1.25
 
 
 @qd.func
@@ -50,7 +57,7 @@ def not_answered(value, moved, walls: Walls, c: Coefficients, missing, spacing):
 
     Its layer of particles has to make room for all of its way.
     """
-    layer = qd.min(qd.max(2.5 - 2.0 * value.w / spacing, 0.0), 1.0) / spacing
+    layer = qd.min(qd.max(2.0 * farthest() - 2.0 * value.w / spacing, 0.0), 1.0) / spacing
     answer = (1.0 + missing) * wall_share(walls, value.w, c.h)[1] * c.wall_density / c.h
     return moved.dot(vec3(value.x, value.y, value.z)) * qd.max(layer - answer, 0.0)
 

@@ -9,10 +9,20 @@ pressure there is continued from around instead (`buoyancy.py`), and what such a
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients
-from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, corners, nearest, on_axis, tents
+from wavetank.physics.grid_pressure.coarse_grid import (
+    add_whole,
+    center_of,
+    coordinates,
+    corners,
+    nearest,
+    on_axis,
+    taken,
+    tents,
+)  # fmt: skip
 from wavetank.physics.grid_pressure.listed_solids import listed, solids_near
 from wavetank.physics.grid_pressure.slits import mostly
 from wavetank.physics.grid_pressure.thin_walls import behind, farthest, keep_thin, mark_shut, way_from
+from wavetank.physics.teams import end_of_part, first_of_part, part_of, turns_over
 from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec3, vec4
 
 LEAST_OPEN = 0.1  # a cell that is less open is solid
@@ -80,10 +90,11 @@ def open_share(grid: CoarseGrid, n):
 
 
 @qd.func
-def add_tents(grid: CoarseGrid, n, unit, dim: qd.template()):
+def add_tents(grid: CoarseGrid, n, part, unit, dim: qd.template()):
     """Add what free places of the cell of node `n` count at the nodes around, as particles there would, to the sums.
 
-    Pieces of half an edge are asked. Next to nodes without room the others have their share.
+    Those are of a `part` of the nodes. Pieces of half an edge are asked. Next to nodes without room the others have
+    their share.
     """
     own = coordinates(grid, n)
     edges = vec3(grid.dx, grid.dy, grid.dz)
@@ -103,7 +114,8 @@ def add_tents(grid: CoarseGrid, n, unit, dim: qd.template()):
             weights = open_tents(grid, at, s, dim, 1)
             for corner in qd.static(range(2**dim)):
                 amount = unit * free * weights[corner] / 2.0**dim
-                qd.atomic_add(grid.sums[at[corner]], qd.cast(qd.round(amount), qd.i32))
+                of_part = part * grid.nx * grid.ny * grid.nz + at[corner]
+                add_whole(grid.sums, of_part, qd.cast(qd.round(amount), qd.i32), grid.alone)
 
 
 @qd.func
@@ -241,11 +253,13 @@ def find_room(
             largest_along(grid.gaps, grid.depth, grid, row, 1, 1)
         for row in range(grid.ny * grid.nz):
             largest_along(grid.rhs, grid.gaps, grid, row, 2, 1)
-        for n in range(grid.nx * grid.ny * grid.nz):
+        for turn in range(turns_over(grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)):
             edge = longest_edge(grid)
-            grid.rhs[n] = qd.cast(grid.rhs[n] == 0.0 and grid.lam[n] >= 0.75 * edge, qd.f32)
-            if grid.rhs[n] == 0.0 and grid.lam[n] > -edge:
-                add_tents(grid, n, unit, dim)
+            first = first_of_part(turn, grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)
+            for n in range(first, end_of_part(turn, grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)):
+                grid.rhs[n] = qd.cast(grid.rhs[n] == 0.0 and grid.lam[n] >= 0.75 * edge, qd.f32)
+                if grid.rhs[n] == 0.0 and grid.lam[n] > -edge:
+                    add_tents(grid, n, grid.alone * part_of(turn), unit, dim)
         for row in range(grid.ny * grid.nz):
             spread_along(grid.depth, grid.rhs, grid, row, 0, tent_beside())
         for row in range(grid.ny * grid.nz):
@@ -253,9 +267,9 @@ def find_room(
         for row in range(grid.ny * grid.nz):
             spread_along(grid.rhs, grid.gaps, grid, row, 2, tent_beside())
         for n in range(grid.nx * grid.ny * grid.nz):
+            total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
             if grid.room[n] > 0.0 and grid.lam[n] < 2.0 * longest_edge(grid):
-                grid.room[n] = grid.sums[n] / unit + grid.rhs[n]
-            grid.sums[n] = 0
+                grid.room[n] = total / unit + grid.rhs[n]
             grid.rhs[n] = grid.room[n]
         if qd.static(searched == 2):
             for n in range(grid.nx * grid.ny * grid.nz):

@@ -46,6 +46,19 @@ def depth_in_solids(solids: SolidSet, around: qd.template(), at):
 
 
 @qd.func
+def is_inside(solids: SolidSet, around: qd.template(), at):
+    """Say whether the place `at` is in one of the solids listed as `around`."""
+    found = False
+    number = 0
+    while number < around[0] and not found:
+        k = listed(solids, around, number)
+        if (image_near(solids, k, at) - solids.position[k]).norm() < solids.reach[k]:
+            found = signed_distance(solids, k, at).w < 0.0
+        number += 1
+    return found
+
+
+@qd.func
 def ahead(solids: SolidSet, around: qd.template(), middle, way, outward):
     """Return 1 where a solid goes on from its `middle` by a `way` along it, or bends up or down from there."""
     goes = 0
@@ -56,7 +69,7 @@ def ahead(solids: SolidSet, around: qd.template(), middle, way, outward):
         if goes == 0:
             turn = (number + 1) // 2
             at = middle + way * cosines[turn] - outward * (sines[turn] * (1 - 2 * (number % 2)))
-            goes = qd.cast(depth_in_solids(solids, around, at) > 0.0, qd.i32)
+            goes = qd.cast(is_inside(solids, around, at), qd.i32)
     return goes
 
 
@@ -121,8 +134,8 @@ def keep_thin(grid: CoarseGrid, solids: SolidSet, around: qd.template(), n, wall
         surface = center_of(grid, n) - outward * wall.w
         most = thickest() * edge
         close = narrowed(solids, around, surface, 1.1 * most)  # no place that is asked for is farther away than `most`
-        is_thin = depth_in_solids(solids, close, surface - outward * most) == 0.0
-        is_thin = is_thin or depth_in_solids(solids, close, surface - outward * (0.5 * most)) == 0.0
+        is_thin = not is_inside(solids, close, surface - outward * most)
+        is_thin = is_thin or not is_inside(solids, close, surface - outward * (0.5 * most))
         if wall.w <= 0.0 and not is_thin:
             outward = straight_across(grid, solids, close, center_of(grid, n), edge)
             surface = center_of(grid, n) - outward * wall.w
