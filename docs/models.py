@@ -136,6 +136,9 @@ def valley(columns: int = 161, rows: int = 121) -> np.ndarray:
     )
     low = np.where(z > middle, 1.0 - 0.55 * np.clip((x - 1.55) / 0.5, 0.0, 1.0), 1.0)  # the near side, to look in
     h = bed + sides * low + back + rough * np.clip(across - 0.35, 0.0, 1.0)
+    # The edge of the plain above is round over four steps of the grid: a sharp one that runs aslant has teeth.
+    edge = 0.1
+    h = np.minimum(h, 0.98 + edge) - np.clip(h - 0.98 + edge, 0.0, 2.0 * edge) ** 2 / (4.0 * edge)
     return np.clip(h, 0.02, 0.98)
 
 

@@ -225,3 +225,16 @@ def test_a_solid_beside_rays_that_spread_has_a_share_of_them():
     assert (covers[1][inside] == 1.0).all() and (covers[1][heights > 0.71] == 0.0).all()
     near = covers[1][outside & (heights < 0.695)]
     assert (np.diff(near) < 0.0).all() and near[0] > 0.9 and near[-1] < 0.1
+
+
+def test_the_outline_of_a_solid_in_the_water_has_no_specks():
+    """Where a bent ray met a solid next to its outline, half of what was shown lay behind it: teeth and pale specks."""
+    frame = filled(0.6, [Sphere(center=(0.5, 0.3, 0.6), radius=0.18, color="#200000")])
+    camera = Camera(eye=(0.9, 0.8, 2.4), target=(0.5, 0.3, 0.5), field_of_view=0.45)
+    image = picture(frame, camera)
+    column, row, _ = camera.project((0.5, 0.3, 0.6), *SIZE)[0]
+    part = image[int(row) - 38 : int(row) + 44, int(column) - 52 : int(column) + 52].sum(axis=2)
+    dark = part < 0.5 * (np.median(part[36:44, 48:56]) + np.median(part[:, :6]))
+    ends = np.diff(np.pad(dark, ((0, 0), (1, 1))).astype(int), axis=1)
+    assert dark[40].sum() > 40
+    assert (ends > 0).sum(axis=1).max() == 1

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from wavetank import Scene, Sphere, Tank
-from wavetank.device.compiler import qd
+from wavetank import Box, Scene, Sphere, Tank
+from wavetank.device.compiler import download, qd
+from wavetank.foundation.rotations import turned
 from wavetank.view.buffers import allocate
 from wavetank.view.camera import Camera
 from wavetank.view.lens import vec3
@@ -92,3 +93,26 @@ def test_tone_mapping_survives_what_is_no_colour():
     shown = developed([[np.nan, 0.5, 0.5], [-1.0, -1.0, -1.0], [np.inf, 1.0, 0.0]], samples=2)
     assert shown.shape == (3, 3)
     assert shown[1].tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize("slope", [35, 60, 75])
+def test_a_face_aslant_to_the_sun_does_not_shade_itself(make_frame, slope):
+    """All of a plane stands in the sun: from 35 degrees on it was striped by its own depths in the sun's map."""
+    to_sun = studio().to_sun
+    turn = np.arctan2(-to_sun[0], -to_sun[2])  # the face leans away from the sun
+    axis = np.cross((0.0, 1.0, 0.0), (np.sin(turn), 0.0, np.cos(turn)))
+    lean = np.radians(slope) - np.arccos(to_sun[1])
+    rotation = (float(np.cos(0.5 * lean)), *(float(part) for part in np.sin(0.5 * lean) * axis))
+    ground = Box(center=(0.5, 0.5, 0.5), size=(0.8, 0.02, 0.8), rotation=rotation)
+    renderer = Renderer(*SIZE)
+    renderer.render(
+        make_frame(Scene(spacing=0.05, tank=Tank(size=(1.0, 1.0, 1.0)), solids=[ground]), []), CAMERA, view="particles"
+    )
+    buffers = renderer.buffers
+    normal = turned(np.array(rotation), np.array((0.0, 1.0, 0.0)))
+    face = download(buffers.pixels.normal) @ normal > 0.999
+    face &= download(buffers.pixels.surface) == -1
+    share = download(buffers.with_light().share)[..., 0][face]
+    assert abs(normal @ to_sun - np.cos(np.radians(slope))) < 1e-3
+    assert len(share) > 500
+    assert (share > 0.999).mean() > 0.95

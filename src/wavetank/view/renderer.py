@@ -26,6 +26,7 @@ from wavetank.view.look import fluid_optics, usual_depth
 from wavetank.view.optics.dyes import ICE, lay_ice
 from wavetank.view.passes import tonemap
 from wavetank.view.quantities import QUANTITIES, Coloring, usual
+from wavetank.view.rounding import Rounding
 from wavetank.view.shot import Shot
 from wavetank.view.stages import Stages, Sunlight, eye_and_style, sun_and_solids
 from wavetank.view.style import Style, quality_options
@@ -60,6 +61,7 @@ class Renderer:
         self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
         self._tracer: Tracer | None = None
         self._images = Images()
+        self._rounding = Rounding()
 
     def render(
         self, frame: Frame, camera: Camera | None = None, *, timings: Timings = None, watch: Watch | None = None,
@@ -97,6 +99,8 @@ class Renderer:
         """Return what the passes need to know of a picture."""
         style = style or Style()
         frame = self._images.within(self._with_ice(frame, style))
+        if (solids := self._rounding.seen(frame.solids)) is not frame.solids:
+            frame = dataclasses.replace(frame, solids=solids)
         extent = extent_of(frame.scene)
         if camera is None:
             camera = Camera.framing_extent(extent, self.width / self.height).tilted(frame.scene, frame.time, ROOM)

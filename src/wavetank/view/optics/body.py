@@ -26,10 +26,11 @@ from wavetank.solids.distance import SolidSet, signed_distance
 from wavetank.view.lens import Lens, to_pixel, to_view, vec2, vec3, vec4
 from wavetank.view.look import Look
 from wavetank.view.optics.fluid import Optics
+from wavetank.view.optics.glimpse import seen_at
 from wavetank.view.optics.interface import bent as crossed
 from wavetank.view.optics.interface import index_of_water
 from wavetank.view.optics.interface import mirrored as reflected
-from wavetank.view.optics.maps import margins_inside, picture_at, share_of
+from wavetank.view.optics.maps import share_of
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.radiance import environment, smoothstep, surface_radiance
 from wavetank.view.optics.rays import Box
@@ -229,35 +230,6 @@ def crossed_about(ahead, n, spread):
 
 
 @qd.func
-def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usual, near, solid: qd.template()):
-    """Radiance that the picture shows at the point `at`, and towards its margins and beyond it what is `usual` there;
-    and (column, row, share of the picture).
-
-    What stands before the water, nearer than `z` [m], is not behind it; where rays meet each `solid` by themselves,
-    neither is one that hides the point from the eye. A point of a solid is shown where the picture's depth is `near`
-    [m] its own; for others that is 0.
-    """
-    result, found = usual, vec3(0.0, 0.0, 0.0)
-    c = to_view(lens, at)
-    if c.z > lens.near:
-        there = to_pixel(lens, c)
-        share = smoothstep(margins_inside(depth, there, qd.select(near > 0.0, 0.02, 0.08)))
-        if share > 0.0:
-            shown = qd.bit_cast(depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32)
-            if near > 0.0:
-                share *= smoothstep(2.0 - qd.abs(shown - c.z) / near)
-            elif shown <= z or shown >= 1e30:
-                share = 0.0
-            elif qd.static(solid):
-                if shown < 0.97 * c.z:
-                    share = 0.0
-            if share > 0.0:
-                result += share * (picture_at(picture, there) - result)
-                found = vec3(there.x, there.y, share)
-    return result, found
-
-
-@qd.func
 def within_water(sun: Lens, first: qd.template(), walls: Box, p, ahead, spacing):
     """(outward normal, way [m]) of what a ray from a point in the water meets first: a wall, the floor, the surface."""
     result = wall_ahead(walls, p, ahead)
@@ -335,6 +307,8 @@ def through_body(
                         cover = qd.select(cover > 0.5, 1.0, 0.0)
                     if cover > 0.0:
                         shows, place, near, s = 1, p + hit.w * ahead, 2.0 * optics.spacing, hit.w
+                        # On it, not as far before it as it is met.
+                        place -= 0.1 * optics.spacing * vec3(hit.x, hit.y, hit.z)
                         sunny = 1.0
                         if piece == 0:
                             deep = about_depth(sun, first, inside.walls, place, optics.spacing)

@@ -123,7 +123,7 @@ def murky(
             # Shadows are the same as elsewhere; both maps show the same, in texels of their own.
             c, fine = to_view(sun, above), qd.cast(shade.shape[0], qd.f32) / sunlit.depth.shape[0]
             share *= sun_share(
-                shade, fine * to_pixel(sun, c), c.z - 0.5 * optics.spacing, fine * sun.focal, look.sun_size,
-                vec2(1.0, 0.0), 16,
+                shade, fine * to_pixel(sun, c), c.z - 0.5 * optics.spacing, vec2(0.0, 0.0), fine * sun.focal,
+                look.sun_size, vec2(1.0, 0.0), 16,
             )  # fmt: skip
     return surface_radiance(look, color, n, seen, vec2(share, 1.0), 0.45, 0.0) + glow

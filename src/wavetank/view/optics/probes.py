@@ -61,13 +61,17 @@ def sun_reach(sun_depth: qd.template(), sun_size):
 
 
 @qd.func
-def sun_share(sun_depth: qd.template(), place, depth, focal, sun_size, turn, probes: qd.template()):
+def sun_share(sun_depth: qd.template(), place, depth, tilt, focal, sun_size, turn, probes: qd.template()):
     """Share 0 to 1 of the sun that is seen from a point at `depth` that the map, of `focal` texels a metre, shows at
     `place`.
+
+    The surface that the point lies on is deeper by `tilt` [m] for each texel across and down the map: it does not
+    stand in its own way (J. Isidoro, "Shadow mapping: GPU-based tips and techniques", 2006).
     """
     below, casters, wide = 0.0, 0, sun_reach(sun_depth, sun_size)
     for k in qd.static(range(5)):
-        gap = gap_at(sun_depth, place + wide * turned(turn, spiral(k, 5)), depth)
+        offset = wide * turned(turn, spiral(k, 5))
+        gap = gap_at(sun_depth, place + offset, depth + tilt.dot(offset))
         if gap > 0.0:
             below += gap
             casters += 1
@@ -77,6 +81,7 @@ def sun_share(sun_depth: qd.template(), place, depth, focal, sun_size, turn, pro
     elif casters > 0:
         spread = qd.min(qd.max(sun_size * below / casters * focal, 1.0), wide)
         for k in qd.static(range(probes)):
-            if gap_at(sun_depth, place + spread * turned(turn, spiral(k, probes)), depth) > 0.0:
+            offset = spread * turned(turn, spiral(k, probes))
+            if gap_at(sun_depth, place + offset, depth + tilt.dot(offset)) > 0.0:
                 share -= 1.0 / probes
     return qd.max(share, 0.0)

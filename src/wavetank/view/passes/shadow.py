@@ -71,9 +71,12 @@ def receive(
                     away += lift
                 c = to_view(sun, at + away * normal)
                 place = to_pixel(sun, c)
+                # Of what is aslant to the sun as a plane is; no more than that of 76 degrees.
+                steep = qd.max(normal.dot(to_sun), 0.25) * sun.focal
+                tilt = vec2(normal.dot(sun.right), -normal.dot(sun.up)) / steep
                 wide = sun_reach(sun_depth, sun_size)
                 if qd.min(place.x, place.y) > -wide and qd.max(place.x, place.y) < texels + wide:
                     share = sun_share(
-                        sun_depth, place, c.z, sun.focal, sun_size, pattern_turn(own_row, own_column), probes
+                        sun_depth, place, c.z, tilt, sun.focal, sun_size, pattern_turn(own_row, own_column), probes
                     )
             light.share[own_row, own_column] = vec2(share, 1.0)
