@@ -26,10 +26,10 @@ def test_a_full_tank_reads_rest_density_on_its_faces(dim, kernel):
 
 def test_a_solid_is_a_wall_like_any_other():
     """A box that replaces the lower part of the tank adds the same density as the tank's floor did."""
-    d, size = 0.05, (0.4, 0.8, 0.4)
-    low = wt.Scene(spacing=d, tank=wt.Tank(size=size), fluids=[wt.Block(lower=(0, 0, 0), upper=(0.4, 0.3, 0.4))])
+    d, tank, weightless = 0.05, wt.Tank(size=(0.4, 0.8, 0.4)), (0.0, 0.0, 0.0)  # so that both begin as their rows
+    low = wt.Scene(spacing=d, tank=tank, gravity=weightless, fluids=[wt.Block(lower=(0, 0, 0), upper=(0.4, 0.3, 0.4))])
     high = wt.Scene(
-        spacing=d, tank=wt.Tank(size=size), fluids=[wt.Block(lower=(0, 0.2, 0), upper=(0.4, 0.5, 0.4))],
+        spacing=d, tank=tank, gravity=weightless, fluids=[wt.Block(lower=(0, 0.2, 0), upper=(0.4, 0.5, 0.4))],
         solids=[wt.Box(center=(0.2, 0.05, 0.2), size=(1.0, 0.3, 1.0))],
     )  # fmt: skip
     np.testing.assert_allclose(Simulation(low).densities, Simulation(high).densities, rtol=1e-4)

@@ -324,9 +324,6 @@ class Bodies(Mapping[str, Body]):
     @contextlib.contextmanager
     def standing(self) -> Iterator[None]:
         """Let all bodies stand where they are meanwhile, and keep their velocities."""
-        if not self.members:
-            yield
-            return
         own, self._standing = self.coupling.velocity.copy(), True
         try:
             yield

@@ -1,5 +1,6 @@
 """A running world: the public face of the solver."""
 
+import contextlib
 import math
 import time
 from collections.abc import Iterator, Sequence
@@ -184,7 +185,7 @@ class Simulation(States):
             return False
         dt, limit = duration / whole(self._steps_in(duration)), self._speed_limit(duration)
         fall = np.array(scene.gravity, np.float32) * np.float32(dt) ** 2
-        with self.bodies.standing():
+        with self.bodies.standing() if self.bodies else contextlib.nullcontext():
             stands = settle(
                 self.world, lambda: self._take_step(scene, (), 0.0, dt, (0.0, 1.0), limit), fall, scene.spacing,
                 lambda places: self.solids.nearer(places, NEAR * scene.wall_gap * scene.spacing),
