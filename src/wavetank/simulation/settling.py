@@ -23,7 +23,7 @@ import numpy as np
 from wavetank.physics.world import World
 from wavetank.simulation.arrays import by_id, put_by_id
 
-FEWEST, MOST = 8, 60  # steps
+FEWEST, MOST, MOST_BESIDE_BODIES = 8, 60, 24  # steps
 CALM = 0.04  # of the fall: mean way in a step of what does not fall freely; where it is less all water stands
 RUNS = 0.1  # of the fall, the same: where it is more water runs
 CALMER = 0.98  # mean way over that in the step before: where it falls by less, water runs and will not stand
@@ -34,18 +34,19 @@ LIVELY = 0.002  # of the particles: where fewer move by more than that, steps en
 
 
 def settle(
-    world: World, step: Callable[[], None], fall: np.ndarray, spacing: float, near: Callable[[np.ndarray], np.ndarray]
-) -> bool:
+    world: World, step: Callable[[], None], fall: np.ndarray, spacing: float, *,
+    near: Callable[[np.ndarray], np.ndarray] | None,
+) -> bool:  # fmt: skip
     """Let a world take such steps, and say whether the water stands; `step` takes one, `fall` has shape [dim].
 
     What moves where not all is calm begins where it was, but for what began too near to a solid: `near` says of places
-    [n, dim] which are, bool [n].
+    [n, dim] which are, bool [n]. Without it, beside bodies, nothing is, and what moves always begins where it was.
     """
     count = world.count
     own, begun = by_id(world.particles, count, "v"), by_id(world.particles, count, "x")
     free_way = max(float(np.linalg.norm(fall)), 1e-30)
     length, is_free, mean = np.zeros(count), np.zeros(count, bool), np.inf
-    for number in range(MOST):
+    for number in range(MOST_BESIDE_BODIES if near is None else MOST):
         world.particles.v.fill(0.0)
         before = by_id(world.particles, count, "x")
         step()
@@ -54,12 +55,14 @@ def settle(
         is_free = np.linalg.norm(way - fall, axis=1) < FREE * free_way
         way *= np.where(is_free, 0.0, np.minimum(1.0, FARTHEST * spacing / np.maximum(length, 1e-30)))[:, None]
         put_by_id(world.particles, count, "x", before + way)
-        mean, last = float(length[~is_free].sum()) / max(count - is_free.sum(), 1) / free_way, mean
-        lively = np.count_nonzero(length[~is_free] > STANDING * free_way) / count
-        if number + 1 >= FEWEST and ((mean < CALM and lively < LIVELY) or mean > CALMER * last):
+        borne = length if near is None else length[~is_free]
+        mean, last = float(borne.sum()) / max(len(borne), 1) / free_way, mean
+        lively = near is not None and np.count_nonzero(borne > STANDING * free_way) >= LIVELY * count
+        if number + 1 >= FEWEST and ((mean < CALM and not lively) or mean > CALMER * last):
             break
-    if mean >= CALM:
-        stands = np.where(near(begun), 1.0, np.clip(2.0 - length / (STANDING * free_way), 0.0, 1.0))[:, None]
+    if near is None or mean >= CALM:
+        led = False if near is None else near(begun)
+        stands = np.where(led, 1.0, np.clip(2.0 - length / (STANDING * free_way), 0.0, 1.0))[:, None]
         put_by_id(world.particles, count, "x", begun + stands * (by_id(world.particles, count, "x") - begun))
     put_by_id(world.particles, count, "v", own)
     return bool(mean < RUNS and 2 * np.count_nonzero(is_free) < count)

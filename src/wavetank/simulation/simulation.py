@@ -61,10 +61,9 @@ class Simulation(States):
         self.pushed: list[Force] = []  # these in the next one only
         self.seconds_per_frame = math.nan  # that the last frame took to compute
         self.time_steps = 1  # of the last frame
-        if self._begin(start, clear=False) and not self._settle():
+        has_bodies = any(solid.is_body for solid in scene.solids)
+        if self._begin(start, clear=has_bodies) and not self._settle() and not has_bodies:
             self._begin(start, clear=True)
-            if self.bodies:
-                self._settle()
         check_places(self)
 
     def _begin(self, start: Scene, *, clear: bool) -> bool:
@@ -188,11 +187,14 @@ class Simulation(States):
         with self.bodies.standing() if self.bodies else contextlib.nullcontext():
             stands = settle(
                 self.world, lambda: self._take_step(scene, (), 0.0, dt, (0.0, 1.0), limit), fall, scene.spacing,
-                lambda places: self.solids.nearer(places, NEAR * scene.wall_gap * scene.spacing),
+                near=None if self.bodies else self._too_near,
             )  # fmt: skip
         self.solids.passing = None
         self.solids.move_to(0.0, 1.0)
         return stands
+
+    def _too_near(self, places: np.ndarray) -> np.ndarray:
+        return self.solids.nearer(places, NEAR * self.scene.wall_gap * self.scene.spacing)
 
     def _let_out(self) -> None:
         """Take what has crossed an open side of the tank out of the world."""
