@@ -11,7 +11,7 @@ make, one of them is felt.
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, in_cells, nearest, on_axis, sizes, stride
+from wavetank.physics.grid_pressure.coarse_grid import center_of, coordinates, nearest, on_axis, stride
 from wavetank.physics.grid_pressure.listed_solids import listed, narrowed
 from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec3
 
@@ -35,24 +35,9 @@ def thickest():
 
 
 @qd.func
-def beyond_tank(grid: CoarseGrid, at):
-    """How far [m] the place `at` lies beyond the last cells, 0 within."""
-    edges, beyond, place = vec3(grid.dx, grid.dy, grid.dz), 0.0, in_cells(grid, at)
-    for axis in qd.static(range(3)):
-        if qd.static(not grid.repeats >> axis & 1):
-            if grid.nz > 1 or axis < 2:
-                cells = qd.max(-0.5 - place[axis], place[axis] + 0.5 - sizes(grid)[axis])
-                beyond = qd.max(beyond, cells * edges[axis])
-    return beyond
-
-
-@qd.func
-def depth_in_solids(grid: CoarseGrid, solids: SolidSet, around: qd.template(), at):
-    """Depth [m] of the place `at` in that of the solids listed as `around` that it is in, 0 outside.
-
-    What lies beyond the tank is solid: a lining of its walls is thick, and a wall that ends there goes on.
-    """
-    depth = beyond_tank(grid, at)
+def depth_in_solids(solids: SolidSet, around: qd.template(), at):
+    """Depth [m] of the place `at` in that of the solids listed as `around` that it is in, 0 outside."""
+    depth = 0.0
     for number in range(around[0]):
         k = listed(solids, around, number)
         if (image_near(solids, k, at) - solids.position[k]).norm() < solids.reach[k]:
@@ -61,9 +46,9 @@ def depth_in_solids(grid: CoarseGrid, solids: SolidSet, around: qd.template(), a
 
 
 @qd.func
-def is_inside(grid: CoarseGrid, solids: SolidSet, around: qd.template(), at):
-    """Say whether the place `at` is in one of the solids listed as `around`, or beyond the tank."""
-    found = beyond_tank(grid, at) > 0.0
+def is_inside(solids: SolidSet, around: qd.template(), at):
+    """Say whether the place `at` is in one of the solids listed as `around`."""
+    found = False
     number = 0
     while number < around[0] and not found:
         k = listed(solids, around, number)
@@ -74,7 +59,7 @@ def is_inside(grid: CoarseGrid, solids: SolidSet, around: qd.template(), at):
 
 
 @qd.func
-def ahead(grid: CoarseGrid, solids: SolidSet, around: qd.template(), middle, way, outward):
+def ahead(solids: SolidSet, around: qd.template(), middle, way, outward):
     """Return 1 where a solid goes on from its `middle` by a `way` along it, or bends up or down from there."""
     goes = 0
     # Straight on first; thin walls are met by a step of a sixteenth of a turn. Kept, as they are asked for so often.
@@ -84,7 +69,7 @@ def ahead(grid: CoarseGrid, solids: SolidSet, around: qd.template(), middle, way
         if goes == 0:
             turn = (number + 1) // 2
             at = middle + way * cosines[turn] - outward * (sines[turn] * (1 - 2 * (number % 2)))
-            goes = qd.cast(is_inside(grid, solids, around, at), qd.i32)
+            goes = qd.cast(is_inside(solids, around, at), qd.i32)
     return goes
 
 
@@ -94,7 +79,7 @@ def goes_on(grid: CoarseGrid, solids: SolidSet, around: qd.template(), surface, 
     middle, deepest = surface, 0.0
     for k in qd.static(range(4)):
         at = surface - outward * (0.1 * 2.0**k * edge)
-        depth = depth_in_solids(grid, solids, around, at)
+        depth = depth_in_solids(solids, around, at)
         if depth > deepest:
             middle, deepest = at, depth
     # Two directions along the wall; a world in a plane goes on along z.
@@ -107,7 +92,7 @@ def goes_on(grid: CoarseGrid, solids: SolidSet, around: qd.template(), surface, 
     for k in range(4):
         if inside >= k - 1:  # else two sides are free already
             way = (first if k % 2 == 0 else second) * ((k // 2 - 0.5) * 1.5 * edge)
-            inside += ahead(grid, solids, around, middle, way, outward * (0.75 * edge))
+            inside += ahead(solids, around, middle, way, outward * (0.75 * edge))
     return inside >= 3
 
 
@@ -124,7 +109,7 @@ def straight_across(grid: CoarseGrid, solids: SolidSet, around: qd.template(), a
             side = 1.0 - 2.0 * (number % 2)
             way = vec3(0.0, 0.0, 0.0)
             way[axis] = side * (0.5 if number < 2 else 0.15) * thickest() * edge
-            depth = depth_in_solids(grid, solids, around, at + way)
+            depth = depth_in_solids(solids, around, at + way)
             free += depth if number < 2 else 0.0
             nearer += 0.0 if number < 2 else side * depth
         if free == 0.0:
@@ -149,8 +134,8 @@ def keep_thin(grid: CoarseGrid, solids: SolidSet, around: qd.template(), n, wall
         surface = center_of(grid, n) - outward * wall.w
         most = thickest() * edge
         close = narrowed(solids, around, surface, 1.1 * most)  # no place that is asked for is farther away than `most`
-        is_thin = not is_inside(grid, solids, close, surface - outward * most)
-        is_thin = is_thin or not is_inside(grid, solids, close, surface - outward * (0.5 * most))
+        is_thin = not is_inside(solids, close, surface - outward * most)
+        is_thin = is_thin or not is_inside(solids, close, surface - outward * (0.5 * most))
         if wall.w <= 0.0 and not is_thin:
             outward = straight_across(grid, solids, close, center_of(grid, n), edge)
             surface = center_of(grid, n) - outward * wall.w
