@@ -47,7 +47,7 @@ def test_the_same_in_space():
     assert fastest(sim, 30) < 0.08
 
 
-def test_fifty_pillars_each_take_their_own_room():
+def test_pillars_each_take_their_own_room():
     """Places are counted for each solid by itself, so that no side of the pool begins fuller than another."""
     rng = np.random.default_rng(1)
     places = [(0.1 + 0.2 * k + rng.uniform(-0.02, 0.02), 0.15) for k in range(6)]
