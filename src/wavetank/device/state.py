@@ -108,6 +108,10 @@ class CoarseGrid:
     thin_z: qd.types.ndarray()  # likewise
     thin_s: qd.types.ndarray()  # f32 [nodes], m
     shut: qd.types.ndarray()  # f32 [nodes]
+    open_x: qd.types.ndarray()  # f32 [nodes]: share of the face to the next node along x that is open
+    open_y: qd.types.ndarray()  # likewise
+    open_z: qd.types.ndarray()  # likewise
+    basin: qd.types.ndarray()  # i32 [nodes]: first node of the connected room that a node belongs to
     fill: qd.types.ndarray()  # f32 [nodes]: water over room
     gaps: qd.types.ndarray()  # f32 [nodes]: share of the room that is free between rows of particles
     depth: qd.types.ndarray()  # f32 [nodes], m: depth below the surface that the volume of the water has

@@ -45,8 +45,11 @@ class World:
     solids_version: int = 0  # changes with each motion of the solids
     room_version: int = -1  # of the solids when the grid was last told which room they leave
     room_gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m/s^2: at that time, which says what lies above what
-    thin_walls: Any = dataclasses.field(default_factory=lambda: integers(1))  # i32 [1]: nodes of the grid at thin walls
+    # i32 [3]: nodes of the grid at thin walls, basins (`grid_pressure/sealed.py`), nodes with room
+    room_found: Any = dataclasses.field(default_factory=lambda: integers(3))
     has_thin_walls: bool = False
+    basins: int = 1
+    open_nodes: int = 0
     solid_speed: float = 0.0  # m/s: the fastest that any solid moves in this frame
     known: dict[tuple[Any, ...], Any] = dataclasses.field(default_factory=dict)  # see `exchanged`
     pieces: Pieces | None = None  # of the bodies, where there are any

@@ -211,7 +211,7 @@ def _new_level(shape: list[int], box: tuple[np.ndarray, np.ndarray], repeats: in
     rim = nodes + nx * ny + LANES  # what is beyond the last node is read, and counts nothing
     kinds = {field.name: field.type for field in dataclasses.fields(CoarseGrid)}
     parts = sums_of(nodes)
-    sums = {"sums": integers(parts * nodes), "mass_sums": integers(parts * nodes)}
+    sums = {"sums": integers(parts * nodes), "mass_sums": integers(parts * nodes), "basin": integers(rim)}
     numbers = (qd.i32, qd.f32, Final[int])
     fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in numbers and name not in sums}
     return CoarseGrid(

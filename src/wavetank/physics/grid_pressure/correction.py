@@ -58,6 +58,7 @@ from wavetank.physics.grid_pressure.gaps import across, gaps_at
 from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
 from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, open_tents, spread_along
+from wavetank.physics.grid_pressure.sealed import MOSTLY_FULL, balance, find_basins
 from wavetank.physics.grid_pressure.slits import below_roof, close_slit, in_part, mostly, openness
 from wavetank.physics.grid_pressure.surface import depth_at
 from wavetank.physics.grid_pressure.weight import BORNE, flow_out
@@ -75,6 +76,7 @@ from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, vec3
 
 UNIT = float(1 << 20)  # sums are whole multiples of its inverse
+LARGEST_SUM = float(1 << 29)  # of errors, in whole numbers
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 BELOW = (0.4, 0.65)  # supports: and its depth, so that the top layer never counts, however it lies in the cells
 FILM = (0.75, 1.25)  # cells of water: from where to where the grid takes part in a film
@@ -294,10 +296,12 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     finest, cells, count, searched = world.levels[0], world.grid, world.count, int(world.has_solids)
     gravity = (c.gravity_x, c.gravity_y, c.gravity_z)
     if world.room_version != world.solids_version or (world.pieces and world.room_gravity != gravity):
-        world.thin_walls.fill(0)
-        find_room(finest, world.thin_walls, world.solids, c, LEAST_OPEN, UNIT, world.searched, params.dim)
+        world.room_found.fill(0)
+        find_room(finest, world.room_found, world.solids, c, LEAST_OPEN, UNIT, world.searched, params.dim)
+        find_basins(finest, world.room_found)
         world.room_version, world.room_gravity = world.solids_version, gravity
-        world.has_thin_walls = bool(download(world.thin_walls)[0])
+        thin, world.basins, world.open_nodes = map(int, download(world.room_found))
+        world.has_thin_walls = thin > 0
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     few = int(not is_shared(finest))
     numbers = errors(finest, params, stiffness, bodies=world.pieces is not None)
@@ -305,6 +309,10 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         finest, world.particles, world.scratch, cells, world.solids, world.walls, c,
         numbers, count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
     )  # fmt: skip
+    water = count * params.spacing**params.dim
+    if world.basins > 1 or water > MOSTLY_FULL * world.open_nodes * finest.dx * finest.dy * finest.dz:
+        nodes = finest.nx * finest.ny * finest.nz
+        balance(finest, LARGEST_SUM / nodes / numbers.per_way if numbers.per_way else 0.0)
     solve_levels(world.levels)
     move_particles(
         finest, world.particles, world.scratch, cells, world.solids, c, push_of(params, stiffness, c.h), count, few,

@@ -20,7 +20,6 @@ import math
 from wavetank.device.compiler import current_backend, qd, worth_sharing
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import coordinates, nearest
-from wavetank.physics.grid_pressure.thin_walls import is_shut
 
 SWEEPS, MOST_SWEEPS = 8, 200  # at once, and of the coarsest level
 ON_EACH = (2 * SWEEPS, 1.7)  # sweeps of a level and their relaxation: eight leave what drives calm water round
@@ -65,10 +64,11 @@ def open_area(grid: CoarseGrid, n, m):
 
 
 @qd.func
-def coupling(grid: CoarseGrid, n, m, edge, least_theta, shut):
-    """What the face between the nodes `n` and `m` couples them with [1/m^2]: 0 into solids and between air and air.
+def coupling(grid: CoarseGrid, n, m, share, edge, least_theta):
+    """What a face between the nodes `n` and `m`, of which a `share` is open, couples them with [1/m^2].
 
-    It is the inverse of the density, that of the heaviest fluid being 1, over the square of the distance.
+    It is 0 between air and air, else the inverse of the density, that of the heaviest fluid being 1, over the square
+    of the distance.
     """
     a = qd.min(grid.fill[n], 1.0) - 0.5
     b = qd.min(grid.fill[m], 1.0) - 0.5
@@ -76,8 +76,8 @@ def coupling(grid: CoarseGrid, n, m, edge, least_theta, shut):
     # Light fluid gives way more: the inverse of the mean density, and of that of the water where there is air.
     mean = 0.5 * (grid.density[n] + grid.density[m])
     density = qd.select(a <= 0.0, grid.density[m], qd.select(b <= 0.0, grid.density[n], mean))
-    is_open = qd.min(qd.max(a, b), qd.min(grid.room[n], grid.room[m])) > 0.0 and shut == 0
-    return qd.select(is_open, open_area(grid, n, m) / qd.max(theta * edge * edge * density, 1e-12), 0.0)
+    is_open = qd.min(qd.max(a, b), share) > 0.0
+    return qd.select(is_open, share / qd.max(theta * edge * edge * density, 1e-12), 0.0)
 
 
 @qd.func
@@ -105,15 +105,14 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta):
     for lane in range(grid.width):
         x = first + lane
         n = begin + x
-        shut = qd.cast(grid.shut[n], qd.i32)
-        wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, over_x), grid.dx, least_theta, shut & 1)
-        wy = coupling(grid, n, after_y + x, grid.dy, least_theta, shut & 2)
-        wz = coupling(grid, n, after_z + x, grid.dz, least_theta, shut & 4)
+        before = qd.Vector([qd.select(x > 0, n - 1, under_x), before_y + x, before_z + x])
+        wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, over_x), grid.open_x[n], grid.dx, least_theta)
+        wy = coupling(grid, n, after_y + x, grid.open_y[n], grid.dy, least_theta)
+        wz = coupling(grid, n, after_z + x, grid.open_z[n], grid.dz, least_theta)
         diagonal = wx + wy + wz
-        before = qd.select(x > 0, n - 1, under_x)
-        diagonal += coupling(grid, n, before, grid.dx, least_theta, is_shut(grid, before, 0))
-        diagonal += coupling(grid, n, before_y + x, grid.dy, least_theta, is_shut(grid, before_y + x, 1))
-        diagonal += coupling(grid, n, before_z + x, grid.dz, least_theta, is_shut(grid, before_z + x, 2))
+        diagonal += coupling(grid, n, before.x, grid.open_x[before.x], grid.dx, least_theta)
+        diagonal += coupling(grid, n, before.y, grid.open_y[before.y], grid.dy, least_theta)
+        diagonal += coupling(grid, n, before.z, grid.open_z[before.z], grid.dz, least_theta)
         is_water = qd.min(grid.fill[n] - 0.5, qd.min(grid.room[n], diagonal)) > 0.0
         found[0, lane] = wx
         found[1, lane] = wy
@@ -128,10 +127,23 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta):
 
 
 @qd.func
+def open_towards(grid: CoarseGrid, c, m, axis: qd.template(), ahead):
+    """Share that is open of the face from the node `c` to the next one along an axis, or if not `ahead` from `m`."""
+    n = qd.select(ahead == 1, c[0] + grid.nx * (c[1] + grid.ny * c[2]), m)
+    share = grid.open_z[n]
+    if qd.static(axis == 0):
+        share = grid.open_x[n]
+    elif qd.static(axis == 1):
+        share = grid.open_y[n]
+    return share
+
+
+@qd.func
 def interpolated(coarser: CoarseGrid, c, halved):
     """Value at the node `c` of the next finer level between those of a `coarser` one, linear along each axis.
 
-    Axes that are not `halved` have as many nodes on both. Beyond solids and the rim of the tank it is even.
+    Axes that are not `halved` have as many nodes on both. Beyond solids and the rim of the tank it is even, and so it
+    is where no water flows from one node to the other.
     """
     at = c >> halved
     own = coarser.lam[at[0] + coarser.nx * (at[1] + coarser.ny * at[2])]
@@ -141,7 +153,7 @@ def interpolated(coarser: CoarseGrid, c, halved):
             place = at
             place[axis] += 2 * (c[axis] & 1) - 1
             m = nearest(coarser, place)
-            if coarser.room[m] > 0.0:
+            if open_towards(coarser, at, m, axis, c[axis] & 1) > 0.0:
                 found += 0.25 * (coarser.lam[m] - own)
     return qd.min(found, 0.0)
 
@@ -280,33 +292,49 @@ def solve_in_block(
 
 
 @qd.func
+def open_through(fine: CoarseGrid, c, ratio, axis: qd.template()):
+    """Share that is open of the face of a coarser node `c` to the next one, by those of the nodes that it stands for.
+
+    It is shut as well where a wall parts these nodes from each other.
+    """
+    last, shut = 0.0, 0.0
+    size = ratio[0] * ratio[1] * ratio[2] // ratio[axis]
+    for k in range(ratio[0] * ratio[1] * ratio[2]):
+        way = qd.Vector([k % ratio[0], k // ratio[0] % ratio[1], k // (ratio[0] * ratio[1])])
+        place = c * ratio + way
+        n = place[0] + fine.nx * (place[1] + fine.ny * place[2])
+        share = qd.Vector([fine.open_x[n], fine.open_y[n], fine.open_z[n]])[axis]
+        after = place
+        after[axis] += 1
+        if way[axis] == ratio[axis] - 1:
+            last += share
+        elif share == 0.0 and qd.min(fine.room[n], fine.room[nearest(fine, after)]) > 0.0:
+            shut += 1.0
+    return qd.select(2.0 * shut >= size, 0.0, last / size)
+
+
+@qd.func
 def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
     """Give node `n` of a coarser level the means of the finer nodes that it stands for."""
     c = coordinates(coarse, n)
-    fx = fine.nx // coarse.nx
-    fy = fine.ny // coarse.ny
-    fz = fine.nz // coarse.nz
+    ratio = qd.Vector([fine.nx // coarse.nx, fine.ny // coarse.ny, fine.nz // coarse.nz])
     room, fill, rhs, density = 0.0, 0.0, 0.0, 0.0
-    shut_x, shut_y, shut_z = 0, 0, 0
-    for z in range(c[2] * fz, c[2] * fz + fz):
-        for y in range(c[1] * fy, c[1] * fy + fy):
+    for z in range(c[2] * ratio[2], c[2] * ratio[2] + ratio[2]):
+        for y in range(c[1] * ratio[1], c[1] * ratio[1] + ratio[1]):
             row = fine.nx * (y + fine.ny * z)
-            for m in range(row + c[0] * fx, row + c[0] * fx + fx):
+            for m in range(row + c[0] * ratio[0], row + c[0] * ratio[0] + ratio[0]):
                 room += fine.room[m]
                 fill += fine.fill[m] * fine.room[m]
                 rhs += fine.rhs[m]
                 density += fine.density[m] * fine.fill[m] * fine.room[m]
-                shut_x += is_shut(fine, m, 0)
-                shut_y += is_shut(fine, m, 1)
-                shut_z += is_shut(fine, m, 2)
-    coarse.shut[n] = (
-        qd.cast(2 * shut_x >= fy * fz, qd.i32) + 2 * qd.cast(2 * shut_y >= fx * fz, qd.i32)
-        + 4 * qd.cast(2 * shut_z >= fx * fy, qd.i32)
-    )  # fmt: skip
-    coarse.room[n] = room / (fx * fy * fz)
+    coarse.open_x[n] = open_through(fine, c, ratio, 0)
+    coarse.open_y[n] = open_through(fine, c, ratio, 1)
+    coarse.open_z[n] = open_through(fine, c, ratio, 2)
+    size = ratio[0] * ratio[1] * ratio[2]
+    coarse.room[n] = room / size
     coarse.density[n] = density / fill if fill > 0.0 else 1.0
     coarse.fill[n] = fill / qd.max(room, 1e-6)
-    coarse.rhs[n] = rhs / (fx * fy * fz)
+    coarse.rhs[n] = rhs / size
 
 
 @qd.kernel(fastcache=True)

@@ -20,10 +20,11 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     tents,
 )  # fmt: skip
 from wavetank.physics.grid_pressure.listed_solids import listed, solids_near
+from wavetank.physics.grid_pressure.poisson import open_area
 from wavetank.physics.grid_pressure.slits import mostly
-from wavetank.physics.grid_pressure.thin_walls import behind, farthest, keep_thin, mark_shut, way_from
+from wavetank.physics.grid_pressure.thin_walls import behind, farthest, is_shut, keep_thin, mark_shut, way_from
 from wavetank.physics.teams import end_of_part, first_of_part, part_of, turns_over
-from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec3, vec4
+from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec2, vec3, vec4
 
 LEAST_OPEN = 0.1  # a cell that is less open is solid
 
@@ -41,22 +42,66 @@ def tent_beside():
 
 
 @qd.func
-def nearest_wall(grid: CoarseGrid, solids: SolidSet, around: qd.template(), n):
-    """(gradient, distance [m]) of that of the solids `around` nearest to node `n`; far away where none is near."""
-    center = center_of(grid, n)
+def wall_at(grid: CoarseGrid, solids: SolidSet, around: qd.template(), at):
+    """Number of that of the solids `around` nearest to the place `at`, and its (gradient, distance [m]).
+
+    The number is -1, and the distance is large, where none is near.
+    """
     edge = longest_edge(grid)
-    nearest = vec4(0.0, 1.0, 0.0, 4.0 * edge)
+    found, nearest = -1, vec4(0.0, 1.0, 0.0, 4.0 * edge)
     for number in range(around[0]):
         k = listed(solids, around, number)
-        way, reach = image_near(solids, k, center) - solids.position[k], solids.reach[k]
+        way, reach = image_near(solids, k, at) - solids.position[k], solids.reach[k]
         if way.norm_sqr() < (reach + nearest.w) ** 2 and reach + nearest.w > 0.0 and nearest.w > -2.0 * edge:
             # What is farther away takes no room: that of the ball around the solid is good enough there.
             value = vec4(way.x, way.y, way.z, way.norm() - reach)
             if value.w < 2.0 * edge:
-                value = signed_distance(solids, k, center)
+                value = signed_distance(solids, k, at)
             if value.w < nearest.w:
-                nearest = value
-    return nearest
+                found, nearest = k, value
+    return found, nearest
+
+
+@qd.func
+def seam():
+    """Cells up to which two solids touch, and how far beyond a surface the wall that they make is looked for."""
+    return vec2(0.08, 0.5)
+
+
+@qd.func
+def nearest_wall(grid: CoarseGrid, solids: SolidSet, around: qd.template(), n):
+    """(gradient, distance [m]) of that of the solids `around` nearest to node `n`; far away where none is near.
+
+    Where solids touch, or parts of one, the surfaces between them are no walls: what was taken for room along the
+    seams of a box of boards let the pressure out. Beyond a seam the wall is that of the solid there.
+    """
+    edge, center = longest_edge(grid), center_of(grid, n)
+    wall, touching, at = vec4(0.0, 1.0, 0.0, 4.0 * edge), 1.0, center
+    outward, surface, looks = vec3(0.0, 1.0, 0.0), center, 0
+    while looks < 3:
+        k, value = wall_at(grid, solids, around, at)
+        if looks == 0:
+            wall, outward = value, vec3(value.x, value.y, value.z)
+            surface = center - outward * value.w
+            parts = solids.first[k + 1] - solids.first[k] if k >= 0 else 0
+            at = surface + outward * (2.0 * seam().x * edge)
+            if qd.abs(value.w) >= edge or qd.max(parts, around[0]) < 2:
+                looks = 3
+        elif looks == 1:
+            touching = qd.min(-value.w / (seam().x * edge), 1.0)
+            at = surface + outward * (seam().y * edge)
+            if touching <= 0.0:
+                looks = 3
+        elif value.w < 0.0:
+            beyond = vec3(value.x, value.y, value.z)
+            depth = -edge
+            if beyond.dot(outward) > -0.7:
+                depth = value.w + beyond.dot(center - at)
+                outward = beyond
+            depth = qd.min(wall.w, depth)
+            wall = vec4(outward.x, outward.y, outward.z, wall.w + touching * (depth - wall.w))
+        looks += 1
+    return wall
 
 
 @qd.func
@@ -226,6 +271,19 @@ def is_slit(grid: CoarseGrid, n, gravity):
     return narrowest < narrow() and widest < mostly()
 
 
+@qd.func
+def open_faces(grid: CoarseGrid, n):
+    """Find which share of its faces to the next nodes along each axis is open for node `n`."""
+    share = vec3(0.0, 0.0, 0.0)
+    for axis in qd.static(range(3)):
+        ahead = coordinates(grid, n)
+        ahead[axis] += 1
+        m = nearest(grid, ahead)
+        if m != n and qd.min(grid.room[n], grid.room[m]) > 0.0 and is_shut(grid, n, axis) == 0:
+            share[axis] = open_area(grid, n, m)
+    grid.open_x[n], grid.open_y[n], grid.open_z[n] = share.x, share.y, share.z
+
+
 @qd.kernel(fastcache=True)
 def find_room(
     grid: CoarseGrid, thin: qd.types.ndarray(), solids: SolidSet, c: Coefficients, least_open: qd.f32, unit: qd.f32,
@@ -286,3 +344,5 @@ def find_room(
             largest_along(grid.clear, grid.gaps, grid, row, 2, 2)
         for n in range(grid.nx * grid.ny * grid.nz):
             grid.clear[n] = 1.0 if grid.clear[n] < 1e-3 else 0.0
+    for n in range(grid.nx * grid.ny * grid.nz):
+        open_faces(grid, n)
