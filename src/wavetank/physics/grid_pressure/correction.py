@@ -42,6 +42,7 @@ from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scr
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import fall
 from wavetank.physics.grid_pressure.approach import approached
+from wavetank.physics.grid_pressure.block import is_shared
 from wavetank.physics.grid_pressure.buoyancy import push_on_grid
 from wavetank.physics.grid_pressure.coarse_grid import (
     add_whole,
@@ -53,9 +54,10 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     taken,
     tents,
 )  # fmt: skip
+from wavetank.physics.grid_pressure.couplings import LEAST_THETA, couple_nodes
 from wavetank.physics.grid_pressure.films import left_to_grid
 from wavetank.physics.grid_pressure.gaps import across, gaps_at
-from wavetank.physics.grid_pressure.poisson import LEAST_THETA, couple_nodes, is_shared, solve_levels
+from wavetank.physics.grid_pressure.poisson import solve_levels
 from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, open_tents, spread_along
 from wavetank.physics.grid_pressure.sealed import MOSTLY_FULL, balance, find_basins

@@ -12,8 +12,8 @@ from wavetank.device.state import CoarseGrid, Coefficients, Grid, Particles, Scr
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import fall, flattened, kept_in_tank
 from wavetank.physics.grid_pressure.coarse_grid import beside_on, corners, in_cells, nearest, ramp, tents
+from wavetank.physics.grid_pressure.couplings import open_area
 from wavetank.physics.grid_pressure.own_weight import FOREIGN, own_push
-from wavetank.physics.grid_pressure.poisson import open_area
 from wavetank.physics.grid_pressure.surface import carried_share
 from wavetank.physics.grid_pressure.weight import BORNE
 from wavetank.physics.pairs import column

@@ -19,10 +19,10 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     taken,
     tents,
 )  # fmt: skip
+from wavetank.physics.grid_pressure.couplings import open_faces
 from wavetank.physics.grid_pressure.listed_solids import listed, solids_near
-from wavetank.physics.grid_pressure.poisson import open_area
 from wavetank.physics.grid_pressure.slits import mostly
-from wavetank.physics.grid_pressure.thin_walls import behind, farthest, is_shut, keep_thin, mark_shut, way_from
+from wavetank.physics.grid_pressure.thin_walls import behind, farthest, keep_thin, mark_shut, way_from
 from wavetank.physics.teams import end_of_part, first_of_part, part_of, turns_over
 from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec2, vec3, vec4
 
@@ -269,19 +269,6 @@ def is_slit(grid: CoarseGrid, n, gravity):
                         before = m
                 narrowest = qd.min(narrowest, width)
     return narrowest < narrow() and widest < mostly()
-
-
-@qd.func
-def open_faces(grid: CoarseGrid, n):
-    """Find which share of its faces to the next nodes along each axis is open for node `n`."""
-    share = vec3(0.0, 0.0, 0.0)
-    for axis in qd.static(range(3)):
-        ahead = coordinates(grid, n)
-        ahead[axis] += 1
-        m = nearest(grid, ahead)
-        if m != n and qd.min(grid.room[n], grid.room[m]) > 0.0 and is_shut(grid, n, axis) == 0:
-            share[axis] = open_area(grid, n, m)
-    grid.open_x[n], grid.open_y[n], grid.open_z[n] = share.x, share.y, share.z
 
 
 @qd.kernel(fastcache=True)

@@ -57,7 +57,7 @@ def start_basins(grid: CoarseGrid, row, found: qd.template()):
 
 @qd.func
 def join_ahead(grid: CoarseGrid, n):
-    """Join node `n` with the next along each axis, if the face is open and those before are not joined in the same way."""
+    """Join node `n` with the next along each axis, if the face is open and not those before it in the same way."""
     x = n % grid.nx
     if qd.static(grid.repeats & 1):
         if x == grid.nx - 1 and grid.open_x[n] > 0.0:

@@ -15,7 +15,7 @@ weigh among those of another fluid: `own_weight.py`.
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import beside_on
-from wavetank.physics.grid_pressure.poisson import open_area
+from wavetank.physics.grid_pressure.couplings import open_area
 from wavetank.physics.grid_pressure.surface import nodes_beyond
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3

@@ -1,0 +1,78 @@
+"""Boxes of boards, and water that no air bounds."""
+
+import numpy as np
+import pytest
+
+import wavetank as wt
+
+D = 0.025  # m
+
+
+def boards(middle, size, thick):
+    """Four boards around a room of that size, end to end, as one would nail them."""
+    (x, y), (a, b) = middle, size
+    return [
+        wt.Box(center=(x, y - 0.5 * (b + thick)), size=(a + 2.0 * thick, thick)),
+        wt.Box(center=(x, y + 0.5 * (b + thick)), size=(a + 2.0 * thick, thick)),
+        wt.Box(center=(x - 0.5 * (a + thick), y), size=(thick, b)),
+        wt.Box(center=(x + 0.5 * (a + thick), y), size=(thick, b)),
+    ]
+
+
+def under_water(solids):
+    block = wt.Block(lower=(0.0, 0.0), upper=(1.2, 0.8))
+    return wt.Scene(spacing=D, tank=wt.Tank(size=(1.2, 0.9)), fluids=[block], solids=solids)
+
+
+def full(size, solids=()):
+    block = wt.Block(lower=(0.0,) * len(size), upper=size)
+    return wt.Scene(spacing=D, tank=wt.Tank(size=size), fluids=[block], solids=list(solids))
+
+
+def fastest(sim, before, frames):
+    """The fastest particle in so many frames after those `before` [m/s]."""
+    result = 0.0
+    for frame in range(before + frames):
+        sim.step()
+        if frame >= before:
+            result = max(result, float(np.linalg.norm(sim.velocities, axis=1).max()))
+    return result
+
+
+@pytest.mark.parametrize("thick", [0.07, 0.1])
+def test_water_inside_and_around_a_box_of_boards_is_at_rest(thick):
+    """Hydrostatics: seams are no room, and both waters have a pressure of their own. It was at 0.25 and 2 m/s."""
+    sim = wt.Simulation(under_water(boards((0.6, 0.4), (0.4, 0.3), thick)))
+    assert sim.world.basins == 2
+    assert fastest(sim, 60, 90) < 0.03
+
+
+def test_a_box_in_one_piece_keeps_two_waters_apart():
+    shell = wt.Union(center=(0.6, 0.4), parts=[part.model_copy() for part in boards((0.0, 0.0), (0.4, 0.3), 0.1)])
+    sim = wt.Simulation(under_water([shell]))
+    assert sim.world.basins == 2
+    assert fastest(sim, 150, 60) < 0.03
+
+
+@pytest.mark.parametrize(
+    ("size", "solids"),
+    [
+        ((0.81, 0.513), []),
+        ((0.81, 0.513), [wt.Box(center=(0.37, 0.22), size=(0.2, 0.1))]),
+        ((0.5, 0.413, 0.31), [wt.Sphere(center=(0.25, 0.2, 0.15), radius=0.08)]),
+    ],
+    ids=["empty", "box", "ball in space"],
+)
+def test_a_full_tank_is_at_rest(size, solids):
+    """Without air the pressure has no level; the first two were at 0.15 to 0.2 m/s for ever."""
+    sim = wt.Simulation(full(size, solids))
+    assert fastest(sim, 120, 90) < 0.03
+
+
+def test_a_wall_of_planks_lets_nothing_through():
+    """A partition of boards end to end: water on one side stands as high after a while, and nothing flows."""
+    planks = [wt.Box(center=(0.6, 0.071 * (k + 0.5)), size=(0.08, 0.071)) for k in range(11)]
+    block = wt.Block(lower=(0.0, 0.0), upper=(0.56, 0.5))
+    sim = wt.Simulation(wt.Scene(spacing=D, tank=wt.Tank(size=(1.2, 0.8)), fluids=[block], solids=planks))
+    assert fastest(sim, 60, 90) < 0.03
+    assert sim.positions[:, 0].max() < 0.56
