@@ -76,3 +76,21 @@ def test_a_wall_of_planks_lets_nothing_through():
     sim = wt.Simulation(wt.Scene(spacing=D, tank=wt.Tank(size=(1.2, 0.8)), fluids=[block], solids=planks))
     assert fastest(sim, 60, 90) < 0.03
     assert sim.positions[:, 0].max() < 0.56
+
+
+def test_no_water_begins_in_a_seam():
+    """A cup of five boards in half a tank: eighteen particles began between boards, and crept along the seams."""
+    d, (x, y, z), (a, b, c), t = 0.03, (0.4, 0.2, 0.3), (0.3, 0.26, 0.26), 0.07
+    cup = [
+        wt.Box(center=(x, y - 0.5 * (b + t), z), size=(a + 2 * t, t, c + 2 * t)),
+        wt.Box(center=(x - 0.5 * (a + t), y, z), size=(t, b, c + 2 * t)),
+        wt.Box(center=(x + 0.5 * (a + t), y, z), size=(t, b, c + 2 * t)),
+        wt.Box(center=(x, y, z - 0.5 * (c + t)), size=(a, b, t)),
+        wt.Box(center=(x, y, z + 0.5 * (c + t)), size=(a, b, t)),
+    ]
+    block = wt.Block(lower=(0.0, 0.0, 0.0), upper=(0.8, 0.25, 0.6))
+    sim = wt.Simulation(wt.Scene(spacing=d, tank=wt.Tank(size=(0.8, 0.6, 0.6)), fluids=[block], solids=cup))
+    inside = [
+        np.min(0.5 * np.array(board.size) - np.abs(sim.positions - np.array(board.center)), axis=1) for board in cup
+    ]
+    assert np.max(inside) < 0.0

@@ -18,13 +18,14 @@ from wavetank.solids.distance import SolidSet
 from wavetank.solids.sampling import nearest_of
 
 CUT = 0.5  # spacings: cells nearer than that to a surface are cut by it
+TOUCH = 0.1  # spacings: solids that are nearer to each other have a seam, which is no place for water
 EVEN = 0.2  # spacings: by so much places are shuffled in their order, so that a part of a row is spread along it
 SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])  # well spread numbers of cells: Roberts 2018, R3
 
 
 def outside(scene: Scene, places: np.ndarray, solids: SolidSet, first: int) -> np.ndarray:
     """Say which `places` [n, dim] the solids from number `first` on leave to the fluids of a scene, bool [n]."""
-    s, nearest = nearest_of(solids, first, places)
+    s, nearest = nearest_of(solids, first, places, TOUCH * scene.spacing)
     s /= scene.spacing
     free, cut = s >= CUT, np.flatnonzero(np.abs(s) < CUT)
     cells = np.floor(places[cut] / scene.spacing)
