@@ -413,6 +413,13 @@ def test_slow_water_rests_between_upright_sides_and_leaves_from_below():
     assert below > 0.65
 
 
+def test_slow_water_rests_between_two_bodies_that_rest():
+    """A gap between two hulls has a mode of its own, in which water goes up and down; their edges damp it."""
+    other = wt.Box(name="other", center=(0.12, 0.2, 0.5 * WIDE), size=(0.24, 0.24, 0.4), density=500.0, held=True)
+    beside = kept_in_a_gap((0.40, 0.2, 0.5 * WIDE), other, lambda x: (x[:, 0] < 0.28) & (abs(x[:, 1] - 0.2) < 0.1))
+    assert beside < 0.5
+
+
 @pytest.mark.parametrize("gap", [0.8, 1.0])
 def test_water_between_a_wall_and_the_side_of_a_body_rests(gap):
     """Less than half a cell that stands upright is no slit: without room there, water was thrown at 1.5 m/s."""

@@ -13,10 +13,11 @@ The tank's floor takes it from puddles, a layer at most.
 And all of them, but bodies, take the same share from slow motion towards them and away, from the layer next to them.
 Iterations answer what presses a layer or two together with more than all of it, so that it jumped from step to step.
 
-A body takes none of it where water lies between it and another solid. The other takes none where that water is squeezed
-out: by a body that is on its way, between two of them, and where one lies above the other. A layer that cannot leave
-would bear it. Beside upright sides of bodies that rest walls do as elsewhere: without that, water there was thrown to
-and fro without end (docs/notebook/calm.md, "Upright slits").
+Where water lies between a body and another solid, that takes none where water is squeezed out: by a body that is on
+its way, and where one lies above the other. A layer that cannot leave would bear it. Beside upright sides of bodies
+that rest walls do as elsewhere, and so do two bodies: without that, water there was thrown to and fro without end, and
+went up and down between them (docs/notebook/calm.md, "Upright slits", "Between two bodies"). A body beside what is none
+takes nothing, or small ones turn back and forth.
 
     code     symbol    meaning                                           unit
     push     delta     displacement that the wall has given              m
@@ -97,10 +98,10 @@ def apply_friction(
 
 @qd.func
 def between(i, p, others, near, scratch: Scratch, solids: SolidSet, c: Coefficients):
-    """(whether water is beside a body and beside another solid, how surely it is to leave from between), from 0 to 1.
+    """(share that bodies, share that other solids do not take where water is beside a body and another solid).
 
-    It is to leave where the body is on its way, where there are two bodies, and where one of the two lies above the
-    other: surfaces that lean by 60 degrees and more do not, below 30 they do.
+    The latter is how surely it is to leave from between: where a body is on its way, and where one of the two lies
+    above the other: surfaces that lean by 60 degrees and more do not, below 30 they do. Two bodies do as other solids.
     """
     bodies, total = 0, 0
     on_its_way, above, below = 0.0, 0.0, 0.0
@@ -123,8 +124,8 @@ def between(i, p, others, near, scratch: Scratch, solids: SolidSet, c: Coefficie
                 leans = vec3(value.x, value.y, value.z).dot(down(c))
                 above, below = qd.max(above, leans), qd.max(below, -leans)
     is_between = qd.cast(bodies > 0 and total > 1, qd.f32)
-    leaves = qd.max(on_its_way, ramp(above, 0.5, 0.85) * ramp(below, 0.5, 0.85)) if bodies == 1 else 1.0
-    return qd.Vector([is_between, is_between * leaves])
+    leaves = qd.max(on_its_way, ramp(above, 0.5, 0.85) * ramp(below, 0.5, 0.85))
+    return qd.Vector([is_between * (1.0 if bodies == 1 else leaves), is_between * leaves])
 
 
 @qd.func

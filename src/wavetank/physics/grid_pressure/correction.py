@@ -62,7 +62,7 @@ from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, open_tents, spread_along
 from wavetank.physics.grid_pressure.sealed import MOSTLY_FULL, balance, find_basins
 from wavetank.physics.grid_pressure.slits import below_roof, close_slit, in_part, mostly, openness
-from wavetank.physics.grid_pressure.surface import depth_at
+from wavetank.physics.grid_pressure.surface import depth_at, depth_beside
 from wavetank.physics.grid_pressure.weight import BORNE, flow_out
 from wavetank.physics.mixture import Blend
 from wavetank.physics.predicted_positions import predicted
@@ -268,6 +268,13 @@ def gather(
         grid.gaps[n] = grid.rhs[n]
         grid.depth[n] = depth_at(grid, n)
         grid.slope_y[n] = inside_at(grid, n, e)
+    if qd.static(searched):
+        qd.loop_config(serialize=bool(few))
+        for n in range(grid.nx * grid.ny * grid.nz):
+            grid.slope_z[n] = depth_beside(grid, n, vec3(c.gravity_x, c.gravity_y, c.gravity_z))
+        qd.loop_config(serialize=bool(few))
+        for n in range(grid.nx * grid.ny * grid.nz):
+            grid.depth[n] = grid.slope_z[n]
     for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
         for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):

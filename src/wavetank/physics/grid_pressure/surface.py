@@ -15,6 +15,10 @@ fifth; the sum of the fills on the way to the air is not, because tents add up t
 the volume of fluid method (Cummins et al. 2005, 10.1016/j.compstruc.2004.08.017). What three axes say is taken for the
 distance of a plane that cuts them there.
 
+A node inside of a solid, below one or above one is on no such way. It counted as deep in the water, or as high above
+it, and a particle at the waterline beside a body was carried or fell as the body gave that node room or took it, for
+which a hundredth of a spacing is enough. Water is level: those nodes are told by the ones beside them.
+
     code      meaning                                                     unit
     depth     of a node below the surface, above it less than 0           m
     way       along an axis, from a node to the surface                   m
@@ -76,6 +80,32 @@ def depth_at(grid: CoarseGrid, n):
     below = qd.min(deepest, 1.0 / qd.sqrt(closeness)) if closeness > 0.0 else deepest
     found = below if grid.fill[n] >= 0.5 else depth * grid.dy
     return found if grid.room[n] > 0.0 else deepest  # inside of a solid nothing sticks out
+
+
+@qd.func
+def is_told(grid: CoarseGrid, n):
+    """Whether the depth of node `n` is known: a way leads to the surface from there, or no solid is near."""
+    found = grid.depth[n] < 2.999 * grid.dy and grid.depth[n] > -0.999 * grid.dy
+    return grid.clear[n] > 0.0 or (grid.room[n] > 0.0 and found)
+
+
+@qd.func
+def depth_beside(grid: CoarseGrid, n, gravity):
+    """Depth [m] of node `n`, or where a solid is in its way to the surface the mean of the nodes beside it.
+
+    Those lie across `gravity`, a vector of any length. Thin walls have other levels on their other sides.
+    """
+    total, number = 0.0, 0
+    if not is_told(grid, n) and grid.thin_s[n] <= 0.0:
+        for axis in qd.static(range(3)):
+            if (grid.nz > 1 or axis < 2) and qd.abs(gravity[axis]) <= 0.7 * gravity.norm():
+                for side in qd.static((-1, 1)):
+                    if nodes_beyond(grid, n, axis, side) > 0:
+                        m = beside_on(grid, n, axis, side)
+                        if is_told(grid, m) and shut_towards(grid, n, m, axis) == 0:
+                            total += grid.depth[m]
+                            number += 1
+    return total / number if number > 0 else grid.depth[n]
 
 
 @qd.func
