@@ -5,7 +5,7 @@ import pytest
 from test_ellipsoids import lattice
 from worlds import frame_of
 
-from wavetank import Box, Camera, Capsule, Scene, Sphere, Tank
+from wavetank import Box, Camera, Capsule, Scene, Simulation, Sphere, Tank
 from wavetank.device.compiler import download, qd, upload
 from wavetank.solids.distance import SolidSet
 from wavetank.view.lens import Lens, basis, lens_at, ray_direction, vec2, vec3, vec4, view_ray
@@ -254,3 +254,16 @@ def test_a_slanted_outline_in_the_water_has_no_teeth_where_there_are_many_sample
     off = place - np.polyval(np.polyfit(rows, place, 1), rows)
     assert np.ptp(place) > 15.0
     assert off.std() < 0.15, "0.58 with two kinds of pairs"
+
+
+def test_what_lies_beyond_the_ground_does_not_shine_through_it():
+    """No water is above where a ray would end beyond the ground: it left the water next to the ground, and passed it.
+
+    Dotted rings of sky lay over the deep end of the mountain lake.
+    """
+    frame = Simulation(Scene.load("mountain-lake").changed(spacing=0.04)).frame()
+    camera = Camera(eye=(1.95, 2.2, 1.45), target=(0.6, 0.35, -0.35))
+    image = Renderer(640, 360).render(frame, camera, view="water").astype(int).sum(axis=2)
+    deep = image[55:165, 95:280]
+    brighter = deep[3:-3] - np.maximum(deep[:-6], deep[6:])
+    assert (brighter > 60).sum() < 10, "174 before"
