@@ -5,7 +5,7 @@ import pytest
 from test_ellipsoids import lattice
 from worlds import frame_of
 
-from wavetank import Box, Camera, Scene, Sphere, Tank
+from wavetank import Box, Camera, Capsule, Scene, Simulation, Sphere, Tank
 from wavetank.device.compiler import download, qd, upload
 from wavetank.solids.distance import SolidSet
 from wavetank.view.lens import Lens, basis, lens_at, ray_direction, vec2, vec3, vec4, view_ray
@@ -238,3 +238,32 @@ def test_the_outline_of_a_solid_in_the_water_has_no_specks():
     ends = np.diff(np.pad(dark, ((0, 0), (1, 1))).astype(int), axis=1)
     assert dark[40].sum() > 40
     assert (ends > 0).sum(axis=1).max() == 1
+
+
+def test_a_slanted_outline_in_the_water_has_no_teeth_where_there_are_many_samples():
+    """Of two pixels that share a ray it is the left one's in one pair, the right one's in the next: teeth of four."""
+    rod = Capsule(start=(0.35, 0.05, 0.6), end=(0.55, 0.55, 0.6), radius=0.1, color="#200000")
+    camera = Camera(eye=(0.5, 0.32, 2.6), target=(0.5, 0.3, 0.5), field_of_view=0.4)
+    image = Renderer(*SIZE).render(filled(0.6, [rod]), camera, view="water", samples=16).astype(float)
+    top, bottom = (int(row) for row in camera.project([(0.5, 0.42, 1.0), (0.4, 0.16, 1.0)], *SIZE)[:, 1])
+    light = image[top:bottom, : SIZE[0] // 2].sum(axis=2)
+    rows, half = np.arange(bottom - top), 0.5 * (light.min(axis=1) + np.median(light[:, :50], axis=1))
+    first = (light < half[:, None]).argmax(axis=1)
+    before, after = light[rows, first - 1], light[rows, first]
+    place = first - (half - after) / (before - after)
+    off = place - np.polyval(np.polyfit(rows, place, 1), rows)
+    assert np.ptp(place) > 15.0
+    assert off.std() < 0.15, "0.58 with two kinds of pairs"
+
+
+def test_what_lies_beyond_the_ground_does_not_shine_through_it():
+    """No water is above where a ray would end beyond the ground: it left the water next to the ground, and passed it.
+
+    Dotted rings of sky lay over the deep end of the mountain lake.
+    """
+    frame = Simulation(Scene.load("mountain-lake").changed(spacing=0.04)).frame()
+    camera = Camera(eye=(1.95, 2.2, 1.45), target=(0.6, 0.35, -0.35))
+    image = Renderer(640, 360).render(frame, camera, view="water").astype(int).sum(axis=2)
+    deep = image[55:165, 95:280]
+    brighter = deep[3:-3] - np.maximum(deep[:-6], deep[6:])
+    assert (brighter > 60).sum() < 10, "174 before"

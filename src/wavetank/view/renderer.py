@@ -23,6 +23,7 @@ from wavetank.view.glare import add_glare, excess_of
 from wavetank.view.images import Images
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
 from wavetank.view.look import fluid_optics, usual_depth
+from wavetank.view.optics.between import GROUP
 from wavetank.view.optics.dyes import ICE, lay_ice
 from wavetank.view.passes import tonemap
 from wavetank.view.quantities import QUANTITIES, Coloring, usual
@@ -204,7 +205,7 @@ class Renderer:
         to_sun = vector(*(to_sun / np.linalg.norm(to_sun)))
         return dataclasses.replace(
             shot,
-            turn=number % 2,
+            turn=(number + number // 4) % GROUP,  # by no pattern that `across` has
             lens=dataclasses.replace(shot.lens, middle=shot.lens.middle + vector(across - 0.5, down - 0.5)),
             sun=_sun_lens(shot.extent, to_sun, self.buffers.texels),
             water_sun=_sun_lens(shot.extent, to_sun, sun_texels(shot.extent)),

@@ -32,7 +32,7 @@ class Shot:
     lit: int  # number of a solid that shines, -1 for none
     hasty: bool  # whether outlines stay rough
     shutter: float  # s: for which what moves is smeared
-    turn: int  # 1 in every second of many samples, where pixels that share what is behind them are other pairs
+    turn: int  # 0 to 3 in turns of many samples: by how many pixels the groups of those lie aside that share a ray
     plane: tuple[Any, float]  # of a cut: unit normal [3], and the distance [m] of the plane from the origin along it
 
     @property

@@ -230,13 +230,14 @@ def crossed_about(ahead, n, spread):
 
 
 @qd.func
-def within_water(sun: Lens, first: qd.template(), walls: Box, p, ahead, spacing):
-    """(outward normal, way [m]) of what a ray from a point in the water meets first: a wall, the floor, the surface."""
-    result = wall_ahead(walls, p, ahead)
-    s = result[3]
-    if about_depth(sun, first, walls, p + 0.999 * s * ahead, spacing) <= 0.0:
+def surface_before(sun: Lens, first: qd.template(), walls: Box, p, ahead, far, above, spacing):
+    """(normal out of the water, way [m]) of the surface, where a ray from a point in the water meets it before it has
+    come `far` [m]; where it does not that is its way. What it meets there may lie `above` [m] the surface.
+    """
+    result = vec4(0.0, 0.0, 0.0, far)
+    if about_depth(sun, first, walls, p + 0.999 * far * ahead, spacing) <= -above:
         # Three halvings, and between their ends as if the surface were straight.
-        low, over, deep = 0.0, 0.0, 0.0
+        low, over, deep, s = 0.0, 0.0, 0.0, far
         for _ in range(3):
             middle = 0.5 * (low + s)
             found = depth_at(sun, first, walls, p + middle * ahead, spacing)
@@ -292,10 +293,11 @@ def through_body(
         if done == 0:
             n, s = vec3(0.0, 1.0, 0.0), 1e3
             if piece == 0:
-                met = within_water(sun, first, inside.walls, p, ahead, optics.spacing)
+                met = wall_ahead(inside.walls, p, ahead)
                 n, s = vec3(met[0], met[1], met[2]), met[3]
             # What it shows: `usual`, or what the picture shows at a `place`, of a solid within `near` of it.
             shows, place, usual, near, cover = 0, p, vec3(0.0, 0.0, 0.0), 0.0, 0.0
+            hit, k = vec4(0.0, 0.0, 0.0, 0.0), 0
             if qd.static(solid):
                 if past == 0:
                     hit, k, found = solid_ahead(
@@ -305,6 +307,16 @@ def through_body(
                     cover = found
                     if share > 0.0:
                         cover = qd.select(cover > 0.5, 1.0, 0.0)
+            if piece == 0:
+                # A solid that rays meet is in the water unless it is clearly above: at a shore both are in one place.
+                far = qd.select(cover > 0.0, hit[3], s)
+                met = surface_before(
+                    sun, first, inside.walls, p, ahead, far, qd.select(cover > 0.0, optics.spacing, 0.0), optics.spacing
+                )
+                if met[3] < far:
+                    n, s, cover = vec3(met[0], met[1], met[2]), met[3], 0.0
+            if qd.static(solid):
+                if past == 0:
                     if cover > 0.0:
                         shows, place, near, s = 1, p + hit.w * ahead, 2.0 * optics.spacing, hit.w
                         # On it, not as far before it as it is met.
