@@ -27,7 +27,7 @@ def couple(level: CoarseGrid, least_theta: qd.f32):
     for n in range(level.nx * level.ny * level.nz):
         couplings.open_faces(level, n)
     for piece in range(level.pieces * level.ny * level.nz):
-        couplings.couple_nodes(level, piece, least_theta)
+        couplings.couple_nodes(level, piece, least_theta, 0)
 
 
 def filled(level, heights) -> None:

@@ -72,6 +72,17 @@ def test_a_full_tank_is_at_rest(size, solids):
     assert fastest(sim, 120, 90) < 0.03
 
 
+@pytest.mark.parametrize(
+    ("size", "depth"),
+    [((0.5, 0.5), 0.49), ((0.8, 0.513), 0.513), ((0.8, 0.513), 0.48), ((0.8, 0.52), 0.52), ((0.4, 0.5, 0.4), 0.49)],
+)
+def test_water_whose_surface_lies_just_below_the_lid_is_at_rest(size, depth):
+    """Its last cells are partly full and have no air above them: in a plane it was at 0.2 to 0.75 m/s for ever."""
+    block = wt.Block(lower=(0.0,) * len(size), upper=(size[0], depth, *size[2:]))
+    sim = wt.Simulation(wt.Scene(spacing=D, tank=wt.Tank(size=size), fluids=[block]))
+    assert fastest(sim, 90, 60) < 0.02
+
+
 def test_a_wall_of_planks_lets_nothing_through():
     """A partition of boards end to end: water on one side stands as high after a while, and nothing flows."""
     planks = [wt.Box(center=(0.6, 0.071 * (k + 0.5)), size=(0.08, 0.071)) for k in range(11)]

@@ -54,7 +54,7 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     taken,
     tents,
 )  # fmt: skip
-from wavetank.physics.grid_pressure.couplings import LEAST_THETA, couple_nodes
+from wavetank.physics.grid_pressure.couplings import LEAST_THETA, couple_nodes, has_lid
 from wavetank.physics.grid_pressure.films import left_to_grid
 from wavetank.physics.grid_pressure.gaps import across, gaps_at
 from wavetank.physics.grid_pressure.poisson import solve_levels
@@ -266,7 +266,7 @@ def gather(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.gaps[n] = grid.rhs[n]
-        grid.depth[n] = depth_at(grid, n)
+        grid.depth[n] = depth_at(grid, n, vec3(c.gravity_x, c.gravity_y, c.gravity_z))
         grid.slope_y[n] = inside_at(grid, n, e)
     if qd.static(searched):
         qd.loop_config(serialize=bool(few))
@@ -293,7 +293,7 @@ def gather(
         grid.rhs[n] *= left_to_grid(grid, n, e.thin, e.thick)
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
-        couple_nodes(grid, piece, e.least_theta)
+        couple_nodes(grid, piece, e.least_theta, has_lid(vec3(c.gravity_x, c.gravity_y, c.gravity_z)))
 
 
 def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
@@ -318,11 +318,12 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         finest, world.particles, world.scratch, cells, world.solids, world.walls, c,
         numbers, count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
     )  # fmt: skip
+    lid = int(-gravity[1] > 0.7 * math.hypot(*gravity))
     water = count * params.spacing**params.dim
     if world.basins > 1 or water > MOSTLY_FULL * world.open_nodes * finest.dx * finest.dy * finest.dz:
         nodes = finest.nx * finest.ny * finest.nz
-        balance(finest, LARGEST_SUM / nodes / numbers.per_way if numbers.per_way else 0.0)
-    solve_levels(world.levels)
+        balance(finest, LARGEST_SUM / nodes / numbers.per_way if numbers.per_way else 0.0, lid)
+    solve_levels(world.levels, lid)
     move_particles(
         finest, world.particles, world.scratch, cells, world.solids, c, push_of(params, stiffness, c.h), count, few,
         searched, kinds.mixed,

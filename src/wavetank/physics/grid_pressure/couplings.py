@@ -14,7 +14,7 @@ from one pressure, and a few sweeps did not part them again (docs/notebook/calm.
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.block import block_threads, wait_for_block
-from wavetank.physics.grid_pressure.coarse_grid import coordinates, nearest
+from wavetank.physics.grid_pressure.coarse_grid import coordinates, nearest, ramp
 from wavetank.physics.grid_pressure.thin_walls import is_shut
 from wavetank.solids.distance import vec3
 
@@ -61,10 +61,30 @@ def coupling(grid: CoarseGrid, n, m, share, edge, least_theta):
 
 
 @qd.func
-def couple_nodes(grid: CoarseGrid, piece, least_theta):
+def has_lid(gravity):
+    """Whether a tank is closed above its water, which falls along y: 1 or 0."""
+    return qd.cast(-gravity[1] > 0.7 * gravity.norm(), qd.i32)
+
+
+@qd.func
+def lid_open(grid: CoarseGrid, n, lid):
+    """Share of the face of node `n` to the `lid` of the tank that air lies at: 0 where there is none, or no air.
+
+    The surface may lie in the last cells below the lid, which have no air above them: there it is as far as these are
+    full, and the fuller they are the less sure it is that there is one. Those of a full tank are nearly full.
+    """
+    share = 0.0
+    if qd.static(not grid.repeats & 2):
+        if lid == 1 and n // grid.nx % grid.ny == grid.ny - 1 and n < grid.nx * grid.ny * grid.nz:
+            share = 1.0 - ramp(grid.fill[n], 0.8, 0.95)
+    return share
+
+
+@qd.func
+def couple_nodes(grid: CoarseGrid, piece, least_theta, lid):
     """Set the couplings of `width` nodes of a row with the next ones along x, y and z, and what inverts their equation.
 
-    The rim of the arrays, where there is no room, stands for what is beyond the tank.
+    The rim of the arrays, where there is no room, stands for what is beyond the tank, and for air where it has a `lid`.
     """
     first = piece % grid.pieces * grid.width
     row = piece // grid.pieces
@@ -87,7 +107,8 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta):
         n = begin + x
         before = qd.Vector([qd.select(x > 0, n - 1, under_x), before_y + x, before_z + x])
         wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, over_x), grid.open_x[n], grid.dx, least_theta)
-        wy = coupling(grid, n, after_y + x, grid.open_y[n], grid.dy, least_theta)
+        open_y = grid.open_y[n] + lid_open(grid, n, lid)
+        wy = coupling(grid, n, after_y + x, open_y, grid.dy, least_theta)
         wz = coupling(grid, n, after_z + x, grid.open_z[n], grid.dz, least_theta)
         diagonal = wx + wy + wz
         diagonal += coupling(grid, n, before.x, grid.open_x[before.x], grid.dx, least_theta)
@@ -165,18 +186,18 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
 
 
 @qd.kernel(fastcache=True)
-def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, shared: qd.template()):
+def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, lid: qd.i32, shared: qd.template()):
     """Set up the equation of a coarser level; `shared` by all threads, or done by one."""
     qd.loop_config(serialize=not shared)
     for n in range(coarse.nx * coarse.ny * coarse.nz):
         average_node(coarse, fine, n)
     qd.loop_config(serialize=not shared)
     for piece in range(coarse.pieces * coarse.ny * coarse.nz):
-        couple_nodes(coarse, piece, least_theta)
+        couple_nodes(coarse, piece, least_theta, lid)
 
 
 @qd.kernel(fastcache=True)
-def restrict_in_block(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, fenced: qd.template()):
+def restrict_in_block(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, lid: qd.i32, fenced: qd.template()):
     """Do what `restrict` does, in one launch of one block on a graphics processor."""
     qd.loop_config(block_dim=block_threads())
     for thread in range(block_threads()):
@@ -187,5 +208,5 @@ def restrict_in_block(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32,
         wait_for_block(fenced)
         piece = thread
         while piece < coarse.pieces * coarse.ny * coarse.nz:
-            couple_nodes(coarse, piece, least_theta)
+            couple_nodes(coarse, piece, least_theta, lid)
             piece += block_threads()

@@ -199,14 +199,17 @@ def coarsest_relaxation(level: CoarseGrid) -> tuple[int, float]:
     return min(sweeps, MOST_SWEEPS), over_relaxation
 
 
-def solve_levels(levels: list[CoarseGrid]) -> None:
-    """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set."""
+def solve_levels(levels: list[CoarseGrid], lid: int = 0) -> None:
+    """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set.
+
+    `lid` is 1 in a tank that is closed above its water, else 0.
+    """
     fenced = int(current_backend() != "cuda")
     for fine, coarse in itertools.pairwise(levels):
         if in_block(coarse):
-            restrict_in_block(coarse, fine, LEAST_THETA, fenced)
+            restrict_in_block(coarse, fine, LEAST_THETA, lid, fenced)
         else:
-            restrict(coarse, fine, LEAST_THETA, int(is_shared(coarse)))
+            restrict(coarse, fine, LEAST_THETA, lid, int(is_shared(coarse)))
     coarsest = coarser = levels[-1]
     for level in reversed(levels):
         start = FROM_COARSER

@@ -17,6 +17,7 @@ not linear set union algorithm", 10.1145/321879.321884).
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import beside_on
+from wavetank.physics.grid_pressure.couplings import lid_open
 
 MOSTLY_FULL = 0.7  # share of the room that water takes, below which there is air somewhere
 
@@ -98,18 +99,18 @@ def find_basins(grid: CoarseGrid, found: qd.types.ndarray()):
 
 
 @qd.kernel(fastcache=True)
-def balance(grid: CoarseGrid, per_error: qd.f32):
+def balance(grid: CoarseGrid, per_error: qd.f32, lid: qd.i32):
     """Take the mean of a basin without air from its right side, where it is positive.
 
     Sums are of whole multiples of the inverse of `per_error` [m^2], so that the order of threads does not matter. What
     a step finds anew serves as memory: `slope_y` says at the root of a basin whether there is air, `slope_z` counts its
-    nodes, both are found again by `move_particles`.
+    nodes, both are found again by `move_particles`. `lid` is 1 in a tank that is closed above its water.
     """
     for n in range(grid.nx * grid.ny * grid.nz):
         if grid.basin[n] == n:
             grid.slope_y[n], grid.slope_z[n] = 0.0, 0.0
     for n in range(grid.nx * grid.ny * grid.nz):
-        if grid.room[n] > 0.0 and grid.fill[n] <= 0.5:
+        if grid.room[n] > 0.0 and (grid.fill[n] <= 0.5 or lid_open(grid, n, lid) > 0.0):
             grid.slope_y[grid.basin[n]] = 1.0
     for n in range(grid.nx * grid.ny * grid.nz):
         root = grid.basin[n]

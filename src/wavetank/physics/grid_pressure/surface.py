@@ -27,6 +27,7 @@ which a hundredth of a spacing is enough. Water is level: those nodes are told b
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import beside_on, coordinates, corners, sizes, tents
+from wavetank.physics.grid_pressure.couplings import has_lid, lid_open
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3
 
@@ -42,17 +43,28 @@ def nodes_beyond(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
 
 
 @qd.func
-def way_to_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
-    """Cells from node `n`, in water, to the surface on a `side` along an `axis`; 0 if there is none within three."""
-    total, reached, m = grid.fill[n] - 0.5, 0, n
-    for _ in range(qd.min(nodes_beyond(grid, n, axis, side), 3)):
+def way_to_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template(), gravity):
+    """Cells from node `n`, in water, to the surface on a `side` along an `axis`; 0 if there is none within three.
+
+    The last cells below the lid of a tank have no air above them: there the surface is as far as these are full, and
+    the farther away the less sure that is. Those of a full tank are nearly full.
+    """
+    nodes = qd.min(nodes_beyond(grid, n, axis, side), 3)
+    total, reached, closed, m = grid.fill[n] - 0.5, 0, 0, n
+    for _ in range(nodes):
         before = m
         m = beside_on(grid, m, axis, side)
         if grid.room[m] <= 0.0 or shut_towards(grid, before, m, axis) == 1:
+            closed = 1
             break
         total += qd.min(grid.fill[m], 1.0)
         reached = 1 if grid.fill[m] < 0.5 else reached
-    return qd.max(total, 1e-3) if reached == 1 else 0.0
+    way = qd.max(total, 1e-3) if reached == 1 else 0.0
+    if qd.static(axis == 1 and side == 1):
+        sure = lid_open(grid, m, has_lid(gravity))
+        if reached + closed == 0 and nodes < 3 and sure > 0.0:
+            way = qd.max(total, 1e-3) / qd.sqrt(sure)
+    return way
 
 
 @qd.func
@@ -64,8 +76,11 @@ def depth_in_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
 
 
 @qd.func
-def depth_at(grid: CoarseGrid, n):
-    """Depth [m] of node `n` below the surface that the volume of the water has, at most three cells."""
+def depth_at(grid: CoarseGrid, n, gravity):
+    """Depth [m] of node `n` below the surface that the volume of the water has, at most three cells.
+
+    `gravity` is a vector of any length.
+    """
     edges = vec3(grid.dx, grid.dy, grid.dz)
     deepest = 3.0 * grid.dy
     closeness, depth = 0.0, -1.0  # sum of inverse squares of the ways [1/m^2]; cells
@@ -73,7 +88,7 @@ def depth_at(grid: CoarseGrid, n):
         if grid.nz > 1 or axis < 2:
             for side in qd.static((-1, 1)):
                 if grid.fill[n] >= 0.5:
-                    way = way_to_air(grid, n, axis, side) * edges[axis]
+                    way = way_to_air(grid, n, axis, side, gravity) * edges[axis]
                     closeness += 1.0 / (way * way) if way > 0.0 else 0.0
                 else:
                     depth = qd.max(depth, depth_in_air(grid, n, axis, side))
