@@ -89,10 +89,10 @@ def relax_nodes(grid: CoarseGrid, row, first, last, over_relaxation):
     y, z = row % grid.ny, row // grid.ny
     before_y = begin - grid.nx if y > 0 else rim
     before_z = begin - layer if row >= grid.ny else rim
-    after_y, after_z = begin + grid.nx, begin + layer
+    after_y, after_z = begin + grid.nx if y + 1 < grid.ny else rim, begin + layer
     if qd.static(grid.repeats & 2):
         before_y = before_y if y > 0 else begin + (grid.ny - 1) * grid.nx
-        after_y = after_y if y + 1 < grid.ny else begin - y * grid.nx
+        after_y = begin + grid.nx if y + 1 < grid.ny else begin - y * grid.nx
     if qd.static(grid.repeats & 4):
         before_z = before_z if z > 0 else begin + (grid.nz - 1) * layer
         after_z = after_z if z + 1 < grid.nz else begin - z * layer

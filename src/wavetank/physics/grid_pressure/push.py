@@ -14,7 +14,7 @@ from wavetank.physics.boundary import fall, flattened, kept_in_tank
 from wavetank.physics.grid_pressure.coarse_grid import beside_on, corners, in_cells, nearest, ramp, tents
 from wavetank.physics.grid_pressure.couplings import open_area
 from wavetank.physics.grid_pressure.own_weight import FOREIGN, own_push
-from wavetank.physics.grid_pressure.surface import carried_share
+from wavetank.physics.grid_pressure.surface import carried_share, nodes_beyond
 from wavetank.physics.grid_pressure.weight import BORNE
 from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predict_at, predicted
@@ -87,7 +87,8 @@ def move_particles(
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.slope_x[n] = slope_across(grid, grid.wx[n], grid.dx, n, beside_on(grid, n, 0, 1))
-        grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, beside_on(grid, n, 1, 1))
+        above = beside_on(grid, n, 1, 1) if nodes_beyond(grid, n, 1, 1) > 0 else grid.nx * grid.ny * grid.nz
+        grid.slope_y[n] = slope_across(grid, grid.wy[n], grid.dy, n, above)  # air below a lid is the rim of the arrays
         grid.slope_z[n] = slope_across(grid, grid.wz[n], grid.dz, n, beside_on(grid, n, 2, 1))
     for turn in range(turns(cells, count)):
         at_rest = -fall(c) / push.stiffness

@@ -103,24 +103,27 @@ def balance(grid: CoarseGrid, per_error: qd.f32, lid: qd.i32):
     """Take the mean of a basin without air from its right side, where it is positive.
 
     Sums are of whole multiples of the inverse of `per_error` [m^2], so that the order of threads does not matter. What
-    a step finds anew serves as memory: `slope_y` says at the root of a basin whether there is air, `slope_z` counts its
-    nodes, both are found again by `move_particles`. `lid` is 1 in a tank that is closed above its water.
+    a step finds anew serves as memory, until `move_particles`: `slope_y` says at the root of a basin how surely there
+    is air, `slope_z` counts its nodes. `lid` is 1 in a tank that is closed above its water.
     """
     for n in range(grid.nx * grid.ny * grid.nz):
         if grid.basin[n] == n:
             grid.slope_y[n], grid.slope_z[n] = 0.0, 0.0
     for n in range(grid.nx * grid.ny * grid.nz):
-        if grid.room[n] > 0.0 and (grid.fill[n] <= 0.5 or lid_open(grid, n, lid) > 0.0):
-            grid.slope_y[grid.basin[n]] = 1.0
+        if grid.room[n] > 0.0:
+            air = 1.0 if grid.fill[n] <= 0.5 else lid_open(grid, n, lid)
+            if air > 0.0 and grid.slope_y[grid.basin[n]] < air:
+                qd.atomic_max(grid.slope_y[grid.basin[n]], air)
     for n in range(grid.nx * grid.ny * grid.nz):
         root = grid.basin[n]
-        if grid.inverse[n] > 0.0 and grid.slope_y[root] == 0.0:
+        if grid.inverse[n] > 0.0 and grid.slope_y[root] < 1.0:
             qd.atomic_add(grid.sums[root], qd.cast(qd.round(per_error * grid.rhs[n]), qd.i32))
             qd.atomic_add(grid.slope_z[root], 1.0)
     for n in range(grid.nx * grid.ny * grid.nz):
         root = grid.basin[n]
-        if grid.inverse[n] > 0.0 and grid.slope_y[root] == 0.0:
-            grid.rhs[n] -= qd.max(grid.sums[root], 0) / (per_error * grid.slope_z[root])
+        if grid.inverse[n] > 0.0 and grid.slope_y[root] < 1.0:
+            mean = qd.max(grid.sums[root], 0) / (per_error * grid.slope_z[root])
+            grid.rhs[n] -= (1.0 - grid.slope_y[root]) * mean
     for n in range(grid.nx * grid.ny * grid.nz):
         if grid.basin[n] == n:
             grid.sums[n] = 0
