@@ -108,3 +108,16 @@ def test_no_water_begins_in_a_seam():
         np.min(0.5 * np.array(board.size) - np.abs(sim.positions - np.array(board.center)), axis=1) for board in cup
     ]
     assert np.max(inside) < 0.0
+
+
+@pytest.mark.parametrize("thick", [0.05, 0.08])
+def test_a_closed_bottle_full_of_water_stands_on_the_ground_of_a_pool(thick):
+    """Archimedes: it is heavier than water. Its water had any pressure, and it was thrown about at 4 m/s."""
+    pytest.importorskip("rapier3d")
+    bottle = wt.Union(
+        name="bottle", center=(0.6, 0.15 + thick), parts=boards((0.0, 0.0), (0.4, 0.3), thick), density=1500
+    )
+    block = wt.Block(lower=(0.0, 0.0), upper=(1.2, 0.6))
+    sim = wt.Simulation(wt.Scene(spacing=D, tank=wt.Tank(size=(1.2, 0.9)), fluids=[block], solids=[bottle]))
+    assert fastest(sim, 150, 60) < 0.3
+    np.testing.assert_allclose(sim.bodies["bottle"].position[:2], (0.6, 0.15 + thick), atol=0.25 * D)

@@ -60,7 +60,7 @@ from wavetank.physics.grid_pressure.gaps import across, gaps_at
 from wavetank.physics.grid_pressure.poisson import solve_levels
 from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, open_tents, spread_along
-from wavetank.physics.grid_pressure.sealed import MOSTLY_FULL, balance, find_basins
+from wavetank.physics.grid_pressure.sealed import MOSTLY_FULL, anchor, balance, find_basins
 from wavetank.physics.grid_pressure.slits import below_roof, close_slit, in_part, mostly, openness
 from wavetank.physics.grid_pressure.surface import depth_at, depth_beside
 from wavetank.physics.grid_pressure.weight import BORNE, flow_out
@@ -320,10 +320,13 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     )  # fmt: skip
     lid = int(-gravity[1] > 0.7 * math.hypot(*gravity))
     water = count * params.spacing**params.dim
-    if world.basins > 1 or water > MOSTLY_FULL * world.open_nodes * finest.dx * finest.dy * finest.dz:
+    may_be_sealed = world.basins > 1 or water > MOSTLY_FULL * world.open_nodes * finest.dx * finest.dy * finest.dz
+    if may_be_sealed:
         nodes = finest.nx * finest.ny * finest.nz
         balance(finest, LARGEST_SUM / nodes / numbers.per_way if numbers.per_way else 0.0, lid)
     solve_levels(world.levels, lid)
+    if may_be_sealed:
+        anchor(finest)
     move_particles(
         finest, world.particles, world.scratch, cells, world.solids, c, push_of(params, stiffness, c.h), count, few,
         searched, kinds.mixed,

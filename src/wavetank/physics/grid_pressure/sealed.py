@@ -4,7 +4,8 @@ Its pressure has no level: the equation there has a solution only if what flows 
 taken together. Where they are not 0 but positive, as for the layers beside walls, sweeps raise the pressure for ever,
 the two colours of nodes by turns, and each step was left with a pattern of stripes; coarser levels handed it on to the
 water behind the wall. So the mean of such a basin is taken from its errors. Where it is negative there is room that
-lacks water, lambda <= 0 leaves it at the top, and all is well.
+lacks water, lambda <= 0 leaves it at the top, and all is well. The pressure that is found has any level, and is moved
+to the least that it can have.
 
 A basin is room that is connected through open faces. Basins are found by joining rows in a forest, each with the lowest
 number of its nodes as its root: that does not depend on the order of threads (Tarjan 1975, "Efficiency of a good but
@@ -127,3 +128,23 @@ def balance(grid: CoarseGrid, per_error: qd.f32, lid: qd.i32):
     for n in range(grid.nx * grid.ny * grid.nz):
         if grid.basin[n] == n:
             grid.sums[n] = 0
+
+
+@qd.kernel(fastcache=True)
+def anchor(grid: CoarseGrid):
+    """Give a basin without air the least pressure that it can have: 0 where it is least.
+
+    Any other fulfils the equation as well, and what sweeps end at is by chance. A closed body that holds such water
+    feels its pressure on all sides, and the more there is of it the more is left of the sum: a bottle was thrown.
+    """
+    for n in range(grid.nx * grid.ny * grid.nz):
+        if grid.basin[n] == n:
+            grid.slope_z[n] = -1e30
+    for n in range(grid.nx * grid.ny * grid.nz):
+        root = grid.basin[n]
+        if grid.inverse[n] > 0.0 and grid.slope_y[root] < 1.0:
+            qd.atomic_max(grid.slope_z[root], grid.lam[n])
+    for n in range(grid.nx * grid.ny * grid.nz):
+        root = grid.basin[n]
+        if grid.inverse[n] > 0.0 and grid.slope_y[root] < 1.0:
+            grid.lam[n] = qd.min(grid.lam[n] - (1.0 - grid.slope_y[root]) * grid.slope_z[root], 0.0)
