@@ -308,11 +308,14 @@ def through_body(
                     if share > 0.0:
                         cover = qd.select(cover > 0.5, 1.0, 0.0)
             if piece == 0:
-                # A solid that rays meet is in the water unless it is clearly above: at a shore both are in one place.
-                far = qd.select(cover > 0.0, hit[3], s)
-                met = surface_before(
-                    sun, first, inside.walls, p, ahead, far, qd.select(cover > 0.0, optics.spacing, 0.0), optics.spacing
-                )
+                # The surface before a solid is one that is on the way to the wall and to the solid: the way ends in the
+                # ground beside a lake, and above a solid that sticks out there is no water, either. At a shore both
+                # are in one place, and the solid is met unless it is clearly above.
+                far, met = qd.select(cover > 0.0, hit[3], s), vec4(0.0, 0.0, 0.0, s)
+                for search in range(2):
+                    if search == 0 or (cover > 0.0 and met[3] < far):
+                        end, above = qd.select(search == 0, s, far), qd.select(search == 0, 0.0, optics.spacing)
+                        met = surface_before(sun, first, inside.walls, p, ahead, end, above, optics.spacing)
                 if met[3] < far:
                     n, s, cover = vec3(met[0], met[1], met[2]), met[3], 0.0
             if qd.static(solid):
