@@ -113,8 +113,13 @@ def balance(grid: CoarseGrid, per_error: qd.f32, lid: qd.i32):
     for n in range(grid.nx * grid.ny * grid.nz):
         if grid.room[n] > 0.0:
             air = 1.0 if grid.fill[n] <= 0.5 else lid_open(grid, n, lid)
-            if air > 0.0 and grid.slope_y[grid.basin[n]] < air:
-                qd.atomic_max(grid.slope_y[grid.basin[n]], air)
+            amount = qd.cast(1024.0 * air, qd.i32)
+            if amount > grid.sums[grid.basin[n]]:
+                qd.atomic_max(grid.sums[grid.basin[n]], amount)
+    for n in range(grid.nx * grid.ny * grid.nz):
+        if grid.basin[n] == n:
+            grid.slope_y[n] = grid.sums[n] / 1024.0
+            grid.sums[n] = 0
     for n in range(grid.nx * grid.ny * grid.nz):
         root = grid.basin[n]
         if grid.inverse[n] > 0.0 and grid.slope_y[root] < 1.0:
@@ -139,12 +144,16 @@ def anchor(grid: CoarseGrid):
     """
     for n in range(grid.nx * grid.ny * grid.nz):
         if grid.basin[n] == n:
-            grid.slope_z[n] = -1e30
+            grid.sums[n] = -(1 << 30)
     for n in range(grid.nx * grid.ny * grid.nz):
         root = grid.basin[n]
         if grid.inverse[n] > 0.0 and grid.slope_y[root] < 1.0:
-            qd.atomic_max(grid.slope_z[root], grid.lam[n])
+            qd.atomic_max(grid.sums[root], -qd.bit_cast(qd.abs(grid.lam[n]), qd.i32))  # such bits are in order
     for n in range(grid.nx * grid.ny * grid.nz):
         root = grid.basin[n]
         if grid.inverse[n] > 0.0 and grid.slope_y[root] < 1.0:
-            grid.lam[n] = qd.min(grid.lam[n] - (1.0 - grid.slope_y[root]) * grid.slope_z[root], 0.0)
+            least = -qd.bit_cast(-grid.sums[root], qd.f32)
+            grid.lam[n] = qd.min(grid.lam[n] - (1.0 - grid.slope_y[root]) * least, 0.0)
+    for n in range(grid.nx * grid.ny * grid.nz):
+        if grid.basin[n] == n:
+            grid.sums[n] = 0
