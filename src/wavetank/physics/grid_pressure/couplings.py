@@ -128,15 +128,20 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta, lid):
 
 
 @qd.func
-def open_towards(grid: CoarseGrid, c, m, axis: qd.template(), ahead):
-    """Share that is open of the face from the node `c` to the next one along an axis, or if not `ahead` from `m`."""
-    n = qd.select(ahead == 1, c[0] + grid.nx * (c[1] + grid.ny * c[2]), m)
+def open_ahead(grid: CoarseGrid, n, axis: qd.template()):
+    """Share that is open of the face from node `n` to the next one along an axis."""
     share = grid.open_z[n]
     if qd.static(axis == 0):
         share = grid.open_x[n]
     elif qd.static(axis == 1):
         share = grid.open_y[n]
     return share
+
+
+@qd.func
+def open_towards(grid: CoarseGrid, c, m, axis: qd.template(), ahead):
+    """The same from the node `c`, or if the next one is not `ahead` but behind from that, which is `m`."""
+    return open_ahead(grid, qd.select(ahead == 1, c[0] + grid.nx * (c[1] + grid.ny * c[2]), m), axis)
 
 
 @qd.func
@@ -151,7 +156,7 @@ def open_through(fine: CoarseGrid, c, ratio, axis: qd.template()):
         way = qd.Vector([k % ratio[0], k // ratio[0] % ratio[1], k // (ratio[0] * ratio[1])])
         place = c * ratio + way
         n = place[0] + fine.nx * (place[1] + fine.ny * place[2])
-        share = qd.Vector([fine.open_x[n], fine.open_y[n], fine.open_z[n]])[axis]
+        share = open_ahead(fine, n, axis)
         after = place
         after[axis] += 1
         if way[axis] == ratio[axis] - 1:

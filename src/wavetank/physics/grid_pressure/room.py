@@ -83,7 +83,7 @@ def nearest_wall(grid: CoarseGrid, solids: SolidSet, around: qd.template(), n):
         if looks == 0:
             wall, outward = value, vec3(value.x, value.y, value.z)
             surface = center - outward * value.w
-            parts = solids.first[k + 1] - solids.first[k] if k >= 0 else 0
+            parts = solids.first[qd.max(k, 0) + 1] - solids.first[qd.max(k, 0)]  # none is near if k < 0: far away
             at = surface + outward * (2.0 * seam().x * edge)
             if qd.abs(value.w) >= edge or qd.max(parts, around[0]) < 2:
                 looks = 3

@@ -18,7 +18,7 @@ not linear set union algorithm", 10.1145/321879.321884).
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import beside_on
-from wavetank.physics.grid_pressure.couplings import lid_open
+from wavetank.physics.grid_pressure.couplings import lid_open, open_ahead
 
 MOSTLY_FULL = 0.7  # share of the room that water takes, below which there is air somewhere
 
@@ -67,20 +67,14 @@ def join_ahead(grid: CoarseGrid, n):
     follows = x > 0
     if follows:
         follows = grid.open_x[n - 1] > 0.0
-    if grid.open_y[n] > 0.0:
-        m = beside_on(grid, n, 1, 1)
-        joined = follows
-        if follows:
-            joined = qd.min(grid.open_x[m - 1], grid.open_y[n - 1]) > 0.0
-        if not joined:
-            join(grid, n, m)
-    if grid.open_z[n] > 0.0:
-        m = beside_on(grid, n, 2, 1)
-        joined = follows
-        if follows:
-            joined = qd.min(grid.open_x[m - 1], grid.open_z[n - 1]) > 0.0
-        if not joined:
-            join(grid, n, m)
+    for axis in qd.static((1, 2)):
+        if open_ahead(grid, n, axis) > 0.0:
+            m = beside_on(grid, n, axis, 1)
+            joined = follows
+            if follows:
+                joined = qd.min(grid.open_x[m - 1], open_ahead(grid, n - 1, axis)) > 0.0
+            if not joined:
+                join(grid, n, m)
 
 
 @qd.kernel(fastcache=True)

@@ -61,9 +61,10 @@ def way_to_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template(), gr
         reached = 1 if grid.fill[m] < 0.5 else reached
     way = qd.max(total, 1e-3) if reached == 1 else 0.0
     if qd.static(axis == 1 and side == 1):
-        sure = lid_open(grid, m, has_lid(gravity))
-        if reached + closed == 0 and nodes < 3 and sure > 0.0:
-            way = qd.max(total, 1e-3) / qd.sqrt(sure)
+        if reached + closed == 0 and nodes < 3:
+            sure = lid_open(grid, m, has_lid(gravity))
+            if sure > 0.0:
+                way = qd.max(total, 1e-3) / qd.sqrt(sure)
     return way
 
 
