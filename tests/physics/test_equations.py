@@ -20,8 +20,8 @@ def solve(cloud: Cloud) -> None:
         world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, cloud.method, 0,
     )  # fmt: skip
     correct_positions(
-        world.spare, world.particles, world.scratch, world.grid, world.solids, world.walls, cloud.c, count,
-        cloud.method, int(cloud.scene.tensile_strength > 0), 0, 0,
+        world.spare, world.particles, world.scratch, world.scratch.dlam, world.grid, world.solids, world.walls, cloud.c,
+        count, cloud.method, int(cloud.scene.tensile_strength > 0), 0,
     )  # fmt: skip
 
 

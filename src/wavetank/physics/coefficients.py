@@ -103,9 +103,9 @@ def before_fall(c: Coefficients) -> Coefficients:
     return dataclasses.replace(c, fallen=(1.0 - c.carried) * c.dt**2)
 
 
-def correction_number(params: Parameters) -> int:
-    """Return the place of the correction in `density_constraint.CORRECTIONS`."""
-    return 0 if params.tensile_strength == 0.0 else 2 if params.tensile_exponent == 4.0 else 1
+def correction_number(params: Parameters, mixed: int) -> int:
+    """Return the place of the correction in `density_constraint.CORRECTIONS`, of fluids that are `mixed` if 1."""
+    return 3 * mixed + (0 if params.tensile_strength == 0.0 else 2 if params.tensile_exponent == 4.0 else 1)
 
 
 def method_number(params: Parameters) -> int:

@@ -66,19 +66,44 @@ def add_correction(sums: qd.template(), r, square, a, b, c: Coefficients, method
 
 
 @qd.func
+def artificial_pressure(w, c: Coefficients, quartic: qd.template()):
+    """Return what a pair's kernel `w` adds to its multipliers [m^2] (Eq. 7); `quartic` has the exponent 4, no power."""
+    share = (w * w) * (w * w)
+    if qd.static(not quartic):
+        share = w**c.tensile_exponent
+    return -c.tensile * share
+
+
+@qd.func
 def add_tensile_correction(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to the correction of particle i: Eq. 8, Eq. 6 with the artificial pressure of Eq. 7."""
     w = kernel(method, square * c.inverse_h2)
-    s_corr = -c.tensile * w[0] ** c.tensile_exponent  # Eq. 7
-    sums += r * ((a[0] + b[0] + s_corr) * c.gradient_scale * w[1])
+    sums += r * ((a[0] + b[0] + artificial_pressure(w[0], c, False)) * c.gradient_scale * w[1])
 
 
 @qd.func
 def add_quartic_correction(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
-    """`add_tensile_correction` with the exponent 4, without a power."""
+    """`add_tensile_correction` with the exponent 4."""
     w = kernel(method, square * c.inverse_h2)
-    square_of_w = w[0] * w[0]
-    s_corr = -c.tensile * square_of_w * square_of_w  # Eq. 7
+    sums += r * ((a[0] + b[0] + artificial_pressure(w[0], c, True)) * c.gradient_scale * w[1])
+
+
+@qd.func
+def add_mixed_tensile_correction(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
+    """`add_tensile_correction` for fluids of different density: behind the multipliers are the inverse masses.
+
+    The lighter of the two is moved as far as it would be among its like.
+    """
+    w = kernel(method, square * c.inverse_h2)
+    s_corr = artificial_pressure(w[0], c, False) / qd.max(a[1], b[1])
+    sums += r * ((a[0] + b[0] + s_corr) * c.gradient_scale * w[1])
+
+
+@qd.func
+def add_mixed_quartic_correction(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
+    """`add_mixed_tensile_correction` with the exponent 4."""
+    w = kernel(method, square * c.inverse_h2)
+    s_corr = artificial_pressure(w[0], c, True) / qd.max(a[1], b[1])
     sums += r * ((a[0] + b[0] + s_corr) * c.gradient_scale * w[1])
 
 
@@ -96,8 +121,15 @@ def add_weighted_density(sums: qd.template(), r, square, a, b, c: Coefficients, 
 
 #: By `mixed`; append only, as `smoothing.KERNELS`.
 DENSITIES = (add_density, add_weighted_density)
-#: Append only, as `smoothing.KERNELS`.
-CORRECTIONS = (add_correction, add_tensile_correction, add_quartic_correction)
+#: Those of one fluid and, from 3 on, of fluids of different density. Append only, as `smoothing.KERNELS`.
+CORRECTIONS = (
+    add_correction,
+    add_tensile_correction,
+    add_quartic_correction,
+    add_correction,
+    add_mixed_tensile_correction,
+    add_mixed_quartic_correction,
+)
 
 
 @qd.func
@@ -167,18 +199,19 @@ def solve_multipliers(
 
 @qd.kernel(fastcache=True)
 def correct_positions(
-    corrected: Particles, particles: Particles, scratch: Scratch, grid: Grid, solids: SolidSet, walls: Walls,
-    c: Coefficients, count: qd.i32, method: qd.template(), correction: qd.template(), mixed: qd.template(),
+    corrected: Particles, particles: Particles, scratch: Scratch, changes: qd.types.ndarray(), grid: Grid,
+    solids: SolidSet, walls: Walls, c: Coefficients, count: qd.i32, method: qd.template(), correction: qd.template(),
     searched: qd.template(),
 ):  # fmt: skip
     """Move the predicted positions by the corrections (Eq. 6 or 8, by its number in CORRECTIONS), inside the tank.
 
-    Where solids are `searched` they stay out of those as well; with 2, bodies feel it.
+    `changes` are those of the multipliers, `scratch.dlam`, with inverse masses behind where the correction asks for
+    them. Where solids are `searched` they stay out of those as well; with 2, bodies feel it.
     """
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
             sums = qd.Matrix.zero(qd.f32, particles.x[team].n, grid.lanes)
-            add_neighbors(sums, qd.static(CORRECTIONS[correction]), team, particles, scratch.dlam, grid, c, method)
+            add_neighbors(sums, qd.static(CORRECTIONS[correction]), team, particles, changes, grid, c, method)
             for i in range(team * grid.lanes, end_of(team, grid, count)):
                 p = predicted(particles, i)
                 dp = column(sums, i - team * grid.lanes)
@@ -186,7 +219,7 @@ def correct_positions(
                 if near != 0:
                     for k in qd.static(range(p.n)):
                         dp[k] += scratch.dlam[i] * scratch.wall[i][k]
-                if qd.static(mixed):
+                if qd.static(correction > 2):
                     dp *= scratch.weight[i]
                 # Within one substep a particle must not run past the solids that were marked for it.
                 most = c.largest_correction

@@ -8,6 +8,7 @@ volumes it is. Only ratios of masses matter: where all fluids are equally dense 
     code       symbol               meaning                                        unit
     weight     w_i = m_max / m_i    inverse mass, 1 for the heaviest               1
     packed                          velocity and, behind it, one property          m/s, -
+            lambda_i, w_i           or change of the multiplier and inverse mass   m^2, 1
 
 Where we differ: the multipliers are those of mass-weighted position-based dynamics,
 lambda_i = -C_i / sum_k w_k |grad_k C_i|^2, and not an equation of state. The Jacobi matrix of the constraint keeps its
@@ -84,3 +85,12 @@ def weigh(scratch: Scratch, particles: Particles, rows: qd.types.ndarray(), coun
     """Write the inverse mass of every particle."""
     for i in range(count):
         scratch.weight[i] = rows[particles.material[i]][0]
+
+
+@qd.kernel(fastcache=True)
+def pack_multipliers(packed: qd.types.ndarray(), scratch: Scratch, count: qd.i32):
+    """Put the changes of multipliers and inverse masses side by side."""
+    for i in range(count):
+        row = packed[i]
+        row[0], row[1] = scratch.dlam[i], scratch.weight[i]
+        packed[i] = row

@@ -52,7 +52,7 @@ class Plan:
 def plan_step(world: World, params: Parameters, dt: float) -> Plan:
     """Plan a step of `dt` [s]."""
     kinds, on_grid = blend(world.materials, params), has_grid_pressure(world, params)
-    thick, correction = carries_on(world, kinds, params), correction_number(params)
+    thick, correction = carries_on(world, kinds, params), correction_number(params, kinds.mixed)
     share = thick_share(kinds, params) if thick else 0.0
     stirred = thick and world.solid_speed * dt > STIRRED * params.spacing
     return Plan(
@@ -61,7 +61,7 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         searched=world.searched,
         correction=correction,
         # Beside the grid, which carries the water, all of it comes at once: it keeps packings even, and costs a fifth.
-        later_correction=0 if on_grid else correction,
+        later_correction=3 * kinds.mixed if on_grid else correction,
         parts=1 if on_grid else params.iterations,
         turning=int(params.vorticity > 0.0),
         is_tense=kinds.surface_tension > 0.0,

@@ -23,6 +23,7 @@ from wavetank.physics.dynamic_viscosity.implicit_viscosity import carry_on, solv
 from wavetank.physics.friction import apply_friction
 from wavetank.physics.grid_pressure.correction import correct_pressure
 from wavetank.physics.integrate import bring_within, predict, update_velocities
+from wavetank.physics.mixture import pack_multipliers
 from wavetank.physics.near_solids import FARTHEST, hand_over_pushes, look_again, look_at_solids
 from wavetank.physics.neighbors import find_neighbors, sort_particles
 from wavetank.physics.plan import Plan, plan_step
@@ -134,9 +135,14 @@ def find_multipliers(world: World, plan: Plan, c: Coefficients, *, first: bool) 
 
 def apply_corrections(world: World, plan: Plan, c: Coefficients, *, first: bool) -> None:
     """Move the predicted positions by what the multipliers say, outside of solids; ice stays."""
+    correction = plan.correction if first else plan.later_correction
+    changes = world.scratch.dlam
+    if correction > 3:  # of fluids of different density, with artificial pressure
+        changes = world.fluids.array("packed")
+        pack_multipliers(changes, world.scratch, world.count)
     correct_positions(
-        world.spare, world.particles, world.scratch, world.grid, world.solids, world.walls, c, world.count,
-        plan.method, plan.correction if first else plan.later_correction, plan.kinds.mixed, plan.searched,
+        world.spare, world.particles, world.scratch, changes, world.grid, world.solids, world.walls, c, world.count,
+        plan.method, correction, plan.searched,
     )  # fmt: skip
     world.exchange("px", "py", "pz")
     if world.frozen:

@@ -62,7 +62,8 @@ def add_mixed_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, method
     dv = 0.0 * r
     for k in qd.static(range(r.n)):
         dv[k] = b[k] - a[k]
-    share = share_of_pair(dv, c) * kernel(method, square * c.inverse_h2)[0] * qd.min(1.0, a[3] / b[3])
+    slow = dv / qd.sqrt(qd.max(a[3], b[3]))  # as fast as the heaviest fluid would be with that energy
+    share = share_of_pair(slow, c) * kernel(method, square * c.inverse_h2)[0] * qd.min(1.0, a[3] / b[3])
     for k in qd.static(range(r.n)):
         sums[k] += dv[k] * share
 
