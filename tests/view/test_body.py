@@ -11,6 +11,8 @@ from wavetank.solids.distance import SolidSet
 from wavetank.view.lens import Lens, basis, lens_at, ray_direction, vec2, vec3, vec4, view_ray
 from wavetank.view.optics.body import crossed_about, solid_ahead
 from wavetank.view.optics.normals import normal_of, rise_at
+from wavetank.view.optics.rays import OPEN, box
+from wavetank.view.optics.rays import Box as Walls
 from wavetank.view.passes.water import unevenness
 from wavetank.view.renderer import Renderer
 
@@ -166,22 +168,22 @@ def test_broken_water_lets_nothing_out_straight_up_that_it_should_mirror():
 
 
 @qd.kernel
-def rough_of(found: qd.types.ndarray(), depth: qd.types.ndarray(), lens: Lens, spacing: qd.f32):
+def rough_of(found: qd.types.ndarray(), depth: qd.types.ndarray(), lens: Lens, walls: Walls, spacing: qd.f32):
     for row, column in qd.ndrange((40, 41), (40, 41)):
         z = qd.bit_cast(depth[row, column], qd.f32)
         n = normal_of(lens, row, column, z, rise_at(row, column, z, 3.0 * spacing, depth))
         direction = ray_direction(lens, view_ray(lens, row, column))
-        found[0] = unevenness(lens, row, column, z, n, direction, spacing, depth)
+        found[0] = unevenness(lens, walls, row, column, z, n, direction, spacing, depth)
 
 
-def uneven(depth_of):
+def uneven(depth_of, walls=OPEN):
     """`unevenness` in the middle of a map of 81 x 81 pixels of 0.05 spacings, by a function of u and v [m]."""
     lens = lens_at(np.zeros(3), basis(np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])), 81, 81, 400.0,
                    perspective=False, near=0.0)  # fmt: skip
     u, v = np.meshgrid((np.arange(81) - 40) / 400.0, (40 - np.arange(81)) / 400.0)
     depth, found = qd.ndarray(qd.i32, shape=(81, 81)), qd.ndarray(qd.f32, shape=(1,))
     upload(depth, np.asarray(depth_of(u, v), np.float32).view(np.int32))
-    rough_of(found, depth, lens, D)
+    rough_of(found, depth, lens, walls, D)
     return float(download(found)[0])
 
 
@@ -196,6 +198,17 @@ def test_a_plane_is_even_and_a_ball_as_uneven_as_it_is_round():
     # Where the surface ends on one side the other counts, and where it does on both it is broken.
     assert uneven(lambda u, v: np.where(u > 0.02, 1e38, ball(u, v))) == pytest.approx(uneven(ball), rel=0.1)
     assert uneven(lambda u, v: np.where(abs(u) > 0.02, 1e38, ball(u, v))) > np.sqrt(1.0 / 12.0)
+
+
+def test_a_plane_is_even_beside_the_edge_of_its_tank_whatever_lies_beyond():
+    """The map goes on behind the panes, and bends there; in a corner nothing is known of either axis."""
+
+    def bent_beyond(u, v):
+        return 2.0 + 30.0 * np.maximum(u - 0.01, 0.0) ** 2 + 30.0 * np.maximum(v - 0.01, 0.0) ** 2
+
+    assert uneven(bent_beyond) > 0.05
+    assert uneven(bent_beyond, box((-1.0, -1.0, -3.0), (0.012, 0.012, 0.0))) < 1e-3
+    assert uneven(bent_beyond, box((-0.02, -0.02, -3.0), (0.012, 0.012, 0.0))) < 1e-3
 
 
 @qd.kernel

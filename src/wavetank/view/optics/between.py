@@ -30,13 +30,13 @@ def alike(seen, above, place, other_seen, other_above, other_place, apart):
     """Whether what two rays show has what is between them in between.
 
     So it is where neither has met a body, where they show places of one kind that are less than `apart` [px], or nearly
-    the same light.
+    the same light and not two places of different kinds: at their border pixels would show one and the other by turns.
     """
     result = seen[3] < 0.0 and other_seen[3] < 0.0
     if seen[3] >= 0.0 and other_seen[3] >= 0.0:
         off = qd.max(qd.abs(place[0] - other_place[0]), qd.abs(place[1] - other_place[1]))
         result = place[2] > 0.0 and place[2] == other_place[2] and off < apart
-        if not result:
+        if not result and qd.min(place[2], other_place[2]) <= 0.0:
             away = qd.abs(other_seen - seen)
             result = qd.max(away[0], away[1], away[2]) < 0.05
     step = qd.abs(other_above - above)

@@ -257,7 +257,7 @@ def surface_before(sun: Lens, first: qd.template(), walls: Box, p, ahead, far, a
 @qd.func
 def through_body(
     depth: qd.template(), picture: qd.template(), first: qd.template(), lens: Lens, sun: Lens, look: Look,
-    optics: Optics, inside: Inside, z, at, bent, mirrored, whole, uneven, solid: qd.template(),
+    optics: Optics, inside: Inside, at, bent, mirrored, whole, uneven, solid: qd.template(),
 ):  # fmt: skip
     """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, and
     (radiance, share) of the solid that the ray which is `mirrored` there meets, and (column, row, kind) of the place
@@ -360,7 +360,7 @@ def through_body(
             if ends == 1:
                 there = vec3(0.0, 0.0, 0.0)
                 if shows == 1:
-                    usual, there = seen_at(depth, picture, lens, z, place, usual, near, solid)
+                    usual, there = seen_at(depth, picture, lens, place, usual, near, solid)
                 way = total + qd.select(cover > 0.0 and piece == 0, s, 0.0)
                 if piece == 2:
                     done = 1

@@ -7,13 +7,12 @@ from wavetank.view.optics.radiance import smoothstep
 
 
 @qd.func
-def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usual, near, solid: qd.template()):
+def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, at, usual, near, solid: qd.template()):
     """Radiance that the picture shows at the point `at`, and towards its margins and beyond it what is `usual` there;
     and (column, row, share of the picture).
 
-    What stands before the water, nearer than `z` [m], is not behind it; where rays meet each `solid` by themselves,
-    neither is one that hides the point from the eye. A point of a solid is shown where the picture's depth is `near`
-    [m] its own; for others that is 0.
+    A `solid` that hides the point from the eye is not behind the water: rays meet each by themselves. A point of a
+    solid is shown where the picture's depth is `near` [m] its own; for others that is 0.
     """
     result, found = usual, vec3(0.0, 0.0, 0.0)
     c = to_view(lens, at)
@@ -36,7 +35,7 @@ def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, z, at, usu
                 share *= smoothstep(4.0 * weight)
             else:
                 shown = qd.bit_cast(depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32)
-                if shown <= z or shown >= 1e30:
+                if shown >= 1e30:
                     share = 0.0
                 if qd.static(solid):
                     if shown < 0.97 * c.z:

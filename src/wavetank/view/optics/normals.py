@@ -1,7 +1,8 @@
 """Normals of a surface that is a map of depths, as a lens sees it."""
 
 from wavetank.device.compiler import qd
-from wavetank.view.lens import Lens, from_view, plane_position, vec2, vec3
+from wavetank.view.lens import Lens, from_view, plane_position, ray_direction, ray_origin, vec2, vec3, view_ray
+from wavetank.view.optics.rays import Box
 
 
 @qd.func
@@ -52,24 +53,29 @@ def normal_beside(lens: Lens, row, column, z, limit, depth: qd.template()):
 
 
 @qd.func
-def unevenness(lens: Lens, row, column, z, n, direction, spacing, depth: qd.template()):
+def unevenness(lens: Lens, walls: Box, row, column, z, n, direction, spacing, depth: qd.template()):
     """Standard deviation of the normals of the surface around a pixel, along an axis, within a spacing.
 
-    Of both sides the rougher counts, and none beyond which the surface ends; where it does to both, it is broken. A
-    mean of two, half of it along each axis, a third of it at the edge is that within.
+    Of both sides the rougher counts, and none beyond which the surface ends, or the tank; where it ends to all that
+    are in the tank, it is broken. A mean of two, half of it along each axis, a third of it at the edge is that within.
     """
     total, pixel = 0.0, lens.pixel * (1.0 + lens.perspective * (z - 1.0))
     steep = qd.max(qd.abs(n.dot(direction)), 1e-3)
     for axis in range(2):
-        away, slope = -1.0, n.dot(qd.select(axis == 0, lens.right, lens.up)) / steep
+        away, ends, slope = -1.0, 0, n.dot(qd.select(axis == 0, lens.right, lens.up)) / steep
         k = qd.max(qd.cast(spacing / (pixel * qd.sqrt(1.0 + slope * slope)), qd.i32), 1)
         for side in range(2):
             step = k * (1 - 2 * side)
             r = qd.min(qd.max(row + step * axis, 0), depth.shape[0] - 1)
             c = qd.min(qd.max(column + step * (1 - axis), 0), depth.shape[1] - 1)
             there = qd.bit_cast(depth[r, c], qd.f32)
-            if qd.abs(there - z) < 3.0 * spacing:
+            ray = view_ray(lens, r, c)
+            at = ray_origin(lens, ray) + there * ray_direction(lens, ray)
+            beyond = qd.max((walls.lower - at).max(), (at - walls.upper).max())
+            if qd.abs(there - z) >= 3.0 * spacing:
+                ends = 1
+            elif beyond < 0.1 * spacing:
                 other = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * spacing, depth)) - n
                 away = qd.max(away, other.dot(other))
-        total += qd.select(away < 0.0, 1.0, away)
+        total += qd.select(away < 0.0, qd.cast(ends, qd.f32), away)
     return qd.sqrt(total / 12.0)

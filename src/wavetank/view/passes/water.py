@@ -227,6 +227,7 @@ def lay(
                                     if layer == 1 and (found.y > 0.0 or shiny):
                                         uneven = unevenness(
                                             lens,
+                                            inside.walls,
                                             row,
                                             column,
                                             z,
@@ -243,7 +244,7 @@ def lay(
                                         kept_whole = found.x + calm(uneven) * (found.y - found.x)
                                         kept, kept_above, lead = through_body(
                                             pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
-                                            inside, at, point, bent,
+                                            inside, point, bent,
                                             qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), kept_whole, uneven,
                                             qd.static(world % 10 == 4),
                                         )  # fmt: skip
