@@ -72,7 +72,7 @@ def test_the_surface_mirrors_what_stands_in_the_water():
 
 
 def test_the_floor_is_seen_in_the_mirror_of_a_pane_also_where_it_is_nearer_than_where_the_ray_went_in():
-    """Rays that enter beside the far pane are mirrored there and end on the floor before it: 48 % were one flat colour."""
+    """Rays that enter beside the far pane are mirrored there and meet the floor: 48 % were one flat colour."""
     frame = Simulation(Scene.load("still-tank").changed(spacing=0.05)).frame()
     camera = Camera.framing_extent(extent_of(frame.scene), 400 / 300)
     image = Renderer(400, 300).render(frame, camera, view="water", floor="tiles").astype(int)

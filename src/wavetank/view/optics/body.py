@@ -311,10 +311,12 @@ def through_body(
                 # The surface before a solid is one that is on the way to the wall and to the solid: the way ends in the
                 # ground beside a lake, and above a solid that sticks out there is no water, either. At a shore both
                 # are in one place, and the solid is met unless it is clearly above.
+                # What has just come in is below the surface, however the sun's map of it and the eye's differ.
+                least = qd.select(within == 0, 0.2, 0.0) * optics.spacing
                 far, met = qd.select(cover > 0.0, hit[3], s), vec4(0.0, 0.0, 0.0, s)
                 for search in range(2):
                     if search == 0 or (cover > 0.0 and met[3] < far):
-                        end, above = qd.select(search == 0, s, far), qd.select(search == 0, 0.0, optics.spacing)
+                        end, above = qd.select(search == 0, s, far), qd.select(search == 0, least, optics.spacing)
                         met = surface_before(sun, first, inside.walls, p, ahead, end, above, optics.spacing)
                 if met[3] < far:
                     n, s, cover = vec3(met[0], met[1], met[2]), met[3], 0.0
