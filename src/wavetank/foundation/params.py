@@ -171,7 +171,7 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 #: Operating points of the method: what `quality` puts in place of the defaults. Figures of each: docs/method.md.
 QUALITIES: dict[str, dict[str, Any]] = {
-    "draft": {"substeps": 1, "iterations": 3, "wave_courant": 0.6, "courant": 1.35},
+    "draft": {"substeps": 1, "iterations": 3, "wave_courant": 0.6, "courant": 1.35, "calming": 1.0},
     "standard": {},
     "high": {"substeps": 4, "iterations": 4, "wave_courant": 0.2, "courant": 0.6},
 }
