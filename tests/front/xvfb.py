@@ -11,8 +11,9 @@ class Display:
     def __init__(self) -> None:
         reading, writing = os.pipe()
         self.process = subprocess.Popen(
-            # Without -noreset it begins anew when the last window goes, and meanwhile refuses the next one.
-            ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x860x24", "-nolisten", "tcp", "-noreset"],
+            # Without -noreset it begins anew when the last window goes, and meanwhile refuses the next one. With -r a
+            # key does not repeat: on a busy machine half a second may pass before it is let go.
+            ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x860x24", "-nolisten", "tcp", "-noreset", "-r"],
             pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         os.close(writing)
