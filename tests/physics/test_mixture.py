@@ -21,7 +21,7 @@ def mixed_cloud(dim: int, ratio: float = 100.0, **settings) -> tuple[Cloud, np.n
     return cloud, weight
 
 
-def solve(cloud: Cloud, mixed: int, correction: int = -1) -> np.ndarray:
+def solve(cloud: Cloud, mixed: int, correction: int = 0) -> np.ndarray:
     world = cloud.world
     start_multipliers(
         world.scratch,
@@ -35,7 +35,7 @@ def solve(cloud: Cloud, mixed: int, correction: int = -1) -> np.ndarray:
         mixed,
     )
     changes = world.scratch.dlam
-    correction = correction if correction >= 0 else 3 * mixed
+    correction = correction or 3 * mixed
     if correction > 3:
         changes = world.fluids.array("packed")
         pack_multipliers(changes, world.scratch, cloud.count)

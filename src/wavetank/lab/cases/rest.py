@@ -88,10 +88,10 @@ def watch(name: str, seconds: float, arch: str) -> Rest:
         frame = sim.frame(measured=False)
         speed = np.linalg.norm(frame.velocities.astype(float), axis=1)
         fastest = max(fastest, float(speed.max()))
-        past = max(past, fastest_past(frame.positions.astype(float), frame.velocities, AROUND * scene.spacing))
+        x = frame.positions.astype(float)
+        past = max(past, fastest_past(x, frame.velocities, AROUND * scene.spacing))
         if number % 30:
             continue
-        x = frame.positions.astype(float)
         tops = surface(x - scene.tank.box()[0], scene.spacing, scene.tank.size) if scene.tank else np.zeros(1)
         mass = frame.rest_densities.astype(float) * scene.spacing**scene.dim
         rest.time.append(sim.time)
