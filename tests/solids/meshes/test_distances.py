@@ -55,6 +55,16 @@ def test_distances_are_those_of_the_shape(name):
     np.testing.assert_array_equal((found < 0)[np.abs(exact) > 0.5 * cell], (exact < 0)[np.abs(exact) > 0.5 * cell])
 
 
+def test_triangles_without_area_say_nothing_about_thickness():
+    """Those at the poles of a ball: rounded corners give each a normal of its own, which sees a thin solid."""
+    vertices, faces = ball()
+    corners = vertices[faces] + np.random.default_rng(1).normal(0.0, 1e-7, (*faces.shape, 3))
+    mesh = wt.Mesh.of(corners.reshape(-1, 3), np.arange(faces.size).reshape(-1, 3), size=0.5, **POSE)
+    points = cloud(20000, 0.5)
+    near = np.abs(exact := distances(TWINS["ball"][1], points)[1]) < 3.0 * 0.05
+    assert np.abs(distances(mesh, points)[1] - exact)[near].max() < 0.5 * 0.05 / 4
+
+
 @each
 def test_gradients_are_those_of_the_shape(name):
     mesh, twin = TWINS[name]

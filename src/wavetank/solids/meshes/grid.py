@@ -26,7 +26,7 @@ import numpy as np
 from wavetank.device.compiler import download, qd, upload
 from wavetank.foundation.errors import WavetankError
 from wavetank.solids.distance import vec3
-from wavetank.solids.meshes.tree import Tree, box_square, leaving, next_node, plant, triangle_square
+from wavetank.solids.meshes.tree import Tree, box_square, is_needle, leaving, next_node, plant, triangle_square
 
 CELLS = (4, 3, 2)  # per particle spacing: the first that makes a grid of at most FINE_NODES, else the last
 FINE_NODES = 2_000_000
@@ -124,7 +124,7 @@ def part_faces(tree: Tree, thinnest: qd.f32, count: qd.i32):
     for t in range(count):
         a, b, c = tree.a[t], tree.b[t], tree.c[t]
         n = (b - a).cross(c - a)
-        if n.norm() > 1e-12:
+        if not is_needle(n, a, b, c):  # its neighbours say how thick the solid is there
             origin, way = (a + b + c) / 3.0, -thinnest * n.normalized()
             low, high = qd.min(origin, origin + way) - 1e-3, qd.max(origin, origin + way) + 1e-3
             first = 1.0

@@ -14,7 +14,7 @@ from wavetank.foundation.folders import cache_folder
 from wavetank.foundation.replacing import replacing
 from wavetank.solids.meshes.grid import DistanceGrid
 
-FORMAT = 1  # counts up when the same mesh would give other distances
+FORMAT = 2  # counts up when the same mesh would give other distances
 _KEPT = 8  # grids in memory
 _grids: dict[str, DistanceGrid] = {}
 

@@ -92,13 +92,21 @@ def segment_square(p, a, b):
 
 
 @qd.func
+def is_needle(n, a, b, c):
+    """Whether a triangle is so narrow that its normal `n` is rounding; its edges are the whole of it.
+
+    That is one less than a thousandth of a cell across, or a ten thousandth of its longest edge.
+    """
+    longest = qd.max((b - a).dot(b - a), (c - b).dot(c - b), (a - c).dot(a - c))
+    return n.dot(n) <= qd.max(1e-6, 1e-8 * longest) * longest
+
+
+@qd.func
 def triangle_square(p, a, b, c):
     """Square of the distance from a point to a triangle."""
     square = qd.min(segment_square(p, a, b), segment_square(p, b, c), segment_square(p, c, a))
     n = (b - a).cross(c - a)
-    longest = qd.max((b - a).dot(b - a), (c - b).dot(c - b), (a - c).dot(a - c))
-    # The plane of a needle is rounding; its edges are the whole of it.
-    if n.dot(n) > 1e-8 * longest * longest:
+    if not is_needle(n, a, b, c):
         over = (
             n.cross(b - a).dot(p - a) >= 0.0 and n.cross(c - b).dot(p - b) >= 0.0 and n.cross(a - c).dot(p - c) >= 0.0
         )
@@ -110,12 +118,12 @@ def triangle_square(p, a, b, c):
 
 @qd.func
 def leaving(origin, way, a, b, c):
-    """Where a ray leaves through the back of a triangle, in lengths of `way`; -1 where it does not."""
+    """Where a ray leaves through the back of a triangle that is no needle, in lengths of `way`; -1 where it does not."""
     ab, ac = b - a, c - a
     across = way.cross(ac)
     volume = ab.dot(across)
     t = -1.0
-    if volume < 0.0:
+    if volume < 0.0 and not is_needle(ab.cross(ac), a, b, c):
         start = origin - a
         u, v = start.dot(across) / volume, way.dot(start.cross(ab)) / volume
         # A little beyond the edges, so that no ray slips between two triangles.
