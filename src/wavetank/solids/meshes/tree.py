@@ -118,7 +118,7 @@ def triangle_square(p, a, b, c):
 
 @qd.func
 def leaving(origin, way, a, b, c):
-    """Where a ray leaves through the back of a triangle that is no needle, in lengths of `way`; -1 where it does not."""
+    """Where a ray leaves through the back of a triangle, no needle, in lengths of `way`; -1 where it does not."""
     ab, ac = b - a, c - a
     across = way.cross(ac)
     volume = ab.dot(across)

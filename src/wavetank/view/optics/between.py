@@ -23,6 +23,7 @@ def group():
 
 
 GROUP = group.fn()
+APART = 6.0  # groups of pixels: between rays that end farther from each other nothing is taken
 
 
 @qd.func
@@ -31,6 +32,7 @@ def alike(seen, above, place, other_seen, other_above, other_place, apart):
 
     So it is where neither has met a body, where they show places of one kind that are less than `apart` [px], or nearly
     the same light and not two places of different kinds: at their border pixels would show one and the other by turns.
+    Nothing is alike where `apart` is 0.
     """
     result = seen[3] < 0.0 and other_seen[3] < 0.0
     if seen[3] >= 0.0 and other_seen[3] >= 0.0:
@@ -40,7 +42,7 @@ def alike(seen, above, place, other_seen, other_above, other_place, apart):
             away = qd.abs(other_seen - seen)
             result = qd.max(away[0], away[1], away[2]) < 0.05
     step = qd.abs(other_above - above)
-    return result and qd.max(step[0], step[1], step[2], step[3]) < 0.05
+    return apart > 0.0 and result and qd.max(step[0], step[1], step[2], step[3]) < 0.05
 
 
 @qd.func

@@ -5,6 +5,7 @@ import dataclasses
 from wavetank.device.compiler import qd
 from wavetank.device.state import remembered
 from wavetank.view.lens import vec3, vector
+from wavetank.view.optics.between import APART, GROUP
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import UNIT
 
@@ -28,6 +29,7 @@ class Optics:
     slack: qd.f32  # m: depth by which an edge of the tank wins
     samples: qd.i32  # computed pixels beside each other that see the same through a body of water,
     tall: qd.i32  # and rows of them
+    apart: qd.f32  # computed pixels between the ends of two rays, up to which those between need not be followed
     turn: qd.i32  # columns by which the first group of those is fewer
     under: qd.i32  # 1 where the eye is in the water
 
@@ -38,7 +40,8 @@ def optics_of(shot: Shot, under: int = 0, samples: int = 1, tall: int = 1) -> Op
         absorption=shot.absorption, scattering=shot.scattering, glow=vector(*(shot.look.glow * shot.tint)),
         usual=shot.usual, coarse=float(coarseness(shot)), fine=float(fineness(shot)), unit=shot.extent.spacing / UNIT,
         spacing=shot.extent.spacing, disc=DISC[2] * shot.extent.spacing,
-        slack=2.0 * shot.radius, under=under, samples=samples, tall=tall, turn=shot.turn * samples,
+        slack=2.0 * shot.radius, under=under, samples=samples, tall=tall,
+        apart=APART * GROUP * samples, turn=shot.turn * samples,
     ))  # fmt: skip
 
 

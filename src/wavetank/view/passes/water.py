@@ -183,9 +183,9 @@ def lay(
                                             off = qd.abs(at - old_of[0] - between * (new_of[0] - old_of[0]))
                                             if same < 0:
                                                 same = qd.cast(
-                                                    alike(before, before_above, old, end, end_above, new,
-                                                          6.0 * wide_group), qd.i32,
-                                                )  # fmt: skip
+                                                    alike(before, before_above, old, end, end_above, new, optics.apart),
+                                                    qd.i32,
+                                                )
                                             lies = off < 0.3 * optics.spacing and same == 1
                                         near = qd.abs(at - kept_z) < 0.3 * optics.spacing
                                         fresh = pixel != kept_pixel or layer != kept_layer or not near
