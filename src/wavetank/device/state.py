@@ -94,8 +94,8 @@ class Grid:
 class CoarseGrid:
     """A level of the grid of `physics/grid_pressure/correction.py`; nodes are the centres of its cells, x fastest."""
 
-    sums: qd.types.ndarray()  # i32 [parts * nodes]: of the tents of particles, then of these times density errors
-    mass_sums: qd.types.ndarray()  # i32 [parts * nodes]: of the tents times densities, where these differ
+    sums: qd.types.ndarray()  # i32 [parts * nodes]: of shares of particles, then of tents times density errors
+    mass_sums: qd.types.ndarray()  # i32 [parts * nodes]: of these shares times densities, where these differ
     room: qd.types.ndarray()  # f32 [nodes]: share of the cell that no solid takes, 0 where next to nothing is left
     facing_x: qd.types.ndarray()  # f32 [nodes]: outward normal of the solid nearest to a node, up where none is near
     facing_y: qd.types.ndarray()  # likewise

@@ -1,8 +1,9 @@
 """Grids over the tank of about a support an edge, each half as fine as the one before.
 
-Nodes are the centres of cells, which divide the tank without remainder; a node's number is x + nx (y + ny z). A
-particle counts at the nodes around it with the weights of linear interpolation, "tents", and at a wall at the nearest
-node alone: that is what particle-in-cell methods do (Harlow 1964).
+Nodes are the centres of cells, which divide the tank without remainder; a node's number is x + nx (y + ny z). What is
+known at particles goes to the nodes around them, and back, with the weights of linear interpolation, "tents", and at a
+wall to the nearest node alone: that is what particle-in-cell methods do (Harlow 1964). How full a cell is, is told with
+larger ones (`parcels.py`).
 """
 
 import dataclasses

@@ -57,6 +57,7 @@ from wavetank.physics.grid_pressure.coarse_grid import (
 from wavetank.physics.grid_pressure.couplings import LEAST_THETA, couple_nodes, has_lid
 from wavetank.physics.grid_pressure.films import left_to_grid
 from wavetank.physics.grid_pressure.gaps import across, gaps_at
+from wavetank.physics.grid_pressure.parcels import add_parcel, parcel_at
 from wavetank.physics.grid_pressure.poisson import solve_levels
 from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, open_tents, spread_along
@@ -65,6 +66,7 @@ from wavetank.physics.grid_pressure.slits import below_roof, close_slit, in_part
 from wavetank.physics.grid_pressure.surface import depth_at, depth_beside
 from wavetank.physics.grid_pressure.weight import BORNE, flow_out
 from wavetank.physics.mixture import Blend
+from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.smoothing import rest_lattice
 from wavetank.physics.teams import (
@@ -136,31 +138,22 @@ def weights_at(grid: CoarseGrid, nodes: qd.template(), s, dim: qd.template(), se
 
 @qd.func
 def add_fill(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, team, part, unit, count,
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, e: Errors, team, part, count,
     searched: qd.template(), mixed: qd.template(),
 ):  # fmt: skip
-    """Add the tents of a team's particles to the sums of a `part`, and those over their weights where `mixed`."""
+    """Add what nodes have of a team's particles to the sums of a `part`, and that over their weights where `mixed`."""
     lanes = qd.static(cells.lanes)
     first = team * lanes
     dim = qd.static(particles.x[first].n)
-    at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
-    amounts = qd.Matrix.zero(qd.i32, 2**dim, lanes)
-    masses = qd.Matrix.zero(qd.i32, 2**dim if mixed else 1, lanes)
+    parcels = qd.Matrix.zero(qd.f32, 12, lanes)
     for lane in range(lanes):
-        s = in_cells(grid, predicted(particles, first + lane))
-        nodes = corners(grid, qd.floor(s, qd.i32), dim)
-        weights = weights_at(grid, nodes, s, dim, searched)
-        for k in qd.static(range(2**dim)):
-            w = unit * weights[k]
-            at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
-            amounts[k, lane] = qd.cast(qd.round(w), qd.i32)
-            if qd.static(mixed):
-                masses[k, lane] = qd.cast(qd.round(w / scratch.weight[first + lane]), qd.i32)
+        found = parcel_at(grid, in_cells(grid, predicted(particles, first + lane)), e.spacing)
+        for k in qd.static(range(12)):
+            parcels[k, lane] = found[k]
     for lane in range(qd.min(lanes, count - first)):
-        for k in qd.static(range(2**dim)):
-            add_whole(grid.sums, at[k, lane], amounts[k, lane], grid.alone)
-            if qd.static(mixed):
-                add_whole(grid.mass_sums, at[k, lane], masses[k, lane], grid.alone)
+        s = in_cells(grid, predicted(particles, first + lane))
+        density = 1.0 / scratch.weight[first + lane]
+        add_parcel(grid, column(parcels, lane), s, e.unit, density, part, dim, searched, mixed)
 
 
 @qd.func
@@ -218,7 +211,7 @@ def gather(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, solids: SolidSet, walls: Walls,
     c: Coefficients, e: Errors, count: qd.i32, searched: qd.template(), mixed: qd.template(), few: qd.template(),
 ):  # fmt: skip
-    """Sum the tents of all particles at the nodes, find gaps, sum density errors (Eq. 2), and set up the equation.
+    """Sum what nodes have of all particles, find gaps, sum density errors (Eq. 2), and set up the equation.
 
     The sums are 0 before. There are only the walls of the tank unless solids are `searched`. Where fluids are `mixed`,
     their densities are averaged.
@@ -229,7 +222,7 @@ def gather(
     for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
         for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
-            add_fill(grid, particles, scratch, cells, team, grid.alone * part_of(turn), e.unit, count, searched, mixed)
+            add_fill(grid, particles, scratch, cells, e, team, grid.alone * part_of(turn), count, searched, mixed)
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)

@@ -7,6 +7,9 @@ water behind the wall. So the mean of such a basin is taken from its errors. Whe
 lacks water, lambda <= 0 leaves it at the top, and all is well. The pressure that is found has any level, and is moved
 to the least that it can have.
 
+Air is where a cell is less than half full, by degrees from a quarter of a cell of it on. A sliver that a corner leaves
+is told more room than it has, seemed empty, and all of its basin was left as it was: it boiled at 4 m/s.
+
 A basin is room that is connected through open faces. Basins are found by joining rows in a forest, each with the lowest
 number of its nodes as its root: that does not depend on the order of threads (Tarjan 1975, "Efficiency of a good but
 not linear set union algorithm", 10.1145/321879.321884).
@@ -17,7 +20,7 @@ not linear set union algorithm", 10.1145/321879.321884).
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import beside_on
+from wavetank.physics.grid_pressure.coarse_grid import beside_on, ramp
 from wavetank.physics.grid_pressure.couplings import lid_open, open_ahead
 
 MOSTLY_FULL = 0.7  # share of the room that water takes, below which there is air somewhere
@@ -106,7 +109,9 @@ def balance(grid: CoarseGrid, per_error: qd.f32, lid: qd.i32):
             grid.slope_y[n], grid.slope_z[n] = 0.0, 0.0
     for n in range(grid.nx * grid.ny * grid.nz):
         if grid.room[n] > 0.0:
-            air = 1.0 if grid.fill[n] <= 0.5 else lid_open(grid, n, lid)
+            air = ramp(grid.room[n] * (1.0 - grid.fill[n]), 0.25, 0.5)
+            if grid.fill[n] > 0.5:
+                air = lid_open(grid, n, lid)
             amount = qd.cast(1024.0 * air, qd.i32)
             if amount > grid.sums[grid.basin[n]]:
                 qd.atomic_max(grid.sums[grid.basin[n]], amount)

@@ -8,12 +8,14 @@ of a spacing in three seconds, an egg carton, until single particles were thrown
 Particles above the place of the top layer at rest, half a spacing below the surface, therefore lose the grid's push, by
 a share that grows with their height: what sticks out has weight, rests on its neighbours, and sinks back. Nobody has
 more than the grid's push: that would be a layer of light water below a heavy one. Nobody deeper loses any: iterations
-between particles would have to carry it, and the top layer would sink by a sixth of a spacing.
+between particles would have to carry it, and the top layer would sink by a sixth of a spacing. The bound lies a little
+above that place (`push.SUPPORTED`): the top layer lags behind a wave by some hundredths of its height, and a push that
+grew with that fed waves.
 
-For that the surface must be known to a tenth of a spacing. A crossing of the fill between two nodes is off by up to a
-fifth; the sum of the fills on the way to the air is not, because tents add up to the volume: the height function of
-the volume of fluid method (Cummins et al. 2005, 10.1016/j.compstruc.2004.08.017). What three axes say is taken for the
-distance of a plane that cuts them there.
+For that the surface must be known to some hundredths of a spacing, as boxes tell it (`parcels.py`). A crossing of the
+fill between two nodes is off by up to a fifth; the sum of the fills on the way to the air is not, because shares add up
+to the volume: the height function of the volume of fluid method (Cummins et al. 2005, 10.1016/j.compstruc.2004.08.017).
+What three axes say is taken for the distance of a plane that cuts them there.
 
 A node inside of a solid, below one or above one is on no such way. It counted as deep in the water, or as high above
 it, and a particle at the waterline beside a body was carried or fell as the body gave that node room or took it, for

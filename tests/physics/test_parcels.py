@@ -1,0 +1,139 @@
+"""Boxes of particles fill the room of a lattice; so the longest wave of a tank dies out, whatever its size."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+import wavetank as wt
+from wavetank.device import compiler
+from wavetank.device.compiler import qd
+from wavetank.device.state import CoarseGrid, vectors
+from wavetank.physics.grid_pressure.coarse_grid import in_cells, new_levels
+from wavetank.physics.grid_pressure.parcels import add_parcel, parcel_at
+
+UNIT = float(1 << 24)
+
+
+@qd.kernel
+def add(places: qd.types.ndarray(), grid: CoarseGrid, spacing: qd.f32, count: qd.i32, searched: qd.template()):
+    """Add what nodes have of particles at these places [m] to the sums."""
+    qd.loop_config(serialize=True)
+    for i in range(count):
+        s = in_cells(grid, places[i])
+        add_parcel(grid, parcel_at(grid, s, spacing), s, UNIT, 1.0, 0, 3, searched, False)
+
+
+def shares_of(level, places, spacing, searched=0):
+    """What each node has of boxes of that size at `places` [n, 3], [nz, ny, nx]."""
+    given = vectors(3, len(places))
+    given.from_numpy(places.astype(np.float32))
+    level.sums.fill(0)
+    add(given, level, spacing, len(places), searched)
+    nodes = level.nx * level.ny * level.nz
+    return level.sums.to_numpy()[:nodes].reshape(level.nz, level.ny, level.nx) / UNIT
+
+
+@pytest.fixture(scope="module")
+def level():
+    compiler.start("cpu")
+    found = new_levels((np.zeros(3), np.array([1.0, 1.2, 0.8])), 0.1)[0]
+    found.room.fill(1.0)
+    found.clear.fill(1.0)
+    return found
+
+
+def test_shares_are_the_mean_of_a_tent_over_the_box(level):
+    """Bardenhagen and Kober 2004, Eq. 18: here the mean over 20 points along each axis."""
+    rng, d = np.random.default_rng(2), 0.055
+    edges, sizes = np.array([level.dx, level.dy, level.dz]), (level.nx, level.ny, level.nz)
+    parts = ((np.arange(20) + 0.5) / 20 - 0.5) * d
+    for place in rng.uniform(0.2, 0.6, (20, 3)):
+        shares = shares_of(level, place[None], d)
+        means = [
+            np.maximum(1.0 - np.abs((place[k] + parts) / edges[k] - 0.5 - np.arange(sizes[k])[:, None]), 0.0).mean(1)
+            for k in range(3)
+        ]
+        assert shares == pytest.approx(np.einsum("i,j,k->kji", *means), abs=1e-3)
+        assert shares.sum() == pytest.approx(1.0, abs=1e-5)
+        first = [np.sum(shares.sum(axis=tuple({0, 1, 2} - {2 - k})) * np.arange(sizes[k])) for k in range(3)]
+        assert np.array(first) == pytest.approx(place / edges - 0.5, abs=1e-4)  # the first moment is kept
+
+
+def test_a_lattice_fills_its_room_wherever_it_lies(level):
+    """Boxes of the spacing leave no gap; as points, its particles fill nodes by 0.97 to 1.03 with these cells."""
+    d = 0.057
+    rows = np.arange(24) * d
+    for shift in (0.0, 0.013, 0.03, 0.049):
+        places = np.stack(np.meshgrid(rows, rows, rows, indexing="ij"), -1).reshape(-1, 3) - 0.2 + shift
+        inside = ((places > 0.0) & (places < (1.0, 1.2, 0.8))).all(axis=1)
+        fill = shares_of(level, places[inside], d) * d**3 / (level.dx * level.dy * level.dz)
+        assert fill[2:6, 2:8, 2:7] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_nodes_without_room_leave_their_share_to_others(level):
+    """A particle beside a solid counts in full at the nodes that are open to it."""
+    nodes = level.nx * level.ny * level.nz
+    room = np.ones(level.room.shape[0], np.float32)
+    room[:nodes].reshape(level.nz, level.ny, level.nx)[:, :5] = 0.0
+    level.room.from_numpy(room)
+    level.clear.fill(0.0)
+    for place, whole in (((0.4, 0.52, 0.4), 1.0), ((0.43, 0.5, 0.38), 1.0), ((0.41, 0.2, 0.37), 0.0)):
+        shares = shares_of(level, np.array([place]), 0.055, searched=1)
+        assert shares.sum() == pytest.approx(whole, abs=1e-5)  # the last has none around it
+        assert not shares[:, :5].any()
+    level.room.fill(1.0)
+    level.clear.fill(1.0)
+
+
+def growth(sim, depth: float, seconds: float) -> tuple[float, float]:
+    """Give a tank its longest standing wave, 1 mm/s fast; (rate at which it grows [1/s], omega over that of theory).
+
+    Airy's linear waves: velocities are the gradient of cosh(k y) cos(k x), omega^2 = g k tanh(k H).
+    """
+    k = np.pi / sim.scene.tank.size[0]
+
+    def shape(x):
+        across, along = k * x[:, 0], k * x[:, 1]
+        return np.stack([np.cosh(along) * np.sin(across), -np.sinh(along) * np.cos(across)], 1) / np.cosh(k * depth)
+
+    velocities = sim.velocities.copy()
+    velocities[:, :2] += 1e-3 * shape(sim.positions)
+    sim.velocities = velocities
+    found = []
+    for _ in range(round(60 * seconds)):
+        sim.step()
+        mode = shape(sim.positions)
+        found.append(np.sum(mode * sim.velocities[:, :2]) / np.sum(mode**2) / 1e-3)
+    time, theory = np.arange(1, len(found) + 1) / 60.0, np.sqrt(9.81 * k * np.tanh(k * depth))
+
+    def apart(p):
+        return (p[0] * np.cos(p[3] * time) + p[1] * np.sin(p[3] * time)) * np.exp(p[2] * time) + p[4] - found
+
+    rate, omega = least_squares(apart, [1.0, 0.0, 0.0, theory, 0.0]).x[2:4]
+    return float(rate), float(omega / theory)
+
+
+@pytest.mark.parametrize("size", [(40, 50, 20), (40, 59, 20), (40, 60, 20), (24, 29, 16), (31, 29, 14)], ids=str)
+def test_the_longest_wave_of_a_tank_dies_out_and_is_as_fast_as_it_should_be(size):
+    """The second law, and Airy: waves of 1 mm/s grew by 0.018/s in some tanks, were damped by 0.3/s in others.
+
+    Width, height and depth in spacings; omega was 0.87 to 1.05 of that of theory.
+    """
+    width, height, depth = (0.025 * edge for edge in size)
+    block = wt.Block(lower=(0, 0), upper=(width, depth))
+    sim = wt.Simulation(wt.Scene(spacing=0.025, tank=wt.Tank(size=(width, height)), fluids=[block]))
+    sim.advance(15.0)
+    rate, ratio = growth(sim, depth, 5.0)
+    assert -0.15 < rate < -0.01
+    assert ratio == pytest.approx(1.0, abs=0.02)
+
+
+def test_the_longest_wave_of_a_shallow_tank_in_space_dies_out():
+    """The same, seven layers deep, where a top layer with weight in level water let waves grow by 0.007/s."""
+    size = (1.1, 0.65, 0.25)
+    block = wt.Block(lower=(0, 0, 0), upper=(1.1, 0.175, 0.25))
+    sim = wt.Simulation(wt.Scene(spacing=0.025, tank=wt.Tank(size=size), fluids=[block]))
+    sim.advance(15.0)
+    rate, ratio = growth(sim, 0.175, 5.0)
+    assert -0.15 < rate < -0.01
+    assert ratio == pytest.approx(1.0, abs=0.02)
