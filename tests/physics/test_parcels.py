@@ -9,7 +9,7 @@ from wavetank.device import compiler
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, vectors
 from wavetank.physics.grid_pressure.coarse_grid import in_cells, new_levels
-from wavetank.physics.grid_pressure.parcels import add_parcel, parcel_at
+from wavetank.physics.grid_pressure.parcels import add_parcel
 
 UNIT = float(1 << 24)
 
@@ -19,8 +19,7 @@ def add(places: qd.types.ndarray(), grid: CoarseGrid, spacing: qd.f32, count: qd
     """Add what nodes have of particles at these places [m] to the sums."""
     qd.loop_config(serialize=True)
     for i in range(count):
-        s = in_cells(grid, places[i])
-        add_parcel(grid, parcel_at(grid, s, spacing), s, UNIT, 1.0, 0, 3, searched, False)
+        add_parcel(grid, in_cells(grid, places[i]), spacing, UNIT, 1.0, 0, 3, searched, False)
 
 
 def shares_of(level, places, spacing, searched=0):
@@ -43,7 +42,7 @@ def level():
 
 
 def test_shares_are_the_mean_of_a_tent_over_the_box(level):
-    """Bardenhagen and Kober 2004, Eq. 18: here the mean over 20 points along each axis."""
+    """Bardenhagen and Kober 2004, with tents: here the mean over 20 points along each axis."""
     rng, d = np.random.default_rng(2), 0.055
     edges, sizes = np.array([level.dx, level.dy, level.dz]), (level.nx, level.ny, level.nz)
     parts = ((np.arange(20) + 0.5) / 20 - 0.5) * d

@@ -57,7 +57,7 @@ from wavetank.physics.grid_pressure.coarse_grid import (
 from wavetank.physics.grid_pressure.couplings import LEAST_THETA, couple_nodes, has_lid
 from wavetank.physics.grid_pressure.films import left_to_grid
 from wavetank.physics.grid_pressure.gaps import across, gaps_at
-from wavetank.physics.grid_pressure.parcels import add_parcel, parcel_at
+from wavetank.physics.grid_pressure.parcels import add_parcel
 from wavetank.physics.grid_pressure.poisson import solve_levels
 from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, open_tents, spread_along
@@ -66,7 +66,6 @@ from wavetank.physics.grid_pressure.slits import below_roof, close_slit, in_part
 from wavetank.physics.grid_pressure.surface import depth_at, depth_beside
 from wavetank.physics.grid_pressure.weight import BORNE, flow_out
 from wavetank.physics.mixture import Blend
-from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.smoothing import rest_lattice
 from wavetank.physics.teams import (
@@ -142,18 +141,11 @@ def add_fill(
     searched: qd.template(), mixed: qd.template(),
 ):  # fmt: skip
     """Add what nodes have of a team's particles to the sums of a `part`, and that over their weights where `mixed`."""
-    lanes = qd.static(cells.lanes)
-    first = team * lanes
-    dim = qd.static(particles.x[first].n)
-    parcels = qd.Matrix.zero(qd.f32, 12, lanes)
-    for lane in range(lanes):
-        found = parcel_at(grid, in_cells(grid, predicted(particles, first + lane)), e.spacing)
-        for k in qd.static(range(12)):
-            parcels[k, lane] = found[k]
-    for lane in range(qd.min(lanes, count - first)):
-        s = in_cells(grid, predicted(particles, first + lane))
-        density = 1.0 / scratch.weight[first + lane]
-        add_parcel(grid, column(parcels, lane), s, e.unit, density, part, dim, searched, mixed)
+    first = team * cells.lanes
+    for i in range(first, qd.min(first + cells.lanes, count)):
+        p = predicted(particles, i)
+        density = 1.0 / scratch.weight[i]
+        add_parcel(grid, in_cells(grid, p), e.spacing, e.unit, density, part, qd.static(p.n), searched, mixed)
 
 
 @qd.func

@@ -18,88 +18,57 @@ cured the noise of material points that cross cells with it. Three nodes along a
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import add_whole, nearest, on_axis
-from wavetank.physics.grid_pressure.thin_walls import behind
+from wavetank.physics.grid_pressure.coarse_grid import add_whole, nearest
+from wavetank.physics.grid_pressure.thin_walls import is_open_to
 from wavetank.solids.distance import vec3
 
 
 @qd.func
 def parcel_shares(s, size):
-    """Shares that the nodes around the coordinate `s` have, and the whole coordinate of the nearest as the fourth."""
-    middle = qd.floor(s + 0.5)
-    aside, half = s - middle, 0.5 * size
+    """Shares that the node nearest to the coordinate `s`, the one before and the one behind have, in their order."""
+    aside, half = s - qd.floor(s + 0.5), 0.5 * size
     before = (qd.max(half - aside, 0.0) ** 2 - qd.max(-half - aside, 0.0) ** 2) / (2.0 * size)
     after = (qd.max(half + aside, 0.0) ** 2 - qd.max(aside - half, 0.0) ** 2) / (2.0 * size)
-    return qd.Vector([before, 1.0 - before - after, after, middle])
-
-
-@qd.func
-def parcel_at(grid: CoarseGrid, s, spacing):
-    """Shares along x, y and z of the nodes around the place `s` [cells], in rows: three each, and the nearest node."""
-    x = parcel_shares(s.x, qd.min(spacing / grid.dx, 1.0))
-    y = parcel_shares(s.y, qd.min(spacing / grid.dy, 1.0))
-    z = parcel_shares(s.z, qd.min(spacing / grid.dz, 1.0))
-    return qd.Vector([x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3], z[0], z[1], z[2], z[3]])
-
-
-@qd.func
-def is_open_to(grid: CoarseGrid, n, s, node, thin: qd.template()):
-    """Whether node `n`, at the whole coordinates `node`, has room for what is at the place `s` [cells]: 1 or 0.
-
-    It has none behind a `thin` wall, if there are any in this world.
-    """
-    found = grid.room[n] > 0.0
-    if qd.static(thin):
-        way = vec3((s.x - node.x) * grid.dx, (s.y - node.y) * grid.dy, (s.z - node.z) * grid.dz)
-        found = found and not behind(grid, n, way)
-    return qd.cast(found, qd.f32)
-
-
-@qd.func
-def open_total(grid: CoarseGrid, parcel, s, dim: qd.template(), thin: qd.template()):
-    """Share of a particle at the place `s` [cells] that nodes with room have."""
-    total = 0.0
-    for k in range(qd.static(3**dim)):
-        node = vec3(parcel[3] + k % 3 - 1.0, parcel[7] + k // 3 % 3 - 1.0, 0.0)
-        share = parcel[k % 3] * parcel[4 + k // 3 % 3]
-        if qd.static(dim == 3):
-            node.z = parcel[11] + k // 9 - 1.0
-            share *= parcel[8 + k // 9]
-        total += share * is_open_to(grid, nearest(grid, qd.cast(node, qd.i32)), s, node, thin)
-    return total
+    return vec3(before, 1.0 - before - after, after)
 
 
 @qd.func
 def add_parcel(
-    grid: CoarseGrid, parcel, s, unit, density, part, dim: qd.template(), searched: qd.template(),
+    grid: CoarseGrid, s, spacing, unit, density, part, dim: qd.template(), searched: qd.template(),
     mixed: qd.template(),
 ):  # fmt: skip
-    """Add to the sums of a `part` what nodes have of a particle, and that times its `density` where `mixed`.
+    """Add to the sums of a `part` what nodes have of a particle at the place `s`; where `mixed`, times `density`, too.
 
     Where solids are `searched`, nodes without room leave theirs to others; with 2, so do those behind a thin wall.
     """
+    x = parcel_shares(s.x, qd.min(spacing / grid.dx, 1.0))
+    y = parcel_shares(s.y, qd.min(spacing / grid.dy, 1.0))
+    z = vec3(0.0, 1.0, 0.0)
+    if qd.static(dim == 3):
+        z = parcel_shares(s.z, qd.min(spacing / grid.dz, 1.0))
+    low = qd.floor(s + 0.5, qd.i32) - 1
     whole, beside = unit, False
     if qd.static(searched):
-        z = parcel[11] if qd.static(dim == 3) else 0.0
-        beside = grid.clear[nearest(grid, qd.cast(vec3(parcel[3], parcel[7], z), qd.i32))] == 0.0
+        beside = grid.clear[nearest(grid, low + 1)] == 0.0
         if beside:
-            whole /= qd.max(open_total(grid, parcel, s, dim, searched - 1), 1e-3)
+            total = 0.0
+            for k in range(qd.static(3**dim)):
+                way = qd.Vector([k % 3, k // 3 % 3, k // 9 if qd.static(dim == 3) else 1])
+                node = low + way
+                share = x[way[0]] * y[way[1]] * z[way[2]]
+                total += share * is_open_to(grid, nearest(grid, node), node, s, searched - 1)
+            whole /= qd.max(total, 1e-3)
     begin = part * grid.nx * grid.ny * grid.nz
     for row in range(qd.static(3 ** (dim - 1))):
-        of_row, z = whole * parcel[4 + row % 3], 0.0
-        if qd.static(dim == 3):
-            of_row *= parcel[8 + row // 3]
-            z = parcel[11] + row // 3 - 1.0
+        of_row = whole * y[row % 3] * z[row // 3 if qd.static(dim == 3) else 1]
         if of_row > 0.0:
-            y = parcel[7] + row % 3 - 1.0
-            first = grid.nx * (on_axis(grid, qd.cast(y, qd.i32), 1) + grid.ny * on_axis(grid, qd.cast(z, qd.i32), 2))
             for k in qd.static(range(3)):
-                x = parcel[3] + (k - 1.0)
-                n = first + on_axis(grid, qd.cast(x, qd.i32), 0)
-                amount = of_row * parcel[k]
+                node = low + qd.Vector([k, row % 3, row // 3 if qd.static(dim == 3) else 1])
+                n = nearest(grid, node)
+                amount = of_row * x[k]
                 if qd.static(searched):
                     if beside:
-                        amount *= is_open_to(grid, n, s, vec3(x, y, z), searched - 1)
+                        amount *= is_open_to(grid, n, node, s, searched - 1)
                 add_whole(grid.sums, begin + n, qd.cast(qd.round(amount), qd.i32), grid.alone)
                 if qd.static(mixed):
                     mass = qd.cast(qd.round(amount * density), qd.i32)

@@ -22,7 +22,7 @@ from wavetank.physics.grid_pressure.coarse_grid import (
 from wavetank.physics.grid_pressure.couplings import open_faces
 from wavetank.physics.grid_pressure.listed_solids import listed, solids_near
 from wavetank.physics.grid_pressure.slits import mostly
-from wavetank.physics.grid_pressure.thin_walls import behind, farthest, keep_thin, mark_shut, way_from
+from wavetank.physics.grid_pressure.thin_walls import farthest, is_open_to, keep_thin, mark_shut
 from wavetank.physics.teams import end_of_part, first_of_part, part_of, turns_over
 from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec2, vec3, vec4
 
@@ -173,10 +173,8 @@ def open_tents(grid: CoarseGrid, at: qd.template(), s, dim: qd.template(), thin:
     low = qd.floor(s, qd.i32)
     total = 0.0
     for k in qd.static(range(2**dim)):
-        is_open = grid.room[at[k]] > 0.0
-        if qd.static(thin):
-            is_open = is_open and not behind(grid, at[k], way_from(grid, low, k, s))
-        weights[k] *= qd.cast(is_open, qd.f32)
+        node = qd.Vector([low[0] + (k & 1), low[1] + (k >> 1 & 1), low[2] + (k >> 2)])
+        weights[k] *= is_open_to(grid, at[k], node, s, thin)
         total += weights[k]
     return weights / qd.max(total, 1e-3)
 

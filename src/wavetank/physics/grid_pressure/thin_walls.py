@@ -151,13 +151,13 @@ def keep_thin(grid: CoarseGrid, solids: SolidSet, around: qd.template(), n, wall
 
 
 @qd.func
-def way_from(grid: CoarseGrid, low, k: qd.template(), s):
-    """Way [m] to the place `s` [cells] from corner `k` of the cell from the whole coordinates `low` on."""
-    node = qd.Vector([low[0] + (k & 1), low[1] + (k >> 1 & 1), low[2] + (k >> 2)])
+def way_from(grid: CoarseGrid, node, s):
+    """Way [m] to the place `s` [cells] from the whole coordinates `node`, or from the nearest node of the tank."""
+    start = node
     for axis in qd.static(range(3)):
         if qd.static(not grid.repeats >> axis & 1):
-            node[axis] = on_axis(grid, node[axis], axis)
-    return vec3((s.x - node[0]) * grid.dx, (s.y - node[1]) * grid.dy, (s.z - node[2]) * grid.dz)
+            start[axis] = on_axis(grid, node[axis], axis)
+    return vec3((s.x - start[0]) * grid.dx, (s.y - start[1]) * grid.dy, (s.z - start[2]) * grid.dz)
 
 
 @qd.func
@@ -191,6 +191,18 @@ def behind(grid: CoarseGrid, n, way):
     """Say whether the place that is a `way` [m] from node `n` lies behind a thin wall, seen from there."""
     ahead = way.dot(vec3(grid.thin_x[n], grid.thin_y[n], grid.thin_z[n])) + grid.thin_s[n]
     return ahead < -0.15 * qd.min(grid.dx, grid.dy)
+
+
+@qd.func
+def is_open_to(grid: CoarseGrid, n, node, s, thin: qd.template()):
+    """Whether node `n`, at the whole coordinates `node`, has room for what is at the place `s` [cells]: 1 or 0.
+
+    It has none for what lies behind a `thin` wall, if there are any in this world.
+    """
+    found = grid.room[n] > 0.0
+    if qd.static(thin):
+        found = found and not behind(grid, n, way_from(grid, node, s))
+    return qd.cast(found, qd.f32)
 
 
 @qd.func
