@@ -191,7 +191,7 @@ def test_reset_starts_without_foam():
 def test_another_seed_makes_other_foam_of_the_same_amount():
     counts = [born(dam(foam_seed=seed), 1.0) for seed in (0, 1, 2)]
     assert len(set(counts)) > 1
-    assert counts == pytest.approx([np.mean(counts)] * 3, rel=0.1)
+    assert max(counts) == pytest.approx(min(counts), rel=0.1)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
