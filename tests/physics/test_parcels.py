@@ -6,28 +6,32 @@ from scipy.optimize import least_squares
 
 import wavetank as wt
 from wavetank.device import compiler
-from wavetank.device.compiler import qd
-from wavetank.device.state import CoarseGrid, vectors
-from wavetank.physics.grid_pressure.coarse_grid import in_cells, new_levels
-from wavetank.physics.grid_pressure.parcels import add_parcel
+from wavetank.device.compiler import qd, upload
+from wavetank.device.state import CoarseGrid, Particles, Scratch, new_particles, new_scratch
+from wavetank.physics.grid_pressure.coarse_grid import new_levels
+from wavetank.physics.grid_pressure.parcels import add_parcels
 
 UNIT = float(1 << 24)
 
 
 @qd.kernel
-def add(places: qd.types.ndarray(), grid: CoarseGrid, spacing: qd.f32, count: qd.i32, searched: qd.template()):
-    """Add what nodes have of particles at these places [m] to the sums."""
+def add(
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, spacing: qd.f32, count: qd.i32, lanes: qd.template(),
+    searched: qd.template(),
+):  # fmt: skip
+    """Add what nodes have of these particles to the sums."""
     qd.loop_config(serialize=True)
-    for i in range(count):
-        add_parcel(grid, in_cells(grid, places[i]), spacing, UNIT, 1.0, 0, 3, searched, False)
+    for team in range((count + lanes - 1) // lanes):
+        add_parcels(grid, particles, scratch, spacing, UNIT, team, 0, count, lanes, searched, False)
 
 
 def shares_of(level, places, spacing, searched=0):
     """What each node has of boxes of that size at `places` [n, 3], [nz, ny, nx]."""
-    given = vectors(3, len(places))
-    given.from_numpy(places.astype(np.float32))
+    particles, scratch = new_particles(3, len(places)), new_scratch(len(places))
+    for component, values in zip((particles.px, particles.py, particles.pz), places.T, strict=True):
+        upload(component, np.pad(values, (0, component.shape[0] - len(values))).astype(np.float32))
     level.sums.fill(0)
-    add(given, level, spacing, len(places), searched)
+    add(level, particles, scratch, spacing, len(places), compiler.lanes(), searched)
     nodes = level.nx * level.ny * level.nz
     return level.sums.to_numpy()[:nodes].reshape(level.nz, level.ny, level.nx) / UNIT
 

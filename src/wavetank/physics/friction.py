@@ -15,9 +15,9 @@ Iterations answer what presses a layer or two together with more than all of it,
 
 Where water lies between a body and another solid, that takes none where water is squeezed out: by a body that is on
 its way, and where one lies above the other. A layer that cannot leave would bear it. Beside upright sides of bodies
-that rest walls do as elsewhere, and so do two bodies: without that, water there was thrown to and fro without end, and
-went up and down between them (docs/notebook/calm.md, "Upright slits", "Between two bodies"). A body beside what is none
-takes nothing, or small ones turn back and forth.
+that rest solids do as elsewhere, the tank's walls as other solids do, and so do two bodies: without that, water there
+was thrown to and fro without end, crept up and down walls and went up and down between bodies (docs/notebook/calm.md,
+"Upright slits", "Between two bodies"). A body beside what is none takes nothing, or small ones turn back and forth.
 
     code     symbol    meaning                                           unit
     push     delta     displacement that the wall has given              m
@@ -49,23 +49,26 @@ def apply_friction(
             p = lift(predicted(particles, i))
             v = lift(particles.v[i])
             others = known(scratch, i) if near >> solids.tank_count != 0 else 0
-            calm, beside_body = c.calming_at_solids, c.calming_at_solids
+            calm, beside_body, beside_tank = c.calming_at_solids, c.calming_at_solids, 0.0
             if qd.static(felt):
                 found = between(i, p, others, near, scratch, solids, c)
                 beside_body *= 1.0 - found[0]
                 calm *= 1.0 - found[1]
+                beside_tank = c.calming_at_solids * (found[0] - found[1])
             for number in range(solids.tank_count + others):
                 at, k = 0, number
-                value = vec4(0.0, 0.0, 0.0, 0.0)
-                if number < solids.tank_count:
-                    value = plane_distance(solids, k, p)
-                else:
+                value = vec4(0.0, 0.0, 0.0, c.h)
+                if number >= solids.tank_count:
                     at = place_of(scratch, i, number - solids.tank_count)
                     k = scratch.solid[at]
                     value = facing_at(scratch, at, i, p)
+                elif is_near(near, k, solids) == 1:
+                    value = plane_distance(solids, k, p)
                 n = vec3(value.x, value.y, value.z)
-                if value.w < c.h and (k >= solids.tank_count or is_near(near, k, solids) == 1):
-                    moving = surface_velocity(solids, k, p, c.dt)
+                if value.w < c.h:
+                    moving = vec3(0.0, 0.0, 0.0)
+                    if k >= solids.tank_count:
+                        moving = surface_velocity(solids, k, p, c.dt)
                     relative = v - moving
                     towards = n.dot(relative)
                     if value.w < layer() * c.h and solids.unit[k] == 0.0:
@@ -81,6 +84,8 @@ def apply_friction(
                     if k < solids.tank_count:
                         if qd.static(on_grid):
                             share += calmed(slip.norm_sqr(), calm, c) * qd.max(0.0, -n.dot(down(c))) * scratch.puddle[i]
+                        if qd.static(on_grid and felt):
+                            share += calmed(slip.norm_sqr(), beside_tank, c)
                     else:
                         calming = calmed(slip.norm_sqr(), beside_body if solids.unit[k] > 0.0 else calm, c)
                         if solids.unit[k] > 0.0:  # a body that is on its way is not held up

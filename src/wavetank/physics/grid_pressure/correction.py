@@ -57,7 +57,7 @@ from wavetank.physics.grid_pressure.coarse_grid import (
 from wavetank.physics.grid_pressure.couplings import LEAST_THETA, couple_nodes, has_lid
 from wavetank.physics.grid_pressure.films import left_to_grid
 from wavetank.physics.grid_pressure.gaps import across, gaps_at
-from wavetank.physics.grid_pressure.parcels import add_parcel
+from wavetank.physics.grid_pressure.parcels import add_parcels
 from wavetank.physics.grid_pressure.poisson import solve_levels
 from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, open_tents, spread_along
@@ -136,19 +136,6 @@ def weights_at(grid: CoarseGrid, nodes: qd.template(), s, dim: qd.template(), se
 
 
 @qd.func
-def add_fill(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, e: Errors, team, part, count,
-    searched: qd.template(), mixed: qd.template(),
-):  # fmt: skip
-    """Add what nodes have of a team's particles to the sums of a `part`, and that over their weights where `mixed`."""
-    first = team * cells.lanes
-    for i in range(first, qd.min(first + cells.lanes, count)):
-        p = predicted(particles, i)
-        density = 1.0 / scratch.weight[i]
-        add_parcel(grid, in_cells(grid, p), e.spacing, e.unit, density, part, qd.static(p.n), searched, mixed)
-
-
-@qd.func
 def inside_at(grid: CoarseGrid, n, e: Errors):
     """How far inside of the water node `n` lies: below 0 no particle there counts, above 1 all do in full.
 
@@ -214,7 +201,10 @@ def gather(
     for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
         for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
-            add_fill(grid, particles, scratch, cells, e, team, grid.alone * part_of(turn), count, searched, mixed)
+            add_parcels(
+                grid, particles, scratch, e.spacing, e.unit, team, grid.alone * part_of(turn), count,
+                qd.static(cells.lanes), searched, mixed,
+            )  # fmt: skip
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
@@ -272,7 +262,8 @@ def gather(
         error = e.scale * total
         drawn = qd.min(error, 0.0) * ramp(grid.fill[n], e.drawn_from, e.drawn_to)
         borne = ramp(grid.fill[n], e.borne_from, e.borne_to)
-        grid.rhs[n] = error - drawn - e.per_way * flow_out(grid, n, fall(c)) * borne
+        flows = flow_out(grid, n, fall(c)) if borne > 0.0 else 0.0
+        grid.rhs[n] = error - drawn - e.per_way * flows * borne
         if qd.static(searched):
             grid.rhs[n] -= grid.slope_x[n] * e.closing * grid.room[n]
         grid.rhs[n] *= left_to_grid(grid, n, e.thin, e.thick)

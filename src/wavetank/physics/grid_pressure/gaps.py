@@ -45,8 +45,11 @@ def fullest_around(grid: CoarseGrid, x: qd.template(), y: qd.template(), z: qd.t
 
 @qd.func
 def gaps_at(grid: CoarseGrid, x: qd.template(), y: qd.template(), z: qd.template(), n, full):
-    """How far even the fullest cells around node `n` are from `full`; 0 near solids, whose room is known roughly."""
+    """How far even the fullest cells around node `n` are from `full`.
+
+    It is 0 near solids, whose room is known roughly, and where there is no water.
+    """
     gaps = 0.0
-    if grid.clear[n] > 0.0:
+    if qd.min(grid.clear[n], grid.fill[n]) > 0.0:
         gaps = qd.max(full - fullest_around(grid, x, y, z, n), 0.0)
     return gaps

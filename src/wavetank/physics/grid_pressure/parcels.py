@@ -17,59 +17,102 @@ cured the noise of material points that cross cells with it. Three nodes along a
 """
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import add_whole, nearest
+from wavetank.device.state import CoarseGrid, Particles, Scratch
+from wavetank.physics.grid_pressure.coarse_grid import add_whole, in_cells, on_axis
 from wavetank.physics.grid_pressure.thin_walls import is_open_to
+from wavetank.physics.predicted_positions import predicted
 from wavetank.solids.distance import vec3
 
 
 @qd.func
-def parcel_shares(s, size):
-    """Shares that the node nearest to the coordinate `s`, the one before and the one behind have, in their order."""
-    aside, half = s - qd.floor(s + 0.5), 0.5 * size
-    before = (qd.max(half - aside, 0.0) ** 2 - qd.max(-half - aside, 0.0) ** 2) / (2.0 * size)
-    after = (qd.max(half + aside, 0.0) ** 2 - qd.max(aside - half, 0.0) ** 2) / (2.0 * size)
-    return vec3(before, 1.0 - before - after, after)
+def find_shares(
+    shares: qd.template(), nodes: qd.template(), lane, grid: CoarseGrid, s, spacing, dim: qd.template()
+):  # fmt: skip
+    """Find for a `lane` what the nodes before, nearest to and behind the place `s` [cells] have, axis by axis.
+
+    `nodes` are by how much these add to the number of a node, beyond the tank as the nearest one there.
+    """
+    edges, strides = vec3(grid.dx, grid.dy, grid.dz), qd.Vector([1, grid.nx, grid.nx * grid.ny])
+    for axis in qd.static(range(dim)):
+        size = qd.min(spacing / edges[axis], 1.0)
+        middle = qd.floor(s[axis] + 0.5)
+        aside, half = s[axis] - middle, 0.5 * size
+        before, over_before = qd.max(half - aside, 0.0), qd.max(-half - aside, 0.0)
+        after, over_after = qd.max(half + aside, 0.0), qd.max(aside - half, 0.0)
+        shares[3 * axis, lane] = (before * before - over_before * over_before) / (2.0 * size)
+        shares[3 * axis + 2, lane] = (after * after - over_after * over_after) / (2.0 * size)
+        shares[3 * axis + 1, lane] = 1.0 - shares[3 * axis, lane] - shares[3 * axis + 2, lane]
+        for k in qd.static(range(3)):
+            nodes[3 * axis + k, lane] = on_axis(grid, qd.cast(middle, qd.i32) + k - 1, axis) * strides[axis]
 
 
 @qd.func
-def add_parcel(
-    grid: CoarseGrid, s, spacing, unit, density, part, dim: qd.template(), searched: qd.template(),
-    mixed: qd.template(),
+def share_of(shares: qd.template(), lane, k: qd.template(), dim: qd.template()):
+    """Share that the `k`-th of the nodes around has, the first axis fastest."""
+    share = shares[k % 3, lane] * shares[3 + k // 3 % 3, lane]
+    if qd.static(dim == 3):
+        share *= shares[6 + k // 9, lane]
+    return share
+
+
+@qd.func
+def close(
+    shares: qd.template(), at: qd.template(), amounts: qd.template(), masses: qd.template(), lane, grid: CoarseGrid,
+    s, unit, density, begin, dim: qd.template(), thin: qd.template(), mixed: qd.template(),
 ):  # fmt: skip
-    """Add to the sums of a `part` what nodes have of a particle at the place `s`; where `mixed`, times `density`, too.
+    """Let those of the nodes `at` that are closed to the place `s` [cells] leave what they have to the others."""
+    total, is_open = 0.0, 0
+    for k in range(qd.static(3**dim)):
+        share = share_of(shares, lane, k, dim)
+        node = qd.floor(s + 0.5, qd.i32) + qd.Vector([k % 3 - 1, k // 3 % 3 - 1, k // 9 - 1 if dim == 3 else 0])
+        if share > 0.0:
+            has_room = is_open_to(grid, at[k, lane] - begin, node, s, thin)
+            total += share * has_room
+            is_open |= qd.cast(has_room, qd.i32) << k
+    for k in range(qd.static(3**dim)):
+        amount = unit * share_of(shares, lane, k, dim) * (is_open >> k & 1) / qd.max(total, 1e-3)
+        amounts[k, lane] = qd.cast(qd.round(amount), qd.i32)
+        if qd.static(mixed):
+            masses[k, lane] = qd.cast(qd.round(amount * density), qd.i32)
+
+
+@qd.func
+def add_parcels(
+    grid: CoarseGrid, particles: Particles, scratch: Scratch, spacing, unit, team, part, count, lanes: qd.template(),
+    searched: qd.template(), mixed: qd.template(),
+):  # fmt: skip
+    """Add to the sums of a `part` what nodes have of a team of `lanes` particles; where `mixed`, times their densities.
 
     Where solids are `searched`, nodes without room leave theirs to others; with 2, so do those behind a thin wall.
     """
-    x = parcel_shares(s.x, qd.min(spacing / grid.dx, 1.0))
-    y = parcel_shares(s.y, qd.min(spacing / grid.dy, 1.0))
-    z = vec3(0.0, 1.0, 0.0)
-    if qd.static(dim == 3):
-        z = parcel_shares(s.z, qd.min(spacing / grid.dz, 1.0))
-    low = qd.floor(s + 0.5, qd.i32) - 1
-    whole, beside = unit, False
-    if qd.static(searched):
-        beside = grid.clear[nearest(grid, low + 1)] == 0.0
-        if beside:
-            total = 0.0
-            for k in range(qd.static(3**dim)):
-                way = qd.Vector([k % 3, k // 3 % 3, k // 9 if qd.static(dim == 3) else 1])
-                node = low + way
-                share = x[way[0]] * y[way[1]] * z[way[2]]
-                total += share * is_open_to(grid, nearest(grid, node), node, s, searched - 1)
-            whole /= qd.max(total, 1e-3)
-    begin = part * grid.nx * grid.ny * grid.nz
-    for row in range(qd.static(3 ** (dim - 1))):
-        of_row = whole * y[row % 3] * z[row // 3 if qd.static(dim == 3) else 1]
-        if of_row > 0.0:
-            for k in qd.static(range(3)):
-                node = low + qd.Vector([k, row % 3, row // 3 if qd.static(dim == 3) else 1])
-                n = nearest(grid, node)
-                amount = of_row * x[k]
-                if qd.static(searched):
-                    if beside:
-                        amount *= is_open_to(grid, n, node, s, searched - 1)
-                add_whole(grid.sums, begin + n, qd.cast(qd.round(amount), qd.i32), grid.alone)
-                if qd.static(mixed):
-                    mass = qd.cast(qd.round(amount * density), qd.i32)
-                    add_whole(grid.mass_sums, begin + n, mass, grid.alone)
+    # The loops over lanes become vectors, which takes a third of the time; the last one cannot.
+    first, begin = team * lanes, part * grid.nx * grid.ny * grid.nz
+    dim = qd.static(particles.x[first].n)
+    shares = qd.Matrix.zero(qd.f32, 9, lanes)
+    nodes = qd.Matrix.zero(qd.i32, 9, lanes)
+    at = qd.Matrix.zero(qd.i32, 3**dim, lanes)
+    amounts = qd.Matrix.zero(qd.i32, 3**dim, lanes)
+    masses = qd.Matrix.zero(qd.i32, 3**dim if mixed else 1, lanes)
+    for lane in range(lanes):
+        find_shares(shares, nodes, lane, grid, in_cells(grid, predicted(particles, first + lane)), spacing, dim)
+    for lane in range(lanes):
+        for k in qd.static(range(3**dim)):
+            at[k, lane] = begin + nodes[k % 3, lane] + nodes[3 + k // 3 % 3, lane]
+            if qd.static(dim == 3):
+                at[k, lane] += nodes[6 + k // 9, lane]
+            amount = unit * share_of(shares, lane, k, dim)
+            amounts[k, lane] = qd.cast(qd.round(amount), qd.i32)
+            if qd.static(mixed):
+                masses[k, lane] = qd.cast(qd.round(amount / scratch.weight[first + lane]), qd.i32)
+    for lane in range(qd.min(lanes, count - first)):
+        if qd.static(searched):
+            if grid.clear[at[qd.static(3**dim // 2), lane] - begin] == 0.0:
+                s = in_cells(grid, predicted(particles, first + lane))
+                density = 1.0 / scratch.weight[first + lane]
+                close(
+                    shares, at, amounts, masses, lane, grid, s, unit, density, begin, dim, searched - 1, mixed
+                )  # fmt: skip
+        for k in qd.static(range(3**dim)):
+            add_whole(grid.sums, at[k, lane], amounts[k, lane], grid.alone)
+            if qd.static(mixed):
+                add_whole(grid.mass_sums, at[k, lane], masses[k, lane], grid.alone)

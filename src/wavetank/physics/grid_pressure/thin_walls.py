@@ -201,7 +201,8 @@ def is_open_to(grid: CoarseGrid, n, node, s, thin: qd.template()):
     """
     found = grid.room[n] > 0.0
     if qd.static(thin):
-        found = found and not behind(grid, n, way_from(grid, node, s))
+        if found and grid.thin_s[n] > 0.0:
+            found = not behind(grid, n, way_from(grid, node, s))
     return qd.cast(found, qd.f32)
 
 
