@@ -56,7 +56,7 @@ def share_of(shares: qd.template(), lane, k: qd.template(), dim: qd.template()):
 
 
 @qd.func
-def close(
+def share_among_open(
     shares: qd.template(), at: qd.template(), amounts: qd.template(), masses: qd.template(), lane, grid: CoarseGrid,
     s, unit, density, begin, dim: qd.template(), thin: qd.template(), mixed: qd.template(),
 ):  # fmt: skip
@@ -85,7 +85,7 @@ def add_parcels(
 
     Where solids are `searched`, nodes without room leave theirs to others; with 2, so do those behind a thin wall.
     """
-    # The loops over lanes become vectors, which takes a third of the time; the last one cannot.
+    # All loops over lanes but the last become vectors, which takes half of the time; shares and sums in one would not.
     first, begin = team * lanes, part * grid.nx * grid.ny * grid.nz
     dim = qd.static(particles.x[first].n)
     shares = qd.Matrix.zero(qd.f32, 9, lanes)
@@ -109,7 +109,7 @@ def add_parcels(
             if grid.clear[at[qd.static(3**dim // 2), lane] - begin] == 0.0:
                 s = in_cells(grid, predicted(particles, first + lane))
                 density = 1.0 / scratch.weight[first + lane]
-                close(
+                share_among_open(
                     shares, at, amounts, masses, lane, grid, s, unit, density, begin, dim, searched - 1, mixed
                 )  # fmt: skip
         for k in qd.static(range(3**dim)):
