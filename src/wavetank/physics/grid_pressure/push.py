@@ -23,7 +23,7 @@ from wavetank.solids.distance import SolidSet, lift
 
 PUDDLE = (0.43, 0.6)  # fill at a particle: up to where it lies in a puddle, and from where in none
 REACH = 0.2  # of the support: the longest correction
-SUPPORTED = 0.47  # d: depth from which on the grid carries a particle in full, a little above the top layer at rest
+SUPPORTED = 0.48  # d: depth from which on the grid carries a particle in full, a little above the top layer at rest
 FADE = 1.0  # d: by how much higher it carries nothing
 
 
