@@ -11,8 +11,9 @@ from wavetank.device.compiler import upload
 from wavetank.physics import neighbors
 from wavetank.physics.coefficients import coefficients
 from wavetank.physics.integrate import forget_predictions
-from wavetank.physics.neighbors import new_grid, reorder
+from wavetank.physics.neighbors import new_grid
 from wavetank.physics.pairs import count_neighbors
+from wavetank.physics.sorting import reorder
 from wavetank.simulation import arrays
 from wavetank.simulation.simulation import Simulation
 

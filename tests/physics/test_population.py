@@ -9,8 +9,9 @@ from wavetank.device import compiler
 from wavetank.device.compiler import download, upload
 from wavetank.device.state import KINDS, LASTING, Diffuse, Particles, bubble, foam, new_particles, spray, with_viscosity
 from wavetank.physics.foam.pool import ROWS
-from wavetank.physics.neighbors import new_grid, sort_particles
+from wavetank.physics.neighbors import new_grid
 from wavetank.physics.population import append, at_capacity
+from wavetank.physics.sorting import sort_particles
 
 NAMES = tuple(field.name for field in dataclasses.fields(Particles))
 COUNT = 5

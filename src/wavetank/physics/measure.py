@@ -8,8 +8,9 @@ from wavetank.physics.density_constraint import measure_density
 from wavetank.physics.integrate import predict
 from wavetank.physics.mixture import blend
 from wavetank.physics.near_solids import look_at_solids
-from wavetank.physics.neighbors import find_neighbors, sort_particles
+from wavetank.physics.neighbors import find_neighbors
 from wavetank.physics.pairs import count_neighbors
+from wavetank.physics.sorting import sort_particles
 from wavetank.physics.tension import prepare_fluids
 from wavetank.physics.world import World
 

@@ -1,21 +1,16 @@
-"""Neighbour search: particles sorted into cells of edge h, then a list of neighbours for every eight particles.
+"""Neighbour search: a list of neighbours for every eight particles, from cells of edge h that they are sorted into.
 
 Cells are numbered x + nx (y + ny z) modulo their count, for any whole numbers x, y, z. The numbering therefore covers
 all of space with as many cells as there is room for: in a tank every cell has its own number, in the open two far
 cells may share one, which costs a few more distance tests and changes no result. A row of three cells along x is
 always three consecutive numbers, and the rows around a particle never overlap as long as nx, ny and nz are at least 3.
 
-Inside a cell particles stand in the order of their x, then of their ids, whatever the threads did: results repeat bit
-for bit, and eight particles that follow each other fill a piece of a row about as long as it is wide. Such a group has
-one list, of all who are within h of any of the eight, itself included; `pairs.py` walks it. That is three times as long
-as the list of one, so that lists of all take two fifths of the room.
+Eight particles that follow each other in sorted order (`sorting.py`) fill a piece of a row about as long as it is wide.
+Such a group has one list, of all who are within h of any of the eight, itself included; `pairs.py` walks it. That is
+three times as long as the list of one, so that lists of all take two fifths of the room.
 
 Building a list tests the candidates of a row without a branch, a block of them against eight places into the bits of
 one word, and then walks over the bits that are set. Measured: docs/notebook/performance.md.
-
-Counting sort after Green 2010 ("Particle Simulation using CUDA"); Hoetzlein 2014 ("Fast Fixed-Radius Nearest
-Neighbors") for the counting by integer atomics. What there is little of is counted by one thread: waking the others
-costs more than they save.
 """
 
 import dataclasses
@@ -24,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.device.compiler import lanes, qd, threads, worth_sharing
+from wavetank.device.compiler import lanes, qd, threads
 from wavetank.device.periods import NONE, Periods, nearest_along, within_along
 from wavetank.device.state import Coefficients, Grid, Particles, integers, nowhere
-from wavetank.device.sums import blocks_of, many_threads, share_of, sort_by
+from wavetank.device.sums import blocks_of, many_threads, share_of
 from wavetank.foundation.errors import WavetankError
-from wavetank.physics.predicted_positions import predict_at, predicted
+from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.teams import end_of_part, first_of_part, groups, turns_over
 
 PARTS = 8  # of a pass for each thread: enough to even out what takes longer
@@ -71,42 +66,6 @@ def cell_number(grid: Grid, c):
         layer = remainder(c[1] + grid.ny * remainder(c[2], grid.nz), grid.ny * grid.nz)
         number = remainder(c[0] + grid.nx * layer, grid.cells)
     return number
-
-
-@qd.kernel(fastcache=True)
-def reorder(sorted_: Particles, particles: Particles, grid: Grid, count: qd.i32, shared: qd.template()):
-    """Copy the particles into their sorted order, given the cell of each: count, sum up, fill in, copy.
-
-    One thread does all but copying, or all threads share it where `shared`.
-    """
-    # Some ten thousand particles are done before other threads have started.
-    sort_by(grid.cell, grid.order, grid.start, grid.fill, grid.blocks, grid.cells, count, shared)
-    for n in range(count):
-        i = grid.order[n]
-        own = particles.px[i]
-        cell = grid.cell[i]
-        place = grid.start[cell]
-        for k in range(place, grid.start[cell + 1]):
-            other = grid.order[k]
-            x = particles.px[other]
-            place += qd.cast(x < own or (x == own and particles.id[other] < particles.id[i]), qd.i32)
-        copy_particle(sorted_, place, particles, i)
-
-
-@qd.func
-def copy_particle(target: Particles, to, source: Particles, i):
-    """Copy particle `i` of `source` to the place `to` of `target`."""
-    target.x[to] = source.x[i]
-    predict_at(target, to, predicted(source, i))
-    target.v[to] = source.v[i]
-    target.a[to] = source.a[i]
-    if source.viscous.shape[0] > 1 and target.viscous.shape[0] > 1:
-        target.viscous[to] = source.viscous[i]
-    target.id[to] = source.id[i]
-    target.material[to] = source.material[i]
-    target.near[to] = source.near[i]
-    target.dye[to] = source.dye[i]
-    target.frozen[to] = source.frozen[i]
 
 
 @qd.func
@@ -330,11 +289,6 @@ def list_room(dim: int, support: float) -> int:
     if dim == 3:
         near = edge**3 + 6.0 * edge**2 * support + math.pi * support**2 * (3.0 * edge + 4.0 / 3.0 * support)
     return 16 * math.ceil(near / 16) + 16
-
-
-def sort_particles(particles: Particles, spare: Particles, grid: Grid, count: int) -> None:
-    """Sort `particles` by cell into `spare`; `grid.cell` holds the cell of each."""
-    reorder(spare, particles, grid, count, int(worth_sharing(grid.cells + count)))
 
 
 def find_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> Grid:

@@ -19,8 +19,8 @@ from wavetank.device.compiler import download, qd, upload
 from wavetank.device.periods import NONE, Periods, nearest_image
 from wavetank.device.state import LASTING, Grid, Particles, integers, new_particles, vectors, with_viscosity
 from wavetank.foundation.errors import WavetankError
-from wavetank.physics.neighbors import copy_particle
 from wavetank.physics.predicted_positions import predict_at
+from wavetank.physics.sorting import copy_particle
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3
 
 

@@ -25,9 +25,10 @@ from wavetank.physics.grid_pressure.correction import correct_pressure
 from wavetank.physics.integrate import bring_within, predict, update_velocities
 from wavetank.physics.mixture import pack_multipliers
 from wavetank.physics.near_solids import FARTHEST, hand_over_pushes, look_again, look_at_solids
-from wavetank.physics.neighbors import find_neighbors, sort_particles
+from wavetank.physics.neighbors import find_neighbors
 from wavetank.physics.plan import Plan, plan_step
 from wavetank.physics.population import hold_frozen, stop_frozen
+from wavetank.physics.sorting import sort_particles
 from wavetank.physics.tension import apply_tension, prepare_fluids
 from wavetank.physics.vorticity import confine_vorticity
 from wavetank.physics.world import World

@@ -21,8 +21,9 @@ from wavetank.lab.bench.counts import device_bytes
 from wavetank.lab.bench.machine import cores, load, machine
 from wavetank.physics.coefficients import coefficients
 from wavetank.physics.integrate import forget_predictions
-from wavetank.physics.neighbors import find_neighbors, new_grid, sort_particles
+from wavetank.physics.neighbors import find_neighbors, new_grid
 from wavetank.physics.pairs import count_neighbors
+from wavetank.physics.sorting import sort_particles
 from wavetank.scene.scene import Scene
 
 SIZES = (10_000, 100_000, 1_000_000)

@@ -58,7 +58,7 @@ from wavetank.physics.grid_pressure.couplings import LEAST_THETA, couple_nodes, 
 from wavetank.physics.grid_pressure.films import left_to_grid
 from wavetank.physics.grid_pressure.gaps import across, gaps_at
 from wavetank.physics.grid_pressure.parcels import add_parcels
-from wavetank.physics.grid_pressure.poisson import solve_levels
+from wavetank.physics.grid_pressure.poisson import restrict_rooms, solve_levels
 from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, open_tents, spread_along
 from wavetank.physics.grid_pressure.sealed import MOSTLY_FULL, anchor, balance, find_basins
@@ -284,6 +284,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         world.room_found.fill(0)
         find_room(finest, world.room_found, world.solids, c, LEAST_OPEN, UNIT, world.searched, params.dim)
         find_basins(finest, world.room_found)
+        restrict_rooms(world.levels)
         world.room_version, world.room_gravity = world.solids_version, gravity
         thin, world.basins, world.open_nodes = map(int, download(world.room_found))
         world.has_thin_walls = thin > 0

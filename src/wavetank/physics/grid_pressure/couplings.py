@@ -167,10 +167,15 @@ def open_through(fine: CoarseGrid, c, ratio, axis: qd.template()):
 
 
 @qd.func
+def ratio_of(coarse: CoarseGrid, fine: CoarseGrid):
+    """How many finer nodes one of a coarser level stands for along each axis."""
+    return qd.Vector([fine.nx // coarse.nx, fine.ny // coarse.ny, fine.nz // coarse.nz])
+
+
+@qd.func
 def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
     """Give node `n` of a coarser level the means of the finer nodes that it stands for."""
-    c = coordinates(coarse, n)
-    ratio = qd.Vector([fine.nx // coarse.nx, fine.ny // coarse.ny, fine.nz // coarse.nz])
+    c, ratio = coordinates(coarse, n), ratio_of(coarse, fine)
     room, fill, rhs, density = 0.0, 0.0, 0.0, 0.0
     for z in range(c[2] * ratio[2], c[2] * ratio[2] + ratio[2]):
         for y in range(c[1] * ratio[1], c[1] * ratio[1] + ratio[1]):
@@ -180,19 +185,30 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
                 fill += fine.fill[m] * fine.room[m]
                 rhs += fine.rhs[m]
                 density += fine.density[m] * fine.fill[m] * fine.room[m]
-    coarse.open_x[n] = open_through(fine, c, ratio, 0)
-    coarse.open_y[n] = open_through(fine, c, ratio, 1)
-    coarse.open_z[n] = open_through(fine, c, ratio, 2)
-    size = ratio[0] * ratio[1] * ratio[2]
-    coarse.room[n] = room / size
     coarse.density[n] = density / fill if fill > 0.0 else 1.0
     coarse.fill[n] = fill / qd.max(room, 1e-6)
-    coarse.rhs[n] = rhs / size
+    coarse.rhs[n] = rhs / (ratio[0] * ratio[1] * ratio[2])
+
+
+@qd.kernel(fastcache=True)
+def restrict_room(coarse: CoarseGrid, fine: CoarseGrid):
+    """Give a coarser level the room of the finer one and its faces, which stay until solids have moved."""
+    for n in range(coarse.nx * coarse.ny * coarse.nz):
+        c, ratio = coordinates(coarse, n), ratio_of(coarse, fine)
+        room = 0.0
+        for k in range(ratio[0] * ratio[1] * ratio[2]):
+            way = qd.Vector([k % ratio[0], k // ratio[0] % ratio[1], k // (ratio[0] * ratio[1])])
+            place = c * ratio + way
+            room += fine.room[place[0] + fine.nx * (place[1] + fine.ny * place[2])]
+        coarse.room[n] = room / (ratio[0] * ratio[1] * ratio[2])
+        coarse.open_x[n] = open_through(fine, c, ratio, 0)
+        coarse.open_y[n] = open_through(fine, c, ratio, 1)
+        coarse.open_z[n] = open_through(fine, c, ratio, 2)
 
 
 @qd.kernel(fastcache=True)
 def restrict(coarse: CoarseGrid, fine: CoarseGrid, least_theta: qd.f32, lid: qd.i32, shared: qd.template()):
-    """Set up the equation of a coarser level; `shared` by all threads, or done by one."""
+    """Set up the equation of a coarser level, whose room is known; `shared` by all threads, or done by one."""
     qd.loop_config(serialize=not shared)
     for n in range(coarse.nx * coarse.ny * coarse.nz):
         average_node(coarse, fine, n)

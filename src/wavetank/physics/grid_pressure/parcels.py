@@ -56,24 +56,36 @@ def share_of(shares: qd.template(), lane, k: qd.template(), dim: qd.template()):
 
 
 @qd.func
-def share_among_open(
-    shares: qd.template(), at: qd.template(), amounts: qd.template(), masses: qd.template(), lane, grid: CoarseGrid,
-    s, unit, density, begin, dim: qd.template(), thin: qd.template(), mixed: qd.template(),
+def node_of(nodes: qd.template(), lane, k: qd.template(), dim: qd.template()):
+    """Number of the `k`-th of the nodes around, the first axis fastest."""
+    node = nodes[k % 3, lane] + nodes[3 + k // 3 % 3, lane]
+    if qd.static(dim == 3):
+        node += nodes[6 + k // 9, lane]
+    return node
+
+
+@qd.func
+def add_to_open(
+    grid: CoarseGrid, s, spacing, unit, density, begin, dim: qd.template(), thin: qd.template(), mixed: qd.template()
 ):  # fmt: skip
-    """Let those of the nodes `at` that are closed to the place `s` [cells] leave what they have to the others."""
+    """Add the shares of the particle at the place `s` [cells], where nodes closed to it leave theirs to the others."""
+    shares, nodes = qd.Matrix.zero(qd.f32, 9, 1), qd.Matrix.zero(qd.i32, 9, 1)
+    find_shares(shares, nodes, 0, grid, s, spacing, dim)
     total, is_open = 0.0, 0
     for k in range(qd.static(3**dim)):
-        share = share_of(shares, lane, k, dim)
+        share = share_of(shares, 0, k, dim)
         node = qd.floor(s + 0.5, qd.i32) + qd.Vector([k % 3 - 1, k // 3 % 3 - 1, k // 9 - 1 if dim == 3 else 0])
         if share > 0.0:
-            has_room = is_open_to(grid, at[k, lane] - begin, node, s, thin)
+            has_room = is_open_to(grid, node_of(nodes, 0, k, dim), node, s, thin)
             total += share * has_room
             is_open |= qd.cast(has_room, qd.i32) << k
     for k in range(qd.static(3**dim)):
-        amount = unit * share_of(shares, lane, k, dim) * (is_open >> k & 1) / qd.max(total, 1e-3)
-        amounts[k, lane] = qd.cast(qd.round(amount), qd.i32)
-        if qd.static(mixed):
-            masses[k, lane] = qd.cast(qd.round(amount * density), qd.i32)
+        if is_open >> k & 1 == 1:
+            amount = unit * share_of(shares, 0, k, dim) / qd.max(total, 1e-3)
+            at = begin + node_of(nodes, 0, k, dim)
+            add_whole(grid.sums, at, qd.cast(qd.round(amount), qd.i32), grid.alone)
+            if qd.static(mixed):
+                add_whole(grid.mass_sums, at, qd.cast(qd.round(amount * density), qd.i32), grid.alone)
 
 
 @qd.func
@@ -97,22 +109,21 @@ def add_parcels(
         find_shares(shares, nodes, lane, grid, in_cells(grid, predicted(particles, first + lane)), spacing, dim)
     for lane in range(lanes):
         for k in qd.static(range(3**dim)):
-            at[k, lane] = begin + nodes[k % 3, lane] + nodes[3 + k // 3 % 3, lane]
-            if qd.static(dim == 3):
-                at[k, lane] += nodes[6 + k // 9, lane]
+            at[k, lane] = begin + node_of(nodes, lane, k, dim)
             amount = unit * share_of(shares, lane, k, dim)
             amounts[k, lane] = qd.cast(qd.round(amount), qd.i32)
             if qd.static(mixed):
                 masses[k, lane] = qd.cast(qd.round(amount / scratch.weight[first + lane]), qd.i32)
     for lane in range(qd.min(lanes, count - first)):
+        is_beside = False
         if qd.static(searched):
-            if grid.clear[at[qd.static(3**dim // 2), lane] - begin] == 0.0:
+            is_beside = grid.clear[at[qd.static(3**dim // 2), lane] - begin] < 0.0
+            if is_beside:
                 s = in_cells(grid, predicted(particles, first + lane))
                 density = 1.0 / scratch.weight[first + lane]
-                share_among_open(
-                    shares, at, amounts, masses, lane, grid, s, unit, density, begin, dim, searched - 1, mixed
-                )  # fmt: skip
-        for k in qd.static(range(3**dim)):
-            add_whole(grid.sums, at[k, lane], amounts[k, lane], grid.alone)
-            if qd.static(mixed):
-                add_whole(grid.mass_sums, at[k, lane], masses[k, lane], grid.alone)
+                add_to_open(grid, s, spacing, unit, density, begin, dim, searched - 1, mixed)
+        if not is_beside:
+            for k in qd.static(range(3**dim)):
+                add_whole(grid.sums, at[k, lane], amounts[k, lane], grid.alone)
+                if qd.static(mixed):
+                    add_whole(grid.mass_sums, at[k, lane], masses[k, lane], grid.alone)

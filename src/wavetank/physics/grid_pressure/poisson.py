@@ -14,7 +14,13 @@ from wavetank.device.compiler import current_backend, qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.block import block_threads, in_block, is_shared, wait_for_block
 from wavetank.physics.grid_pressure.coarse_grid import nearest
-from wavetank.physics.grid_pressure.couplings import LEAST_THETA, open_towards, restrict, restrict_in_block
+from wavetank.physics.grid_pressure.couplings import (
+    LEAST_THETA,
+    open_towards,
+    restrict,
+    restrict_in_block,
+    restrict_room,
+)  # fmt: skip
 
 SWEEPS, MOST_SWEEPS = 8, 200  # at once, and of the coarsest level
 ON_EACH = (2 * SWEEPS, 1.7)  # sweeps of a level and their relaxation: eight leave what drives calm water round
@@ -199,9 +205,16 @@ def coarsest_relaxation(level: CoarseGrid) -> tuple[int, float]:
     return min(sweeps, MOST_SWEEPS), over_relaxation
 
 
+def restrict_rooms(levels: list[CoarseGrid]) -> None:
+    """Let all `levels` know which room the solids leave on the finest one, the first in the list."""
+    for fine, coarse in itertools.pairwise(levels):
+        restrict_room(coarse, fine)
+
+
 def solve_levels(levels: list[CoarseGrid], lid: int = 0) -> None:
     """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set.
 
+    They know their rooms (`restrict_rooms`).
     `lid` is 1 in a tank that is closed above its water, else 0.
     """
     fenced = int(current_backend() != "cuda")

@@ -328,6 +328,14 @@ def find_room(
         for row in range(grid.ny * grid.nz):
             largest_along(grid.clear, grid.gaps, grid, row, 2, 2)
         for n in range(grid.nx * grid.ny * grid.nz):
-            grid.clear[n] = 1.0 if grid.clear[n] < 1e-3 else 0.0
+            grid.rhs[n] = qd.cast(grid.room[n] <= 0.0 or grid.thin_s[n] > 0.0, qd.f32)
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.depth, grid.rhs, grid, row, 0, 1)
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.gaps, grid.depth, grid, row, 1, 1)
+        for row in range(grid.ny * grid.nz):
+            largest_along(grid.rhs, grid.gaps, grid, row, 2, 1)
+        for n in range(grid.nx * grid.ny * grid.nz):
+            grid.clear[n] = 1.0 if grid.clear[n] < 1e-3 else -grid.rhs[n]
     for n in range(grid.nx * grid.ny * grid.nz):
         open_faces(grid, n)
