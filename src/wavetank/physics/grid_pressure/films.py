@@ -45,9 +45,12 @@ def thickness(grid: CoarseGrid, n, axis: qd.template()):
 
 @qd.func
 def left_to_grid(grid: CoarseGrid, n, thin, thick):
-    """Share of the errors at node `n` that is the grid's: none where water is `thin` [cells], all where `thick`."""
+    """Share of the errors at node `n` that is the grid's: none where water is `thin` [cells], all where `thick`.
+
+    A film is no deeper than that below the air.
+    """
     cells = 2.0 * reach()
-    if grid.fill[n] >= 0.5 and grid.room[n] > 0.0:
+    if grid.fill[n] >= 0.5 and grid.room[n] > 0.0 and grid.depth[n] < 2.999 * grid.dy:
         for axis in qd.static(range(3)):
             if grid.nz > 1 or axis < 2:
                 cells = qd.min(cells, thickness(grid, n, axis))

@@ -25,11 +25,15 @@ BORNE = (0.6, 0.9)  # fill of a cell from where to where the grid bears its weig
 
 @qd.func
 def flow_out(grid: CoarseGrid, n, way):
-    """Share of a cell that flows out of that of node `n`, where all water moves by the same `way` [m]."""
+    """Share of a cell that flows out of that of node `n`, where all water moves by the same `way` [m].
+
+    Far from solids, and between two nodes, as much flows in.
+    """
     edges = vec3(grid.dx, grid.dy, grid.dz)
     total = 0.0
     for axis in qd.static(range(3)):
-        if grid.nz > 1 or axis < 2:
+        is_between = qd.min(nodes_beyond(grid, n, axis, -1), nodes_beyond(grid, n, axis, 1)) > 0
+        if (grid.nz > 1 or axis < 2) and not (is_between and grid.clear[n] > 0.0):
             for side in qd.static((-1, 1)):
                 if nodes_beyond(grid, n, axis, side) > 0:
                     m = beside_on(grid, n, axis, side)
