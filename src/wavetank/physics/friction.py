@@ -25,84 +25,125 @@ was thrown to and fro without end, crept up and down walls and went up and down 
 """
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import Coefficients, Particles, Scratch, Walls
-from wavetank.physics.boundary import is_near, wall_share
+from wavetank.device.state import Coefficients, Grid, Particles, Scratch, Walls
+from wavetank.physics.boundary import is_near, next_near, wall_share
 from wavetank.physics.grid_pressure.coarse_grid import ramp
 from wavetank.physics.near_solids import facing_at, known, place_of
+from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predicted
-from wavetank.solids.distance import SolidSet, image_near, lift, plane_distance, rotate, to_local, vec3, vec4
+from wavetank.physics.teams import end_of, end_team, first_team, turns
+from wavetank.solids.distance import SolidSet, image_near, lift, plane_distance, rotate, to_local, vec3
 
 
 @qd.kernel(fastcache=True)
 def apply_friction(
-    particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients, count: qd.i32,
+    particles: Particles, scratch: Scratch, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, count: qd.i32,
     on_grid: qd.template(), felt: qd.template(),
 ):  # fmt: skip
     """Reduce the velocities along walls and solids, and slow ones towards them and away.
 
     Where the step was taken `on_grid`, the floor of the tank lets puddles come to rest. Bodies are `felt` where there
-    are some.
+    are some. The tank's walls are computed for a team at once.
     """
-    for i in range(count):
-        near = particles.near[i]
-        if near != 0:
-            p = lift(predicted(particles, i))
-            v = lift(particles.v[i])
-            others = known(scratch, i) if near >> solids.tank_count != 0 else 0
-            calm, beside_body, beside_tank = c.calming_at_solids, c.calming_at_solids, 0.0
-            if qd.static(felt):
-                found = between(i, p, others, near, scratch, solids, c)
-                beside_body *= 1.0 - found[0]
-                calm *= 1.0 - found[1]
-                beside_tank = c.calming_at_solids * (found[0] - found[1])
-            for number in range(solids.tank_count + others):
-                at, k = 0, number
-                value = vec4(0.0, 0.0, 0.0, c.h)
-                if number >= solids.tank_count:
-                    at = place_of(scratch, i, number - solids.tank_count)
-                    k = scratch.solid[at]
-                    value = facing_at(scratch, at, i, p)
-                elif is_near(near, k, solids) == 1:
-                    value = plane_distance(solids, k, p)
-                n = vec3(value.x, value.y, value.z)
-                if value.w < c.h:
-                    moving = vec3(0.0, 0.0, 0.0)
-                    if k >= solids.tank_count:
-                        moving = surface_velocity(solids, k, p, c.dt)
-                    relative = v - moving
-                    towards = n.dot(relative)
-                    if value.w < layer() * c.h and solids.unit[k] == 0.0:
-                        v -= n * (towards * settled(n, towards, calm, c))
-                    slip = relative - n * towards
-                    share = 0.0
-                    if solids.friction[k] > 0.0:
-                        push = (
-                            scratch.weight[i] * qd.abs(scratch.lam[i]) * wall_share(walls, value.w, c.h)[1]
-                            * c.wall_density / c.h
-                        )  # fmt: skip
-                        share = solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12)
-                    if k < solids.tank_count:
-                        if qd.static(on_grid):
-                            share += calmed(slip.norm_sqr(), calm, c) * qd.max(0.0, -n.dot(down(c))) * scratch.puddle[i]
-                        if qd.static(on_grid and felt):
-                            share += calmed(slip.norm_sqr(), beside_tank, c)
-                    else:
-                        calming = calmed(slip.norm_sqr(), beside_body if solids.unit[k] > 0.0 else calm, c)
-                        if solids.unit[k] > 0.0:  # a body that is on its way is not held up
-                            calming *= qd.max(free(), at_rest(moving, c))
-                        share += calming
-                    change = slip * qd.min(solids.grip[k], share)
-                    v -= change
-                    if solids.unit[k] > 0.0:
-                        scratch.push[at] -= change * (c.dt / scratch.weight[i])
-            held = particles.v[i]
-            for axis in qd.static(range(held.n)):
-                held[axis] = v[axis]
-            particles.v[i] = held
+    for turn in range(turns(grid, count)):
+        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+            first, end, near = team * grid.lanes, end_of(team, grid, count), 0
+            for i in range(first, end):
+                near |= particles.near[i]
+            if near != 0:
+                dim = qd.static(particles.v[first].n)
+                v_of = qd.Matrix.zero(qd.f32, 3, grid.lanes)
+                calmings = qd.Matrix.zero(qd.f32, 3, grid.lanes)  # by the tank, beside bodies and by bodies, by solids
+                for lane in range(grid.lanes):
+                    v = particles.v[first + lane]
+                    for axis in qd.static(range(dim)):
+                        v_of[axis, lane] = v[axis]
+                    calmings[1, lane] = c.calming_at_solids
+                    calmings[2, lane] = c.calming_at_solids
+                if qd.static(felt):
+                    for i in range(first, end):
+                        found = between(i, lift(predicted(particles, i)), scratch, particles.near[i], solids, c)
+                        calmings[0, i - first] = c.calming_at_solids * (found[0] - found[1])
+                        calmings[1, i - first] = c.calming_at_solids * (1.0 - found[0])
+                        calmings[2, i - first] = c.calming_at_solids * (1.0 - found[1])
+                k = next_near(near, -1, solids)
+                while k < solids.tank_count:
+                    for lane in range(grid.lanes):
+                        slow_at_wall(v_of, calmings, lane, k, first, particles, scratch, solids, walls, c, on_grid)
+                    k = next_near(near, k, solids)
+                for i in range(first, end):
+                    if particles.near[i] != 0:
+                        v = column(v_of, i - first)
+                        if particles.near[i] >> solids.tank_count != 0:
+                            calming = column(calmings, i - first)
+                            v = slowed_at_solids(v, calming, i, particles, scratch, solids, walls, c)
+                        held = particles.v[i]
+                        for axis in qd.static(range(dim)):
+                            held[axis] = v[axis]
+                        particles.v[i] = held
 
 
 @qd.func
-def between(i, p, others, near, scratch: Scratch, solids: SolidSet, c: Coefficients):
+def rubbed(i, k, distance, slip, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients):
+    """Share of a `slip` [m/s] along solid `k`, at that `distance` [m], that Coulomb's friction takes."""
+    share = 0.0
+    if solids.friction[k] > 0.0:
+        push = scratch.weight[i] * qd.abs(scratch.lam[i]) * wall_share(walls, distance, c.h)[1] * c.wall_density / c.h
+        share = solids.friction[k] * push / c.dt / qd.max(slip.norm(), 1e-12)
+    return share
+
+
+@qd.func
+def slow_at_wall(
+    v_of: qd.template(), calmings: qd.template(), lane, k, first, particles: Particles, scratch: Scratch,
+    solids: SolidSet, walls: Walls, c: Coefficients, on_grid: qd.template(),
+):  # fmt: skip
+    """Let wall `k` of the tank slow the particle in a `lane` of the team from number `first` on, if that is near."""
+    i = first + lane
+    value = plane_distance(solids, k, lift(predicted(particles, i)))
+    n, v = vec3(value.x, value.y, value.z), column(v_of, lane)
+    towards = n.dot(v)
+    slip = v - n * towards
+    settles = qd.select(value.w < layer() * c.h, settled(n, towards, calmings[2, lane], c), 0.0)
+    share = rubbed(i, k, value.w, slip, scratch, solids, walls, c)
+    if qd.static(on_grid):
+        squared, in_puddle = slip.norm_sqr(), qd.max(0.0, -n.dot(down(c))) * scratch.puddle[i]
+        share += calmed(squared, calmings[2, lane], c) * in_puddle + calmed(squared, calmings[0, lane], c)
+    changed = v - n * (towards * settles) - slip * qd.min(solids.grip[k], share)
+    is_at = value.w < c.h and is_near(particles.near[i], k, solids) == 1
+    for axis in qd.static(range(3)):
+        v_of[axis, lane] = qd.select(is_at, changed[axis], v[axis])
+
+
+@qd.func
+def slowed_at_solids(
+    v, calmings, i, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients
+):  # fmt: skip
+    """The velocity `v` [m/s] of particle `i` as the solids that it knows leave it; bodies feel what they take."""
+    p, left = lift(predicted(particles, i)), v
+    for number in range(known(scratch, i)):
+        at = place_of(scratch, i, number)
+        k, value = scratch.solid[at], facing_at(scratch, at, i, p)
+        if value.w < c.h:
+            n, moving = vec3(value.x, value.y, value.z), surface_velocity(solids, k, p, c.dt)
+            relative = left - moving
+            towards = n.dot(relative)
+            slip = relative - n * towards
+            calming = calmings[2]
+            if solids.unit[k] > 0.0:  # a body that is on its way is not held up
+                calming = calmings[1] * qd.max(free(), at_rest(moving, c))
+            elif value.w < layer() * c.h:
+                left -= n * (towards * settled(n, towards, calmings[2], c))
+            share = rubbed(i, k, value.w, slip, scratch, solids, walls, c) + calmed(slip.norm_sqr(), calming, c)
+            change = slip * qd.min(solids.grip[k], share)
+            left -= change
+            if solids.unit[k] > 0.0:
+                scratch.push[at] -= change * (c.dt / scratch.weight[i])
+    return left
+
+
+@qd.func
+def between(i, p, scratch: Scratch, near, solids: SolidSet, c: Coefficients):
     """(share that bodies, share that other solids do not take where water is beside a body and another solid).
 
     The latter is how surely it is to leave from between: where a body is on its way, and where one of the two lies
@@ -110,6 +151,7 @@ def between(i, p, others, near, scratch: Scratch, solids: SolidSet, c: Coefficie
     """
     bodies, total = 0, 0
     on_its_way, above, below = 0.0, 0.0, 0.0
+    others = known(scratch, i) if near >> solids.tank_count != 0 else 0
     for number in range(others):
         at = place_of(scratch, i, number)
         k = scratch.solid[at]

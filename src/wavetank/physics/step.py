@@ -79,7 +79,7 @@ def step(
     update_velocities(world.particles, c, world.count)  # 21, 23
     if plan.is_rubbed:
         apply_friction(
-            world.particles, world.scratch, world.solids, world.walls, c, world.count, int(plan.on_grid),
+            world.particles, world.scratch, world.grid, world.solids, world.walls, c, world.count, int(plan.on_grid),
             int(plan.searched == 2),
         )  # fmt: skip
     if plan.searched == 2:
