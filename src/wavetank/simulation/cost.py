@@ -6,6 +6,7 @@ processor needs for a particle and a step, so that what is refused by it is real
 
 import contextlib
 import dataclasses
+import functools
 import math
 import os
 from collections.abc import Iterator
@@ -82,11 +83,17 @@ def check_cost(scene: Scene, capacity: int | None = None) -> None:
         )
 
 
+@functools.cache
+def processors() -> int:
+    """Return how many processors the machine has; the system takes as long to say it as a kernel to launch."""
+    return os.cpu_count() or 1
+
+
 def expected_seconds(particles: int, scene: Scene, seconds: float) -> float:
     """Return a lower bound of the time [s] that `seconds` of water take to compute."""
     steps = scene.substeps * seconds / scene.frame_time
     threads = compiler.threads() or 64
-    return steps * (PER_STEP + particles * PER_PARTICLE / min(threads, os.cpu_count() or 1))
+    return steps * (PER_STEP + particles * PER_PARTICLE / min(threads, processors()))
 
 
 def check_time(particles: int, scene: Scene, seconds: float, what: str) -> None:
