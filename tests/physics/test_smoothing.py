@@ -6,7 +6,7 @@ import wavetank as wt
 from wavetank.device.compiler import qd
 from wavetank.physics import smoothing
 from wavetank.physics.coefficients import coefficients, relaxations
-from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, lattice_density, rest_lattice, sigma
+from wavetank.physics.smoothing import KERNELS, NAMES, SLOPES, kernel_shape, lattice_density, rest_lattice, sigma
 
 SINGLE = [name for name, (a, b) in NAMES.items() if a == b]
 
@@ -19,11 +19,11 @@ def evaluate(q: qd.types.ndarray(), out: qd.types.ndarray(), method: qd.template
 
 
 def on_device(name: str, q: np.ndarray) -> np.ndarray:
-    """(w, w') at `q`; a kernel gives w' over q."""
+    """(w, w') at `q`; a kernel gives w' over q and its factor in SLOPES."""
     points, pairs = qd.ndarray(qd.f32, shape=(len(q),)), qd.ndarray(qd.types.vector(2, qd.f32), shape=(len(q),))
     points.from_numpy(q.astype(np.float32))
     evaluate(points, pairs, list(NAMES).index(name))
-    return pairs.to_numpy()
+    return pairs.to_numpy() * np.array([1.0, SLOPES[NAMES[name][1]]], np.float32)
 
 
 def shell(q: np.ndarray, dim: int) -> np.ndarray:

@@ -240,7 +240,7 @@ class Coefficients:
     inverse_h: qd.f32  # 1/m
     inverse_h2: qd.f32  # 1/m^2
     density_scale: qd.f32  # see RestLattice
-    gradient_scale: qd.f32  # 1/m^2
+    gradient_scale: qd.f32  # 1/m^2, of what `smoothing.kernel` gives
     eps: qd.f32  # 1/m^2, constraint force mixing
     relaxation: qd.f32
     momentum: qd.f32

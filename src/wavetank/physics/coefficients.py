@@ -11,7 +11,7 @@ from wavetank.foundation.params import Parameters
 from wavetank.physics.density_constraint import schedule
 from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED
 from wavetank.physics.mixture import stiffening
-from wavetank.physics.smoothing import KERNELS, NAMES, kernel_shape, rest_lattice
+from wavetank.physics.smoothing import KERNELS, NAMES, SLOPES, kernel_shape, rest_lattice
 
 LEAST_MIXING = 1e-6  # of S_0: a particle without neighbours has no gradient to divide by
 EARTH = 9.81  # m/s^2
@@ -57,7 +57,7 @@ def coefficients(
             inverse_h=1.0 / h,
             inverse_h2=1.0 / h**2,
             density_scale=rest.density_scale,
-            gradient_scale=rest.gradient_scale / h**2,
+            gradient_scale=rest.gradient_scale * SLOPES[NAMES[params.kernel][1]] / h**2,
             eps=max(params.force_mixing, LEAST_MIXING) * s_0,
             relaxation=params.relaxation,
             momentum=0.0,

@@ -43,14 +43,16 @@ from wavetank.solids.distance import SolidSet, lift, vec4
 
 @qd.func
 def add_density(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
-    """Add neighbour j to (sum w, grad_i C, sum_j |grad_j C|^2): Eq. 1 and the denominator of Eq. 4."""
+    """Add neighbour j to (sum w, grad_i C, sum_j |grad_j C|^2): Eq. 1 and the denominator of Eq. 4.
+
+    Gradients are over `gradient_scale`, by which a particle's sums are multiplied at the end.
+    """
     w = kernel(method, square * c.inverse_h2)
-    share = c.gradient_scale * w[1]
     sums[0] += w[0]
-    direction = r * share
+    direction = r * w[1]
     for k in qd.static(range(r.n)):
         sums[1 + k] += direction[k]
-    sums[1 + r.n] += share * share * square  # none for the particle itself
+    sums[1 + r.n] += w[1] * w[1] * square  # none for the particle itself
 
 
 @qd.func
@@ -61,8 +63,8 @@ def add_weight(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd
 
 @qd.func
 def add_correction(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
-    """Add neighbour j to the correction of particle i: Eq. 6."""
-    sums += r * ((a[0] + b[0]) * c.gradient_scale * kernel(method, square * c.inverse_h2)[1])
+    """Add neighbour j to the correction of particle i over `gradient_scale`: Eq. 6."""
+    sums += r * ((a[0] + b[0]) * kernel(method, square * c.inverse_h2)[1])
 
 
 @qd.func
@@ -78,14 +80,14 @@ def artificial_pressure(w, c: Coefficients, quartic: qd.template()):
 def add_tensile_correction(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """Add neighbour j to the correction of particle i: Eq. 8, Eq. 6 with the artificial pressure of Eq. 7."""
     w = kernel(method, square * c.inverse_h2)
-    sums += r * ((a[0] + b[0] + artificial_pressure(w[0], c, False)) * c.gradient_scale * w[1])
+    sums += r * ((a[0] + b[0] + artificial_pressure(w[0], c, False)) * w[1])
 
 
 @qd.func
 def add_quartic_correction(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """`add_tensile_correction` with the exponent 4."""
     w = kernel(method, square * c.inverse_h2)
-    sums += r * ((a[0] + b[0] + artificial_pressure(w[0], c, True)) * c.gradient_scale * w[1])
+    sums += r * ((a[0] + b[0] + artificial_pressure(w[0], c, True)) * w[1])
 
 
 @qd.func
@@ -96,7 +98,7 @@ def add_mixed_tensile_correction(sums: qd.template(), r, square, a, b, c: Coeffi
     """
     w = kernel(method, square * c.inverse_h2)
     s_corr = artificial_pressure(w[0], c, False) / qd.max(a[1], b[1])
-    sums += r * ((a[0] + b[0] + s_corr) * c.gradient_scale * w[1])
+    sums += r * ((a[0] + b[0] + s_corr) * w[1])
 
 
 @qd.func
@@ -104,19 +106,18 @@ def add_mixed_quartic_correction(sums: qd.template(), r, square, a, b, c: Coeffi
     """`add_mixed_tensile_correction` with the exponent 4."""
     w = kernel(method, square * c.inverse_h2)
     s_corr = artificial_pressure(w[0], c, True) / qd.max(a[1], b[1])
-    sums += r * ((a[0] + b[0] + s_corr) * c.gradient_scale * w[1])
+    sums += r * ((a[0] + b[0] + s_corr) * w[1])
 
 
 @qd.func
 def add_weighted_density(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
     """`add_density` for fluids of different density: squared gradients count with the inverse masses."""
     w = kernel(method, square * c.inverse_h2)
-    share = c.gradient_scale * w[1]
     sums[0] += w[0]
-    direction = r * share
+    direction = r * w[1]
     for k in qd.static(range(r.n)):
         sums[1 + k] += direction[k]
-    sums[1 + r.n] += b[0] * share * share * square
+    sums[1 + r.n] += b[0] * w[1] * w[1] * square
 
 
 #: By `mixed`; append only, as `smoothing.KERNELS`.
@@ -170,10 +171,10 @@ def start_multipliers(
                 constraint = c.density_scale * sum[0] + wall.w - 1.0  # Eq. 2
                 own = c.eps
                 for k in qd.static(range(dim)):
-                    own += (sum[1 + k] + wall[k]) ** 2
+                    own += (c.gradient_scale * sum[1 + k] + wall[k]) ** 2
                 if qd.static(mixed):
                     own *= scratch.weight[i]
-                squares = sum[dim + 1] + own
+                squares = c.gradient_scale * c.gradient_scale * sum[dim + 1] + own
                 scratch.squares[i] = squares
                 set_multiplier(i, 0.0, -c.relaxation * constraint / squares, scratch, c)  # Eq. 5
 
@@ -214,7 +215,7 @@ def correct_positions(
             add_neighbors(sums, qd.static(CORRECTIONS[correction]), team, particles, changes, grid, c, method)
             for i in range(team * grid.lanes, end_of(team, grid, count)):
                 p = predicted(particles, i)
-                dp = column(sums, i - team * grid.lanes)
+                dp = c.gradient_scale * column(sums, i - team * grid.lanes)
                 near = particles.near[i]
                 if near != 0:
                     for k in qd.static(range(p.n)):

@@ -30,39 +30,39 @@ TABLE_SIZE = 256  # samples of the half-space integrals over s/h in [-1, 1]
 
 @qd.func
 def spiky(square):
-    """Pair (w, w'/q) of Spiky."""
+    """Pair (w, -w'/q / 3) of Spiky."""
     q = qd.sqrt(square)
     t = qd.max(1.0 - q, 0.0)
-    return qd.Vector([t * t * t, -3.0 * t * t / qd.max(q, 1e-6)])
+    return qd.Vector([t * t * t, t * t / qd.max(q, 1e-6)])
 
 
 @qd.func
 def poly6(square):
-    """Pair (w, w'/q) of Poly6."""
+    """Pair (w, -w'/q / 6) of Poly6."""
     t = qd.max(1.0 - square, 0.0)
-    return qd.Vector([t * t * t, -6.0 * t * t])
+    return qd.Vector([t * t * t, t * t])
 
 
 @qd.func
 def cubic(square):
-    """Pair (w, w'/q) of the cubic spline."""
+    """Pair (w, -w'/q / 6) of the cubic spline."""
     q = qd.sqrt(square)
     a = qd.max(1.0 - q, 0.0)
     b = qd.max(0.5 - q, 0.0)
-    return qd.Vector([2.0 * a * a * a - 8.0 * b * b * b, (24.0 * b * b - 6.0 * a * a) / qd.max(q, 1e-6)])
+    return qd.Vector([2.0 * a * a * a - 8.0 * b * b * b, (a * a - 4.0 * b * b) / qd.max(q, 1e-6)])
 
 
 @qd.func
 def wendland(square):
-    """Pair (w, w'/q) of Wendland C2."""
+    """Pair (w, -w'/q / 20) of Wendland C2."""
     q = qd.sqrt(square)
     t = qd.max(1.0 - q, 0.0)
-    return qd.Vector([t * t * t * t * (1.0 + 4.0 * q), -20.0 * t * t * t])
+    return qd.Vector([t * t * t * t * (1.0 + 4.0 * q), t * t * t])
 
 
 @qd.func
 def poly6_spiky(square):
-    """Pair (w of Poly6, w'/q of Spiky): the choice of Macklin and Müller 2013 and of the report.
+    """Pair (w of Poly6, -w'/q / 3 of Spiky): the choice of Macklin and Müller 2013 and of the report.
 
     The second is scaled to the integral of the first, sigma(spiky) / sigma(poly6), by `RestLattice.gradient_scale`.
     """
@@ -71,6 +71,8 @@ def poly6_spiky(square):
 
 #: Append only: compiled kernels are kept between runs under a kernel's number, and do not see what the tuple holds.
 KERNELS = (spiky, poly6, cubic, wendland, poly6_spiky)
+#: By what the second of each pair is multiplied to be w'/q: once for a particle, not for each of its pairs.
+SLOPES = {"spiky": -3.0, "poly6": -6.0, "cubic": -6.0, "wendland": -20.0}
 #: For each of KERNELS, the kernel of the density and the kernel of the gradient.
 NAMES = {
     "spiky": ("spiky", "spiky"),
@@ -90,9 +92,10 @@ _SIGMA = {
 
 @qd.func
 def kernel(method: qd.template(), square):
-    """Pair (w, w'/q) at `square` = q^2 of the kernel with that number in KERNELS, chosen when the caller is compiled.
+    """Pair (w, w'/q over the factor in SLOPES) at `square` = q^2 of the kernel with that number in KERNELS.
 
-    A gradient is grad_i w = w'/q r_ij / h^2: a kernel that is a polynomial of q^2 needs neither root nor division.
+    It is chosen when the caller is compiled. A gradient is grad_i w = w'/q r_ij / h^2: a kernel that is a polynomial of
+    q^2 needs neither root nor division. `Coefficients.gradient_scale` has the factor.
     Pairs nearer than 1e-6 h are pushed less, and not without bound.
     """
     return qd.static(KERNELS[method])(square)

@@ -23,7 +23,7 @@ from wavetank.solids.distance import vec3
 @qd.func
 def share_of_pair(dv, c: Coefficients):
     """Share c of the difference of two velocities that is taken: more where it is small."""
-    return c.viscosity + c.calming * qd.max(0.0, 1.0 - dv.norm_sqr() * c.slow)
+    return qd.max(c.viscosity, c.viscosity + c.calming - (c.calming * c.slow) * dv.norm_sqr())
 
 
 @qd.func
