@@ -13,6 +13,7 @@ from wavetank.device.compiler import qd, worth_sharing
 from wavetank.device.state import Grid, Particles
 from wavetank.device.sums import sort_by
 from wavetank.physics.predicted_positions import predict_at, predicted
+from wavetank.physics.teams import end_of_part, first_of_part, turns_over
 
 
 @qd.func
@@ -104,11 +105,15 @@ def reorder(sorted_: Particles, particles: Particles, grid: Grid, count: qd.i32,
     # Some ten thousand particles are done before other threads have started.
     sort_by(grid.cell, grid.order, grid.start, grid.fill, grid.blocks, grid.cells, count, shared)
     if qd.static(grid.lanes > 1):
-        for cell in range(grid.cells):
-            sort_cell(particles, grid, grid.start[cell], grid.start[cell + 1])
-        for part in qd.static(range(len(PARTS_OF_PARTICLE))):
-            for n in range(count):
-                qd.static(PARTS_OF_PARTICLE[part])(sorted_, n, particles, grid.order[n])
+        # In one loop, because each wakes all threads.
+        for turn in range(turns_over(grid.cells, grid.parts, grid.lanes)):
+            begin = qd.min(first_of_part(turn, grid.cells, grid.parts, grid.lanes), grid.cells)
+            end = qd.max(end_of_part(turn, grid.cells, grid.parts, grid.lanes), begin)
+            for cell in range(begin, end):
+                sort_cell(particles, grid, grid.start[cell], grid.start[cell + 1])
+            for part in qd.static(range(len(PARTS_OF_PARTICLE))):
+                for n in range(grid.start[begin], grid.start[end]):
+                    qd.static(PARTS_OF_PARTICLE[part])(sorted_, n, particles, grid.order[n])
     else:
         for n in range(count):
             i = grid.order[n]
