@@ -25,10 +25,10 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import Air, Births, Coefficients, Grid, Particles, Walls
 from wavetank.device.sums import sum_up
 from wavetank.physics.boundary import wall_density
-from wavetank.physics.density_constraint import add_density
 from wavetank.physics.foam.noise import stream, uniform
 from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.predicted_positions import predicted
+from wavetank.physics.smoothing import kernel
 from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.solids.distance import SolidSet
 
@@ -56,12 +56,18 @@ def add_bend(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.t
 
 
 @qd.func
+def add_slope(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
+    """Add neighbour j to the gradient of the density over `gradient_scale`."""
+    sums += r * kernel(method, square * c.inverse_h2)[1]
+
+
+@qd.func
 def outward_normal(i, sum, particles: Particles, solids: SolidSet, walls: Walls, c: Coefficients):
     """Unit normal of the water's surface at particle `i`, zero inside the water: the density falls along it."""
     p = predicted(particles, i)
     n = p * 0.0
     for k in qd.static(range(p.n)):
-        n[k] = -sum[1 + k]
+        n[k] = -c.gradient_scale * sum[k]
     if particles.near[i] != 0:
         wall = wall_density(p, particles.near[i], solids, walls, c)
         for k in qd.static(range(p.n)):
@@ -84,9 +90,9 @@ def find_normals(
     fastest = 0.0
     for i in range(first, last):
         fastest = qd.max(fastest, particles.v[i].norm_sqr())
-    sums = qd.Matrix.zero(qd.f32, dim + 2, grid.lanes)
+    sums = qd.Matrix.zero(qd.f32, dim, grid.lanes)
     if fastest > slow:
-        add_neighbors(sums, add_density, team, particles, particles.v, grid, c, method)
+        add_neighbors(sums, add_slope, team, particles, particles.v, grid, c, method)
     for i in range(first, last):
         n = particles.x[i] * 0.0
         if particles.v[i].norm_sqr() > slow:
