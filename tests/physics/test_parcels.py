@@ -73,13 +73,28 @@ def test_a_lattice_fills_its_room_wherever_it_lies(level):
         assert fill[2:6, 2:8, 2:7] == pytest.approx(1.0, abs=1e-4)
 
 
+@pytest.mark.parametrize("width", [0.1, 0.2, 0.3])
+def test_what_is_beyond_a_narrow_tank_counts_at_its_walls(width):
+    """A tank one, two or three cells wide: each particle counts once, those near a wall at the node beside it."""
+    compiler.start("cpu")
+    narrow = new_levels((np.zeros(3), np.array([width, 0.8, 0.8])), 0.1)[0]
+    narrow.room.fill(1.0)
+    narrow.clear.fill(1.0)
+    assert narrow.nx == round(width / 0.1)
+    places = np.random.default_rng(0).uniform(0.01, 0.99, (40, 3)) * np.array([width, 0.8, 0.8])
+    shares = shares_of(narrow, places, 0.05)
+    assert shares.sum() == pytest.approx(40.0, abs=1e-4)
+    one = shares_of(narrow, np.array([[0.02, 0.05, 0.05]]), 0.05)
+    assert one[:, :, 0].sum() == pytest.approx(1.0, abs=1e-5)
+
+
 def test_nodes_without_room_leave_their_share_to_others(level):
     """A particle beside a solid counts in full at the nodes that are open to it."""
     nodes = level.nx * level.ny * level.nz
     room = np.ones(level.room.shape[0], np.float32)
     room[:nodes].reshape(level.nz, level.ny, level.nx)[:, :5] = 0.0
     level.room.from_numpy(room)
-    level.clear.fill(0.0)
+    level.clear.fill(-1.0)
     for place, whole in (((0.4, 0.52, 0.4), 1.0), ((0.43, 0.5, 0.38), 1.0), ((0.41, 0.2, 0.37), 0.0)):
         shares = shares_of(level, np.array([place]), 0.055, searched=1)
         assert shares.sum() == pytest.approx(whole, abs=1e-5)  # the last has none around it

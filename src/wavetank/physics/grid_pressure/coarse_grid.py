@@ -212,7 +212,8 @@ def _new_level(shape: list[int], box: tuple[np.ndarray, np.ndarray], repeats: in
     rim = nodes + nx * ny + LANES  # what is beyond the last node is read, and counts nothing
     kinds = {field.name: field.type for field in dataclasses.fields(CoarseGrid)}
     parts = sums_of(nodes)
-    sums = {"sums": integers(parts * nodes), "mass_sums": integers(parts * nodes), "basin": integers(rim)}
+    of_rows = parts * nodes + 2  # where a row is shorter than three, `parcels.py` adds nothing beyond its end
+    sums = {"sums": integers(of_rows), "mass_sums": integers(of_rows), "basin": integers(rim)}
     numbers = (qd.i32, qd.f32, Final[int])
     fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in numbers and name not in sums}
     return CoarseGrid(

@@ -30,7 +30,8 @@ def find_shares(
 ):  # fmt: skip
     """Find for a `lane` what the nodes before, nearest to and behind the place `s` [cells] have, axis by axis.
 
-    `nodes` are by how much these add to the number of a node, beyond the tank as the nearest one there.
+    `nodes` are by how much these add to the number of a node, beyond the tank as the nearest one there. Along x they
+    are three that follow each other, also at its ends: beyond these the last ones have it.
     """
     edges, strides = vec3(grid.dx, grid.dy, grid.dz), qd.Vector([1, grid.nx, grid.nx * grid.ny])
     for axis in qd.static(range(dim)):
@@ -44,6 +45,16 @@ def find_shares(
         shares[3 * axis + 1, lane] = 1.0 - shares[3 * axis, lane] - shares[3 * axis + 2, lane]
         for k in qd.static(range(3)):
             nodes[3 * axis + k, lane] = on_axis(grid, qd.cast(middle, qd.i32) + k - 1, axis) * strides[axis]
+        if qd.static(axis == 0 and not grid.repeats & 1):
+            begin = qd.max(qd.min(qd.cast(middle, qd.i32) - 1, grid.nx - 3), 0)
+            own = vec3(shares[0, lane], shares[1, lane], shares[2, lane])
+            for k in qd.static(range(3)):
+                share = 0.0
+                for other in qd.static(range(3)):
+                    share += qd.select(nodes[other, lane] == begin + k, own[other], 0.0)
+                shares[k, lane] = share
+            for k in qd.static(range(3)):
+                nodes[k, lane] = begin + k
 
 
 @qd.func
@@ -65,6 +76,15 @@ def node_of(nodes: qd.template(), lane, k: qd.template(), dim: qd.template()):
 
 
 @qd.func
+def aside_of(grid: CoarseGrid, nodes: qd.template(), lane, k: qd.template()):
+    """By how much the number of the `k`-th node of a row is more than that of the first."""
+    aside = k
+    if qd.static(grid.repeats & 1):
+        aside = nodes[k, lane] - nodes[0, lane]
+    return aside
+
+
+@qd.func
 def add_to_open(
     grid: CoarseGrid, s, spacing, unit, density, begin, dim: qd.template(), thin: qd.template(), mixed: qd.template()
 ):  # fmt: skip
@@ -75,6 +95,8 @@ def add_to_open(
     for k in range(qd.static(3**dim)):
         share = share_of(shares, 0, k, dim)
         node = qd.floor(s + 0.5, qd.i32) + qd.Vector([k % 3 - 1, k // 3 % 3 - 1, k // 9 - 1 if dim == 3 else 0])
+        if qd.static(not grid.repeats & 1):
+            node[0] = nodes[k % 3, 0]
         if share > 0.0:
             has_room = is_open_to(grid, node_of(nodes, 0, k, dim), node, s, thin)
             total += share * has_room
@@ -102,14 +124,15 @@ def add_parcels(
     dim = qd.static(particles.x[first].n)
     shares = qd.Matrix.zero(qd.f32, 9, lanes)
     nodes = qd.Matrix.zero(qd.i32, 9, lanes)
-    at = qd.Matrix.zero(qd.i32, 3**dim, lanes)
+    rows = qd.Matrix.zero(qd.i32, 3 ** (dim - 1), lanes)
     amounts = qd.Matrix.zero(qd.i32, 3**dim, lanes)
     masses = qd.Matrix.zero(qd.i32, 3**dim if mixed else 1, lanes)
     for lane in range(lanes):
         find_shares(shares, nodes, lane, grid, in_cells(grid, predicted(particles, first + lane)), spacing, dim)
     for lane in range(lanes):
+        for row in qd.static(range(3 ** (dim - 1))):
+            rows[row, lane] = begin + node_of(nodes, lane, 3 * row, dim)
         for k in qd.static(range(3**dim)):
-            at[k, lane] = begin + node_of(nodes, lane, k, dim)
             amount = unit * share_of(shares, lane, k, dim)
             amounts[k, lane] = qd.cast(qd.round(amount), qd.i32)
             if qd.static(mixed):
@@ -117,13 +140,16 @@ def add_parcels(
     for lane in range(qd.min(lanes, count - first)):
         is_beside = False
         if qd.static(searched):
-            is_beside = grid.clear[at[qd.static(3**dim // 2), lane] - begin] < 0.0
+            is_beside = (
+                grid.clear[rows[qd.static(3 ** (dim - 1) // 2), lane] + aside_of(grid, nodes, lane, 1) - begin] < 0.0
+            )
             if is_beside:
                 s = in_cells(grid, predicted(particles, first + lane))
                 density = 1.0 / scratch.weight[first + lane]
                 add_to_open(grid, s, spacing, unit, density, begin, dim, searched - 1, mixed)
         if not is_beside:
             for k in qd.static(range(3**dim)):
-                add_whole(grid.sums, at[k, lane], amounts[k, lane], grid.alone)
+                at = rows[k // 3, lane] + aside_of(grid, nodes, lane, k % 3)
+                add_whole(grid.sums, at, amounts[k, lane], grid.alone)
                 if qd.static(mixed):
-                    add_whole(grid.mass_sums, at[k, lane], masses[k, lane], grid.alone)
+                    add_whole(grid.mass_sums, at, masses[k, lane], grid.alone)
