@@ -327,6 +327,7 @@ def find_room(
             largest_along(grid.gaps, grid.depth, grid, row, 1, 2)
         for row in range(grid.ny * grid.nz):
             largest_along(grid.clear, grid.gaps, grid, row, 2, 2)
+        # Not all nodes beside it, diagonals included, are open to what is at this one.
         for n in range(grid.nx * grid.ny * grid.nz):
             grid.rhs[n] = qd.cast(grid.room[n] <= 0.0 or grid.thin_s[n] > 0.0, qd.f32)
         for row in range(grid.ny * grid.nz):
