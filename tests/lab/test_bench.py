@@ -18,7 +18,7 @@ from wavetank.lab.bench import run as bench_run
 from wavetank.lab.bench import scenes as room
 from wavetank.lab.bench import tables as bench_tables
 from wavetank.lab.bench.stages import STAGE_NAMES, Clock, stage_of
-from wavetank.physics import neighbors, step
+from wavetank.physics import neighbors, sorting, step
 from wavetank.simulation.simulation import Simulation
 
 
@@ -85,7 +85,7 @@ def modules_with_kernels() -> list[str]:
 
 
 def test_every_kernel_has_a_stage():
-    assert stage_of("wavetank.physics.neighbors") == "neighbours"
+    assert stage_of("wavetank.physics.neighbors") == stage_of("wavetank.physics.sorting") == "neighbours"
     assert stage_of("wavetank.physics.foam.pool") == "foam"
     assert stage_of("wavetank.view.passes.shade") == "render"
     assert stage_of("quadrants._kernels") == "other"
@@ -164,7 +164,7 @@ def test_roofline_shares_follow_from_the_ceilings(monkeypatch):
 
 def test_every_cost_belongs_to_a_kernel():
     """A kernel that was renamed or dropped does not stay in the model."""
-    assert set(roofline.COSTS) <= set(dir(step)) | set(dir(neighbors))
+    assert set(roofline.COSTS) <= set(dir(step)) | set(dir(neighbors)) | set(dir(sorting))
 
 
 def test_start_up_runs_in_fresh_processes(monkeypatch):

@@ -18,7 +18,7 @@ from wavetank.device import compiler
 #: not count as something else unnoticed.
 STAGES: dict[str, tuple[str, ...]] = {
     "contact": ("wavetank.physics.boundary", "wavetank.physics.retry", "wavetank.physics.near_solids"),
-    "neighbours": ("wavetank.physics.neighbors", "wavetank.physics.pairs"),
+    "neighbours": ("wavetank.physics.sorting", "wavetank.physics.neighbors", "wavetank.physics.pairs"),
     "grid": ("wavetank.physics.grid_pressure",),
     "constraint": ("wavetank.physics.density_constraint",),
     "velocities": (

@@ -92,7 +92,7 @@ CLOSING = 0.5  # of what lacks, in a step
 GAP_SHARE = 6.0  # by which errors are less, of what lacks there
 #: Fill from where to where a cell that reads too little draws nothing in, in worlds with bodies or without: beside them
 #: all draw, or a box of half of water's density swings for ever in a plane.
-DRAWN = {True: (1e3, 2e3), False: (0.97, 0.99)}
+DRAWN = {True: (1e3, 2e3), False: (0.96, 1.0)}
 
 
 @dataclasses.dataclass(frozen=True)
