@@ -63,7 +63,7 @@ from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, open_tents, spread_along
 from wavetank.physics.grid_pressure.sealed import MOSTLY_FULL, anchor, balance, find_basins
 from wavetank.physics.grid_pressure.slits import below_roof, close_slit, in_part, mostly, openness
-from wavetank.physics.grid_pressure.surface import depth_at, depth_beside
+from wavetank.physics.grid_pressure.surface import depth_beside, find_depths, keep_extremes
 from wavetank.physics.grid_pressure.weight import BORNE, flow_out
 from wavetank.physics.mixture import Blend
 from wavetank.physics.predicted_positions import predicted
@@ -230,6 +230,7 @@ def gather(
     for row in range(grid.ny * grid.nz):
         spread_along(grid.rhs, grid.fill, grid, row, 0, across())
         spread_along(grid.slope_y, grid.fill, grid, row, 1, across())
+        keep_extremes(grid, row)
     qd.loop_config(serialize=bool(few))
     for row in range(grid.ny * grid.nz):
         spread_along(grid.slope_z, grid.rhs, grid, row, 1, across())
@@ -239,10 +240,11 @@ def gather(
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.rhs[n] = gaps_at(grid, grid.gaps, grid.depth, grid.slope_z, n, e.full)
     qd.loop_config(serialize=bool(few))
-    for n in range(grid.nx * grid.ny * grid.nz):
-        grid.gaps[n] = grid.rhs[n]
-        grid.depth[n] = depth_at(grid, n, vec3(c.gravity_x, c.gravity_y, c.gravity_z))
-        grid.slope_y[n] = inside_at(grid, n, e)
+    for row in range(grid.ny * grid.nz):
+        find_depths(grid, row, vec3(c.gravity_x, c.gravity_y, c.gravity_z))
+        for n in range(grid.nx * row, grid.nx * row + grid.nx):
+            grid.gaps[n] = grid.rhs[n]
+            grid.slope_y[n] = inside_at(grid, n, e)
     if qd.static(searched):
         qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):

@@ -28,7 +28,7 @@ which a hundredth of a spacing is enough. Water is level: those nodes are told b
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import beside_on, coordinates, corners, sizes, tents
+from wavetank.physics.grid_pressure.coarse_grid import beside_on, coordinates, corners, on_axis, sizes, tents
 from wavetank.physics.grid_pressure.couplings import has_lid, lid_open
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3
@@ -98,6 +98,40 @@ def depth_at(grid: CoarseGrid, n, gravity):
     below = qd.min(deepest, 1.0 / qd.sqrt(closeness)) if closeness > 0.0 else deepest
     found = below if grid.fill[n] >= 0.5 else depth * grid.dy
     return found if grid.room[n] > 0.0 else deepest  # inside of a solid nothing sticks out
+
+
+@qd.func
+def keep_extremes(grid: CoarseGrid, row):
+    """Keep the smallest and the largest fill of a row of nodes: in `wx` and `wy`, at the number of the row.
+
+    What is set up behind it serves as memory.
+    """
+    least, most = 1e9, 0.0
+    for n in range(grid.nx * row, grid.nx * row + grid.nx):
+        least, most = qd.min(least, grid.fill[n]), qd.max(most, grid.fill[n])
+    grid.wx[row], grid.wy[row] = least, most
+
+
+@qd.func
+def find_depths(grid: CoarseGrid, row, gravity):
+    """Find the depths of a row of nodes: of each of them only where the air, or the water, is near."""
+    y, z = row % grid.ny, row // grid.ny
+    least, most = grid.wx[row], grid.wy[row]
+    for aside in qd.static((-3, -2, -1, 1, 2, 3)):
+        for beside in qd.static(range(2)):
+            other = on_axis(grid, y + aside, 1) + grid.ny * z
+            if qd.static(beside == 1):
+                other = y + grid.ny * on_axis(grid, z + aside, 2)
+            least = qd.min(least, grid.wx[other])
+            if qd.static(abs(aside) == 1):
+                most = qd.max(most, grid.wy[other])
+    for n in range(grid.nx * row, grid.nx * row + grid.nx):
+        if most < 0.5:
+            grid.depth[n] = -grid.dy if grid.room[n] > 0.0 else 3.0 * grid.dy
+        elif least >= 0.5 and y + 3 < grid.ny:
+            grid.depth[n] = 3.0 * grid.dy
+        else:
+            grid.depth[n] = depth_at(grid, n, gravity)
 
 
 @qd.func
