@@ -121,19 +121,40 @@ def relax_nodes(grid: CoarseGrid, row, first, last, over_relaxation):
 
 
 @qd.func
+def mark_water(grid: CoarseGrid, at, row, first, last):
+    """Mark the place `at` where nodes of a `row` from x = `first` to `last` have water, for `has_water`.
+
+    What `move_particles` finds anew serves as memory.
+    """
+    grid.slope_x[at] = 0.0
+    for n in range(grid.nx * row + first, grid.nx * row + last):
+        if grid.inverse[n] > 0.0:
+            grid.slope_x[at] = 1.0
+
+
+@qd.func
+def has_water(grid: CoarseGrid, at):
+    """Whether nodes that are marked at the place `at` have water: half of most tanks is air, and needs no sweeps."""
+    return grid.slope_x[at] > 0.0
+
+
+@qd.func
 def start_piece(grid: CoarseGrid, coarser: CoarseGrid, piece, start):
-    """Set lambda of `width` nodes of a row to what `start` says."""
+    """Set lambda of `width` nodes of a row to what `start` says, and mark whether they have water."""
     first = piece % grid.pieces * grid.width
-    start_nodes(grid, coarser, piece // grid.pieces, first, qd.min(first + grid.width, grid.nx), start)
+    last = qd.min(first + grid.width, grid.nx)
+    start_nodes(grid, coarser, piece // grid.pieces, first, last, start)
+    mark_water(grid, piece, piece // grid.pieces, first, last)
 
 
 @qd.func
 def relax_piece(grid: CoarseGrid, piece, colour, over_relaxation):
     """Relax those of `width` nodes of a row that have a `colour`."""
-    row = piece // grid.pieces
-    first = piece % grid.pieces * grid.width
-    x = first + (row % grid.ny + row // grid.ny + colour) % 2
-    relax_nodes(grid, row, x, qd.min(first + grid.width, grid.nx), over_relaxation)
+    if has_water(grid, piece):
+        row = piece // grid.pieces
+        first = piece % grid.pieces * grid.width
+        x = first + (row % grid.ny + row // grid.ny + colour) % 2
+        relax_nodes(grid, row, x, qd.min(first + grid.width, grid.nx), over_relaxation)
 
 
 @qd.kernel(fastcache=True)
@@ -157,9 +178,12 @@ def solve(
         for _ in range(1):
             for row in range(grid.ny * grid.nz):
                 start_nodes(grid, coarser, row, 0, grid.nx, start)
+                mark_water(grid, row, row, 0, grid.nx)
             for colour in range(2 * sweeps):
                 for row in range(grid.ny * grid.nz):
-                    relax_nodes(grid, row, (row % grid.ny + row // grid.ny + colour) % 2, grid.nx, over_relaxation)
+                    if has_water(grid, row):
+                        first = (row % grid.ny + row // grid.ny + colour) % 2
+                        relax_nodes(grid, row, first, grid.nx, over_relaxation)
 
 
 @qd.kernel(fastcache=True)
