@@ -54,7 +54,7 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     taken,
     tents,
 )  # fmt: skip
-from wavetank.physics.grid_pressure.couplings import LEAST_THETA, couple_nodes, has_lid
+from wavetank.physics.grid_pressure.couplings import LEAST_THETA, couple_nodes, has_lid, part_nodes
 from wavetank.physics.grid_pressure.films import left_to_grid
 from wavetank.physics.grid_pressure.gaps import across, gaps_at
 from wavetank.physics.grid_pressure.parcels import add_parcels
@@ -63,7 +63,7 @@ from wavetank.physics.grid_pressure.push import move_particles, push_of
 from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, open_tents, spread_along
 from wavetank.physics.grid_pressure.sealed import MOSTLY_FULL, anchor, balance, find_basins
 from wavetank.physics.grid_pressure.slits import below_roof, close_slit, in_part, mostly, openness
-from wavetank.physics.grid_pressure.surface import depth_beside, find_depths, keep_extremes
+from wavetank.physics.grid_pressure.surface import depth_beside, find_depths, is_air, keep_extremes
 from wavetank.physics.grid_pressure.weight import BORNE, flow_out
 from wavetank.physics.mixture import Blend
 from wavetank.physics.predicted_positions import predicted
@@ -271,7 +271,10 @@ def gather(
         grid.rhs[n] *= left_to_grid(grid, n, e.thin, e.thick)
     qd.loop_config(serialize=bool(few))
     for piece in range(grid.pieces * grid.ny * grid.nz):
-        couple_nodes(grid, piece, e.least_theta, has_lid(vec3(c.gravity_x, c.gravity_y, c.gravity_z)))
+        if is_air(grid, piece // grid.pieces):
+            part_nodes(grid, piece)
+        else:
+            couple_nodes(grid, piece, e.least_theta, has_lid(vec3(c.gravity_x, c.gravity_y, c.gravity_z)))
 
 
 def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:

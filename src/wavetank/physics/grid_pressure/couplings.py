@@ -128,6 +128,14 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta, lid):
 
 
 @qd.func
+def part_nodes(grid: CoarseGrid, piece):
+    """Couple `width` nodes of a row with nothing: where all is air."""
+    first = grid.nx * (piece // grid.pieces) + piece % grid.pieces * grid.width
+    for n in range(first, qd.min(first + grid.width, grid.nx * (piece // grid.pieces + 1))):
+        grid.wx[n], grid.wy[n], grid.wz[n], grid.inverse[n] = 0.0, 0.0, 0.0, 0.0
+
+
+@qd.func
 def open_ahead(grid: CoarseGrid, n, axis: qd.template()):
     """Share that is open of the face from node `n` to the next one along an axis."""
     share = grid.open_z[n]

@@ -102,21 +102,29 @@ def depth_at(grid: CoarseGrid, n, gravity):
 
 @qd.func
 def keep_extremes(grid: CoarseGrid, row):
-    """Keep the smallest and the largest fill of a row of nodes: in `wx` and `wy`, at the number of the row.
+    """Keep the smallest and the largest fill of a row of nodes: in `wx` and `lam`, at the number of the row.
 
-    What is set up behind it serves as memory.
+    What is set up, and solved, behind it serves as memory.
     """
     least, most = 1e9, 0.0
     for n in range(grid.nx * row, grid.nx * row + grid.nx):
         least, most = qd.min(least, grid.fill[n]), qd.max(most, grid.fill[n])
-    grid.wx[row], grid.wy[row] = least, most
+    grid.wx[row], grid.lam[row] = least, most
+
+
+@qd.func
+def is_air(grid: CoarseGrid, row):
+    """Whether there is no water in a row of nodes nor in those that follow along y and z, as `keep_extremes` kept it."""
+    y, z = row % grid.ny, row // grid.ny
+    most = qd.max(grid.lam[row], grid.lam[on_axis(grid, y + 1, 1) + grid.ny * z])
+    return qd.max(most, grid.lam[y + grid.ny * on_axis(grid, z + 1, 2)]) < 0.5
 
 
 @qd.func
 def find_depths(grid: CoarseGrid, row, gravity):
     """Find the depths of a row of nodes: of each of them only where the air, or the water, is near."""
     y, z = row % grid.ny, row // grid.ny
-    least, most = grid.wx[row], grid.wy[row]
+    least, most = grid.wx[row], grid.lam[row]
     for aside in qd.static((-3, -2, -1, 1, 2, 3)):
         for beside in qd.static(range(2)):
             other = on_axis(grid, y + aside, 1) + grid.ny * z
@@ -124,7 +132,7 @@ def find_depths(grid: CoarseGrid, row, gravity):
                 other = y + grid.ny * on_axis(grid, z + aside, 2)
             least = qd.min(least, grid.wx[other])
             if qd.static(abs(aside) == 1):
-                most = qd.max(most, grid.wy[other])
+                most = qd.max(most, grid.lam[other])
     for n in range(grid.nx * row, grid.nx * row + grid.nx):
         if most < 0.5:
             grid.depth[n] = -grid.dy if grid.room[n] > 0.0 else 3.0 * grid.dy
