@@ -114,7 +114,7 @@ def keep_extremes(grid: CoarseGrid, row):
 
 @qd.func
 def is_air(grid: CoarseGrid, row):
-    """Whether there is no water in a row of nodes nor in those that follow along y and z, as `keep_extremes` kept it."""
+    """Whether there is no water in a row of nodes nor in those that follow along y and z (`keep_extremes`)."""
     y, z = row % grid.ny, row // grid.ny
     most = qd.max(grid.lam[row], grid.lam[on_axis(grid, y + 1, 1) + grid.ny * z])
     return qd.max(most, grid.lam[y + grid.ny * on_axis(grid, z + 1, 2)]) < 0.5
