@@ -30,7 +30,8 @@ def test_a_cup_holds_its_water(wall, carried):
             sim.move("cup", position=center)
         sim.step()
     out = outside_of_cup(sim.positions - center, radius + 0.5 * d, height)
-    assert sim.count == filled == (300 if wall == d else 320)  # corners of the block lie in the thick wall
+    # Corners of the block lie in the thick wall: 2.8 % of it, by the area of a square without a circle.
+    assert sim.count == filled == (311 if wall == d else 320)
     assert not out.any()
 
 
