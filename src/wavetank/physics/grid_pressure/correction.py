@@ -284,17 +284,16 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     they leave is what it was.
     """
     finest, cells, count, searched = world.levels[0], world.grid, world.count, int(world.has_solids)
-    gravity = (c.gravity_x, c.gravity_y, c.gravity_z)
+    gravity, few = (c.gravity_x, c.gravity_y, c.gravity_z), int(not is_shared(finest))
     if world.room_version != world.solids_version or (world.pieces and world.room_gravity != gravity):
         world.room_found.fill(0)
-        find_room(finest, world.room_found, world.solids, c, LEAST_OPEN, UNIT, world.searched, params.dim)
+        find_room(finest, world.room_found, world.solids, c, LEAST_OPEN, UNIT, world.searched, params.dim, few)
         find_basins(finest, world.room_found)
         restrict_rooms(world.levels)
         world.room_version, world.room_gravity = world.solids_version, gravity
         thin, world.basins, world.open_nodes = map(int, download(world.room_found))
         world.has_thin_walls = thin > 0
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
-    few = int(not is_shared(finest))
     numbers = errors(finest, params, stiffness, bodies=world.pieces is not None)
     gather(
         finest, world.particles, world.scratch, cells, world.solids, world.walls, c,

@@ -199,8 +199,12 @@ def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
 
 
 @qd.kernel(fastcache=True)
-def restrict_room(coarse: CoarseGrid, fine: CoarseGrid):
-    """Give a coarser level the room of the finer one and its faces, which stay until solids have moved."""
+def restrict_room(coarse: CoarseGrid, fine: CoarseGrid, shared: qd.template()):
+    """Give a coarser level the room of the finer one and its faces, which stay until solids have moved.
+
+    It is `shared` by all threads, or done by one.
+    """
+    qd.loop_config(serialize=not shared)
     for n in range(coarse.nx * coarse.ny * coarse.nz):
         c, ratio = coordinates(coarse, n), ratio_of(coarse, fine)
         room = 0.0

@@ -232,7 +232,7 @@ def coarsest_relaxation(level: CoarseGrid) -> tuple[int, float]:
 def restrict_rooms(levels: list[CoarseGrid]) -> None:
     """Let all `levels` know which room the solids leave on the finest one, the first in the list."""
     for fine, coarse in itertools.pairwise(levels):
-        restrict_room(coarse, fine)
+        restrict_room(coarse, fine, int(is_shared(coarse)))
 
 
 def solve_levels(levels: list[CoarseGrid], lid: int = 0) -> None:

@@ -209,6 +209,20 @@ def largest_along(
 
 
 @qd.func
+def largest_around(to: qd.template(), grid: CoarseGrid, far: qd.template(), few: qd.template()):
+    """Put the largest `rhs` of `far` nodes on each side, diagonals included, to the nodes; to be called at the top."""
+    qd.loop_config(serialize=bool(few))
+    for row in range(grid.ny * grid.nz):
+        largest_along(grid.depth, grid.rhs, grid, row, 0, far)
+    qd.loop_config(serialize=bool(few))
+    for row in range(grid.ny * grid.nz):
+        largest_along(grid.gaps, grid.depth, grid, row, 1, far)
+    qd.loop_config(serialize=bool(few))
+    for row in range(grid.ny * grid.nz):
+        largest_along(to, grid.gaps, grid, row, 2, far)
+
+
+@qd.func
 def spread_along(
     to: qd.template(), values: qd.template(), grid: CoarseGrid, row, axis: qd.template(), share: qd.template()
 ):
@@ -272,14 +286,14 @@ def is_slit(grid: CoarseGrid, n, gravity):
 @qd.kernel(fastcache=True)
 def find_room(
     grid: CoarseGrid, thin: qd.types.ndarray(), solids: SolidSet, c: Coefficients, least_open: qd.f32, unit: qd.f32,
-    searched: qd.template(), dim: qd.template(),
+    searched: qd.template(), dim: qd.template(), few: qd.template(),
 ):  # fmt: skip
     """Find which room each node has for water where solids are `searched`; else the tank ends where the cells do.
 
     Sums are of whole multiples of the inverse of `unit`, so that the order of threads does not matter; 0 before. Cells
     that are free, and beside which all nodes have room, count the same at the nodes around: along one axis after the
     other. What a step finds anew serves as memory. `thin` [1] counts nodes at thin walls. Where some of the solids are
-    bodies, `searched` is 2.
+    bodies, `searched` is 2. Where nodes are `few`, one thread does what takes less than to wake the others.
     """
     if qd.static(not searched):
         for n in range(grid.nx * grid.ny * grid.nz):
@@ -288,14 +302,10 @@ def find_room(
     else:
         for piece in range(grid.pieces * grid.ny * grid.nz):
             find_walls(grid, thin, solids, piece, least_open)
+        qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):
             mark_shut(grid, n)
-        for row in range(grid.ny * grid.nz):
-            largest_along(grid.depth, grid.rhs, grid, row, 0, 1)
-        for row in range(grid.ny * grid.nz):
-            largest_along(grid.gaps, grid.depth, grid, row, 1, 1)
-        for row in range(grid.ny * grid.nz):
-            largest_along(grid.rhs, grid.gaps, grid, row, 2, 1)
+        largest_around(grid.rhs, grid, 1, few)
         for turn in range(turns_over(grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)):
             edge = longest_edge(grid)
             first = first_of_part(turn, grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)
@@ -303,40 +313,39 @@ def find_room(
                 grid.rhs[n] = qd.cast(grid.rhs[n] == 0.0 and grid.lam[n] >= 0.75 * edge, qd.f32)
                 if grid.rhs[n] == 0.0 and grid.lam[n] > -edge:
                     add_tents(grid, n, grid.alone * part_of(turn), unit, dim)
+        qd.loop_config(serialize=bool(few))
         for row in range(grid.ny * grid.nz):
             spread_along(grid.depth, grid.rhs, grid, row, 0, tent_beside())
+        qd.loop_config(serialize=bool(few))
         for row in range(grid.ny * grid.nz):
             spread_along(grid.gaps, grid.depth, grid, row, 1, tent_beside())
+        qd.loop_config(serialize=bool(few))
         for row in range(grid.ny * grid.nz):
             spread_along(grid.rhs, grid.gaps, grid, row, 2, tent_beside())
+        qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):
             total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
             if grid.room[n] > 0.0 and grid.lam[n] < 2.0 * longest_edge(grid):
                 grid.room[n] = total / unit + grid.rhs[n]
             grid.rhs[n] = grid.room[n]
         if qd.static(searched == 2):
+            qd.loop_config(serialize=bool(few))
             for n in range(grid.nx * grid.ny * grid.nz):
                 if is_slit(grid, n, vec3(c.gravity_x, c.gravity_y, c.gravity_z)):
                     grid.room[n] = 0.0
+        qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):
             grid.rhs[n] = qd.abs(grid.room[n] - 1.0)
         # No solid takes room within two cells, diagonals included.
-        for row in range(grid.ny * grid.nz):
-            largest_along(grid.depth, grid.rhs, grid, row, 0, 2)
-        for row in range(grid.ny * grid.nz):
-            largest_along(grid.gaps, grid.depth, grid, row, 1, 2)
-        for row in range(grid.ny * grid.nz):
-            largest_along(grid.clear, grid.gaps, grid, row, 2, 2)
+        largest_around(grid.clear, grid, 2, few)
         # Not all nodes beside it, diagonals included, are open to what is at this one.
+        qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):
             grid.rhs[n] = qd.cast(grid.room[n] <= 0.0 or grid.thin_s[n] > 0.0, qd.f32)
-        for row in range(grid.ny * grid.nz):
-            largest_along(grid.depth, grid.rhs, grid, row, 0, 1)
-        for row in range(grid.ny * grid.nz):
-            largest_along(grid.gaps, grid.depth, grid, row, 1, 1)
-        for row in range(grid.ny * grid.nz):
-            largest_along(grid.rhs, grid.gaps, grid, row, 2, 1)
+        largest_around(grid.rhs, grid, 1, few)
+        qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):
             grid.clear[n] = 1.0 if grid.clear[n] < 1e-3 else -grid.rhs[n]
+    qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         open_faces(grid, n)
