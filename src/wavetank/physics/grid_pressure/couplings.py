@@ -153,6 +153,12 @@ def open_towards(grid: CoarseGrid, c, m, axis: qd.template(), ahead):
 
 
 @qd.func
+def way_to(ratio, k):
+    """Whole coordinates of the `k`-th of the finer nodes that a coarser one stands for, from the first of them on."""
+    return qd.Vector([k % ratio[0], k // ratio[0] % ratio[1], k // (ratio[0] * ratio[1])])
+
+
+@qd.func
 def open_through(fine: CoarseGrid, c, ratio, axis: qd.template()):
     """Share that is open of the face of a coarser node `c` to the next one, by those of the nodes that it stands for.
 
@@ -161,7 +167,7 @@ def open_through(fine: CoarseGrid, c, ratio, axis: qd.template()):
     last, shut = 0.0, 0.0
     size = ratio[0] * ratio[1] * ratio[2] // ratio[axis]
     for k in range(ratio[0] * ratio[1] * ratio[2]):
-        way = qd.Vector([k % ratio[0], k // ratio[0] % ratio[1], k // (ratio[0] * ratio[1])])
+        way = way_to(ratio, k)
         place = c * ratio + way
         n = place[0] + fine.nx * (place[1] + fine.ny * place[2])
         share = open_ahead(fine, n, axis)
@@ -182,20 +188,20 @@ def ratio_of(coarse: CoarseGrid, fine: CoarseGrid):
 
 @qd.func
 def average_node(coarse: CoarseGrid, fine: CoarseGrid, n):
-    """Give node `n` of a coarser level the means of the finer nodes that it stands for."""
+    """Give node `n` of a coarser level, whose room is known, the means of the finer nodes that it stands for."""
     c, ratio = coordinates(coarse, n), ratio_of(coarse, fine)
-    room, fill, rhs, density = 0.0, 0.0, 0.0, 0.0
+    fill, rhs, density = 0.0, 0.0, 0.0
+    size = ratio[0] * ratio[1] * ratio[2]
     for z in range(c[2] * ratio[2], c[2] * ratio[2] + ratio[2]):
         for y in range(c[1] * ratio[1], c[1] * ratio[1] + ratio[1]):
             row = fine.nx * (y + fine.ny * z)
             for m in range(row + c[0] * ratio[0], row + c[0] * ratio[0] + ratio[0]):
-                room += fine.room[m]
                 fill += fine.fill[m] * fine.room[m]
                 rhs += fine.rhs[m]
                 density += fine.density[m] * fine.fill[m] * fine.room[m]
     coarse.density[n] = density / fill if fill > 0.0 else 1.0
-    coarse.fill[n] = fill / qd.max(room, 1e-6)
-    coarse.rhs[n] = rhs / (ratio[0] * ratio[1] * ratio[2])
+    coarse.fill[n] = fill / qd.max(coarse.room[n] * size, 1e-6)
+    coarse.rhs[n] = rhs / size
 
 
 @qd.kernel(fastcache=True)
@@ -209,8 +215,7 @@ def restrict_room(coarse: CoarseGrid, fine: CoarseGrid, shared: qd.template()):
         c, ratio = coordinates(coarse, n), ratio_of(coarse, fine)
         room = 0.0
         for k in range(ratio[0] * ratio[1] * ratio[2]):
-            way = qd.Vector([k % ratio[0], k // ratio[0] % ratio[1], k // (ratio[0] * ratio[1])])
-            place = c * ratio + way
+            place = c * ratio + way_to(ratio, k)
             room += fine.room[place[0] + fine.nx * (place[1] + fine.ny * place[2])]
         coarse.room[n] = room / (ratio[0] * ratio[1] * ratio[2])
         coarse.open_x[n] = open_through(fine, c, ratio, 0)

@@ -10,7 +10,7 @@ through a film.
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import beside_on, ramp
-from wavetank.physics.grid_pressure.surface import nodes_beyond
+from wavetank.physics.grid_pressure.surface import is_below_air, nodes_beyond
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 
 
@@ -50,7 +50,7 @@ def left_to_grid(grid: CoarseGrid, n, thin, thick):
     A film is no deeper than that below the air.
     """
     cells = 2.0 * reach()
-    if grid.fill[n] >= 0.5 and grid.room[n] > 0.0 and grid.depth[n] < 2.999 * grid.dy:
+    if grid.fill[n] >= 0.5 and grid.room[n] > 0.0 and is_below_air(grid, n):
         for axis in qd.static(range(3)):
             if grid.nz > 1 or axis < 2:
                 cells = qd.min(cells, thickness(grid, n, axis))

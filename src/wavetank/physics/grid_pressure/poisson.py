@@ -238,8 +238,7 @@ def restrict_rooms(levels: list[CoarseGrid]) -> None:
 def solve_levels(levels: list[CoarseGrid], lid: int = 0) -> None:
     """Solve on all `levels`, the finest first in the list and last in time; its couplings and right side are set.
 
-    They know their rooms (`restrict_rooms`).
-    `lid` is 1 in a tank that is closed above its water, else 0.
+    They know their rooms (`restrict_rooms`). `lid` is 1 in a tank that is closed above its water, else 0.
     """
     fenced = int(current_backend() != "cuda")
     for fine, coarse in itertools.pairwise(levels):

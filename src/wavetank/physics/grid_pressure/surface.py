@@ -143,9 +143,15 @@ def find_depths(grid: CoarseGrid, row, gravity):
 
 
 @qd.func
+def is_below_air(grid: CoarseGrid, n):
+    """Whether a way leads from node `n`, or one in the air, to the surface: else its depth is the deepest."""
+    return grid.depth[n] < 2.999 * grid.dy
+
+
+@qd.func
 def is_told(grid: CoarseGrid, n):
     """Whether the depth of node `n` is known: a way leads to the surface from there, or no solid is near."""
-    found = grid.depth[n] < 2.999 * grid.dy and grid.depth[n] > -0.999 * grid.dy
+    found = is_below_air(grid, n) and grid.depth[n] > -0.999 * grid.dy
     return grid.clear[n] > 0.0 or (grid.room[n] > 0.0 and found)
 
 
