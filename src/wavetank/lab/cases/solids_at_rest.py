@@ -1,4 +1,4 @@
-"""Water around solids that cut the cells of the grid comes to rest: films, wedges, gaps, slopes, what is round, a mesh.
+"""Water around solids that cut the cells of the grid comes to rest: films, wedges, gaps, slopes, roofs, a mesh.
 
 Reference: hydrostatics; nothing acts on water at rest. Each world is small, and its solids lie anywhere to the cells of
 the pressure and to the rows of the water: by a share of a cell that is drawn for each start. What counts is the fastest
@@ -57,6 +57,11 @@ def worlds(dim: int, start: int) -> dict[str, list[AnySolid]]:
             Box(center=(0.4, 0.1), size=(0.2, 0.2)),
             Box(center=(0.5 + 0.1 + d * chance.uniform(0.8, 2.4), 0.15), size=(0.2, 0.3)),
         ]
+        # What breaks the surface, and is a roof over some of it.
+        result["disc in the surface"] = [Sphere(center=at(0.5, surface + 0.06), radius=0.12)]
+        result["box on a corner"] = [Box(center=at(0.5, surface), size=(0.2, 0.2), rotation=turned(math.pi / 4.0))]
+        result["leaning slab"] = [Box(center=at(0.5, surface), size=(0.4, 0.07), rotation=turned(0.9))]
+        result["lintel"] = [Box(center=at(0.5, surface + 0.1), size=(0.4, 0.2))]
         return result
     for layers in (1, 2):
         (x, z), top = at(0.3, 0.21), surface + 1.2 * d - layers * d
@@ -71,6 +76,9 @@ def worlds(dim: int, start: int) -> dict[str, list[AnySolid]]:
     result["pole"] = [Cylinder(start=(x, -0.05, z), end=(x, 0.5, z), radius=0.06)]
     result["capsule"] = [Capsule(start=at(0.2, 0.12, 0.2), end=at(0.4, 0.2, 0.24), radius=0.05)]
     result["knot"] = [Mesh(path="wavetank/knot.obj", center=at(0.3, 0.18, 0.21), size=0.3, rotation=turned(0.2))]
+    result["ball in the surface"] = [Sphere(center=at(0.3, surface + 0.05, 0.21), radius=0.1)]
+    x, y, z = at(0.3, surface, 0.21)
+    result["leaning capsule"] = [Capsule(start=(x - 0.1, y - 0.08, z), end=(x + 0.1, y + 0.1, z), radius=0.06)]
     return result
 
 

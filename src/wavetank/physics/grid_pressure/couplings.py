@@ -67,16 +67,22 @@ def has_lid(gravity):
 
 
 @qd.func
-def lid_open(grid: CoarseGrid, n, lid):
-    """Share of the face of node `n` to the `lid` of the tank that air lies at: 0 where there is none, or no air.
+def air_above(grid: CoarseGrid, n, lid):
+    """Share of the face of node `n` to the `lid` of the tank, or to a roof, that air lies at: 0 where there is none.
 
     The surface may lie in the last cells below the lid, which have no air above them: there it is as far as these are
     full, and the fuller they are the less sure it is that there is one. Those of a full tank are nearly full.
+
+    A roof leaves the next node above no room. What lacks below one that faces down is no air (`slits.py`); below the
+    others a cell that passes half of its room has a surface, and none any more by degrees.
     """
     share = 0.0
     if qd.static(not grid.repeats & 2):
-        if lid == 1 and n // grid.nx % grid.ny == grid.ny - 1 and n < grid.nx * grid.ny * grid.nz:
-            share = 1.0 - ramp(grid.fill[n], 0.8, 0.95)
+        if lid == 1 and n < grid.nx * grid.ny * grid.nz:
+            if n // grid.nx % grid.ny == grid.ny - 1:
+                share = 1.0 - ramp(grid.fill[n], 0.8, 0.95)
+            elif grid.room[n] > 0.0 and grid.room[n + grid.nx] <= 0.0:
+                share = 1.0 - ramp(grid.fill[n], 0.5, 0.7)
     return share
 
 
@@ -107,7 +113,7 @@ def couple_nodes(grid: CoarseGrid, piece, least_theta, lid):
         n = begin + x
         before = qd.Vector([qd.select(x > 0, n - 1, under_x), before_y + x, before_z + x])
         wx = coupling(grid, n, qd.select(x + 1 < grid.nx, n + 1, over_x), grid.open_x[n], grid.dx, least_theta)
-        open_y = grid.open_y[n] + lid_open(grid, n, lid)
+        open_y = grid.open_y[n] + air_above(grid, n, lid)
         wy = coupling(grid, n, after_y + x, open_y, grid.dy, least_theta)
         wz = coupling(grid, n, after_z + x, grid.open_z[n], grid.dz, least_theta)
         diagonal = wx + wy + wz

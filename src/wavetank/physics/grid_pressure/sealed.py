@@ -21,7 +21,7 @@ not linear set union algorithm", 10.1145/321879.321884).
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import beside_on, ramp
-from wavetank.physics.grid_pressure.couplings import lid_open, open_ahead
+from wavetank.physics.grid_pressure.couplings import air_above, open_ahead
 
 MOSTLY_FULL = 0.7  # share of the room that water takes, below which there is air somewhere
 
@@ -111,7 +111,7 @@ def balance(grid: CoarseGrid, per_error: qd.f32, lid: qd.i32):
         if grid.room[n] > 0.0:
             air = ramp(grid.room[n] * (1.0 - grid.fill[n]), 0.25, 0.5)
             if grid.fill[n] > 0.5:
-                air = lid_open(grid, n, lid)
+                air = air_above(grid, n, lid)
             amount = qd.cast(1024.0 * air, qd.i32)
             if amount > grid.sums[grid.basin[n]]:
                 qd.atomic_max(grid.sums[grid.basin[n]], amount)

@@ -29,7 +29,7 @@ which a hundredth of a spacing is enough. Water is level: those nodes are told b
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import beside_on, coordinates, corners, on_axis, sizes, tents
-from wavetank.physics.grid_pressure.couplings import has_lid, lid_open
+from wavetank.physics.grid_pressure.couplings import air_above, has_lid
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3
 
@@ -48,23 +48,23 @@ def nodes_beyond(grid: CoarseGrid, n, axis: qd.template(), side: qd.template()):
 def way_to_air(grid: CoarseGrid, n, axis: qd.template(), side: qd.template(), gravity):
     """Cells from node `n`, in water, to the surface on a `side` along an `axis`; 0 if there is none within three.
 
-    The last cells below the lid of a tank have no air above them: there the surface is as far as these are full, and
-    the farther away the less sure that is. Those of a full tank are nearly full.
+    The last cells below the lid of a tank, or below a roof, have no air above them: there the surface is as far as
+    these are full, and the farther away the less sure that is (`couplings.air_above`).
     """
     nodes = qd.min(nodes_beyond(grid, n, axis, side), 3)
     total, reached, closed, m = grid.fill[n] - 0.5, 0, 0, n
     for _ in range(nodes):
-        before = m
-        m = beside_on(grid, m, axis, side)
-        if grid.room[m] <= 0.0 or shut_towards(grid, before, m, axis) == 1:
+        ahead = beside_on(grid, m, axis, side)
+        if grid.room[ahead] <= 0.0 or shut_towards(grid, m, ahead, axis) == 1:
             closed = 1
             break
+        m = ahead
         total += qd.min(grid.fill[m], 1.0)
         reached = 1 if grid.fill[m] < 0.5 else reached
     way = qd.max(total, 1e-3) if reached == 1 else 0.0
     if qd.static(axis == 1 and side == 1):
-        if reached + closed == 0 and nodes < 3:
-            sure = lid_open(grid, m, has_lid(gravity))
+        if reached == 0 and (closed == 1 or nodes < 3):
+            sure = air_above(grid, m, has_lid(gravity))
             if sure > 0.0:
                 way = qd.max(total, 1e-3) / qd.sqrt(sure)
     return way

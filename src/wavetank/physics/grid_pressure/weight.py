@@ -15,7 +15,7 @@ weigh among those of another fluid: `own_weight.py`.
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
 from wavetank.physics.grid_pressure.coarse_grid import beside_on
-from wavetank.physics.grid_pressure.couplings import has_lid, lid_open, open_area
+from wavetank.physics.grid_pressure.couplings import air_above, has_lid, open_area
 from wavetank.physics.grid_pressure.surface import nodes_beyond
 from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3
@@ -39,6 +39,6 @@ def flow_out(grid: CoarseGrid, n, way):
                     m = beside_on(grid, n, axis, side)
                     if qd.min(grid.room[n], grid.room[m]) > 0.0 and shut_towards(grid, n, m, axis) == 0:
                         total += side * open_area(grid, n, m) * way[axis] / edges[axis]
-                elif qd.static(axis == 1 and side == 1):
-                    total += lid_open(grid, n, has_lid(way)) * way[axis] / edges[axis]
+                if qd.static(axis == 1 and side == 1):
+                    total += air_above(grid, n, has_lid(way)) * way[axis] / edges[axis]
     return total
