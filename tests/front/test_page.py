@@ -70,6 +70,11 @@ def test_a_person_plays(open_page, browser):
     browser.key(".")
     until(lambda: session.ticks == ticks + 1)
 
+    # One that is held pauses once.
+    browser.call("Input.dispatchKeyEvent", type="keyDown", key=" ", text=" ", autoRepeat=True)
+    time.sleep(0.5)
+    assert session.paused
+
     # A slider.
     before = session.sim.viscosity
     x, y = browser.center("[aria-label=Viscosity][type=range]", 0.8)

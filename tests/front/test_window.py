@@ -164,6 +164,20 @@ def test_a_key_pauses_and_another_computes_one_frame(person):
     assert not person.desk.help
 
 
+def test_a_key_that_is_held_turns_on_and_off_once(person):
+    """Signs come again and again while a key is down: the list of keys blinked, and time stood still by chance."""
+    assert not person.desk.help
+    person.display.do("keydown", "question")
+    person.until(lambda: person.desk.help)
+    for _ in range(5):  # as the system sends them, if it does
+        person.imgui.get_io().add_input_character(ord("?"))
+        person.look()
+        assert person.desk.help
+    person.display.do("keyup", "question")
+    person.key("question")
+    assert not person.desk.help
+
+
 def test_a_slider_acts_at_once_and_another_waits_for_a_reset(person):
     person.click("viscosity", 0.8)
     person.until(lambda: person.session.sim.viscosity > 0.6)

@@ -14,15 +14,16 @@ class Key:
     action: str = ""
     command: dict[str, Any] | None = None
     page_only: bool = False
+    repeats: bool = False  # while it is held: what turns something on and off does not
 
 
 KEYS = (
     Key(" ", "Space", "Pause, play", "pause"),
-    Key(".", ".", "One frame", command={"do": "step"}),
-    Key(",", ",", "One second back", "back"),
+    Key(".", ".", "One frame", command={"do": "step"}, repeats=True),
+    Key(",", ",", "One second back", "back", repeats=True),
     Key("r", "R", "Start again", "again"),
-    Key("[", "[ ]", "Slower, faster", "slower"),
-    Key("]", action="faster"),
+    Key("[", "[ ]", "Slower, faster", "slower", repeats=True),
+    Key("]", action="faster", repeats=True),
     Key("m", "M", "Bookmark", "bookmark"),
     Key("h", "H", "See all", command={"do": "home"}),
     Key("Escape", "Esc", "Stop all tools", command={"do": "tool-stop"}),
@@ -30,17 +31,17 @@ KEYS = (
     Key("c", "C", "Controls: the panel", "panel"),
     Key("z", "Z", "Undo a reset or a change of scene", command={"do": "undo"}),
     Key("Enter", "Enter", "Use the tool by keys: arrows aim, Enter puts it down and lifts it", "aim", page_only=True),
-    Key("+", "+ −", "Closer, farther", command={"do": "zoom", "factor": 0.85}),
-    Key("-", command={"do": "zoom", "factor": 1.18}),
-    Key("ArrowLeft", "Arrows", "Turn", command={"do": "orbit", "azimuth": -0.12}),
-    Key("ArrowRight", command={"do": "orbit", "azimuth": 0.12}),
-    Key("ArrowUp", command={"do": "orbit", "elevation": 0.08}),
-    Key("ArrowDown", command={"do": "orbit", "elevation": -0.08}),
+    Key("+", "+ −", "Closer, farther", command={"do": "zoom", "factor": 0.85}, repeats=True),
+    Key("-", command={"do": "zoom", "factor": 1.18}, repeats=True),
+    Key("ArrowLeft", "Arrows", "Turn", command={"do": "orbit", "azimuth": -0.12}, repeats=True),
+    Key("ArrowRight", command={"do": "orbit", "azimuth": 0.12}, repeats=True),
+    Key("ArrowUp", command={"do": "orbit", "elevation": 0.08}, repeats=True),
+    Key("ArrowDown", command={"do": "orbit", "elevation": -0.08}, repeats=True),
     Key("n", "N", "Forces on bodies: buoyancy, drag, power", "forces"),
-    Key("<", "< >", "Turn the sun", command={"do": "light", "turn": -10}),
-    Key(">", command={"do": "light", "turn": 10}),
-    Key("{", "{ }", "Lower, higher sun", command={"do": "light", "rise": -4}),
-    Key("}", command={"do": "light", "rise": 4}),
+    Key("<", "< >", "Turn the sun", command={"do": "light", "turn": -10}, repeats=True),
+    Key(">", command={"do": "light", "turn": 10}, repeats=True),
+    Key("{", "{ }", "Lower, higher sun", command={"do": "light", "rise": -4}, repeats=True),
+    Key("}", command={"do": "light", "rise": 4}, repeats=True),
     Key("?", "?", "This list", "help"),
 )
 

@@ -37,6 +37,7 @@ class Desk:
     pending: dict[str, Any] = dataclasses.field(default_factory=dict)  # parameters that wait for a reset
     panel: bool = True
     help: bool = False
+    held: tuple[str, float] = ("", 0.0)  # the sign whose key may still be down, and when it was last read [s]
     filter: str = ""
     notes: list[tuple[str, float]] = dataclasses.field(default_factory=list)  # with the time at which they go
     curves: dict[str, deque[float]] = dataclasses.field(default_factory=dict)

@@ -10,6 +10,7 @@ from wavetank.front.window.desk import Desk
 from wavetank.front.window.look import ink, rgba
 from wavetank.session.commands import Bookmark, Pause, Reset, Rewind, SetView, Speed, command_of
 
+LONGEST_PAUSE = 1.0  # s between two signs of a key that is held
 POINTER = (
     ("left button", "Use the tool"), ("right button", "Turn the view"), ("right, W A S D Q E", "Fly"),
     ("middle, Shift", "Move the view"), ("wheel", "Zoom"), ("double click a slider", "Its default"),
@@ -75,13 +76,30 @@ def press(desk: Desk, key: Key) -> None:
         ACTIONS[key.action](desk)
 
 
+def is_held(desk: Desk, sign: str) -> bool:
+    """Say whether a sign comes from a key that is held down, and keep it in mind."""
+    before, when = desk.held
+    desk.held = (sign, imgui.get_time())
+    return sign == before and imgui.get_time() - when < LONGEST_PAUSE
+
+
+def has_moved() -> bool:
+    """Say whether a key has gone down or up. Its sign may come a frame later."""
+    codes = range(imgui.Key.named_key_begin, imgui.Key.gamepad_start)
+    return any(imgui.is_key_pressed(imgui.Key(code), False) or imgui.is_key_released(imgui.Key(code)) for code in codes)
+
+
 def read_keys(desk: Desk) -> None:
     """Act on the keys of this frame. Signs are read as characters, because they lie elsewhere on each keyboard."""
     io, name = imgui.get_io(), imgui.Key
     if io.want_text_input or imgui.is_mouse_down(1):  # letters fly while the right button is down
         return
+    if has_moved():
+        desk.held = ("", 0.0)
     for code in io.input_queue_characters:
         sign = chr(code).lower()
+        if is_held(desk, sign) and not (sign in HERE and HERE[sign].repeats):
+            continue
         tool = next((tool["name"] for tool in desk.rail if tool["key"] and tool["key"] == sign), None)
         if sign in HERE:
             press(desk, HERE[sign])

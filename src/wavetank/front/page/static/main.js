@@ -94,6 +94,7 @@ addEventListener("keydown", (event) => {
   const tool = tools.find((other) => other.key && other.key === event.key.toLowerCase());
   if (!key && !tool) return;
   event.preventDefault();
+  if (event.repeat && !key?.repeats) return;
   if (key) (key.command ? send(key.command) : ACTIONS[key.action]()); else if (allows(tool.name)) choose(tool.name);
 });
 
