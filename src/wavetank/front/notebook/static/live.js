@@ -303,6 +303,7 @@ function render({ model, el }) {
     if (key ? !(key.command || ACTIONS[key.action]) : !hit) return;
     event.preventDefault();
     event.stopPropagation();
+    if (event.repeat && !key?.repeats) return;
     if (key) (key.command ? send(key.command) : ACTIONS[key.action]()); else choose(hit.name);
   };
 
