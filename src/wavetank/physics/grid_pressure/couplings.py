@@ -73,8 +73,9 @@ def air_above(grid: CoarseGrid, n, lid):
     The surface may lie in the last cells below the lid, which have no air above them: there it is as far as these are
     full, and the fuller they are the less sure it is that there is one. Those of a full tank are nearly full.
 
-    A roof leaves the next node above no room. What lacks below one that faces down is no air (`slits.py`); below the
-    others a cell that passes half of its room has a surface, and none any more by degrees.
+    A roof leaves the next node above no room, and overhangs: what is above a floor and below a slit is no surface. What
+    lacks below a roof over water is no air (`slits.py`); elsewhere a cell there that passes half of its room has a
+    surface, and none any more by degrees. Only the finest level knows which way solids face.
     """
     share = 0.0
     if qd.static(not grid.repeats & 2):
@@ -82,7 +83,8 @@ def air_above(grid: CoarseGrid, n, lid):
             if n // grid.nx % grid.ny == grid.ny - 1:
                 share = 1.0 - ramp(grid.fill[n], 0.8, 0.95)
             elif grid.room[n] > 0.0 and grid.room[n + grid.nx] <= 0.0:
-                share = 1.0 - ramp(grid.fill[n], 0.5, 0.7)
+                overhangs = ramp(-grid.facing_y[n], 0.1, 0.4)
+                share = overhangs * (1.0 - ramp(grid.fill[n], 0.5, 0.7))
     return share
 
 
