@@ -76,8 +76,8 @@ def press(desk: Desk, key: Key) -> None:
         ACTIONS[key.action](desk)
 
 
-def is_held(desk: Desk, sign: str) -> bool:
-    """Say whether a sign comes from a key that is held down, and keep it in mind."""
+def keep_held(desk: Desk, sign: str) -> bool:
+    """Keep a sign in mind, and say whether it comes from a key that is held down."""
     before, when = desk.held
     desk.held = (sign, imgui.get_time())
     return sign == before and imgui.get_time() - when < LONGEST_PAUSE
@@ -94,11 +94,11 @@ def read_keys(desk: Desk) -> None:
     io, name = imgui.get_io(), imgui.Key
     if io.want_text_input or imgui.is_mouse_down(1):  # letters fly while the right button is down
         return
-    if has_moved():
+    if desk.held[0] and has_moved():
         desk.held = ("", 0.0)
     for code in io.input_queue_characters:
         sign = chr(code).lower()
-        if is_held(desk, sign) and not (sign in HERE and HERE[sign].repeats):
+        if keep_held(desk, sign) and not (sign in HERE and HERE[sign].repeats):
             continue
         tool = next((tool["name"] for tool in desk.rail if tool["key"] and tool["key"] == sign), None)
         if sign in HERE:
