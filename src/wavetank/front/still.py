@@ -31,7 +31,7 @@ USUAL_TIME = 0.5  # s: when a scene is shown unless told
 #: the same for bundled scenes whose best moment is another one
 SHOWN_AT = {
     "still-tank": 1.0, "still-tank-2d": 1.0, "drop": 0.42, "drop-2d": 0.35, "obstacle-tank": 0.62, "knot": 0.35,
-    "fountain": 2.0, "fountain-2d": 1.5, "sluice": 2.0, "sluice-2d": 1.5, "wave-machine": 3.5, "wave-machine-2d": 3.5,
+    "fountain": 2.0, "fountain-2d": 1.5, "sluice": 2.0, "sluice-2d": 1.5, "wave-machine": 4.0, "wave-machine-2d": 4.0,
     "ducks": 3.0, "boats": 4.0, "sinking-ship": 4.0, "deer-scarer": 6.3, "robot": 6.6, "logs": 2.0,
     "paddle-boat": 4.5, "lighthouse": 0.62, "rain": 0.32, "jug": 2.4, "river": 5.0, "honey": 0.4,
     "mountain-lake": 0.8, "vase": 0.28,
