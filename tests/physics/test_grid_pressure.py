@@ -336,7 +336,7 @@ def test_the_room_that_solids_leave_follows_them():
             sim.step()
         level = sim.world.levels[0]
         kept = level.room.to_numpy()
-        args = coarse_pressure.LEAST_OPEN, coarse_pressure.UNIT, int(sim.world.has_solids), 3, 1
+        args = coarse_pressure.LEAST_OPEN, coarse_pressure.UNIT, sim.scene.spacing, int(sim.world.has_solids), 3, 1
         c = coefficients(sim.scene, 1.0 / 60.0)
         coarse_pressure.find_room(level, sim.world.room_found, sim.world.solids, c, *args)
         np.testing.assert_array_equal(level.room.to_numpy(), kept)
@@ -391,7 +391,7 @@ def test_solids_together_leave_the_room_that_their_union_does(count):
         scene = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6, 0.6)), fluids=[water], solids=solids)
         sim = Simulation(scene)
         level = sim.world.levels[0]
-        args = coarse_pressure.LEAST_OPEN, coarse_pressure.UNIT, int(sim.world.has_solids), 3, 1
+        args = coarse_pressure.LEAST_OPEN, coarse_pressure.UNIT, sim.scene.spacing, int(sim.world.has_solids), 3, 1
         c = coefficients(sim.scene, 1.0 / 60.0)
         coarse_pressure.find_room(level, sim.world.room_found, sim.world.solids, c, *args)
         nodes = level.nx * level.ny * level.nz

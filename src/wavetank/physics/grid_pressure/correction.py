@@ -147,6 +147,28 @@ def inside_at(grid: CoarseGrid, n, e: Errors):
 
 
 @qd.func
+def find_errors(
+    at: qd.template(), amounts: qd.template(), added: qd.template(), grid: CoarseGrid, particles: Particles,
+    scratch: Scratch, e: Errors, first, part, lanes: qd.template(), searched: qd.template(),
+):  # fmt: skip
+    """Find what a team's particles from number `first` on add to a `part`'s sums, and where."""
+    dim = qd.static(particles.x[first].n)
+    for lane in range(lanes):
+        s = in_cells(grid, predicted(particles, first + lane))
+        nodes = corners(grid, qd.floor(s, qd.i32), dim)
+        weights = weights_at(grid, nodes, s, dim, searched)
+        inside = 0.0
+        for k in qd.static(range(2**dim)):
+            inside += weights[k] * grid.slope_y[nodes[k]]
+        error = scratch.rho[first + lane] * scratch.weight[first + lane] - 1.0
+        error += added[0, lane] - e.gap_share * grid.gaps[nearest(grid, qd.floor(s + 0.5, qd.i32))]
+        error = e.unit * ramp(inside, 0.0, 1.0) * qd.min(qd.max(error, -1.0), 1.0)
+        for k in qd.static(range(2**dim)):
+            at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
+            amounts[k, lane] = qd.cast(qd.round(error * weights[k]), qd.i32)
+
+
+@qd.func
 def add_errors(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
     e: Errors, cells: Grid, team, part, count, searched: qd.template(),
@@ -167,19 +189,15 @@ def add_errors(
             added[0, i - first] = approached(
                 i, x, p - fall(c), driven, near, scratch, solids, walls, c, e.missing, e.spacing, searched
             )
-    for lane in range(lanes):
-        s = in_cells(grid, predicted(particles, first + lane))
-        nodes = corners(grid, qd.floor(s, qd.i32), dim)
-        weights = weights_at(grid, nodes, s, dim, searched)
-        inside = 0.0
-        for k in qd.static(range(2**dim)):
-            inside += weights[k] * grid.slope_y[nodes[k]]
-        error = scratch.rho[first + lane] * scratch.weight[first + lane] - 1.0
-        error += added[0, lane] - e.gap_share * grid.gaps[nearest(grid, qd.floor(s + 0.5, qd.i32))]
-        error = e.unit * ramp(inside, 0.0, 1.0) * qd.min(qd.max(error, -1.0), 1.0)
-        for k in qd.static(range(2**dim)):
-            at[k, lane] = part * grid.nx * grid.ny * grid.nz + nodes[k]
-            amounts[k, lane] = qd.cast(qd.round(error * weights[k]), qd.i32)
+    is_beside = False
+    if qd.static(searched):
+        for i in range(first, qd.min(first + lanes, count)):
+            s = in_cells(grid, predicted(particles, i))
+            is_beside = is_beside or grid.clear[nearest(grid, qd.floor(s + 0.5, qd.i32))] < 0.0
+    if is_beside:
+        find_errors(at, amounts, added, grid, particles, scratch, e, first, part, lanes, searched)
+    else:
+        find_errors(at, amounts, added, grid, particles, scratch, e, first, part, lanes, 0)
     for lane in range(qd.min(lanes, count - first)):
         for k in qd.static(range(2**dim)):
             add_whole(grid.sums, at[k, lane], amounts[k, lane], grid.alone)
@@ -287,7 +305,10 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     gravity, few = (c.gravity_x, c.gravity_y, c.gravity_z), int(not is_shared(finest))
     if world.room_version != world.solids_version or (world.pieces and world.room_gravity != gravity):
         world.room_found.fill(0)
-        find_room(finest, world.room_found, world.solids, c, LEAST_OPEN, UNIT, world.searched, params.dim, few)
+        find_room(
+            finest, world.room_found, world.solids, c, LEAST_OPEN, UNIT, params.spacing, world.searched, params.dim,
+            few,
+        )  # fmt: skip
         find_basins(finest, world.room_found)
         restrict_rooms(world.levels)
         world.room_version, world.room_gravity = world.solids_version, gravity

@@ -31,7 +31,8 @@ def find_shares(
     """Find for a `lane` what the nodes before, nearest to and behind the place `s` [cells] have, axis by axis.
 
     `nodes` are by how much these add to the number of a node, beyond the tank as the nearest one there. Along x they
-    are three that follow each other, also at its ends: beyond these the last ones have it.
+    are three that follow each other, also at its ends: beyond these the last ones have it. The tenth, 0 before, is the
+    nearest node.
     """
     edges, strides = vec3(grid.dx, grid.dy, grid.dz), qd.Vector([1, grid.nx, grid.nx * grid.ny])
     for axis in qd.static(range(dim)):
@@ -45,6 +46,7 @@ def find_shares(
         shares[3 * axis + 1, lane] = 1.0 - shares[3 * axis, lane] - shares[3 * axis + 2, lane]
         for k in qd.static(range(3)):
             nodes[3 * axis + k, lane] = on_axis(grid, qd.cast(middle, qd.i32) + k - 1, axis) * strides[axis]
+        nodes[9, lane] += nodes[3 * axis + 1, lane]
         if qd.static(axis == 0 and not grid.repeats & 1):
             begin = qd.max(qd.min(qd.cast(middle, qd.i32) - 1, grid.nx - 3), 0)
             own = vec3(shares[0, lane], shares[1, lane], shares[2, lane])
@@ -89,25 +91,31 @@ def add_to_open(
     grid: CoarseGrid, s, spacing, unit, density, begin, dim: qd.template(), thin: qd.template(), mixed: qd.template()
 ):  # fmt: skip
     """Add the shares of the particle at the place `s` [cells], where nodes closed to it leave theirs to the others."""
-    shares, nodes = qd.Matrix.zero(qd.f32, 9, 1), qd.Matrix.zero(qd.i32, 9, 1)
+    shares, nodes = qd.Matrix.zero(qd.f32, 9, 1), qd.Matrix.zero(qd.i32, 10, 1)
     find_shares(shares, nodes, 0, grid, s, spacing, dim)
-    total, is_open = 0.0, 0
-    for k in range(qd.static(3**dim)):
-        share = share_of(shares, 0, k, dim)
-        node = qd.floor(s + 0.5, qd.i32) + qd.Vector([k % 3 - 1, k // 3 % 3 - 1, k // 9 - 1 if dim == 3 else 0])
-        if qd.static(not grid.repeats & 1):
-            node[0] = nodes[k % 3, 0]
+    own, at = qd.Vector.zero(qd.f32, 3**dim), qd.Vector.zero(qd.i32, 3**dim)
+    low = qd.floor(s + 0.5, qd.i32) - 1
+    total, found = 0.0, 0
+    for row in range(qd.static(3 ** (dim - 1))):
+        share = shares[3 + row % 3, 0]
+        first = nodes[3 + row % 3, 0]
+        if qd.static(dim == 3):
+            share *= shares[6 + row // 3, 0]
+            first += nodes[6 + row // 3, 0]
         if share > 0.0:
-            has_room = is_open_to(grid, node_of(nodes, 0, k, dim), node, s, thin)
-            total += share * has_room
-            is_open |= qd.cast(has_room, qd.i32) << k
-    for k in range(qd.static(3**dim)):
-        if is_open >> k & 1 == 1:
-            amount = unit * share_of(shares, 0, k, dim) / qd.max(total, 1e-3)
-            at = begin + node_of(nodes, 0, k, dim)
-            add_whole(grid.sums, at, qd.cast(qd.round(amount), qd.i32), grid.alone)
-            if qd.static(mixed):
-                add_whole(grid.mass_sums, at, qd.cast(qd.round(amount * density), qd.i32), grid.alone)
+            node = qd.Vector([low[0], low[1] + row % 3, low[2] + row // 3 if dim == 3 else 0])
+            for k in range(3):
+                n = first + nodes[k, 0]
+                node[0] = nodes[k, 0] if qd.static(not grid.repeats & 1) else low[0] + k
+                if shares[k, 0] > 0.0 and is_open_to(grid, n, node, s, thin) > 0.0:
+                    own[found], at[found] = shares[k, 0] * share, n
+                    total += own[found]
+                    found += 1
+    for k in range(found):
+        amount = unit * own[k] / qd.max(total, 1e-3)
+        add_whole(grid.sums, begin + at[k], qd.cast(qd.round(amount), qd.i32), grid.alone)
+        if qd.static(mixed):
+            add_whole(grid.mass_sums, begin + at[k], qd.cast(qd.round(amount * density), qd.i32), grid.alone)
 
 
 @qd.func
@@ -123,7 +131,7 @@ def add_parcels(
     first, begin = team * lanes, part * grid.nx * grid.ny * grid.nz
     dim = qd.static(particles.x[first].n)
     shares = qd.Matrix.zero(qd.f32, 9, lanes)
-    nodes = qd.Matrix.zero(qd.i32, 9, lanes)
+    nodes = qd.Matrix.zero(qd.i32, 10, lanes)
     rows = qd.Matrix.zero(qd.i32, 3 ** (dim - 1), lanes)
     amounts = qd.Matrix.zero(qd.i32, 3**dim, lanes)
     masses = qd.Matrix.zero(qd.i32, 3**dim if mixed else 1, lanes)
@@ -140,9 +148,7 @@ def add_parcels(
     for lane in range(qd.min(lanes, count - first)):
         is_beside = False
         if qd.static(searched):
-            is_beside = (
-                grid.clear[rows[qd.static(3 ** (dim - 1) // 2), lane] + aside_of(grid, nodes, lane, 1) - begin] < 0.0
-            )
+            is_beside = grid.clear[nodes[9, lane]] < 0.0
             if is_beside:
                 s = in_cells(grid, predicted(particles, first + lane))
                 density = 1.0 / scratch.weight[first + lane]

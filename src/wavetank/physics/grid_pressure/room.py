@@ -22,7 +22,7 @@ from wavetank.physics.grid_pressure.coarse_grid import (
 from wavetank.physics.grid_pressure.couplings import open_faces
 from wavetank.physics.grid_pressure.listed_solids import listed, solids_near
 from wavetank.physics.grid_pressure.slits import mostly
-from wavetank.physics.grid_pressure.thin_walls import farthest, is_open_to, keep_thin, mark_shut
+from wavetank.physics.grid_pressure.thin_walls import farthest, is_open_to, keep_thin, mark_closed, mark_shut
 from wavetank.physics.teams import end_of_part, first_of_part, part_of, turns_over
 from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec2, vec3, vec4
 
@@ -253,7 +253,7 @@ def find_walls(grid: CoarseGrid, thin: qd.template(), solids: SolidSet, piece, l
         grid.room[n] = qd.cast(open_share(grid, n) >= least_open, qd.f32)
         if keep_thin(grid, solids, around, n, wall) == 1:
             qd.atomic_add(thin[0], 1)
-        grid.rhs[n] = qd.cast(grid.room[n] == 0.0 or grid.thin_s[n] > 0.0, qd.f32)
+        grid.rhs[n] = 0.0
 
 
 @qd.func
@@ -286,7 +286,7 @@ def is_slit(grid: CoarseGrid, n, gravity):
 @qd.kernel(fastcache=True)
 def find_room(
     grid: CoarseGrid, thin: qd.types.ndarray(), solids: SolidSet, c: Coefficients, least_open: qd.f32, unit: qd.f32,
-    searched: qd.template(), dim: qd.template(), few: qd.template(),
+    spacing: qd.f32, searched: qd.template(), dim: qd.template(), few: qd.template(),
 ):  # fmt: skip
     """Find which room each node has for water where solids are `searched`; else the tank ends where the cells do.
 
@@ -305,7 +305,7 @@ def find_room(
         qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):
             mark_shut(grid, n)
-        largest_around(grid.rhs, grid, 1, few)
+            mark_closed(grid.rhs, grid, n, spacing)
         for turn in range(turns_over(grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)):
             edge = longest_edge(grid)
             first = first_of_part(turn, grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)
@@ -341,8 +341,10 @@ def find_room(
         # Not all nodes beside it, diagonals included, are open to what is at this one.
         qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):
-            grid.rhs[n] = qd.cast(grid.room[n] <= 0.0 or grid.thin_s[n] > 0.0, qd.f32)
-        largest_around(grid.rhs, grid, 1, few)
+            grid.rhs[n] = 0.0
+        qd.loop_config(serialize=bool(few))
+        for n in range(grid.nx * grid.ny * grid.nz):
+            mark_closed(grid.rhs, grid, n, spacing)
         qd.loop_config(serialize=bool(few))
         for n in range(grid.nx * grid.ny * grid.nz):
             grid.clear[n] = 1.0 if grid.clear[n] < 1e-3 else -grid.rhs[n]

@@ -194,6 +194,31 @@ def behind(grid: CoarseGrid, n, way):
 
 
 @qd.func
+def may_be_behind(grid: CoarseGrid, n, aside, spacing):
+    """Say whether a particle of the cell `aside` of node `n` may count there and lie behind the thin wall at it.
+
+    `aside` are whole cells; a particle counts as far as a box as large as the `spacing` [m] reaches (`parcels.py`).
+    """
+    edges, nearest_way = vec3(grid.dx, grid.dy, grid.dz), vec3(0.0, 0.0, 0.0)
+    outward = vec3(grid.thin_x[n], grid.thin_y[n], grid.thin_z[n])
+    for axis in qd.static(range(3)):
+        far = 1.0 + 0.5 * qd.min(spacing / edges[axis], 1.0)
+        side = 0.5 if outward[axis] < 0.0 else -0.5
+        nearest_way[axis] = qd.min(qd.max(aside[axis] + side, -far), far) * edges[axis]
+    return grid.thin_s[n] > 0.0 and behind(grid, n, nearest_way)
+
+
+@qd.func
+def mark_closed(marks: qd.template(), grid: CoarseGrid, n, spacing):
+    """Mark those of the nodes around, and node `n` itself, in whose cells a particle may be that is closed to `n`."""
+    if grid.room[n] <= 0.0 or grid.thin_s[n] > 0.0:
+        for k in range(27 if grid.nz > 1 else 9):
+            aside = qd.Vector([k % 3 - 1, k // 3 % 3 - 1, k // 9 - 1 if grid.nz > 1 else 0])
+            if grid.room[n] <= 0.0 or may_be_behind(grid, n, aside, spacing):
+                marks[nearest(grid, coordinates(grid, n) + aside)] = 1.0
+
+
+@qd.func
 def is_open_to(grid: CoarseGrid, n, node, s, thin: qd.template()):
     """Whether node `n`, at the whole coordinates `node`, has room for what is at the place `s` [cells]: 1 or 0.
 
