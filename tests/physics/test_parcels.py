@@ -131,6 +131,26 @@ def growth(sim, depth: float, seconds: float) -> tuple[float, float]:
     return float(rate), float(omega / theory)
 
 
+@pytest.mark.parametrize("turn", [(1.0, 0.0, 0.0, 0.0), (0.9, 0.2, 0.1, 0.35)], ids=["upright", "aslant"])
+def test_only_particles_that_may_be_cut_off_ask_which_nodes_are_open(turn):
+    """Beside thin walls, and where a cell has no room, all others find the same without asking."""
+    plate = wt.Box(center=(0.35, 0.3, 0.4), size=(0.04, 0.5, 0.5), rotation=turn)
+    ball, block = wt.Sphere(center=(0.75, 0.3, 0.3), radius=0.07), wt.Box(center=(0.8, 0.2, 0.7), size=(0.3, 0.3, 0.2))
+    water = wt.Block(lower=(0.0, 0.0, 0.0), upper=(1.0, 0.4, 0.9))
+    tank = wt.Tank(size=(1.0, 0.8, 0.9))
+    sim = wt.Simulation(wt.Scene(spacing=0.05, tank=tank, fluids=[water], solids=[plate, ball, block]))
+    level, rng = sim.world.levels[0], np.random.default_rng(4)
+    places = rng.uniform(0.0, tank.size, (20_000, 3))
+    marks = level.clear.to_numpy()
+    assert 0.1 < (marks[: level.nx * level.ny * level.nz] < 0.0).mean() < 0.6
+    found = shares_of(level, places, 0.05, searched=2)
+    level.clear.fill(-1.0)
+    asked = shares_of(level, places, 0.05, searched=2)
+    assert np.abs(found - asked).max() < 1e-3
+    level.clear.fill(0.0)
+    assert np.abs(shares_of(level, places, 0.05, searched=2) - asked).max() > 0.3
+
+
 @pytest.mark.parametrize("size", [(40, 50, 20), (40, 59, 20), (40, 60, 20), (24, 29, 16), (31, 29, 14)], ids=str)
 def test_the_longest_wave_of_a_tank_dies_out_and_is_as_fast_as_it_should_be(size):
     """The second law, and Airy: waves of 1 mm/s grew by 0.018/s in some tanks, were damped by 0.3/s in others.
