@@ -16,7 +16,7 @@ FRAMES = {
     "obstacle-tank-2d": {"steps": 1, "launch": 103, "wait": 4},
     "honey": {"steps": 2, "launch": 211, "wait": 10},
     "oil-and-water": {"steps": 1, "launch": 108, "wait": 4},
-    "crates": {"steps": 1, "launch": 162, "wait": 15},
+    "crates": {"steps": 1, "launch": 157, "wait": 15},
 }
 
 

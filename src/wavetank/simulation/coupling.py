@@ -39,7 +39,7 @@ Sec. 24), with the wet surface A that the dampers of the walls tell: the nearest
     wanted                  that with which the engine begins                                m/s, rad/s
     seen_push  P            of the step before, and
     seen_gain  dv           what a body's velocity has changed by in it: from step to step they say what k is by
-    later                   of P, what came after bodies might have yielded                  kg m/s, kg m^2/s
+    later                   of P, what came after bodies might have yielded, as a mean       kg m/s, kg m^2/s
     sums                    least squares: sums of -dP ddv and of ddv^2, motion and turn, that fade by `STAYS`
 """
 
@@ -53,6 +53,7 @@ JAMMING = 6.0  # by how much less a body may yield towards the water than away f
 LIGHT = 2.0  # water that goes along, over a body's mass, from which on: heavier ones are not thrown up again
 AFLOAT = 0.4  # of the water that goes along with an immersed body: what goes along with one that lies on the surface
 AT_ONCE = 0.2  # of what is owed: more would ring
+LATELY = 0.5  # share of the last step in what is expected to come late: what alternates from step to step is no omen
 STAYS = 0.9  # share that is left after a step of what was seen of how much water goes along
 MOST = 4.0  # of the water that goes along with an immersed body: most that is believed
 BLOCKS = (slice(0, 3), slice(3, 6))  # motion and turn, columns of a row
@@ -184,13 +185,13 @@ class Coupling:
         self._given_way, self._to_come = np.zeros_like(owed), ratio * self.later
 
     def expect(self) -> None:
-        """Take for what is still to come of a step what came in the step before: last iterations and friction."""
+        """Take for what is still to come of a step what came in the steps before: last iterations and friction."""
         self._so_far = self.impulse
         self.impulse = self.impulse + self._to_come
 
     def end(self) -> None:
         """See what has come since `expect`."""
-        self.later = self.impulse - self._so_far
+        self.later += LATELY * (self.impulse - self._so_far - self.later)
 
     def start(self, rotations: np.ndarray, begun: np.ndarray, velocity: np.ndarray, dt: float) -> None:
         """Take a step of `dt` [s] with these velocities [n, 6]; `begun` they were before contact and joints.
