@@ -4,7 +4,8 @@ Reference: hydrostatics; nothing acts on water at rest. `still-tank` has the bou
 the third second on; scenes that splash, from the second minute on. Roughness is the standard deviation of the tops of
 columns two spacings wide, in spacings; it has a bound where the surface is level. Particles count as still below
 0.02 m/s: a spacing of 2.5 cm in a second and a quarter. Waves of a whole tank are meant to last, and are no unrest:
-there the bound is on how fast a particle goes past those around it, which a throw does and a wave does not.
+there the bound is on how fast a particle goes past those around it, which a throw does and a wave does not. What is
+driven never rests, and is no faster in the second minute than in the first.
 """
 
 import dataclasses
@@ -35,6 +36,7 @@ RESTLESS = {
 WAVES = ("dam-break", "double-dam-2d", "lock-exchange-2d", "oil-and-water-2d")
 WAVING = "its waves keep 96 % a period"
 DRIVEN = "a tap, a motor or a motion goes on"
+GROWTH = 1.5  # at most, of how fast the fastest is that is driven: the same at any time
 AROUND = 4.0  # spacings: edge of the cells in which particles are around each other
 V_RMS, V_MAX, STILL, ROUGH = 0.001, 0.01, 0.02, 0.06  # m/s, m/s, m/s, d
 
@@ -150,13 +152,20 @@ def _figures(rest: Rest, seconds: float) -> list[Figure]:
     source = DRIVEN if rest.driven else RESTLESS.get(rest.name, "rest")
     fastest, past = (float(rest.since(name, settled).max()) for name in ("v_max", "past"))
     waves = rest.name in WAVES
-    return [
+    figures = [
         Figure(
             f"{rest.name}: v_max after {settled:g} s", fastest, "m/s", None, None if waves else bound, "0",
             WAVING if waves else source,
         ),
         Figure(f"{rest.name}: the same past those around", past, "m/s", None, bound, "0", source),
     ]  # fmt: skip
+    if rest.driven and seconds > SETTLED:
+        sooner, later = (float(np.median(half)) for half in np.array_split(rest.v_max, 2))
+        growth = Figure(
+            f"{rest.name}: fastest, second half over first", later / sooner, "", None, GROWTH, "1", "an even drive"
+        )
+        figures.append(growth)
+    return figures
 
 
 CASE = Case("rest", "All scenes come to rest", run, is_long=True)
