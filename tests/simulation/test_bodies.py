@@ -360,7 +360,8 @@ def test_friction_does_not_turn_small_bodies_back_and_forth():
                 bodies = sim.bodies.values()
                 torques.append([body.torque / (9.81 * body.mass * body.solid.reach()) for body in bodies])
         changes.append(np.linalg.norm(np.diff(torques, axis=0), axis=-1))
-    assert np.sqrt(np.mean(np.square(changes), axis=1)).mean() < 0.05
+    found = np.sqrt(np.mean(np.square(changes), axis=1))
+    assert found.mean() < 0.03 and found.max() < 0.2
 
 
 def test_a_heavy_box_comes_down_on_the_floor_of_a_plane_and_is_not_thrown_up_again():

@@ -205,7 +205,7 @@ def may_be_behind(grid: CoarseGrid, n, aside, spacing):
         far = 1.0 + 0.5 * qd.min(spacing / edges[axis], 1.0)
         side = 0.5 if outward[axis] < 0.0 else -0.5
         nearest_way[axis] = qd.min(qd.max(aside[axis] + side, -far), far) * edges[axis]
-    return grid.thin_s[n] > 0.0 and behind(grid, n, nearest_way)
+    return behind(grid, n, nearest_way)
 
 
 @qd.func
