@@ -102,7 +102,7 @@ class CoarseGrid:
     facing_z: qd.types.ndarray()  # likewise
     clear: qd.types.ndarray()  # f32 [nodes]: 1 where no solid is within two cells, -1 where a node may be out of reach
     # Thin walls, see `grid_pressure/thin_walls.py`: outward normal of the one that a node lies at, 0 where there is
-    # none, its distance [m], and bits of the faces to the next nodes along x, y and z that one lies in.
+    # none, its distance [m], below 0 inside, and bits of the faces to the next nodes along x, y and z that one lies in.
     thin_x: qd.types.ndarray()  # f32 [nodes]
     thin_y: qd.types.ndarray()  # likewise
     thin_z: qd.types.ndarray()  # likewise

@@ -127,9 +127,11 @@ def water_of(cut: Cut, density: float) -> Inertia:
 
 
 def _spread(places: np.ndarray, masses: np.ndarray, edges: np.ndarray, mass: float) -> Inertia:
-    center = masses @ places / mass
+    # Sums in NumPy's own order: those of a matrix product depend on how many threads its library has.
+    center = np.sum(masses[:, None] * places, axis=0) / mass
     r = places - center
-    second = (r * masses[:, None]).T @ r + np.diag(mass * edges**2 / 12.0)  # boxes are no points
+    second = np.sum(masses[:, None, None] * r[:, :, None] * r[:, None, :], axis=0)
+    second += np.diag(mass * edges**2 / 12.0)  # boxes are no points
     tensor = np.trace(second) * np.eye(3) - second
     planar = edges[2] == 0.0
     per_mass = np.sqrt(np.maximum(np.linalg.eigvalsh(second) / mass, 0.0))

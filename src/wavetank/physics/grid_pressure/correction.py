@@ -331,7 +331,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         anchor(finest)
     move_particles(
         finest, world.particles, world.scratch, cells, world.solids, c, push_of(params, stiffness, c.h), count, few,
-        searched, kinds.mixed,
+        searched * (1 + world.has_thin_walls), kinds.mixed,
     )  # fmt: skip
     if world.pieces:
         acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2

@@ -18,7 +18,7 @@ own; what is higher by a spacing reads 0.7. As with the surface (`surface.py`), 
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import corners, nearest, ramp, tents
+from wavetank.physics.grid_pressure.coarse_grid import nearest, ramp
 
 FOREIGN = (0.45, 0.8)  # how foreign a particle is where its own weight begins to count, and where all of it does
 
@@ -38,12 +38,11 @@ def farthest_density(grid: CoarseGrid, middle, density, dim: qd.template()):
 
 
 @qd.func
-def own_push(grid: CoarseGrid, s, density, foreign_from, foreign_to, dim: qd.template()):
-    """The push of a particle at the place `s` [cells] over that of the fluid around it."""
-    at = corners(grid, qd.floor(s, qd.i32), dim)
-    weights = tents(s - qd.floor(s), dim)
+def own_push(grid: CoarseGrid, s, at: qd.template(), weights: qd.template(), density, foreign_from, foreign_to):
+    """The push of a particle at the place `s` [cells] over that of the fluid around it, by the nodes `at` it."""
+    dim = qd.static(3 if at.n == 8 else 2)
     around = 0.0
-    for k in qd.static(range(2**dim)):
+    for k in qd.static(range(at.n)):
         around += weights[k] * grid.density[at[k]]
     foreign = qd.abs(around - density) / farthest_density(grid, qd.floor(s + 0.5, qd.i32), density, dim)
     share = ramp(foreign, foreign_from, foreign_to)

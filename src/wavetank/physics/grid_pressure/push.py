@@ -14,6 +14,7 @@ from wavetank.physics.boundary import fall, flattened, kept_in_tank
 from wavetank.physics.grid_pressure.coarse_grid import beside_on, corners, in_cells, nearest, ramp, tents
 from wavetank.physics.grid_pressure.couplings import open_area
 from wavetank.physics.grid_pressure.own_weight import FOREIGN, own_push
+from wavetank.physics.grid_pressure.room import open_tents
 from wavetank.physics.grid_pressure.surface import carried_share, nodes_beyond
 from wavetank.physics.grid_pressure.weight import BORNE
 from wavetank.physics.pairs import column
@@ -75,6 +76,20 @@ def slope_along(
     return found
 
 
+@qd.func
+def shares_by(
+    grid: CoarseGrid, scratch: Scratch, i, s, at: qd.template(), weights: qd.template(), push: Push,
+    mixed: qd.template(),
+):  # fmt: skip
+    """(share of the grid's push, how surely in a puddle) of particle `i` at `s` [cells], by its nodes `at`."""
+    carried_at = carried_share(grid, at, weights, push.supported, push.fade)
+    share = carried_at[0]
+    if qd.static(mixed):
+        density = 1.0 / scratch.weight[i]
+        share *= own_push(grid, s, at, weights, density, push.foreign_from, push.foreign_to)
+    return qd.Vector([share, 1.0 - ramp(carried_at[1], push.dry, push.wet)])
+
+
 @qd.kernel(fastcache=True)
 def move_particles(
     grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, solids: SolidSet, c: Coefficients,
@@ -82,7 +97,8 @@ def move_particles(
 ):  # fmt: skip
     """Move the predicted positions by M grad lambda, inside the tank, and carry it on; what sticks out has less.
 
-    One thread sees to the nodes where they are `few`.
+    Where solids are `searched`, 2 if some are thin walls: how deep water is on their other side is not asked. One
+    thread sees to the nodes where they are `few`.
     """
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
@@ -99,16 +115,22 @@ def move_particles(
             shares = qd.Matrix.zero(qd.f32, 2, cells.lanes)
             for lane in range(cells.lanes):
                 s = in_cells(grid, predicted(particles, first + lane))
-                carried_at = carried_share(grid, s, push.supported, push.fade, dim)
-                shares[0, lane] = carried_at[0]
-                if qd.static(mixed):
-                    density = 1.0 / scratch.weight[first + lane]
-                    shares[0, lane] *= own_push(grid, s, density, push.foreign_from, push.foreign_to, dim)
-                shares[1, lane] = 1.0 - ramp(carried_at[1], push.dry, push.wet)
+                at = corners(grid, qd.floor(s, qd.i32), dim)
+                own = shares_by(grid, scratch, first + lane, s, at, tents(s - qd.floor(s), dim), push, mixed)
+                shares[0, lane], shares[1, lane] = own[0], own[1]
                 slopes[0, lane] = slope_along(grid, grid.slope_x, s, 0, at_rest.x, push, dim, searched)
                 slopes[1, lane] = slope_along(grid, grid.slope_y, s, 1, at_rest.y, push, dim, searched)
                 if qd.static(dim == 3):
                     slopes[2, lane] = slope_along(grid, grid.slope_z, s, 2, at_rest.z, push, dim, searched)
+            if qd.static(searched == 2):
+                for i in range(first, end_of(team, cells, count)):
+                    s = in_cells(grid, predicted(particles, i))
+                    if grid.clear[nearest(grid, qd.floor(s + 0.5, qd.i32))] < 0.0:
+                        at = corners(grid, qd.floor(s, qd.i32), dim)
+                        weights = open_tents(grid, at, s, dim, 1)
+                        if weights.sum() > 0.5:
+                            own = shares_by(grid, scratch, i, s, at, weights, push, mixed)
+                            shares[0, i - first], shares[1, i - first] = own[0], own[1]
             for i in range(first, end_of(team, cells, count)):
                 p = predicted(particles, i)
                 dp = column(slopes, i - first) * (push.stiffness * shares[0, i - first])

@@ -28,9 +28,9 @@ which a hundredth of a spacing is enough. Water is level: those nodes are told b
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid
-from wavetank.physics.grid_pressure.coarse_grid import beside_on, coordinates, corners, on_axis, sizes, tents
+from wavetank.physics.grid_pressure.coarse_grid import beside_on, coordinates, on_axis, sizes
 from wavetank.physics.grid_pressure.couplings import air_above, has_lid
-from wavetank.physics.grid_pressure.thin_walls import shut_towards
+from wavetank.physics.grid_pressure.thin_walls import is_beside, shut_towards
 from wavetank.solids.distance import vec3
 
 
@@ -162,7 +162,7 @@ def depth_beside(grid: CoarseGrid, n, gravity):
     Those lie across `gravity`, a vector of any length. Thin walls have other levels on their other sides.
     """
     total, number = 0.0, 0
-    if not is_told(grid, n) and grid.thin_s[n] <= 0.0:
+    if not is_told(grid, n) and not is_beside(grid, n):
         for axis in qd.static(range(3)):
             if (grid.nz > 1 or axis < 2) and qd.abs(gravity[axis]) <= 0.7 * gravity.norm():
                 for side in qd.static((-1, 1)):
@@ -175,12 +175,10 @@ def depth_beside(grid: CoarseGrid, n, gravity):
 
 
 @qd.func
-def carried_share(grid: CoarseGrid, s, supported, fade, dim: qd.template()):
-    """(share of the grid's push, fill) at the place `s` [cells]: 1 from depth `supported` on, 0 by `fade` above [m]."""
-    at = corners(grid, qd.floor(s, qd.i32), dim)
-    weights = tents(s - qd.floor(s), dim)
+def carried_share(grid: CoarseGrid, at: qd.template(), weights: qd.template(), supported, fade):
+    """(share of the grid's push, fill) by the nodes `at` a place: 1 from a depth `supported` on, 0 `fade` above [m]."""
     depth, fill = 0.0, 0.0
-    for k in qd.static(range(2**dim)):
+    for k in qd.static(range(at.n)):
         depth += weights[k] * grid.depth[at[k]]
         fill += weights[k] * grid.fill[at[k]]
     return qd.Vector([qd.min(qd.max(1.0 + (depth - supported) / fade, 0.0), 1.0), fill])

@@ -4,9 +4,10 @@ A wall thinner than two cells may lie between nodes, or between a particle and i
 on the other too, seemed half empty here and was a film there, and its pressure ended in the air behind the wall.
 
 Each node near such a wall therefore keeps the plane of the wall's surface on its own side. Particles and free places
-behind that plane do not count at it, faces between nodes of which one lies behind the plane of the other are shut, and
-a node inside of the wall is closed, as it is on neither side. It is one plane a node: in a corner that two thin walls
-make, one of them is felt.
+behind that plane do not count at it, and faces between nodes of which one lies behind the plane of the other are shut.
+A node a little inside of the wall belongs to the side that is nearer, as one a little inside of a thick solid has room:
+water in a bowl went round where some nodes had and others had not. One deeper inside is closed, as it is on neither
+side. It is one plane a node: in a corner that two thin walls make, one of them is felt.
 """
 
 from wavetank.device.compiler import qd
@@ -74,6 +75,16 @@ def ahead(solids: SolidSet, around: qd.template(), middle, way, outward):
 
 
 @qd.func
+def along(grid: CoarseGrid, outward):
+    """Two directions along a wall whose normal is `outward`; the second is 0 in a plane, which goes on along z."""
+    aside = vec3(0.0, 0.0, 1.0)
+    if grid.nz > 1 and qd.abs(outward.z) > 0.7:
+        aside = vec3(1.0, 0.0, 0.0)
+    first = outward.cross(aside).normalized()
+    return first, outward.cross(first) if grid.nz > 1 else vec3(0.0, 0.0, 0.0)
+
+
+@qd.func
 def goes_on(grid: CoarseGrid, solids: SolidSet, around: qd.template(), surface, outward, edge):
     """Say whether what is thin behind the place `surface` goes on to its sides: a wall, perhaps its rim, no bar."""
     middle, deepest = surface, 0.0
@@ -82,12 +93,7 @@ def goes_on(grid: CoarseGrid, solids: SolidSet, around: qd.template(), surface, 
         depth = depth_in_solids(solids, around, at)
         if depth > deepest:
             middle, deepest = at, depth
-    # Two directions along the wall; a world in a plane goes on along z.
-    aside = vec3(0.0, 0.0, 1.0)
-    if grid.nz > 1 and qd.abs(outward.z) > 0.7:
-        aside = vec3(1.0, 0.0, 0.0)
-    first = outward.cross(aside).normalized()
-    second = outward.cross(first) if grid.nz > 1 else vec3(0.0, 0.0, 0.0)
+    first, second = along(grid, outward)
     inside = 0
     for k in range(4):
         if inside >= k - 1:  # else two sides are free already
@@ -120,11 +126,34 @@ def straight_across(grid: CoarseGrid, solids: SolidSet, around: qd.template(), a
 
 
 @qd.func
+def is_beside(grid: CoarseGrid, n):
+    """Whether node `n` lies at a thin wall, which it is on one side of."""
+    return qd.abs(grid.thin_x[n]) + qd.abs(grid.thin_y[n]) + qd.abs(grid.thin_z[n]) > 0.0
+
+
+@qd.func
+def belongs(grid: CoarseGrid, solids: SolidSet, around: qd.template(), surface, outward, distance, edge):
+    """Say whether a node inside of a wall, at a `distance` [m] below 0 from its `surface`, belongs to the side there.
+
+    It does a little inside, as at thick solids, unless a corner is near: what is free ahead of the surface must be so
+    beside it as well.
+    """
+    found = distance > -0.35 * edge  # what is deeper has next to no room, `room.LEAST_OPEN`
+    first, second = along(grid, outward)
+    for k in range(5 if grid.nz > 1 else 3):
+        way = outward * (0.1 if k == 0 else 0.5)
+        if k > 0:
+            way += (first if k < 3 else second) * (0.5 if k % 2 == 0 else -0.5)
+        found = found and not is_inside(solids, around, surface + way * edge)
+    return found
+
+
+@qd.func
 def keep_thin(grid: CoarseGrid, solids: SolidSet, around: qd.template(), n, wall):
     """Keep the plane of a thin `wall`, (gradient, distance [m]), that node `n` lies at; return 1 if there is one.
 
-    If the node lies inside of it, it is closed. A wall is thin where it is free beyond, straight through; the solids
-    that are asked are those listed as `around`.
+    If the node lies inside of it and belongs to neither side, it is closed. A wall is thin where it is free beyond,
+    straight through; the solids that are asked are those listed as `around`.
     """
     edge = qd.min(grid.dx, grid.dy)
     outward = vec3(wall.x, wall.y, wall.z)
@@ -142,7 +171,7 @@ def keep_thin(grid: CoarseGrid, solids: SolidSet, around: qd.template(), n, wall
             is_thin = outward.norm() > 0.0
         if is_thin and goes_on(grid, solids, close, surface, outward, edge):
             found = 1
-            if wall.w <= 0.0:
+            if wall.w <= 0.0 and not belongs(grid, solids, close, surface, outward, wall.w, edge):
                 grid.room[n] = 0.0
             else:
                 grid.thin_x[n], grid.thin_y[n], grid.thin_z[n] = outward.x, outward.y, outward.z
@@ -171,6 +200,16 @@ def is_through(grid: CoarseGrid, n, m):
 
 
 @qd.func
+def parts(grid: CoarseGrid, n, m, way):
+    """Say whether the thin wall that node `n` lies at parts it from node `m`, a `way` [m] from there.
+
+    Not if `m` lies in that wall and belongs to the same side.
+    """
+    alike = grid.thin_x[n] * grid.thin_x[m] + grid.thin_y[n] * grid.thin_y[m] + grid.thin_z[n] * grid.thin_z[m]
+    return behind(grid, n, way) and not (grid.thin_s[m] < 0.0 and alike > 0.3)
+
+
+@qd.func
 def mark_shut(grid: CoarseGrid, n):
     """Find in which faces of node `n` to the next nodes a wall lies, of thin ones and of those a little thicker."""
     edges = vec3(grid.dx, grid.dy, grid.dz)
@@ -181,7 +220,7 @@ def mark_shut(grid: CoarseGrid, n):
         m = nearest(grid, ahead)
         way = vec3(0.0, 0.0, 0.0)
         way[axis] = edges[axis]
-        if m != n and (behind(grid, n, way) or behind(grid, m, -way) or is_through(grid, n, m)):
+        if m != n and (parts(grid, n, m, way) or parts(grid, m, n, -way) or is_through(grid, n, m)):
             bits |= 1 << axis
     grid.shut[n] = bits
 
@@ -211,7 +250,7 @@ def may_be_behind(grid: CoarseGrid, n, aside, spacing):
 @qd.func
 def mark_closed(marks: qd.template(), grid: CoarseGrid, n, spacing):
     """Mark those of the nodes around, and node `n` itself, in whose cells a particle may be that is closed to `n`."""
-    if grid.room[n] <= 0.0 or grid.thin_s[n] > 0.0:
+    if grid.room[n] <= 0.0 or is_beside(grid, n):
         for k in range(27 if grid.nz > 1 else 9):
             aside = qd.Vector([k % 3 - 1, k // 3 % 3 - 1, k // 9 - 1 if grid.nz > 1 else 0])
             if grid.room[n] <= 0.0 or may_be_behind(grid, n, aside, spacing):
@@ -226,7 +265,7 @@ def is_open_to(grid: CoarseGrid, n, node, s, thin: qd.template()):
     """
     found = grid.room[n] > 0.0
     if qd.static(thin):
-        if found and grid.thin_s[n] > 0.0:
+        if found and is_beside(grid, n):
             found = not behind(grid, n, way_from(grid, node, s))
     return qd.cast(found, qd.f32)
 
