@@ -48,9 +48,10 @@ def compute(name: str, frames: int, particles: int, state: str, save: str, save_
 def digests(name: str, frames: int, particles: int, threads: int, **more: str | int) -> Digests:
     """Return what such a process printed."""
     options = [f"--{key.replace('_', '-')}={value}" for key, value in more.items()]
+    env = {**os.environ, "QD_CPU_MAX_NUM_THREADS": str(threads), "OPENBLAS_NUM_THREADS": str(threads)}
     done = subprocess.run(
         [sys.executable, __file__, "compute", name, f"--frames={frames}", f"--particles={particles}", *options],
-        env={**os.environ, "QD_CPU_MAX_NUM_THREADS": str(threads)}, capture_output=True, text=True, timeout=7200,
+        env=env, capture_output=True, text=True, timeout=7200,
     )  # fmt: skip
     if done.returncode not in (0, -signal.SIGKILL):
         raise RuntimeError(f"{name}: {done.stderr.strip()[-400:]}")

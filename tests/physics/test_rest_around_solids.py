@@ -92,7 +92,7 @@ def test_a_film_on_a_floor_lies_still(layers):
     assert np.sqrt((speeds**2).mean()) < 0.01 * np.sqrt(9.81 * d)
 
 
-CUPS = [(0.6, 0.013), (1.25, 0.0), (1.25, 0.013), (2.0, 0.027), (3.0, 0.013), (3.0, 0.027)]
+CUPS = [(0.4, 0.007), (0.6, 0.013), (1.25, 0.0), (1.25, 0.013), (2.0, 0.027), (3.0, 0.013), (3.0, 0.027)]
 
 
 @pytest.mark.parametrize(("walls", "shift"), CUPS)
@@ -111,6 +111,25 @@ def test_water_in_a_thin_cup_rests(walls, shift):
     assert speeds.max() < 0.02 * np.sqrt(9.81 * d)
     assert np.sqrt((speeds**2).mean()) < 0.01 * np.sqrt(9.81 * d)
     assert np.all((sim.positions[:, 0] > x + t) & (sim.positions[:, 0] < right - t) & (sim.positions[:, 1] > y + t))
+
+
+BOWLS = [(0.004, (0.006, 0.002, 0.004)), (0.009, (0.001, -0.003, 0.005)), (0.019, (0.0, 0.0, 0.0))]
+
+
+@pytest.mark.parametrize(("thick", "shift"), BOWLS)
+def test_a_puddle_in_a_thin_bowl_lies_still(thick, shift):
+    """Hydrostatics. It went round at 0.16 to 0.19 m/s, and rested in a bowl cut out of a block."""
+    inner, depth, center = 0.08, 0.034, 0.1 + np.array(shift)
+    half = 0.75 * np.sqrt(inner**2 - (inner - depth) ** 2)
+    parts = [wt.Sphere(center=(0, 0, 0), radius=inner + thick), wt.Sphere(center=(0, 0, 0), radius=inner)]
+    lower, upper = center - (half, inner - 0.004, half), center + (half, depth - inner, half)
+    water = wt.Block(lower=tuple(lower), upper=tuple(upper))
+    bowl = wt.Difference(center=tuple(center), parts=parts)
+    tank = wt.Tank(size=(0.2, 0.2, 0.2))
+    sim = wt.Simulation(wt.Scene(spacing=0.007, tank=tank, fluids=[water], solids=[bowl], foam=0.0))
+    sim.advance(6.0)
+    fastest = [np.linalg.norm(frame.velocities, axis=1).max() for frame in sim.frames(seconds=2.0)]
+    assert np.median(fastest) < 0.02
 
 
 def test_a_puddle_on_the_floor_stops():

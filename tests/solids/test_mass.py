@@ -1,5 +1,9 @@
 """Volume, mass and inertia of solids, against the formulas of solid geometry."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -54,3 +58,26 @@ def test_added_mass_is_lambs():
     flat, _ = added_mass((0.05, 1.0, 1.0))
     assert flat * 4 / 3 * np.pi * 0.05 == pytest.approx(8 / 3, rel=0.06)
     assert added_mass((1.0, 1.0)) == (1.0, 0.0)
+
+
+WEIGH = """
+from wavetank.device import compiler
+from wavetank.scene.scene import Scene
+from wavetank.solids.mass import Ruler, inertia_of
+
+compiler.start("cpu")
+for solid in Scene.load("crates").solids[:4]:
+    found = inertia_of(solid, Ruler(solid, 3, 0.02).cut())
+    print(found.tensor.tobytes().hex(), found.center.tobytes().hex())
+"""
+
+
+def test_inertia_is_the_same_whatever_threads_matrix_products_have():
+    """They were summed by the BLAS, and a pile of crates ended elsewhere on one processor than on two."""
+    with_threads = (os.environ | {"OPENBLAS_NUM_THREADS": number} for number in "12")
+    found = [
+        subprocess.run([sys.executable, "-c", WEIGH], env=env, capture_output=True, text=True, check=True).stdout
+        for env in with_threads
+    ]
+    assert found[0].count("\n") == 4
+    assert found[0] == found[1]

@@ -18,6 +18,7 @@ bound because a body had moved by a hundredth of a spacing.
 from wavetank.device.compiler import qd
 from wavetank.device.state import CoarseGrid, Coefficients
 from wavetank.physics.grid_pressure.coarse_grid import coordinates, nearest, ramp
+from wavetank.physics.grid_pressure.thin_walls import shut_towards
 from wavetank.solids.distance import vec3
 
 
@@ -84,25 +85,26 @@ def below_roof(grid: CoarseGrid, n, c: Coefficients):
 def in_part(grid: CoarseGrid, n):
     """The same for a node whose cell a solid takes a part of: where all open nodes beside it, see `gaps`, are full.
 
-    Where none is open, as below a roof near the face of a cell, those count that are mostly so.
+    Where none is open, as below a roof near the face of a cell, those count that are mostly so. What lies behind a thin
+    wall is not beside it.
     """
-    all_open, most_open, all_mostly, most_mostly = 1.0, 0.0, 1.0, 0.0
+    lacks_open, most_open, lacks_mostly, most_mostly = 0.0, 0.0, 0.0, 0.0
     for axis in qd.static(range(3)):
         if grid.nz > 1 or axis < 2:
             for side in qd.static((-1, 1)):
                 place = coordinates(grid, n)
                 place[axis] += side
                 at = nearest(grid, place)
-                if at != n:
+                if at != n and shut_towards(grid, n, at, axis) == 0:
                     lacks = 1.0 - is_water(grid.gaps[at])
                     is_open = openness(grid, at)
-                    all_open = qd.min(all_open, 1.0 - is_open * lacks)
+                    lacks_open = qd.max(lacks_open, is_open * lacks)
                     most_open = qd.max(most_open, is_open)
                     is_open = mostly_open(grid, at)
-                    all_mostly = qd.min(all_mostly, 1.0 - is_open * lacks)
+                    lacks_mostly = qd.max(lacks_mostly, is_open * lacks)
                     most_mostly = qd.max(most_mostly, is_open)
     cut = 1.0 - mostly_open(grid, n)
-    return all_open * most_open + (1.0 - most_open) * all_mostly * most_mostly * cut
+    return most_open - lacks_open + (1.0 - most_open) * (most_mostly - lacks_mostly) * cut
 
 
 @qd.func
