@@ -141,10 +141,11 @@ def belongs(grid: CoarseGrid, solids: SolidSet, around: qd.template(), surface, 
     found = distance > -0.35 * edge  # what is deeper has next to no room, `room.LEAST_OPEN`
     first, second = along(grid, outward)
     for k in range(5 if grid.nz > 1 else 3):
-        way = outward * (0.1 if k == 0 else 0.5)
-        if k > 0:
-            way += (first if k < 3 else second) * (0.5 if k % 2 == 0 else -0.5)
-        found = found and not is_inside(solids, around, surface + way * edge)
+        if found:
+            way = outward * (0.1 if k == 0 else 0.5)
+            if k > 0:
+                way += (first if k < 3 else second) * (0.5 if k % 2 == 0 else -0.5)
+            found = not is_inside(solids, around, surface + way * edge)
     return found
 
 
