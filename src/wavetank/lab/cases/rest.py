@@ -32,8 +32,8 @@ RESTLESS = {
     "mountain-lake": "films run down the valley",
     "river": "runs downhill without an end",
 }
-#: Long tanks with little in them to break a wave.
-WAVES = ("dam-break", "double-dam-2d", "lock-exchange-2d", "oil-and-water-2d")
+#: Tanks with little in them to break a wave.
+WAVES = ("dam-break", "double-dam-2d", "dry-feet", "lock-exchange-2d", "oil-and-water-2d")
 WAVING = "its waves keep 96 % a period"
 DRIVEN = "a tap, a motor or a motion goes on"
 GROWTH = 1.5  # at most, of how fast the fastest is that is driven: the same at any time
