@@ -64,6 +64,7 @@ from wavetank.physics.grid_pressure.room import LEAST_OPEN, find_room, open_tent
 from wavetank.physics.grid_pressure.sealed import MOSTLY_FULL, anchor, balance, find_basins
 from wavetank.physics.grid_pressure.slits import below_roof, close_slit, in_part, mostly, openness
 from wavetank.physics.grid_pressure.surface import depth_beside, find_depths, is_air, keep_extremes
+from wavetank.physics.grid_pressure.thin_walls import may_be_cut_off
 from wavetank.physics.grid_pressure.weight import BORNE, flow_out
 from wavetank.physics.mixture import Blend
 from wavetank.physics.predicted_positions import predicted
@@ -192,8 +193,7 @@ def add_errors(
     is_beside = False
     if qd.static(searched):
         for i in range(first, qd.min(first + lanes, count)):
-            s = in_cells(grid, predicted(particles, i))
-            is_beside = is_beside or grid.clear[nearest(grid, qd.floor(s + 0.5, qd.i32))] < 0.0
+            is_beside = is_beside or may_be_cut_off(grid, in_cells(grid, predicted(particles, i)))
     if is_beside:
         find_errors(at, amounts, added, grid, particles, scratch, e, first, part, lanes, searched)
     else:

@@ -16,6 +16,7 @@ from wavetank.physics.grid_pressure.couplings import open_area
 from wavetank.physics.grid_pressure.own_weight import FOREIGN, own_push
 from wavetank.physics.grid_pressure.room import open_tents
 from wavetank.physics.grid_pressure.surface import carried_share, nodes_beyond
+from wavetank.physics.grid_pressure.thin_walls import may_be_cut_off
 from wavetank.physics.grid_pressure.weight import BORNE
 from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predict_at, predicted
@@ -125,7 +126,7 @@ def move_particles(
             if qd.static(searched == 2):
                 for i in range(first, end_of(team, cells, count)):
                     s = in_cells(grid, predicted(particles, i))
-                    if grid.clear[nearest(grid, qd.floor(s + 0.5, qd.i32))] < 0.0:
+                    if may_be_cut_off(grid, s):
                         at = corners(grid, qd.floor(s, qd.i32), dim)
                         weights = open_tents(grid, at, s, dim, 1)
                         if weights.sum() > 0.5:

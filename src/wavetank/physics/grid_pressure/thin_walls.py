@@ -272,6 +272,12 @@ def is_open_to(grid: CoarseGrid, n, node, s, thin: qd.template()):
 
 
 @qd.func
+def may_be_cut_off(grid: CoarseGrid, s):
+    """Say whether nodes around the place `s` [cells] may have no room for what is there, see `mark_closed`."""
+    return grid.clear[nearest(grid, qd.floor(s + 0.5, qd.i32))] < 0.0
+
+
+@qd.func
 def is_shut(grid: CoarseGrid, n, axis: qd.template()):
     """Say whether a thin wall lies between node `n` and the next along an axis."""
     return (qd.cast(grid.shut[n], qd.i32) >> axis) & 1
