@@ -11,12 +11,17 @@ scene = wt.Scene(
     tank=wt.Tank(size=(1.6, 0.7), tilt="5*deg*sin(2*pi*0.25*t)"),
     fluids=[wt.Block(lower=(0, 0), upper=(0.5, 0.45)), wt.Block(lower=(0.6, 0), upper=(1.6, 0.1))],
     solids=[
-        wt.Box(name="gate", center=(0.55, 0.35), size=(0.05, 0.7),
-               motion=[{"time": 0.3, "position": (0.55, 0.35)}, {"time": 0.9, "position": (0.55, 0.5)}]),
-        wt.Box(name="paddle", center=("1.5 + 0.08*sin(2*pi*1.2*t)", 0.3), size=(0.05, 0.5),
-               rotation="0.2*sin(2*pi*1.2*t)"),
+        wt.Box(
+            name="gate",
+            center=(0.55, 0.35),
+            size=(0.05, 0.7),
+            motion=[{"time": 0.3, "position": (0.55, 0.35)}, {"time": 0.9, "position": (0.55, 0.5)}],
+        ),
+        wt.Box(
+            name="paddle", center=("1.5 + 0.08*sin(2*pi*1.2*t)", 0.3), size=(0.05, 0.5), rotation="0.2*sin(2*pi*1.2*t)"
+        ),
     ],
-)  # fmt: skip
+)
 scene.save("moving.toml")  # all of it is data
 sim = wt.Simulation(wt.Scene.load("moving.toml"))
 images = []

@@ -8,9 +8,7 @@ import wavetank as wt
 
 robot = wt.load_robot(Path(__file__).parent / "robots" / "paddle_boat.xml", position=(0.45, 0.33, 0.5))
 pool = wt.Scene(
-    spacing=0.05,
-    tank=wt.Tank(size=(1.6, 0.75, 1.0)),
-    fluids=[wt.Block(lower=(0, 0, 0), upper=(1.6, 0.33, 1.0))],
+    spacing=0.05, tank=wt.Tank(size=(1.6, 0.75, 1.0)), fluids=[wt.Block(lower=(0, 0, 0), upper=(1.6, 0.33, 1.0))]
 )
 sim = wt.Simulation(robot.joined(pool))
 for name in ("left", "right"):

@@ -33,8 +33,10 @@ def python_of_blender() -> str:
     folder = ROOT / ".venv-blender"
     python = folder / "bin" / "python"
     if not (folder / "ready").exists():
-        for command in ([sys.executable, "-m", "venv", str(folder)],
-                        [str(python), "-m", "pip", "install", "-q", "--only-binary", ":all:", PACKAGE]):  # fmt: skip
+        for command in (
+            [sys.executable, "-m", "venv", str(folder)],
+            [str(python), "-m", "pip", "install", "-q", "--only-binary", ":all:", PACKAGE],
+        ):
             done = subprocess.run(command, capture_output=True, text=True)
             if done.returncode:
                 said = (done.stderr.strip().splitlines() or ["no message"])[-1]
@@ -59,10 +61,15 @@ def make_run(out: Path) -> None:
         with np.load(out / f"run-{number:05d}.npz") as file:
             x, ids, foam = file["positions"], file["ids"], file["foam_kinds"]
             pose = file["solid_poses"][0][:7].tolist()
-            expected.append({
-                "count": len(x), "middle": x.mean(axis=0).tolist(), "ids": int(ids.astype(np.int64).sum()),
-                "foam": [int((foam == kind).sum()) for kind in (1, 2, 3)], "pose": pose,
-            })  # fmt: skip
+            expected.append(
+                {
+                    "count": len(x),
+                    "middle": x.mean(axis=0).tolist(),
+                    "ids": int(ids.astype(np.int64).sum()),
+                    "foam": [int((foam == kind).sum()) for kind in (1, 2, 3)],
+                    "pose": pose,
+                }
+            )
     (out / "expected.json").write_text(json.dumps(expected))
 
 
@@ -97,8 +104,10 @@ def inside(out: Path) -> None:
         ids = np.zeros(len(points.points), np.int32)
         points.attributes["id"].data.foreach_get("value", ids)
         assert int(ids.astype(np.int64).sum()) == frame["ids"], f"ids of frame {number}"
-        found = [len(points_of(clouds[name].evaluated_get(graph), np)[0].points) if name in clouds else 0
-                 for name in ("spray", "foam", "bubbles")]  # fmt: skip
+        found = [
+            len(points_of(clouds[name].evaluated_get(graph), np)[0].points) if name in clouds else 0
+            for name in ("spray", "foam", "bubbles")
+        ]
         assert found == frame["foam"], f"frame {number}: {found} of {frame['foam']}"
         place = paddle.evaluated_get(graph).matrix_world.translation
         x, y, z = frame["pose"][:3]
@@ -113,8 +122,10 @@ def inside(out: Path) -> None:
     pixels = np.array(picture.pixels[:]).reshape(-1, 4)[:, :3]
     blue = (pixels[:, 2] > 1.5 * pixels[:, 0]) & (pixels[:, 2] > 0.15)
     assert pixels.std() > 0.05 and blue.mean() > 0.02, f"{blue.mean():.3f} of the picture is water"
-    print(f"Blender {bpy.app.version_string}: {FRAMES} frames with {expected[-1]['count']} particles, "
-          f"{sum(expected[-1]['foam'])} of foam; {100 * blue.mean():.0f} % of the picture is water")  # fmt: skip
+    print(
+        f"Blender {bpy.app.version_string}: {FRAMES} frames with {expected[-1]['count']} particles, "
+        f"{sum(expected[-1]['foam'])} of foam; {100 * blue.mean():.0f} % of the picture is water"
+    )
 
 
 def points_of(cloud, np):

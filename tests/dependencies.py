@@ -17,9 +17,17 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 TESTS = [
-    "tests/foundation", "tests/scene", "tests/formats", "tests/session", "tests/simulation", "tests/front/test_gate.py",
-    "tests/front/test_floods.py", "tests/front/test_checkpoints.py", "tests/test_cli.py", "tests/fuzz/test_attacks.py",
-]  # fmt: skip
+    "tests/foundation",
+    "tests/scene",
+    "tests/formats",
+    "tests/session",
+    "tests/simulation",
+    "tests/front/test_gate.py",
+    "tests/front/test_floods.py",
+    "tests/front/test_checkpoints.py",
+    "tests/test_cli.py",
+    "tests/fuzz/test_attacks.py",
+]
 
 
 def declared() -> dict[str, str]:

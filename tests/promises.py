@@ -51,8 +51,11 @@ def digests(name: str, frames: int, particles: int, threads: int, **more: str | 
     env = {**os.environ, "QD_CPU_MAX_NUM_THREADS": str(threads), "OPENBLAS_NUM_THREADS": str(threads)}
     done = subprocess.run(
         [sys.executable, __file__, "compute", name, f"--frames={frames}", f"--particles={particles}", *options],
-        env=env, capture_output=True, text=True, timeout=7200,
-    )  # fmt: skip
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=7200,
+    )
     if done.returncode not in (0, -signal.SIGKILL):
         raise RuntimeError(f"{name}: {done.stderr.strip()[-400:]}")
     return {int(number): digest for number, digest in (line.split() for line in done.stdout.splitlines())}
@@ -66,8 +69,9 @@ def differing(name: str, frames: int, particles: int, folder: Path) -> str:
     if len(whole) != frames:
         return f"{len(whole)} of {frames} frames"
     runs = {"two threads": digests(name, frames, particles, 2)}
-    runs["restored"] = digests(name, frames, particles, 1, state=str(saved), save=str(second), save_at=later - 5,
-                               end_at=later)  # fmt: skip
+    runs["restored"] = digests(
+        name, frames, particles, 1, state=str(saved), save=str(second), save_at=later - 5, end_at=later
+    )
     runs["killed, and gone on"] = digests(name, frames, particles, 2, state=str(second))
     needed = {"two threads": (1, frames), "restored": (middle + 1, later), "killed, and gone on": (later - 4, frames)}
     for title, run in runs.items():
@@ -95,8 +99,24 @@ def check_scenes(names: list[str], frames: int, particles: int) -> int:
 
 # --- kills ---
 
-RUN = ("drop-2d", "--set", "spacing=0.03", "--seconds", "4", "--fps", "30", "--size", "96x64", "--video", "--export",
-       "h5,usd,npz", "--checkpoint-every", "0.15", "--name", "a")  # fmt: skip
+RUN = (
+    "drop-2d",
+    "--set",
+    "spacing=0.03",
+    "--seconds",
+    "4",
+    "--fps",
+    "30",
+    "--size",
+    "96x64",
+    "--video",
+    "--export",
+    "h5,usd,npz",
+    "--checkpoint-every",
+    "0.15",
+    "--name",
+    "a",
+)
 
 
 def wavetank(*arguments: str) -> subprocess.Popen:

@@ -26,9 +26,27 @@ def pictures(path: Path) -> list:
 
 def test_run_writes_what_was_asked_for(tmp_path):
     result = process(
-        "run", "drop-2d", "--seconds", "0.2", "--fps", "20", "--size", "160x90", "--out", str(tmp_path / "a" / "b"),
-        "--video", "--gif", "--frames", "--export", "npz", "--export", "ply", "--set", "viscosity=0.2", "--json",
-    )  # fmt: skip
+        "run",
+        "drop-2d",
+        "--seconds",
+        "0.2",
+        "--fps",
+        "20",
+        "--size",
+        "160x90",
+        "--out",
+        str(tmp_path / "a" / "b"),
+        "--video",
+        "--gif",
+        "--frames",
+        "--export",
+        "npz",
+        "--export",
+        "ply",
+        "--set",
+        "viscosity=0.2",
+        "--json",
+    )
     assert result.returncode == 0, result.stderr
     figures = json.loads(result.stdout.strip().splitlines()[-1])
     assert figures["last"]["count"] == 512
@@ -139,8 +157,12 @@ def test_pictures_are_named_after_what_is_on_them(wavetank, tmp_path, monkeypatc
         result = wavetank("render", "drop-2d", "--set", "spacing=0.05", "--size", "96x54", "--quality", "draft", *more)
         assert result.returncode == 0, result.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "drop-2d-0.1s.png", "drop-2d-ff0000.png", "drop-2d-particles.png", "drop-2d-slice.png", "drop-2d.png",
-    ]  # fmt: skip
+        "drop-2d-0.1s.png",
+        "drop-2d-ff0000.png",
+        "drop-2d-particles.png",
+        "drop-2d-slice.png",
+        "drop-2d.png",
+    ]
     assert Image.open("drop-2d-slice.png").size == (96, 54)
     assert "--size = '96' is not allowed" in wavetank("render", "drop-2d", "--size", "96").stderr
     lines = re.findall(r"`wavetank render ([^`]*)`", (ROOT / "README.md").read_text())
@@ -162,8 +184,23 @@ def test_several_formats_in_one_word_and_a_small_gif(wavetank, tmp_path):
         assert picture.size == (800, 450)  # what is asked for
 
 
-@pytest.mark.parametrize("command", ["scenes", "run", "render", "play", "replay", "resume", "export", "import",
-                                     "converge", "validate", "bench", "doctor"])  # fmt: skip
+@pytest.mark.parametrize(
+    "command",
+    [
+        "scenes",
+        "run",
+        "render",
+        "play",
+        "replay",
+        "resume",
+        "export",
+        "import",
+        "converge",
+        "validate",
+        "bench",
+        "doctor",
+    ],
+)
 def test_help_is_for_people(wavetank, command):
     text = wavetank(command, "--help").stdout
     assert "list[" not in text and "--width" not in text
@@ -201,12 +238,28 @@ def test_a_process_ends_with_one_line_too():
 
 def test_ctrl_c_finishes_the_files(tmp_path):
     process = subprocess.Popen(
-        [sys.executable, "-m", "wavetank", "run", "drop-2d", "--seconds", "1000", "--size", "96x64", "--video",
-         "--out", str(tmp_path), "--json"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        [
+            sys.executable,
+            "-m",
+            "wavetank",
+            "run",
+            "drop-2d",
+            "--seconds",
+            "1000",
+            "--size",
+            "96x64",
+            "--video",
+            "--out",
+            str(tmp_path),
+            "--json",
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
         # A test run in the background of a shell ignores interrupts, and children inherit that.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )  # fmt: skip
+    )
     deadline = time.time() + 120
     while time.time() < deadline and not any(p.stat().st_size for p in tmp_path.glob("*partial*")):
         time.sleep(0.1)
@@ -263,8 +316,12 @@ def test_doctor_says_what_works(wavetank):
         assert Path(notes[cache].removesuffix(" (may be deleted)")).is_absolute()
         assert rows[cache] == "empty" or rows[cache].endswith(("bytes", "kB", "MB", "GB"))
     said = wavetank("doctor").stdout
-    assert all(f"wavetank[{extra}]" in note for name, extra in (("anywidget", "notebook"), ("h5py", "hdf5"))
-               if rows[name] == "missing" for note in [notes[name]])  # fmt: skip
+    assert all(
+        f"wavetank[{extra}]" in note
+        for name, extra in (("anywidget", "notebook"), ("h5py", "hdf5"))
+        if rows[name] == "missing"
+        for note in [notes[name]]
+    )
     assert "patches of the compiler" in said and "patch: " not in said  # one line, not one each
 
 

@@ -98,8 +98,12 @@ def _give(one, material):
 
 def _floor(scene):
     """Put a floor below everything, which water without one would hang in nothing over."""
-    corners = [one.matrix_world @ type(one.location)(corner) for one in scene.objects if one.type in ("MESH", "CURVES")
-               for corner in one.bound_box]  # fmt: skip
+    corners = [
+        one.matrix_world @ type(one.location)(corner)
+        for one in scene.objects
+        if one.type in ("MESH", "CURVES")
+        for corner in one.bound_box
+    ]
     if not corners:
         return
     low = min(corner.z for corner in corners)

@@ -92,9 +92,11 @@ def show_tank(scene: dict, view: object) -> None:
     lower, upper = corners
     size = [high - low for low, high in zip(lower, upper, strict=True)]
     box = simple.Box(
-        XLength=size[0], YLength=size[1], ZLength=max(size[2], 1e-6),
+        XLength=size[0],
+        YLength=size[1],
+        ZLength=max(size[2], 1e-6),
         Center=[0.5 * (low + high) for low, high in zip(lower, upper, strict=True)],
-    )  # fmt: skip
+    )
     simple.RenameSource("tank", box)
     edges = simple.Show(box, view)
     edges.SetRepresentationType("Outline")

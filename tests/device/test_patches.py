@@ -29,9 +29,11 @@ def test_the_compiler_is_changed_in_all_places():
     from quadrants.lang.kernel import Kernel, LaunchContextBufferCache
 
     for changed in (
-        kernel_impl._inside_class, _kernel_impl_dataclass.unpack_ast_struct_expressions, Kernel.__call__,
+        kernel_impl._inside_class,
+        _kernel_impl_dataclass.unpack_ast_struct_expressions,
+        Kernel.__call__,
         LaunchContextBufferCache.cache,
-    ):  # fmt: skip
+    ):
         assert changed.__module__.startswith("wavetank.device."), changed
     assert _wrap_inspect.getsourcelines.cache_info().misses >= 0
     assert matrix_ops.dot.__wrapped__.__module__ == "quadrants.lang.matrix_ops"

@@ -82,9 +82,12 @@ def test_every_thread_that_computes_has_a_core_of_its_own(bound, tmp_path):
     program.write_text(BOUND)
     cores = sorted(os.sched_getaffinity(0))
     told = subprocess.run(
-        [sys.executable, str(program)], capture_output=True, text=True, check=True,
+        [sys.executable, str(program)],
+        capture_output=True,
+        text=True,
+        check=True,
         env={**os.environ, "WAVETANK_BIND_THREADS": bound, "QD_CPU_MAX_NUM_THREADS": str(len(cores))},
-    ).stdout  # fmt: skip
+    ).stdout
     # Where a busy machine leaves the work to fewer threads, that is its choice.
     busy, every = json.loads(told.splitlines()[-1])
     if bound == "1":

@@ -67,9 +67,8 @@ def test_a_plane_world_and_another_spacing(read):
 
 
 @pytest.mark.parametrize(
-    ("faces", "solids"),
-    [("all", 1), ("top|left|right|front|back", 1), ("solid", 1), ("left|right", 2), ("left", 1)],
-)  # fmt: skip
+    ("faces", "solids"), [("all", 1), ("top|left|right|front|back", 1), ("solid", 1), ("left|right", 2), ("left", 1)]
+)
 def test_boxes_of_walls(read, faces, solids):
     """A closed one is whole; of an open one each face is a wall that lies outside."""
     found = read(WATER + WALLS + bound(1) + box((0.9, 0.2, 0), (0.1, 0.1, 0.3), faces)).scene.solids
@@ -83,7 +82,7 @@ def test_expressions_lists_and_matrices(read):
     commands = (
         '<newvarcte wide="0.1" _rem="a"/><setvar wide="wide*2"/>' + bound(4) + '<move x="#-wide" y="0" z="Dp*2"/>'
         '<runlist name="ball" times="1"/><matrixreset/><rotate ang="90" x="0" y="0" z="1"/>'
-    )  # fmt: skip
+    )
     commands = WATER + WALLS + commands + bound(5) + box((0.1, -1, 0), (0.4, 0.2, 0.1))
     ball, bar = read(commands).scene.solids
     np.testing.assert_allclose(ball.center, (0.8, 0.24, -0.3), atol=1e-9)
@@ -133,10 +132,14 @@ MOVES = {
     "<begin mov='1' start='0.5'/><mvrect id='1' duration='1' next='2'><vel x='0.2' y='0' z='0'/></mvrect>"
     "<wait id='2' duration='0.5' next='3'/><mvrectace id='3' duration='1'><velini x='0' y='0' z='0.1'/>"
     "<ace x='0' y='0' z='0.2'/></mvrectace>": (
-        (0.25, (0, 0, 0)), (1.0, (0.1, 0, 0)), (1.8, (0.2, 0, 0)), (3.0, (0.2, 0.2, 0))),
+        (0.25, (0, 0, 0)),
+        (1.0, (0.1, 0, 0)),
+        (1.8, (0.2, 0, 0)),
+        (3.0, (0.2, 0.2, 0)),
+    ),
     "<begin mov='1' start='0'/><mvrectsinu id='1' duration='10'><freq x='0.5' y='0' z='0'/><ampl x='0.1' y='0' z='0'/>"
     "<phase x='90' y='0' z='0'/></mvrectsinu>": ((0.5, (-0.1, 0, 0)), (1.0, (-0.2, 0, 0)), (2.0, (0, 0, 0))),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("moves", MOVES)
@@ -194,13 +197,21 @@ def test_laminar_viscosity_and_density(read):
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("<case>", "no XML"), ("<robot/>", "casedef"), ("<!DOCTYPE a><case/>", "document type"),
-     ("<case><casedef><geometry><definition dp='0'/></geometry></casedef></case>", "dp = 0"),
-     ("<case><casedef><geometry><definition dp='a'/></geometry></casedef></case>", "cannot be read"),
-     ("<case><casedef><geometry><definition dp='0.1'/></geometry></casedef></case>", "no fluid"),
-     ("<case><casedef><geometry><definition dp='0.1'/><commands><list name='a'><runlist name='a' times='9'/></list>"
-      "<mainlist><runlist name='a'/></mainlist></commands></geometry></casedef></case>", "draws too much")],
-)  # fmt: skip
+    [
+        ("<case>", "no XML"),
+        ("<robot/>", "casedef"),
+        ("<!DOCTYPE a><case/>", "document type"),
+        ("<case><casedef><geometry><definition dp='0'/></geometry></casedef></case>", "dp = 0"),
+        ("<case><casedef><geometry><definition dp='a'/></geometry></casedef></case>", "cannot be read"),
+        ("<case><casedef><geometry><definition dp='0.1'/></geometry></casedef></case>", "no fluid"),
+        (
+            "<case><casedef><geometry><definition dp='0.1'/><commands><list name='a'>"
+            "<runlist name='a' times='9'/></list><mainlist>"
+            "<runlist name='a'/></mainlist></commands></geometry></casedef></case>",
+            "draws too much",
+        ),
+    ],
+)
 def test_mistakes_are_one_sentence(tmp_path, text, words, monkeypatch):
     path = tmp_path / "a_Def.xml"
     path.write_text(text)

@@ -111,9 +111,12 @@ def test_rotations_are_those_of_the_engine_own_reader(sequence, tmp_path):
     from rapier3d.loaders import mjcf
 
     ways = (
-        'euler="30 40 50"', 'axisangle="1 2 3 40"', 'xyaxes="0 1 0.2 -1 0.1 0"', 'zaxis="1 1 0.5"',
+        'euler="30 40 50"',
+        'axisangle="1 2 3 40"',
+        'xyaxes="0 1 0.2 -1 0.1 0"',
+        'zaxis="1 1 0.5"',
         'quat="0.5 0.1 0.2 0.3"',
-    )  # fmt: skip
+    )
     rows = "".join(
         f'<body name="b{k}" pos="{k} 2 1" {way}><freejoint/><geom type="box" size=".1 .2 .3"/></body>'
         for k, way in enumerate(ways)
@@ -163,8 +166,13 @@ def test_several_hinges_of_a_body_are_a_ball_or_the_first(arm):
 
 
 def test_what_holds_besides_is_joined(arm):
-    arm.write_text(ARM.replace("<actuator>", '<equality><connect body1="leg" body2="post" anchor="0 0 -0.1"/>'
-                                             '<joint joint1="lift"/></equality><actuator>'))  # fmt: skip
+    arm.write_text(
+        ARM.replace(
+            "<actuator>",
+            '<equality><connect body1="leg" body2="post" anchor="0 0 -0.1"/>'
+            '<joint joint1="lift"/></equality><actuator>',
+        )
+    )
     robot = wt.load_robot(arm)
     assert (robot.joints[-1].kind, robot.joints[-1].first, robot.joints[-1].second) == ("ball-joint", "leg", "post")
     assert robot.joints[-1].at == pytest.approx((-0.5, 0.2, 0.0), abs=1e-9)
@@ -214,6 +222,8 @@ def test_the_command_says_what_another_file_is(tmp_path):
     (tmp_path / "a.xml").write_text("<mujoco/>")
     done = subprocess.run(
         [sys.executable, "-m", "wavetank", "import", str(tmp_path / "a.xml"), "-o", str(tmp_path / "s.toml")],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode != 0 and "no bodies with a shape" in done.stderr

@@ -11,8 +11,19 @@ from wavetank.foundation.errors import WavetankError
 def test_npz_brings_everything_back(tmp_path, frame):
     write_npz(tmp_path / "a.npz", frame)
     back = read_npz(tmp_path / "a.npz")
-    for name in ("ids", "positions", "velocities", "densities", "dyes", "foam_positions", "foam_velocities",
-                 "foam_kinds", "foam_ages", "foam_lives", "foam_ids"):  # fmt: skip
+    for name in (
+        "ids",
+        "positions",
+        "velocities",
+        "densities",
+        "dyes",
+        "foam_positions",
+        "foam_velocities",
+        "foam_kinds",
+        "foam_ages",
+        "foam_lives",
+        "foam_ids",
+    ):
         assert (back[name] == getattr(frame, name)).all()
         assert back[name].dtype == getattr(frame, name).dtype
     assert (back["materials"] == frame.materials).all()

@@ -129,9 +129,10 @@ def test_usd_passes_its_own_checker(folder):
         if mesh and prim.GetName() != "fluid":
             for number in range(FRAMES):
                 ok, why = UsdGeom.Mesh.ValidateTopology(
-                    mesh.GetFaceVertexIndicesAttr().Get(number), mesh.GetFaceVertexCountsAttr().Get(number),
+                    mesh.GetFaceVertexIndicesAttr().Get(number),
+                    mesh.GetFaceVertexCountsAttr().Get(number),
                     len(mesh.GetPointsAttr().Get(number)),
-                )  # fmt: skip
+                )
                 assert ok, why
     assert stage.GetPrimAtPath("/World/camera").GetTypeName() == "Camera"
 
@@ -250,9 +251,7 @@ def test_two_dimensional_worlds(tmp_path):
 
 
 def bytes_of(folder):
-    return {
-        str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()
-    }  # fmt: skip
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 def test_a_resumed_run_ends_with_the_same_bytes(folder, tmp_path):

@@ -61,11 +61,16 @@ def test_spacing_tank_blocks_and_gravity(scene):
         Configuration={"gravitation": [0, -5, 1]},
         RigidBodies=[body(isWall=True, mapInvert=True)],
         FluidBlocks=[
-            {"start": [-0.5, -0.5, -0.5], "end": [0.5, 0.5, 0.5], "translation": [0.0, 0.6, 0.0], "scale": [1, 0.5, 1],
-             "initialVelocity": [1, 0, 0]},
+            {
+                "start": [-0.5, -0.5, -0.5],
+                "end": [0.5, 0.5, 0.5],
+                "translation": [0.0, 0.6, 0.0],
+                "scale": [1, 0.5, 1],
+                "initialVelocity": [1, 0, 0],
+            },
             {"start": [-2, 0, -0.5], "end": [-0.8, 0.3, 0.5]},
         ],
-    )  # fmt: skip
+    )
     read = load_splishsplash(path)
     assert read.scene.spacing == pytest.approx(0.05)
     assert read.scene.gravity == (0.0, -5.0, 1.0)
@@ -90,18 +95,34 @@ def test_fluids_slide_along_walls_that_do_not_hold_them(scene, walls, share):
 
 
 def test_viscosity_is_kinematic_and_tension_in_newtons_per_metre(scene):
-    path = scene(Materials=[
-        {"id": "Fluid", "density0": 800, "viscosityMethod": 6, "Weiler et al. 2018": {"viscosity": 0.5},
-         "surfaceTensionMethod": 5, "Zorilla, Ritter, et al. 2020": {"surfaceTension": 0.1}},
-    ])  # fmt: skip
+    path = scene(
+        Materials=[
+            {
+                "id": "Fluid",
+                "density0": 800,
+                "viscosityMethod": 6,
+                "Weiler et al. 2018": {"viscosity": 0.5},
+                "surfaceTensionMethod": 5,
+                "Zorilla, Ritter, et al. 2020": {"surfaceTension": 0.1},
+            }
+        ]
+    )
     material = load_splishsplash(path).scene.materials[0]
     assert material.viscosity == pytest.approx(400.0)
     assert material.density == 800.0
     assert material.surface_tension == pytest.approx(0.1)
-    path = scene(Materials=[
-        {"id": "Fluid", "density0": 1000, "viscosityMethod": 3, "Peer et al. 2015": {"viscosity": 0.5},
-         "surfaceTensionMethod": 2, "vorticityMethod": 1},
-    ])  # fmt: skip
+    path = scene(
+        Materials=[
+            {
+                "id": "Fluid",
+                "density0": 1000,
+                "viscosityMethod": 3,
+                "Peer et al. 2015": {"viscosity": 0.5},
+                "surfaceTensionMethod": 2,
+                "vorticityMethod": 1,
+            }
+        ]
+    )
     read = load_splishsplash(path)
     # 1 / (1 + nu dt / h^2) = 0.5 with h = 0.1 m and dt = 1 ms: nu = 10 m^2/s
     assert read.scene.materials[0].viscosity == pytest.approx(1e4, rel=1e-6)
@@ -111,11 +132,22 @@ def test_viscosity_is_kinematic_and_tension_in_newtons_per_metre(scene):
 
 
 def test_boxes_meshes_and_bodies_stand_where_theirs_do(scene):
-    path = scene(RigidBodies=[
-        body(id=1, rotationAxis=[0, 1, 0], rotationAngle=math.pi / 2, scale=[1, 0.2, 0.4]),
-        body(id=2, geometryFile="../models/wedge.obj", isDynamic=True, density=300, friction=0.4, velocity=[0, 0, 1],
-             rotationAxis=[0, 0, 1], rotationAngle=math.pi / 2, scale=[0.5, 0.5, 0.5]),
-    ])  # fmt: skip
+    path = scene(
+        RigidBodies=[
+            body(id=1, rotationAxis=[0, 1, 0], rotationAngle=math.pi / 2, scale=[1, 0.2, 0.4]),
+            body(
+                id=2,
+                geometryFile="../models/wedge.obj",
+                isDynamic=True,
+                density=300,
+                friction=0.4,
+                velocity=[0, 0, 1],
+                rotationAxis=[0, 0, 1],
+                rotationAngle=math.pi / 2,
+                scale=[0.5, 0.5, 0.5],
+            ),
+        ]
+    )
     box, wedge = load_splishsplash(path).scene.solids
     assert (box.shape, box.center, box.size) == ("box", (0.0, 1.0, 0.0), (1.0, 0.2, 0.4))
     np.testing.assert_allclose(box.quaternion, [math.sqrt(0.5), 0, math.sqrt(0.5), 0], atol=1e-7)
@@ -130,11 +162,19 @@ def test_emitters_count_particles(scene):
     path = scene(
         Materials=[{"id": "Fluid", "density0": 1000, "maxEmitterParticles": 500, "emitterReuseParticles": True}],
         Emitters=[
-            {"width": 8, "height": 3, "translation": [-0.9, 0.7, 0], "rotationAxis": [0, 0, 1],
-             "rotationAngle": -math.pi / 2, "velocity": 2, "type": 0, "emitEndTime": 2},
+            {
+                "width": 8,
+                "height": 3,
+                "translation": [-0.9, 0.7, 0],
+                "rotationAxis": [0, 0, 1],
+                "rotationAngle": -math.pi / 2,
+                "velocity": 2,
+                "type": 0,
+                "emitEndTime": 2,
+            },
             {"width": 6, "translation": [0.9, 0.7, 0], "velocity": 3, "type": 1, "emitStartTime": 1, "emitEndTime": 5},
         ],
-    )  # fmt: skip
+    )
     scene_ = load_splishsplash(path).scene
     first, second = scene_.emitters
     np.testing.assert_allclose(first.direction, (0, -1, 0), atol=1e-7)
@@ -191,8 +231,13 @@ def test_particles_of_houdini(scene, tmp_path):
     points = [(0.1 * k, 0.05 * k, -0.1 * k) for k in range(5)]
     (tmp_path / "models" / "some.bgeo").write_bytes(bgeo_of(points))
     np.testing.assert_allclose(read_bgeo(tmp_path / "models" / "some.bgeo"), points, atol=1e-7)
-    model = {"particleFile": "../models/some.bgeo", "translation": [0, 1, 0], "rotationAxis": [0, 1, 0],
-             "rotationAngle": math.pi / 2, "scale": [2, 2, 2]}  # fmt: skip
+    model = {
+        "particleFile": "../models/some.bgeo",
+        "translation": [0, 1, 0],
+        "rotationAxis": [0, 1, 0],
+        "rotationAngle": math.pi / 2,
+        "scale": [2, 2, 2],
+    }
     (fluid,) = load_splishsplash(scene(FluidModels=[model], FluidBlocks=[])).scene.fluids
     expected = [(2 * z, 2 * y + 1, -2 * x) for x, y, z in points]  # a quarter about y takes z to x and x to -z
     np.testing.assert_allclose(fluid.positions, expected, atol=1e-6)
@@ -238,9 +283,14 @@ def test_the_command_writes_a_scene_that_needs_no_other_file(scene, tmp_path, mo
 
 
 DAMAGED = (
-    "", "[]", "{}", '{"Configuration": 3}', "{" * 5000, '{"Configuration": {"particleRadius": "x"}}',
+    "",
+    "[]",
+    "{}",
+    '{"Configuration": 3}',
+    "{" * 5000,
+    '{"Configuration": {"particleRadius": "x"}}',
     '{"Configuration": {}, "FluidBlocks": [{"start": 1}]}',
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("text", DAMAGED)

@@ -30,8 +30,14 @@ def numeric_fields() -> list[tuple[type[Model], str]]:
 
 def test_there_are_numbers_in_scenes_commands_tools_and_recordings():
     rooms = {model.__module__.rsplit(".", 1)[0] for model, _ in numeric_fields()}
-    assert {"wavetank.foundation", "wavetank.scene", "wavetank.scene.forces", "wavetank.solids",
-            "wavetank.session", "wavetank.session.tools"} <= rooms  # fmt: skip
+    assert {
+        "wavetank.foundation",
+        "wavetank.scene",
+        "wavetank.scene.forces",
+        "wavetank.solids",
+        "wavetank.session",
+        "wavetank.session.tools",
+    } <= rooms
     assert len(numeric_fields()) > 150
 
 

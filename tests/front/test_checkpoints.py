@@ -161,9 +161,13 @@ def heed_signals() -> None:
 
 def process(*arguments: str) -> subprocess.Popen:
     return subprocess.Popen(
-        [sys.executable, "-m", "wavetank", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        start_new_session=True, preexec_fn=heed_signals,
-    )  # fmt: skip
+        [sys.executable, "-m", "wavetank", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=heed_signals,
+    )
 
 
 RUN = ("drop-2d", "--fps", "30", "--size", "160x96", "--video")
@@ -172,11 +176,14 @@ RUN = ("drop-2d", "--fps", "30", "--size", "160x96", "--video")
 @pytest.mark.parametrize(
     ("signals", "codes"),
     [
-        ([signal.SIGINT], {130}), ([signal.SIGTERM], {143}), ([signal.SIGHUP], {129}), ([signal.SIGINT] * 2, {130}),
+        ([signal.SIGINT], {130}),
+        ([signal.SIGTERM], {143}),
+        ([signal.SIGHUP], {129}),
+        ([signal.SIGINT] * 2, {130}),
         # Two that come within one kernel are one signal to Python, and the second may find the run ended.
         ([signal.SIGTERM, signal.SIGTERM], {130, 143}),
     ],
-)  # fmt: skip
+)
 def test_being_asked_to_end_leaves_a_video_that_plays(signals, codes, tmp_path):
     run = process("run", *RUN, "--seconds", "200", "--out", str(tmp_path), "--name", "a")
     end = time.monotonic() + 120

@@ -83,9 +83,14 @@ def test_a_state_and_a_recording_are_exported(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("nothing", "there is no file or folder"), (".", "the run cannot be read"), ("a.xyz", "this is none"),
-     ("frame.npz", "without the scene that they are of"), ("a.h5", "cannot be read")],
-)  # fmt: skip
+    [
+        ("nothing", "there is no file or folder"),
+        (".", "the run cannot be read"),
+        ("a.xyz", "this is none"),
+        ("frame.npz", "without the scene that they are of"),
+        ("a.h5", "cannot be read"),
+    ],
+)
 def test_what_is_no_run_is_one_sentence(tmp_path, monkeypatch, capsys, name, words):
     (tmp_path / "a.xyz").write_text("x")
     (tmp_path / "a.h5").write_text("x")
@@ -106,8 +111,19 @@ def files_of(folder):
 
 def test_a_killed_run_goes_on_to_the_same_bytes(tmp_path):
     """SIGKILL at some frame after the first checkpoint, then `wavetank resume`: all files as without."""
-    order = ["drop", "--set", "spacing=0.04", "--seconds", "0.5", "--size", "64x36", "--checkpoint-every", "0.1",
-             "--export", "usd,vtkhdf,h5,vtp,npz"]  # fmt: skip
+    order = [
+        "drop",
+        "--set",
+        "spacing=0.04",
+        "--seconds",
+        "0.5",
+        "--size",
+        "64x36",
+        "--checkpoint-every",
+        "0.1",
+        "--export",
+        "usd,vtkhdf,h5,vtp,npz",
+    ]
     command = [sys.executable, "-m", "wavetank"]
     subprocess.run([*command, "run", *order, "--out", str(tmp_path / "whole")], check=True, capture_output=True)
     process = subprocess.Popen(

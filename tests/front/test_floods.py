@@ -33,7 +33,7 @@ FLOODS = {
     "numbers": [{"do": "set", "name": "viscosity", "value": 0.1}],
     "nonsense": [{"do": "x" * 1000}, {"do": "load", "text": "x = ["}],
     "tools": [{"do": "point-begin", "tool": "pour", "x": 0.5, "y": 0.5}, {"do": "point-end"}],
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", FLOODS if LONG else ["scenes", "solids", "bookmarks"])
@@ -130,14 +130,21 @@ def test_headers_are_on_every_answer(playing):
     ask = "GET {} HTTP/1.1\r\n" + host + "{}\r\n"
     upgrade = "Upgrade: websocket\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
     requests = {
-        200: [ask.format(f"/?token={token}", ""), ask.format("/page/main.js", ""),
-              ask.format(f"/scene.toml?token={token}", "")],
-        403: [ask.format("/", ""), ask.format("/", "Origin: http://[\r\n"), ask.format("/", "Origin: http://[::1\r\n"),
-              ask.format("/socket", upgrade).replace("Connection: close", "Connection: Upgrade")],
+        200: [
+            ask.format(f"/?token={token}", ""),
+            ask.format("/page/main.js", ""),
+            ask.format(f"/scene.toml?token={token}", ""),
+        ],
+        403: [
+            ask.format("/", ""),
+            ask.format("/", "Origin: http://[\r\n"),
+            ask.format("/", "Origin: http://[::1\r\n"),
+            ask.format("/socket", upgrade).replace("Connection: close", "Connection: Upgrade"),
+        ],
         404: [ask.format("/page/none.js", ""), ask.format(f"/none?token={token}", "")],
         405: [ask.format(f"/?token={token}", "").replace("GET", "POST")],
         400: ["nonsense\r\n\r\n", "GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n"],
-    }  # fmt: skip
+    }
     for status, texts in requests.items():
         for text in texts:
             head = answer(port, text.encode()).partition(b"\r\n\r\n")[0].decode("latin-1").lower()

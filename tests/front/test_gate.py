@@ -104,19 +104,37 @@ def test_bad_messages_do_no_harm(playing):
     world = playing(POOL)
     with connect(world.socket, max_size=None) as socket:
         for text in (
-            "", "x", "[]", "1", '"set"', "{}", '{"do": "fly"}', '{"do": ["set"]}', '{"do": NaN}',
-            '{"do": "set", "name": "viscosity", "value": NaN}', '{"do": "set", "name": "viscosity", "value": -1}',
-            '{"do": "set", "name": "spacing", "value": 1e-9}', '{"do": "set", "name": "viscosity"}',
+            "",
+            "x",
+            "[]",
+            "1",
+            '"set"',
+            "{}",
+            '{"do": "fly"}',
+            '{"do": ["set"]}',
+            '{"do": NaN}',
+            '{"do": "set", "name": "viscosity", "value": NaN}',
+            '{"do": "set", "name": "viscosity", "value": -1}',
+            '{"do": "set", "name": "spacing", "value": 1e-9}',
+            '{"do": "set", "name": "viscosity"}',
             '{"do": "set", "name": "gravity", "value": [1e300, 0]}',
             '{"do": "set", "name": "gravity", "value": [1, 2, 3]}',
-            '{"do": "reset", "parameters": {"spacing": 1e-6}}', '{"do": "load", "name": "../../etc/passwd"}',
-            '{"do": "load", "text": "spacing ="}', '{"do": "load"}', '{"do": "size", "width": -1, "height": 1e9}',
-            '{"do": "point-begin", "x": "left"}', '{"do": "point-begin", "x": 0.5, "y": 0.5, "tool": "hammer"}',
+            '{"do": "reset", "parameters": {"spacing": 1e-6}}',
+            '{"do": "load", "name": "../../etc/passwd"}',
+            '{"do": "load", "text": "spacing ="}',
+            '{"do": "load"}',
+            '{"do": "size", "width": -1, "height": 1e9}',
+            '{"do": "point-begin", "x": "left"}',
+            '{"do": "point-begin", "x": 0.5, "y": 0.5, "tool": "hammer"}',
             '{"do": "point-begin", "x": 0.5, "y": 0.5, "tool": "push", "options": {"radius": 1e9}}',
             '{"do": "tool-begin", "tool": "push", "origin": [0, 0, 0], "direction": [0, 0, 0]}',
-            '{"do": "orbit", "azimuth": Infinity}', '{"do": "step", "frames": 1e9}', '{"do": "detail", "detail": 3}',
-            "[" * 100_000, '{"do": ' * 50_000, '{"do": "set", "value": ' + "9" * 5000 + "}",
-        ):  # fmt: skip
+            '{"do": "orbit", "azimuth": Infinity}',
+            '{"do": "step", "frames": 1e9}',
+            '{"do": "detail", "detail": 3}',
+            "[" * 100_000,
+            '{"do": ' * 50_000,
+            '{"do": "set", "value": ' + "9" * 5000 + "}",
+        ):
             socket.send(text)
         socket.send(b"\x00\xff" * 100)
         notes = 0

@@ -38,11 +38,22 @@ def lab(tmp_path):
     home = {name: str(tmp_path / "home") for name in ("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "IPYTHONDIR")}
     with (tmp_path / "log").open("w") as log:
         process = subprocess.Popen(
-            [sys.executable, "-m", "jupyterlab", "--no-browser", f"--port={port}", "--ServerApp.port_retries=0",
-             "--IdentityProvider.token=t", "--allow-root", f"--ServerApp.root_dir={tmp_path}"],
-            cwd=tmp_path, stdout=log, stderr=log,
+            [
+                sys.executable,
+                "-m",
+                "jupyterlab",
+                "--no-browser",
+                f"--port={port}",
+                "--ServerApp.port_retries=0",
+                "--IdentityProvider.token=t",
+                "--allow-root",
+                f"--ServerApp.root_dir={tmp_path}",
+            ],
+            cwd=tmp_path,
+            stdout=log,
+            stderr=log,
             env={**os.environ, **home},
-        )  # fmt: skip
+        )
     address = f"http://127.0.0.1:{port}"
 
     def ask(path, method="GET"):

@@ -229,8 +229,10 @@ def test_what_is_wrong_is_said_in_the_page_and_the_water_goes_on(shown):
 
 def test_shown_again_it_is_the_same_show_and_stop_leaves_a_picture(shown):
     assert shown.value("wt.show(sim) is view") is True
-    assert re.fullmatch(r"<wavetank in a notebook: <Simulation 'Pool': t = [\d.]+ s, .* on cpu>, paused>",
-                        shown.run("print(repr(view))"))  # fmt: skip
+    assert re.fullmatch(
+        r"<wavetank in a notebook: <Simulation 'Pool': t = [\d.]+ s, .* on cpu>, paused>",
+        shown.run("print(repr(view))"),
+    )
     shown.run("view.stop()")
     updates = [m for m in shown.messages if m["msg_type"] == "update_display_data"]
     shown_first = next(

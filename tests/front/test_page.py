@@ -13,10 +13,12 @@ from wavetank.lab.bench.chromium import Browser, executable
 from wavetank.session import commands as do
 
 BASIN = wt.Scene(
-    title="Basin", spacing=0.05, tank=wt.Tank(size=(1.2, 0.6, 0.4)),
+    title="Basin",
+    spacing=0.05,
+    tank=wt.Tank(size=(1.2, 0.6, 0.4)),
     fluids=[wt.Block(lower=(0, 0, 0), upper=(0.6, 0.4, 0.4))],
     solids=[wt.Box(name="pillar", center=(0.9, 0.1, 0.2), size=(0.12, 0.2, 0.12))],
-)  # fmt: skip
+)
 PICTURE = "(() => { const c = document.querySelector('#picture'); return c.toDataURL() })()"
 
 
@@ -184,13 +186,18 @@ def test_it_comes_back(open_page, browser):
 
 
 LEVEL = wt.Scene(
-    title="Small level", spacing=0.05, tank=wt.Tank(size=(1.2, 0.7)),
-    fluids=[wt.Block(lower=(0, 0), upper=(0.6, 0.3))], solids=[wt.Box(center=(0.65, 0.175), size=(0.1, 0.35))],
+    title="Small level",
+    spacing=0.05,
+    tank=wt.Tank(size=(1.2, 0.7)),
+    fluids=[wt.Block(lower=(0, 0), upper=(0.6, 0.3))],
+    solids=[wt.Box(center=(0.65, 0.175), size=(0.1, 0.35))],
     goal={
-        "text": "Bring the water over.", "seconds": 60, "tools": {"tilt": {"most": 60.0}, "push": {}},
+        "text": "Bring the water over.",
+        "seconds": 60,
+        "tools": {"tilt": {"most": 60.0}, "push": {}},
         "aims": [{"kind": "deliver", "name": "here", "lower": (0.7, 0), "upper": (1.2, 0.7), "share": 0.2}],
     },
-)  # fmt: skip
+)
 
 
 def test_a_level_is_played_and_won(open_page, browser, tmp_path, monkeypatch):
@@ -205,9 +212,11 @@ def test_a_level_is_played_and_won(open_page, browser, tmp_path, monkeypatch):
     )
     browser.wait_for("document.querySelectorAll('#regions line').length === 4")
     # The outline lies where the region is in the picture, once that has the size of the window.
-    box = ("(() => { const b = document.querySelector('#regions polygon').getBoundingClientRect();"
-           "const p = document.querySelector('#picture').getBoundingClientRect();"
-           "return [(b.left - p.left) / p.width, (b.right - p.left) / p.width] })()")  # fmt: skip
+    box = (
+        "(() => { const b = document.querySelector('#regions polygon').getBoundingClientRect();"
+        "const p = document.querySelector('#picture').getBoundingClientRect();"
+        "return [(b.left - p.left) / p.width, (b.right - p.left) / p.width] })()"
+    )
 
     def columns() -> list[float]:
         width, height = world.front.painter.wanted

@@ -294,8 +294,9 @@ def test_the_aim_lies_on_the_water_and_lights_what_would_be_taken(open_page, bro
     middle = session.sight.project([[0.3, 0.3, 0.2]], width, height)[0]
     browser.mouse("mouseMoved", *browser.center("#picture", middle[0] / width, middle[1] / height))
     browser.wait_for("document.querySelectorAll('#aim polyline[points*=\" \"]').length === 4")
-    ring = browser.run("(() => { const b = document.querySelectorAll('#aim polyline')[3].getBBox();"
-                       "return [b.width, b.height] })()")  # fmt: skip
+    ring = browser.run(
+        "(() => { const b = document.querySelectorAll('#aim polyline')[3].getBBox();return [b.width, b.height] })()"
+    )
     assert ring[0] * width > 1.5 * ring[1] * height, "a circle that lies is seen flat"
     browser.run("document.querySelector('[data-tool=grab]').click()")
     top = session.sight.project([[0.9, 0.199, 0.2]], width, height)[0]

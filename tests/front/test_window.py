@@ -16,10 +16,12 @@ from wavetank.session.recording import Recording
 from wavetank.session.session import Session
 
 BASIN = wt.Scene(
-    title="Basin", spacing=0.05, tank=wt.Tank(size=(1.2, 0.6, 0.4)),
+    title="Basin",
+    spacing=0.05,
+    tank=wt.Tank(size=(1.2, 0.6, 0.4)),
     fluids=[wt.Block(lower=(0, 0, 0), upper=(0.6, 0.4, 0.4))],
     solids=[wt.Box(name="pillar", center=(0.9, 0.1, 0.2), size=(0.12, 0.2, 0.12))],
-)  # fmt: skip
+)
 LONGEST = 120.0  # s, on a busy machine that compiles its kernels on the way
 NEEDED = "apt-get install xvfb xdotool libgl1 libgl1-mesa-dri libglx-mesa0 libegl1"
 
@@ -329,14 +331,19 @@ def test_a_file_that_is_dropped_is_opened_and_a_wrong_one_says_why(person, tmp_p
 
 
 LEVEL = wt.Scene(
-    title="Small level", spacing=0.05, tank=wt.Tank(size=(1.2, 0.7)),
-    fluids=[wt.Block(lower=(0, 0), upper=(0.6, 0.3))], solids=[wt.Box(center=(0.65, 0.175), size=(0.1, 0.35))],
+    title="Small level",
+    spacing=0.05,
+    tank=wt.Tank(size=(1.2, 0.7)),
+    fluids=[wt.Block(lower=(0, 0), upper=(0.6, 0.3))],
+    solids=[wt.Box(center=(0.65, 0.175), size=(0.1, 0.35))],
     goal={
-        "text": "Bring the water over.", "hint": "Tilt more.", "seconds": 60,
+        "text": "Bring the water over.",
+        "hint": "Tilt more.",
+        "seconds": 60,
         "tools": {"tilt": {"most": 60.0}, "push": {}},
         "aims": [{"kind": "deliver", "name": "here", "lower": (0.7, 0), "upper": (1.2, 0.7), "share": 0.2}],
     },
-)  # fmt: skip
+)
 
 
 def time_is_over(person) -> None:
@@ -399,8 +406,11 @@ def play_out(arguments, environment, until: str, seconds: float = LONGEST) -> st
     """Start `wavetank play`, wait for a word of its, end it as a person does; return all that it said."""
     process = subprocess.Popen(
         [sys.executable, "-m", "wavetank", "play", "drop-2d", "--particles", "200", *arguments],
-        env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-    )  # fmt: skip
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
     said = ""
     end = time.monotonic() + seconds
     while process.poll() is None and until not in said and time.monotonic() < end:
@@ -440,13 +450,19 @@ def test_play_opens_a_window_and_records(display, tmp_path):
     display = Display()
     process = subprocess.Popen(
         [sys.executable, "-m", "wavetank", "play", "drop-2d", "--particles", "200", "--record", tmp_path / "s.toml"],
-        env=display.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-    )  # fmt: skip
+        env=display.environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
     try:
         found = subprocess.run(
             ["xdotool", "search", "--sync", "--onlyvisible", "--name", "^wavetank$"],
-            env=display.environment, capture_output=True, text=True, timeout=LONGEST,
-        ).stdout.split()  # fmt: skip
+            env=display.environment,
+            capture_output=True,
+            text=True,
+            timeout=LONGEST,
+        ).stdout.split()
         display.do("windowfocus", "--sync", found[0])
         for _ in range(6):  # the first picture is slow where kernels are compiled
             display.do("key", "space")

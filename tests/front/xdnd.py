@@ -14,30 +14,54 @@ REPLACE = 0
 
 class ClientMessage(Structure):
     _fields_ = [
-        ("type", c_int), ("serial", c_ulong), ("send_event", c_int), ("display", c_void_p), ("window", c_ulong),
-        ("message_type", c_ulong), ("format", c_int), ("data", c_long * 5),
-    ]  # fmt: skip
+        ("type", c_int),
+        ("serial", c_ulong),
+        ("send_event", c_int),
+        ("display", c_void_p),
+        ("window", c_ulong),
+        ("message_type", c_ulong),
+        ("format", c_int),
+        ("data", c_long * 5),
+    ]
 
 
 class SelectionRequest(Structure):
     _fields_ = [
-        ("type", c_int), ("serial", c_ulong), ("send_event", c_int), ("display", c_void_p), ("owner", c_ulong),
-        ("requestor", c_ulong), ("selection", c_ulong), ("target", c_ulong), ("property", c_ulong), ("time", c_ulong),
-    ]  # fmt: skip
+        ("type", c_int),
+        ("serial", c_ulong),
+        ("send_event", c_int),
+        ("display", c_void_p),
+        ("owner", c_ulong),
+        ("requestor", c_ulong),
+        ("selection", c_ulong),
+        ("target", c_ulong),
+        ("property", c_ulong),
+        ("time", c_ulong),
+    ]
 
 
 class Selection(Structure):
     _fields_ = [
-        ("type", c_int), ("serial", c_ulong), ("send_event", c_int), ("display", c_void_p), ("requestor", c_ulong),
-        ("selection", c_ulong), ("target", c_ulong), ("property", c_ulong), ("time", c_ulong),
-    ]  # fmt: skip
+        ("type", c_int),
+        ("serial", c_ulong),
+        ("send_event", c_int),
+        ("display", c_void_p),
+        ("requestor", c_ulong),
+        ("selection", c_ulong),
+        ("target", c_ulong),
+        ("property", c_ulong),
+        ("time", c_ulong),
+    ]
 
 
 class Event(Union):
     _fields_ = [
-        ("type", c_int), ("client", ClientMessage), ("request", SelectionRequest), ("selection", Selection),
+        ("type", c_int),
+        ("client", ClientMessage),
+        ("request", SelectionRequest),
+        ("selection", Selection),
         ("room", c_long * 24),
-    ]  # fmt: skip
+    ]
 
 
 class Drag:
@@ -46,14 +70,18 @@ class Drag:
     def __init__(self, display: str, target: int, files: list[Path], x: int, y: int) -> None:
         self.lib = ctypes.CDLL(ctypes.util.find_library("X11"))
         for name, result, *arguments in (
-            ("XOpenDisplay", c_void_p, c_char_p), ("XDefaultRootWindow", c_ulong, c_void_p),
+            ("XOpenDisplay", c_void_p, c_char_p),
+            ("XDefaultRootWindow", c_ulong, c_void_p),
             ("XCreateSimpleWindow", c_ulong, c_void_p, c_ulong, c_int, c_int, c_uint, c_uint, c_uint, c_ulong, c_ulong),
-            ("XInternAtom", c_ulong, c_void_p, c_char_p, c_int), ("XPending", c_int, c_void_p),
-            ("XSetSelectionOwner", c_int, c_void_p, c_ulong, c_ulong, c_ulong), ("XFlush", c_int, c_void_p),
+            ("XInternAtom", c_ulong, c_void_p, c_char_p, c_int),
+            ("XPending", c_int, c_void_p),
+            ("XSetSelectionOwner", c_int, c_void_p, c_ulong, c_ulong, c_ulong),
+            ("XFlush", c_int, c_void_p),
             ("XSendEvent", c_int, c_void_p, c_ulong, c_int, c_long, POINTER(Event)),
-            ("XNextEvent", c_int, c_void_p, POINTER(Event)), ("XCloseDisplay", c_int, c_void_p),
+            ("XNextEvent", c_int, c_void_p, POINTER(Event)),
+            ("XCloseDisplay", c_int, c_void_p),
             ("XChangeProperty", c_int, c_void_p, c_ulong, c_ulong, c_ulong, c_int, c_int, c_char_p, c_int),
-        ):  # fmt: skip
+        ):
             function = getattr(self.lib, name)
             function.restype, function.argtypes = result, arguments
         self.display = self.lib.XOpenDisplay(display.encode())
@@ -99,8 +127,15 @@ class Drag:
         )
         event = Event()
         event.selection = Selection(
-            SELECTION_NOTIFY, 0, 1, None, request.requestor, request.selection, request.target, request.property,
+            SELECTION_NOTIFY,
+            0,
+            1,
+            None,
+            request.requestor,
+            request.selection,
+            request.target,
+            request.property,
             request.time,
-        )  # fmt: skip
+        )
         self.lib.XSendEvent(self.display, request.requestor, 0, 0, byref(event))
         self.lib.XFlush(self.display)

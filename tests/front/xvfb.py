@@ -14,8 +14,10 @@ class Display:
             # Without -noreset it begins anew when the last window goes, and meanwhile refuses the next one. With -r a
             # key does not repeat: on a busy machine half a second may pass before it is let go.
             ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x860x24", "-nolisten", "tcp", "-noreset", "-r"],
-            pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+            pass_fds=[writing],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
         os.close(writing)
         with os.fdopen(reading) as told:
             self.name = f":{told.readline().strip()}"

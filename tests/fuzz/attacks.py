@@ -59,7 +59,10 @@ fluids = [{ lower = [0, 0], upper = [0.5, 0.4] }]
 UNION = 'solids = [{ shape = "union", parts = ['
 #: scene files, each with a word that its refusal has
 SCENES: dict[str, tuple[str, str]] = {
-    "a body of 10^9 m": (POOL + '[[solids]]\nshape = "cylinder"\nstart = [0.5, 0.3]\nend = [0.6, 0.3]\nradius = 1e9\ndensity = 500', "pieces"),
+    "a body of 10^9 m": (
+        POOL + '[[solids]]\nshape = "cylinder"\nstart = [0.5, 0.3]\nend = [0.6, 0.3]\nradius = 1e9\ndensity = 500',
+        "pieces",
+    ),
     "deep arrays": ("x = " + "[" * 100_000, "nested"),
     "deep closed arrays": ("x = " + nested("[", "]", 500), "nested"),
     "deep inline tables": ("x = " + "{a=" * 50_000, "nested"),
@@ -71,16 +74,27 @@ SCENES: dict[str, tuple[str, str]] = {
     "long hexadecimal integer": ("spacing = 0x" + "f" * 100_000, "digits"),
     "integer beyond 64 bits": ("foam_seed = " + "9" * 40, "64 bits"),
     "deep union": (
-        POOL + "solids = [" + nested('{shape="union",parts=[', "]}", 300, '{shape="sphere",center=[0,0],radius=1}') + "]",
+        POOL
+        + "solids = ["
+        + nested('{shape="union",parts=[', "]}", 300, '{shape="sphere",center=[0,0],radius=1}')
+        + "]",
         "nested",
     ),
-    "a million particles by a million": ("spacing = 1e-4\ntank.size = [100, 100]\n"
-        "fluids = [{lower = [0, 0], upper = [100, 100]}]", "particles"),
+    "a million particles by a million": (
+        "spacing = 1e-4\ntank.size = [100, 100]\nfluids = [{lower = [0, 0], upper = [100, 100]}]",
+        "particles",
+    ),
     "10^24 cells": ("spacing = 1e-6\ntank.size = [100, 100, 100]\n", "spacing"),
     "1000 km at 1 m": ("spacing = 1\ntank.size = [1e6, 1e6, 1e6]\nfluids = [{lower=[0,0,0],upper=[1,1,1]}]", "cells"),
-    "999 m at 1 mm": ("spacing = 0.001\ntank.size = [999, 999, 999]\nfluids = [{lower=[0,0,0],upper=[0.1,0.1,0.1]}]", "cells"),
-    "100,000 solids": (POOL + "solids = [" + '{center=[0.8,0.1],size=[0.1,0.1]},' * 100_000 + "]", "at most"),
-    "nested points": (POOL + 'fluids = [{shape="points", positions=[[[0.1,0.1]]]}]'.replace("fluids", "[[fluids]]\n#"), ""),
+    "999 m at 1 mm": (
+        "spacing = 0.001\ntank.size = [999, 999, 999]\nfluids = [{lower=[0,0,0],upper=[0.1,0.1,0.1]}]",
+        "cells",
+    ),
+    "100,000 solids": (POOL + "solids = [" + "{center=[0.8,0.1],size=[0.1,0.1]}," * 100_000 + "]", "at most"),
+    "nested points": (
+        POOL + 'fluids = [{shape="points", positions=[[[0.1,0.1]]]}]'.replace("fluids", "[[fluids]]\n#"),
+        "",
+    ),
     "sway": (POOL + '[[forces]]\nkind = "sway"\nacceleration = [1e30, 0]', "acceleration"),
     "attract": (POOL + '[[forces]]\nkind = "attract"\ncenter = [0, 0]\nradius = 1\nstrength = 1e38', "strength"),
     "wind": (POOL + '[[forces]]\nkind = "wind"\nvelocity = [1e38, 0]', "velocity"),
@@ -88,11 +102,12 @@ SCENES: dict[str, tuple[str, str]] = {
     "vortex": (POOL + '[[forces]]\nkind = "vortex"\ncenter = [0, 0]\nradius = 1e-300\nspeed = 1e300', ""),
     "gravity": (POOL.replace("spacing", "gravity = [1e30, 0]\nspacing", 1), "gravity"),
     "velocity": (POOL.replace("upper", "velocity = [1e38, 0], upper"), "velocity"),
-}  # fmt: skip
+}
 del SCENES["nested points"]
 SCENES["nested points"] = (
-    'spacing = 0.05\ntank.size = [1, 1]\n[[fluids]]\nshape = "points"\npositions = [[[0.1, 0.1]]]', "shape",
-)  # fmt: skip
+    'spacing = 0.05\ntank.size = [1, 1]\n[[fluids]]\nshape = "points"\npositions = [[[0.1, 0.1]]]',
+    "shape",
+)
 
 DEEP = nested("[", "]", 50_000)
 #: messages of whoever drives, none of which may end the session
@@ -103,7 +118,9 @@ MESSAGES: dict[str, str] = {
     "long integers": json.dumps({"do": "load", "text": SCENES["long integer"][0]}),
     "2 MB of dots": json.dumps({"do": "load", "text": "a" + ".a" * 990_000 + " = 1"}),
     "2 MB of solids": json.dumps({"do": "load", "text": SCENES["100,000 solids"][0][:1_990_000]}),
-    "2 MB of good solids": json.dumps({"do": "load", "text": POOL + "solids = [" + "{center=[9,9],size=[1,1]},\n" * 60_000 + "]"}),
+    "2 MB of good solids": json.dumps(
+        {"do": "load", "text": POOL + "solids = [" + "{center=[9,9],size=[1,1]},\n" * 60_000 + "]"}
+    ),
     "999 m at 1 mm": json.dumps({"do": "load", "text": SCENES["999 m at 1 mm"][0]}),
     "empty points": json.dumps({"do": "load", "text": 'spacing = 0.05\n[[fluids]]\nshape = "points"\npositions = []'}),
     "nested points": json.dumps({"do": "load", "text": SCENES["nested points"][0]}),
@@ -121,7 +138,7 @@ MESSAGES: dict[str, str] = {
     "zero": '{"do": "load", "name": "\\u0000"}',
     "a solid of 10^9 m": '{"do": "add-solid", "solid": {"shape": "polygon", "points": [[1e9, -1], [1e9, 0], [0, 0]]}}',
     "a pointer of two lines": '{"do": "point-end", "pointer": "a\\nb"}',
-}  # fmt: skip
+}
 
 
 def state_parts(path: Path) -> dict[str, np.ndarray]:
@@ -197,7 +214,7 @@ HEADERS: dict[str, Callable[[dict[str, Any]], Any]] = {
     "next id beyond numbers": _set("numbers", "next_id", 2**40),
     "ice that is not there": _set("numbers", "frozen_count", 10**6),
     "a box of texts": _set("numbers", "start_box", ["a", "b"]),
-}  # fmt: skip
+}
 
 
 def _replaced(name: str, change: Callable[[np.ndarray], Any]) -> Callable[[dict[str, np.ndarray]], dict[str, Any]]:
@@ -238,17 +255,29 @@ ARRAYS: dict[str, Callable[[dict[str, np.ndarray]], dict[str, Any]]] = {
     "a material below 0": _replaced("material", _put(0, -1)),
     "half frozen": _replaced("frozen", _put(0, 7)),
     "foam of unequal length": _replaced("foam_ages", lambda a: np.zeros(len(a) + 3, np.float32)),
-    "foam of no kind": lambda parts: {**parts, **{
-        name: np.zeros((3, 2) if name in ("foam_positions", "foam_velocities") else 3,
-                       np.int32 if name in ("foam_kinds", "foam_ids") else np.float32) + 9
-        for name in parts if name.startswith("foam_")}},
+    "foam of no kind": lambda parts: {
+        **parts,
+        **{
+            name: np.zeros(
+                (3, 2) if name in ("foam_positions", "foam_velocities") else 3,
+                np.int32 if name in ("foam_kinds", "foam_ids") else np.float32,
+            )
+            + 9
+            for name in parts
+            if name.startswith("foam_")
+        },
+    },
     "a scene that is none": lambda parts: {**parts, "scene": np.array("{")},
     "a scene of lists": lambda parts: {**parts, "scene": np.array("[" * 50_000)},
     "a header of lists": lambda parts: {**parts, "about": np.array("[" * 50_000)},
     "a header of digits": lambda parts: {**parts, "about": np.array("9" * 5000)},
     "objects": lambda parts: {**parts, "x": np.array([{}], object)},
-    "bodies of nobody": lambda parts: {**parts, "bodies_memory": np.zeros((3, 8, 6)), "bodies_engine": np.zeros(5, np.uint8)},
-}  # fmt: skip
+    "bodies of nobody": lambda parts: {
+        **parts,
+        "bodies_memory": np.zeros((3, 8, 6)),
+        "bodies_engine": np.zeros(5, np.uint8),
+    },
+}
 
 
 def bomb(shape: str = "(1000000000000,)", member: str = "x") -> bytes:

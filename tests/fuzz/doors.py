@@ -75,9 +75,11 @@ def goes(session: Session, frames: int = 2) -> None:
 
 scenes = st.one_of(
     mutated(st.deferred(lambda: st.sampled_from(good_scenes())), of_type(Any) | tables(wt.Scene)).map(toml_of),
-    torn(st.deferred(lambda: st.sampled_from(good_scenes())).map(lambda t: toml_of(t).encode())).map(lambda b: b.decode("utf-8", "replace")),
+    torn(st.deferred(lambda: st.sampled_from(good_scenes())).map(lambda t: toml_of(t).encode())).map(
+        lambda b: b.decode("utf-8", "replace")
+    ),
     tables(wt.Scene).map(lambda table: toml_of({"spacing": 0.1, "tank": {"size": [1, 1]}, **table})),
-)  # fmt: skip
+)
 
 
 def try_scene(text: str) -> None:
@@ -170,11 +172,22 @@ messages = st.one_of(
     st.sampled_from(COMMANDS).flatmap(tables).map(json.dumps),
     mutated(st.sampled_from(COMMANDS).flatmap(tables)).map(json.dumps),
     st.tuples(st.just("load"), scenes).map(lambda pair: json.dumps({"do": pair[0], "text": pair[1]})),
-    torn(st.sampled_from(COMMANDS).flatmap(tables).map(lambda table: json.dumps(table).encode())).map(lambda b: b.decode("utf-8", "replace")),
-    st.fixed_dictionaries({"do": st.sampled_from(["ack", "size", "drive", "detail", "point-begin", "point-move", "point-end"]),
-                           "x": WEIRD, "y": WEIRD, "width": WEIRD, "height": WEIRD, "pointer": WEIRD,
-                           "tool": st.sampled_from(["pour", "stir", "cut", "freeze", "", 5, None]), "options": WEIRD}).map(json.dumps),
-)  # fmt: skip
+    torn(st.sampled_from(COMMANDS).flatmap(tables).map(lambda table: json.dumps(table).encode())).map(
+        lambda b: b.decode("utf-8", "replace")
+    ),
+    st.fixed_dictionaries(
+        {
+            "do": st.sampled_from(["ack", "size", "drive", "detail", "point-begin", "point-move", "point-end"]),
+            "x": WEIRD,
+            "y": WEIRD,
+            "width": WEIRD,
+            "height": WEIRD,
+            "pointer": WEIRD,
+            "tool": st.sampled_from(["pour", "stir", "cut", "freeze", "", 5, None]),
+            "options": WEIRD,
+        }
+    ).map(json.dumps),
+)
 _sessions: list[Session] = []
 
 
@@ -208,13 +221,32 @@ def _is_sentence(note: str) -> bool:
 
 
 recordings = st.one_of(
-    st.tuples(st.lists(st.sampled_from(COMMANDS).flatmap(tables), max_size=4), st.deferred(lambda: st.sampled_from(good_scenes()))).map(
-        lambda pair: toml_of({"format": 1, "frames": 2, "scene": pair[1], "most_particles": MOST,
-                              "commands": [{**command, "frame": 1} for command in pair[0]]})),
-    mutated(st.deferred(lambda: st.sampled_from(good_scenes())).map(
-        lambda scene: {"format": 1, "frames": 2, "most_particles": MOST, "scene": scene,
-                       "commands": [{"frame": 0, "do": "pause"}, {"frame": 1, "do": "step"}]})).map(toml_of),
-)  # fmt: skip
+    st.tuples(
+        st.lists(st.sampled_from(COMMANDS).flatmap(tables), max_size=4),
+        st.deferred(lambda: st.sampled_from(good_scenes())),
+    ).map(
+        lambda pair: toml_of(
+            {
+                "format": 1,
+                "frames": 2,
+                "scene": pair[1],
+                "most_particles": MOST,
+                "commands": [{**command, "frame": 1} for command in pair[0]],
+            }
+        )
+    ),
+    mutated(
+        st.deferred(lambda: st.sampled_from(good_scenes())).map(
+            lambda scene: {
+                "format": 1,
+                "frames": 2,
+                "most_particles": MOST,
+                "scene": scene,
+                "commands": [{"frame": 0, "do": "pause"}, {"frame": 1, "do": "step"}],
+            }
+        )
+    ).map(toml_of),
+)
 
 
 def try_recording(text: str) -> None:
@@ -237,9 +269,16 @@ def good_meshes() -> list[tuple[str, bytes]]:
     import trimesh
 
     box, ball = trimesh.creation.box(), trimesh.creation.icosphere(1)
-    return [(suffix, mesh.export(file_type=suffix) if isinstance(mesh.export(file_type=suffix), bytes)
-             else mesh.export(file_type=suffix).encode()) for mesh in (box, ball)
-            for suffix in ("obj", "stl", "ply", "glb", "stl_ascii")]  # fmt: skip
+    return [
+        (
+            suffix,
+            mesh.export(file_type=suffix)
+            if isinstance(mesh.export(file_type=suffix), bytes)
+            else mesh.export(file_type=suffix).encode(),
+        )
+        for mesh in (box, ball)
+        for suffix in ("obj", "stl", "ply", "glb", "stl_ascii")
+    ]
 
 
 @st.composite
@@ -261,6 +300,10 @@ def try_mesh(given: tuple[str, bytes]) -> None:
 
 
 DOORS: dict[str, tuple[st.SearchStrategy[Any], Any]] = {
-    "scene": (scenes, try_scene), "state": (states(), try_state), "message": (messages, try_message),
-    "recording": (recordings, try_recording), "mesh": (meshes(), try_mesh), **FILES,
-}  # fmt: skip
+    "scene": (scenes, try_scene),
+    "state": (states(), try_state),
+    "message": (messages, try_message),
+    "recording": (recordings, try_recording),
+    "mesh": (meshes(), try_mesh),
+    **FILES,
+}

@@ -223,9 +223,12 @@ def robots(draw: Any) -> bytes:
     """A robot with damages."""
     from xml.etree import ElementTree
 
-    root = ElementTree.fromstring(ROBOT.replace("package://a/", "").replace("<mesh filename=\"b.stl\" scale=\"1 1 1\"/>",
-                                                "<sphere radius=\"0.1\"/>" if draw(st.booleans()) else
-                                                "<mesh filename=\"b.stl\" scale=\"1 1 1\"/>"))  # fmt: skip
+    root = ElementTree.fromstring(
+        ROBOT.replace("package://a/", "").replace(
+            '<mesh filename="b.stl" scale="1 1 1"/>',
+            '<sphere radius="0.1"/>' if draw(st.booleans()) else '<mesh filename="b.stl" scale="1 1 1"/>',
+        )
+    )
     return spoiled(draw, root, ["post", "upper", "cup"])
 
 
@@ -265,23 +268,70 @@ def particle_file(
 @functools.cache
 def good_scenes() -> list[tuple[dict[str, Any], Files]]:
     """Scenes of SPlisHSPlasH as its manual describes them, with their particles."""
-    wall = {"id": 1, "geometryFile": "UnitBox.obj", "translation": [0, 1, 0], "scale": [2, 2, 2], "isDynamic": False,
-            "isWall": True, "mapInvert": True}  # fmt: skip
+    wall = {
+        "id": 1,
+        "geometryFile": "UnitBox.obj",
+        "translation": [0, 1, 0],
+        "scale": [2, 2, 2],
+        "isDynamic": False,
+        "isWall": True,
+        "mapInvert": True,
+    }
     first = {
         "Configuration": {"particleRadius": 0.05, "gravitation": [0, -9.81, 0], "timeStepSize": 0.001},
-        "Materials": [{"id": "Fluid", "density0": 1000, "viscosityMethod": 6, "maxEmitterParticles": 1000,
-                       "Weiler et al. 2018": {"viscosity": 0.01}, "surfaceTensionMethod": 5,
-                       "Zorilla, Ritter, et al. 2020": {"surfaceTension": 0.07}}],
-        "RigidBodies": [wall, {"id": 2, "geometryFile": "UnitBox.obj", "translation": [0.3, 0.5, 0], "scale": [0.2, 0.2, 0.2],
-                               "isDynamic": True, "density": 500, "rotationAxis": [1, 0, 0], "rotationAngle": 0.3}],
+        "Materials": [
+            {
+                "id": "Fluid",
+                "density0": 1000,
+                "viscosityMethod": 6,
+                "maxEmitterParticles": 1000,
+                "Weiler et al. 2018": {"viscosity": 0.01},
+                "surfaceTensionMethod": 5,
+                "Zorilla, Ritter, et al. 2020": {"surfaceTension": 0.07},
+            }
+        ],
+        "RigidBodies": [
+            wall,
+            {
+                "id": 2,
+                "geometryFile": "UnitBox.obj",
+                "translation": [0.3, 0.5, 0],
+                "scale": [0.2, 0.2, 0.2],
+                "isDynamic": True,
+                "density": 500,
+                "rotationAxis": [1, 0, 0],
+                "rotationAngle": 0.3,
+            },
+        ],
         "FluidBlocks": [{"start": [-0.9, 0.1, -0.9], "end": [0, 0.9, 0], "translation": [0, 0, 0], "scale": [1, 1, 1]}],
-        "Emitters": [{"id": "Fluid", "width": 5, "height": 5, "translation": [-0.5, 1.5, 0], "velocity": 2,
-                      "rotationAxis": [0, 0, 1], "rotationAngle": 0, "emitEndTime": 4, "type": 1}],
+        "Emitters": [
+            {
+                "id": "Fluid",
+                "width": 5,
+                "height": 5,
+                "translation": [-0.5, 1.5, 0],
+                "velocity": 2,
+                "rotationAxis": [0, 0, 1],
+                "rotationAngle": 0,
+                "emitEndTime": 4,
+                "type": 1,
+            }
+        ],
         "HingeJoints": [{"bodyID1": 2, "bodyID2": 1, "position": [0.3, 0.5, 0], "axis": [0, 0, 1]}],
-    }  # fmt: skip
-    plane = {"Configuration": {"particleRadius": 0.05, "sim2D": True}, "RigidBodies": [wall],
-             "FluidModels": [{"particleFile": "a.bgeo", "translation": [0.1, 0, 0], "rotationAxis": [0, 0, 1],
-                              "rotationAngle": 0.5, "initialVelocity": [1, 0, 0]}]}  # fmt: skip
+    }
+    plane = {
+        "Configuration": {"particleRadius": 0.05, "sim2D": True},
+        "RigidBodies": [wall],
+        "FluidModels": [
+            {
+                "particleFile": "a.bgeo",
+                "translation": [0.1, 0, 0],
+                "rotationAxis": [0, 0, 1],
+                "rotationAngle": 0.5,
+                "initialVelocity": [1, 0, 0],
+            }
+        ],
+    }
     import trimesh
 
     box = trimesh.creation.box().export(file_type="obj").encode()
@@ -333,6 +383,10 @@ def try_particles(content: bytes) -> None:
 
 
 FILES: dict[str, tuple[st.SearchStrategy[Any], Any]] = {
-    "checkpoint": (runs(), try_checkpoint), "run": (runs(), try_run), "robot": (robots(), try_robot),
-    "other": (others(), try_other), "case": (cases(), try_case), "particles": (particles, try_particles),
-}  # fmt: skip
+    "checkpoint": (runs(), try_checkpoint),
+    "run": (runs(), try_run),
+    "robot": (robots(), try_robot),
+    "other": (others(), try_other),
+    "case": (cases(), try_case),
+    "particles": (particles, try_particles),
+}

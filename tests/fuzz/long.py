@@ -24,8 +24,19 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 FOUND = HERE / "found"
-SHARES = {"scene": 0.25, "state": 0.15, "message": 0.25, "recording": 0.08, "mesh": 0.07,
-          "checkpoint": 0.04, "run": 0.06, "robot": 0.03, "other": 0.04, "case": 0.03, "particles": 0.03}  # fmt: skip
+SHARES = {
+    "scene": 0.25,
+    "state": 0.15,
+    "message": 0.25,
+    "recording": 0.08,
+    "mesh": 0.07,
+    "checkpoint": 0.04,
+    "run": 0.06,
+    "robot": 0.03,
+    "other": 0.04,
+    "case": 0.03,
+    "particles": 0.03,
+}
 LONGEST, MORE_MEMORY, BATCH = 5.0, 1_000_000_000, 250
 HANGS = 60.0  # s of a clock, after which the process is ended
 
@@ -63,8 +74,13 @@ def batch(name: str, count: int, seed: int) -> int:
     FOLDER.mkdir(exist_ok=True)
 
     @hypothesis.seed(seed)
-    @settings(max_examples=count, deadline=None, database=None, suppress_health_check=list(HealthCheck),
-              phases=[Phase.generate])  # fmt: skip
+    @settings(
+        max_examples=count,
+        deadline=None,
+        database=None,
+        suppress_health_check=list(HealthCheck),
+        phases=[Phase.generate],
+    )
     @given(inputs)
     def attack(given_input: object) -> None:
         last.write_bytes(pickle.dumps((name, given_input)))

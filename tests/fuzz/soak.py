@@ -39,8 +39,11 @@ class Player(Watcher):
         pick = self.chance.random()
         x, y = self.chance.random(), self.chance.random()
         if pick < 0.8:
-            tables = [{"do": "point-begin", "tool": self.chance.choice(TOOLS), "x": x, "y": y},
-                      {"do": "point-move", "x": y, "y": x}, {"do": "point-end"}]  # fmt: skip
+            tables = [
+                {"do": "point-begin", "tool": self.chance.choice(TOOLS), "x": x, "y": y},
+                {"do": "point-move", "x": y, "y": x},
+                {"do": "point-end"},
+            ]
         elif pick < 0.9:
             tables = [{"do": "reset", "parameters": {}}, {"do": "bookmark", "name": "a"}]
         else:
@@ -82,8 +85,11 @@ def main() -> int:
         session.log.clear()  # what a session remembers of itself grows by design
         # Pictures for each second of the processors: what else runs on the machine changes little of that.
         rows.append((resident(), (driver.pictures - pictures) / (time.process_time() - spent)))
-        print(f"{time.monotonic() - began:7.0f} s  {rows[-1][0]:7.0f} MB  {rows[-1][1]:5.1f} pictures/s of processors  "
-              f"{session.sim.count:7,} particles  {names[number % len(names)]}", flush=True)  # fmt: skip
+        print(
+            f"{time.monotonic() - began:7.0f} s  {rows[-1][0]:7.0f} MB  {rows[-1][1]:5.1f} pictures/s of processors  "
+            f"{session.sim.count:7,} particles  {names[number % len(names)]}",
+            flush=True,
+        )
         if not thread.is_alive():
             print("the simulation's thread has ended")
             return 1

@@ -20,15 +20,51 @@ from pydantic.fields import FieldInfo
 EDGES = [0.0, -0.0, 1.0, -1.0, 0.5, 1e-300, 5e-324, 1e-9, 1e9, 1e18, 1e30, 3.4e38, 1e300, math.inf, -math.inf, math.nan]
 WHOLE = [0, 1, -1, 2, 7, 100, 2**31 - 1, 2**31, -(2**31), 2**32, 2**53, 2**63 - 1, 2**63, 10**30]
 TEXTS = [
-    "", "a", "t", "2*t", "sin(t)/t", "1e300*t", "t**t**t", "1/0", "exp(exp(t))", "((((((((t))))))))", "-" * 300 + "1", "\0",
-    "\ud800", "x" * 1000, "../../etc/passwd", "/dev/zero", "wavetank/boat.obj", "ж\n", "__import__('os')", "nan", "1_0",
-]  # fmt: skip
+    "",
+    "a",
+    "t",
+    "2*t",
+    "sin(t)/t",
+    "1e300*t",
+    "t**t**t",
+    "1/0",
+    "exp(exp(t))",
+    "((((((((t))))))))",
+    "-" * 300 + "1",
+    "\0",
+    "\ud800",
+    "x" * 1000,
+    "../../etc/passwd",
+    "/dev/zero",
+    "wavetank/boat.obj",
+    "ж\n",
+    "__import__('os')",
+    "nan",
+    "1_0",
+]
 WEIRD: st.SearchStrategy[Any] = st.one_of(
-    st.sampled_from(EDGES), st.sampled_from(WHOLE), st.sampled_from(TEXTS), st.booleans(), st.none(),
-    st.sampled_from([[], {}, [[]], [{}], {"a": {}}, [[[0.1]]], [0.1, 0.2], [0.1, 0.2, 0.3], [1] * 5, [[0.1, 0.1]] * 50,
-                     [{"time": 0, "value": 1}, {"time": 1, "value": "t"}]]),
+    st.sampled_from(EDGES),
+    st.sampled_from(WHOLE),
+    st.sampled_from(TEXTS),
+    st.booleans(),
+    st.none(),
+    st.sampled_from(
+        [
+            [],
+            {},
+            [[]],
+            [{}],
+            {"a": {}},
+            [[[0.1]]],
+            [0.1, 0.2],
+            [0.1, 0.2, 0.3],
+            [1] * 5,
+            [[0.1, 0.1]] * 50,
+            [{"time": 0, "value": 1}, {"time": 1, "value": "t"}],
+        ]
+    ),
     st.recursive(st.floats() | st.text(max_size=5), lambda inner: st.lists(inner, max_size=3), max_leaves=8),
-)  # fmt: skip
+)
 
 
 def of_field(field: FieldInfo, depth: int) -> st.SearchStrategy[Any]:
@@ -92,9 +128,14 @@ def tables(model: type[BaseModel], depth: int = 0) -> st.SearchStrategy[dict[str
     """Tables as a model declares them: with what it asks for, and some of the rest."""
     fields = model.model_fields
     needed = {name: of_field(field, depth) for name, field in fields.items() if field.is_required()}
-    needed |= {name: st.just(fields[name].default) for name in ("shape", "kind", "do")
-               if name in fields and isinstance(fields[name].default, str) and model.__name__ != "Parameters"
-               and typing.get_origin(fields[name].annotation) is typing.Literal}  # fmt: skip
+    needed |= {
+        name: st.just(fields[name].default)
+        for name in ("shape", "kind", "do")
+        if name in fields
+        and isinstance(fields[name].default, str)
+        and model.__name__ != "Parameters"
+        and typing.get_origin(fields[name].annotation) is typing.Literal
+    }
     others = {name: of_field(field, depth) for name, field in fields.items() if name not in needed}
     return st.fixed_dictionaries(needed, optional={}).flatmap(
         lambda table: st.lists(st.sampled_from(sorted(others) or ["none"]), max_size=3, unique=True).flatmap(

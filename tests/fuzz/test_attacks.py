@@ -112,7 +112,7 @@ RECORDINGS = {
     "frames without end": RECORDING.replace("frames = 3", "frames = 100000000"),
     "a frame that is a list": RECORDING + '[[commands]]\nframe = [1]\ndo = "pause"',
     "commands of numbers": RECORDING.replace("[scene]", "commands = [1, 2]\n[scene]"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", RECORDINGS)

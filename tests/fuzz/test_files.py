@@ -33,9 +33,15 @@ def test_a_run_reads_what_it_wrote():
 
 @pytest.mark.parametrize(
     ("content", "words"),
-    [("x = " + "[" * 100_000, "nested"), ('format = 2\nwavetank = "9"', "format"), ("every = 0", "every"),
-     ("fps = nan", "fps"), ("\0", "TOML"), ("name = " + "9" * 5000, "digits")],
-)  # fmt: skip
+    [
+        ("x = " + "[" * 100_000, "nested"),
+        ('format = 2\nwavetank = "9"', "format"),
+        ("every = 0", "every"),
+        ("fps = nan", "fps"),
+        ("\0", "TOML"),
+        ("name = " + "9" * 5000, "digits"),
+    ],
+)
 def test_what_was_ordered(content, words):
     folder = fresh("ordered", good_run() | {"run.toml": content.encode()})
     refused(lambda: RunFolder.open(folder), words)
@@ -51,10 +57,18 @@ def test_figures_that_are_none_name_their_line(line):
 
 @pytest.mark.parametrize(
     ("name", "array"),
-    [("velocities", np.zeros((3, 2), "f4")), ("positions", np.zeros((5, 7), "f4")), ("materials", np.full(20, 99)),
-     ("positions", np.full((20, 2), np.nan)), ("foam_kinds", np.zeros(4, "i4")), ("ids", np.zeros(0)), ("time", np.nan),
-     ("solid_poses", np.full((1, 13), np.nan)), ("number", np.array("x"))],
-)  # fmt: skip
+    [
+        ("velocities", np.zeros((3, 2), "f4")),
+        ("positions", np.zeros((5, 7), "f4")),
+        ("materials", np.full(20, 99)),
+        ("positions", np.full((20, 2), np.nan)),
+        ("foam_kinds", np.zeros(4, "i4")),
+        ("ids", np.zeros(0)),
+        ("time", np.nan),
+        ("solid_poses", np.full((1, 13), np.nan)),
+        ("number", np.array("x")),
+    ],
+)
 def test_frames_that_are_none_of_this_scene(name, array):
     folder = RunFolder.open(fresh("frames", {key: good for key, good in good_run().items() if not key.endswith(".h5")}))
     path = folder.path / "a-00001.npz"
@@ -75,12 +89,17 @@ def test_frames_that_unpack_to_terabytes():
 
 @pytest.mark.parametrize(
     "change",
-    [lambda file: file["water/count"].__setitem__(1, 2**62), lambda file: file["water/first"].__setitem__(1, -5),
-     lambda file: file["water/positions"].resize(2**40, axis=0) or file["water/count"].__setitem__(1, 2**40),
-     lambda file: file.attrs.__setitem__("NFrames", "many"), lambda file: file.__delitem__("solids"),
-     lambda file: file["water/positions"].__setitem__(30, np.nan),
-     lambda file: (file.__delitem__("foam/count"), file.__setitem__("foam/count", np.full(3, np.inf))), lambda file: file.attrs.__setitem__("NFrames", 9)],
-)  # fmt: skip
+    [
+        lambda file: file["water/count"].__setitem__(1, 2**62),
+        lambda file: file["water/first"].__setitem__(1, -5),
+        lambda file: file["water/positions"].resize(2**40, axis=0) or file["water/count"].__setitem__(1, 2**40),
+        lambda file: file.attrs.__setitem__("NFrames", "many"),
+        lambda file: file.__delitem__("solids"),
+        lambda file: file["water/positions"].__setitem__(30, np.nan),
+        lambda file: (file.__delitem__("foam/count"), file.__setitem__("foam/count", np.full(3, np.inf))),
+        lambda file: file.attrs.__setitem__("NFrames", 9),
+    ],
+)
 def test_tables_that_say_something_else(change):
     h5py = pytest.importorskip("h5py")
     folder = RunFolder.open(fresh("tables", good_run()))
@@ -107,12 +126,20 @@ def test_checkpoints():
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
-    [('xyz="0 0 0.2"', 'xyz="0"', "3 numbers"), ('xyz="0 0 0.2"', 'xyz="0 0 nan"', "3 numbers"),
-     ('rpy="0 0 1.5707963"', 'rpy="1e400 0 0"', "3 numbers"), ("size=\"0.08 0.06 0.4\"", 'size="1"', "3 numbers"),
-     ('value="2"', 'value="heavy"', "heavy"), ('<child link="tool"/>', "", "child"), ("b.stl", "b" * 5000 + ".stl", ""),
-     ("b.stl", "a\0.stl".replace("\0", "&#9;"), ""), ('<?xml version="1.0"?>', '<!DOCTYPE a [<!ENTITY b "c">]>', "document"),
-     ('<link name="cup">', "<link>" * 90_000, "XML"), ('radius="0.06"', 'radius="1e308"', "")],
-)  # fmt: skip
+    [
+        ('xyz="0 0 0.2"', 'xyz="0"', "3 numbers"),
+        ('xyz="0 0 0.2"', 'xyz="0 0 nan"', "3 numbers"),
+        ('rpy="0 0 1.5707963"', 'rpy="1e400 0 0"', "3 numbers"),
+        ('size="0.08 0.06 0.4"', 'size="1"', "3 numbers"),
+        ('value="2"', 'value="heavy"', "heavy"),
+        ('<child link="tool"/>', "", "child"),
+        ("b.stl", "b" * 5000 + ".stl", ""),
+        ("b.stl", "a\0.stl".replace("\0", "&#9;"), ""),
+        ('<?xml version="1.0"?>', '<!DOCTYPE a [<!ENTITY b "c">]>', "document"),
+        ('<link name="cup">', "<link>" * 90_000, "XML"),
+        ('radius="0.06"', 'radius="1e308"', ""),
+    ],
+)
 def test_robots(old, new, words):
     assert old in ROBOT
     path = fresh("robot", {"arm.urdf": ROBOT.replace(old, new).encode()}) / "arm.urdf"
@@ -127,10 +154,15 @@ def test_a_robot_of_very_many_joints_costs_little():
 
 @pytest.mark.parametrize(
     ("content", "words"),
-    [('{"Configuration": {}, "x": ' + nested("[", "]", 50_000) + "}", "nested"), ('{"Configuration": NaN}', "finite"),
-     ('{"Configuration": {"particleRadius": ' + "9" * 4000 + "}}", ""), ('{"Configuration": []}', "Configuration"),
-     ('{"Configuration": {}, "RigidBodies": [{"geometryFile": "' + "a" * 5000 + '"}]}', "scene.json"), ("\0", "JSON")],
-)  # fmt: skip
+    [
+        ('{"Configuration": {}, "x": ' + nested("[", "]", 50_000) + "}", "nested"),
+        ('{"Configuration": NaN}', "finite"),
+        ('{"Configuration": {"particleRadius": ' + "9" * 4000 + "}}", ""),
+        ('{"Configuration": []}', "Configuration"),
+        ('{"Configuration": {}, "RigidBodies": [{"geometryFile": "' + "a" * 5000 + '"}]}', "scene.json"),
+        ("\0", "JSON"),
+    ],
+)
 def test_scenes_of_another_program(content, words):
     path = fresh("other", {"scene.json": content.encode()}) / "scene.json"
     refused(lambda: load_splishsplash(path), words)
@@ -146,11 +178,15 @@ def test_meshes_beside_such_a_scene_are_counted_first():
 
 @pytest.mark.parametrize(
     ("content", "words"),
-    [(particle_file()[:60], "bgeo"), (gzip.compress(particle_file())[:-30], ""), (b"BgeoV", "bgeo"),
-     (gzip.compress(particle_file()[:5] + struct.pack(">9I", 5, 2**31, 1, 0, 0, 0, 0, 1, 0) + bytes(10**7)), "take"),
-     (particle_file()[:5] + struct.pack(">9I", 5, 1, 1, 0, 0, 2**31, 0, 1, 0) + bytes(10**6), "attributes"),
-     (b"\x1f\x8b" + bytes(50), "particles")],
-)  # fmt: skip
+    [
+        (particle_file()[:60], "bgeo"),
+        (gzip.compress(particle_file())[:-30], ""),
+        (b"BgeoV", "bgeo"),
+        (gzip.compress(particle_file()[:5] + struct.pack(">9I", 5, 2**31, 1, 0, 0, 0, 0, 1, 0) + bytes(10**7)), "take"),
+        (particle_file()[:5] + struct.pack(">9I", 5, 1, 1, 0, 0, 2**31, 0, 1, 0) + bytes(10**6), "attributes"),
+        (b"\x1f\x8b" + bytes(50), "particles"),
+    ],
+)
 def test_particles_of_houdini(content, words):
     path = fresh("particles", {"a.bgeo": content}) / "a.bgeo"
     refused(lambda: read_bgeo(path), words)

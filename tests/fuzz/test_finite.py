@@ -79,8 +79,23 @@ def test_a_run_ends_with_its_files_complete(tmp_path, monkeypatch, capsys):
         step(self, duration)
 
     monkeypatch.setattr(Simulation, "_advance_frame", poison)
-    monkeypatch.setattr("sys.argv", ["wavetank", "run", "drop-2d", "--seconds", "1", "--out", str(tmp_path), "--size",
-                                     "64x48", "--video", "--export", "npz"])  # fmt: skip
+    monkeypatch.setattr(
+        "sys.argv",
+        [
+            "wavetank",
+            "run",
+            "drop-2d",
+            "--seconds",
+            "1",
+            "--out",
+            str(tmp_path),
+            "--size",
+            "64x48",
+            "--video",
+            "--export",
+            "npz",
+        ],
+    )
     with pytest.raises(SystemExit) as end:
         cli.main()
     said = capsys.readouterr().err

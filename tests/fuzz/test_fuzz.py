@@ -8,8 +8,19 @@ from doors import DOORS
 from hypothesis import HealthCheck, given, settings
 from hypothesis.errors import FlakyStrategyDefinition
 
-SHARES = {"scene": 40, "state": 25, "message": 80, "recording": 25, "mesh": 25, "checkpoint": 20, "run": 30, "robot": 30,
-          "other": 30, "case": 30, "particles": 30}  # fmt: skip
+SHARES = {
+    "scene": 40,
+    "state": 25,
+    "message": 80,
+    "recording": 25,
+    "mesh": 25,
+    "checkpoint": 20,
+    "run": 30,
+    "robot": 30,
+    "other": 30,
+    "case": 30,
+    "particles": 30,
+}
 TIMES = int(os.environ.get("WAVETANK_FUZZ_TIMES", "1"))
 
 

@@ -47,18 +47,28 @@ def bomb(path: Path, triangles: int, instances: int) -> None:
     faces = np.stack([np.arange(each), np.arange(each) + 1, np.arange(each) + 2], axis=1).astype(np.uint32)
     data = points.tobytes() + faces.tobytes()
     about = {
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [*range(instances)]}],
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [*range(instances)]}],
         "nodes": [{"mesh": 0, "translation": [k, 0, 0]} for k in range(instances)],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
         "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": len(points), "type": "VEC3",
-             "min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()},
+            {
+                "bufferView": 0,
+                "componentType": 5126,
+                "count": len(points),
+                "type": "VEC3",
+                "min": points.min(axis=0).tolist(),
+                "max": points.max(axis=0).tolist(),
+            },
             {"bufferView": 1, "componentType": 5125, "count": faces.size, "type": "SCALAR"},
         ],
-        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": points.nbytes},
-                        {"buffer": 0, "byteOffset": points.nbytes, "byteLength": faces.nbytes}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": points.nbytes},
+            {"buffer": 0, "byteOffset": points.nbytes, "byteLength": faces.nbytes},
+        ],
         "buffers": [{"byteLength": len(data)}],
-    }  # fmt: skip
+    }
     text = json.dumps(about).encode()
     text += b" " * (-len(text) % 4)
     chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
@@ -73,14 +83,21 @@ MESH = (
 )
 CASES = {
     "10^12 particles in 2-D": (
-        "spacing = 1e-4\ntank.size = [100, 100]\nfluids = [{ lower = [0, 0], upper = [100, 100] }]", "particles"),
+        "spacing = 1e-4\ntank.size = [100, 100]\nfluids = [{ lower = [0, 0], upper = [100, 100] }]",
+        "particles",
+    ),
     "10^12 particles": (
-        "spacing = 1e-3\ntank.size = [10, 10, 10]\nfluids = [{ lower = [0, 0, 0], upper = [10, 10, 10] }]", "particles"),
-    "10^24 cells": ("spacing = 1e-6\ntank.size = [100, 100, 100]\nfluids = [{lower=[0,0,0],upper=[1e-5,1e-5,1e-5]}]", ""),
+        "spacing = 1e-3\ntank.size = [10, 10, 10]\nfluids = [{ lower = [0, 0, 0], upper = [10, 10, 10] }]",
+        "particles",
+    ),
+    "10^24 cells": (
+        "spacing = 1e-6\ntank.size = [100, 100, 100]\nfluids = [{lower=[0,0,0],upper=[1e-5,1e-5,1e-5]}]",
+        "",
+    ),
     "1000 km at 1 m": ("spacing = 1\ntank.size = [1e6, 1e6, 1e6]\nfluids = [{lower=[0,0,0],upper=[1,1,1]}]", "cells"),
     "64 M triangles in 50,000 places": (MESH.replace("FILE", "places.glb"), "50,000 meshes"),
     "64 M triangles": (MESH.replace("FILE", "triangles.glb"), "64,000,000 triangles"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="peaks of memory are read off Linux's /proc")
@@ -92,8 +109,11 @@ def test_a_refusal_costs_little(name, tmp_path):
     (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
     run = subprocess.run(
         [sys.executable, "-c", f"ROOM = {ROOM}\n{CHILD}", str(tmp_path / "scene.toml")],
-        capture_output=True, text=True, timeout=120, env={**os.environ, "WAVETANK_STRICT_DOOR": "1"},
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ, "WAVETANK_STRICT_DOOR": "1"},
+    )
     assert run.returncode == 0, run.stderr[-600:]
     seconds, megabytes, said = json.loads(run.stdout.splitlines()[-1])
     print(f"{name}: {seconds:.2f} s, {megabytes:.0f} MB: {said}")

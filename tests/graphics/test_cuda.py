@@ -32,9 +32,11 @@ def driver(tmp_path_factory) -> Path:
     (folder / "modules").mkdir()
     subprocess.run([compiler, "-shared", "-fPIC", "-o", folder / "libcuda.so", here / "driver.c"], check=True)
     found = os.environ | {
-        "LD_LIBRARY_PATH": str(folder), "CUDA_DRIVER_LOG": str(folder / "book"),
-        "CUDA_DRIVER_MODULES": str(folder / "modules"), "XDG_CACHE_HOME": str(folder / "cache"),
-    }  # fmt: skip
+        "LD_LIBRARY_PATH": str(folder),
+        "CUDA_DRIVER_LOG": str(folder / "book"),
+        "CUDA_DRIVER_MODULES": str(folder / "modules"),
+        "XDG_CACHE_HOME": str(folder / "cache"),
+    }
     done = subprocess.run([sys.executable, here / "worlds.py", "compile_kernels"], env=found, capture_output=True)
     assert done.returncode == 0, done.stderr.decode()[-2000:]
     return folder

@@ -201,8 +201,21 @@ def command(*arguments: str, monkeypatch) -> None:
 def test_the_command_prints_json_last(tmp_path, monkeypatch, capsys):
     out = tmp_path / "new.json"
     with pytest.raises(SystemExit) as end:
-        command("dam-break-2d", "--sizes", "200", "300", "--seconds", "0.03", "--repeats", "2", "--no-start-up",
-                "--out", str(out), "--json", monkeypatch=monkeypatch)  # fmt: skip
+        command(
+            "dam-break-2d",
+            "--sizes",
+            "200",
+            "300",
+            "--seconds",
+            "0.03",
+            "--repeats",
+            "2",
+            "--no-start-up",
+            "--out",
+            str(out),
+            "--json",
+            monkeypatch=monkeypatch,
+        )
     assert end.value.code in (0, None)
     last = json.loads(capsys.readouterr().out.strip().splitlines()[-1])
     assert [run["size"] for run in last["runs"]] == [200, 300]

@@ -11,11 +11,26 @@ from wavetank.lab.bench.run import Order, perform
 
 
 def order(**options) -> Order:
-    return Order(**{
-        "scenes": [], "sizes": "", "seconds": None, "repeats": 1, "threads": None, "peers": False,
-        "their_scenes": False, "pictures": None, "roofline": False, "search": False, "bodies": False, "page": True,
-        "start_up": False, "compare": None, "arch": "cpu", **options,
-    })  # fmt: skip
+    return Order(
+        **{
+            "scenes": [],
+            "sizes": "",
+            "seconds": None,
+            "repeats": 1,
+            "threads": None,
+            "peers": False,
+            "their_scenes": False,
+            "pictures": None,
+            "roofline": False,
+            "search": False,
+            "bodies": False,
+            "page": True,
+            "start_up": False,
+            "compare": None,
+            "arch": "cpu",
+            **options,
+        }
+    )
 
 
 def test_pictures_and_delays_are_counted(monkeypatch):

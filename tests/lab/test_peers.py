@@ -74,9 +74,16 @@ def test_ratios_are_ours_over_theirs_at_equal_error(fake, monkeypatch):
     def mine(scene, seconds, measure=True):
         steps = 1 + round(seconds / (0.01 * scene.wave_courant))
         error = 0.02 * (scene.wave_courant / scene.iterations) ** 2
-        return {"particles": 1000, "steps": steps, "seconds_of_water": seconds, "iterations": scene.iterations,
-                "wall": 0.001 * steps * (1 + scene.iterations), "iterations_in_all": steps * scene.iterations,
-                "density_error_mean": error, "density_error_p99": error}  # fmt: skip
+        return {
+            "particles": 1000,
+            "steps": steps,
+            "seconds_of_water": seconds,
+            "iterations": scene.iterations,
+            "wall": 0.001 * steps * (1 + scene.iterations),
+            "iterations_in_all": steps * scene.iterations,
+            "density_error_mean": error,
+            "density_error_p99": error,
+        }
 
     monkeypatch.setattr(compare, "ours", mine)
     result = compare.compare_peers(1000, 2000, seconds=1.0, repeats=2)
@@ -116,8 +123,13 @@ def test_a_run_slower_than_the_fastest_is_given_up_and_not_chosen():
         steps = round(order["seconds"] / (0.004 * order["cfl_factor"]))
         wall = 0.02 * steps * (1.0 if order["max_error"] == 1.0 else 5.0)  # the others take five times as long
         share = min(1.0, order.get("patience", np.inf) / wall)
-        return {"steps": steps, "wall": share * wall, "seconds_of_water": share * order["seconds"],
-                "given_up": share < 1.0, "density_error_mean": 0.0099}  # fmt: skip
+        return {
+            "steps": steps,
+            "wall": share * wall,
+            "seconds_of_water": share * order["seconds"],
+            "given_up": share < 1.0,
+            "density_error_mean": 0.0099,
+        }
 
     chosen = compare.fastest_of_theirs(their, 0.01, 1.0, lambda text: None)
     assert chosen["max_error"] == 1.0 and "patience" not in chosen

@@ -30,8 +30,21 @@ def test_a_sheet_takes_much_room_and_a_block_none():
 )
 def test_a_wrong_order_says_what_is_allowed(scenes, sizes, said):
     order = Order(
-        scenes=scenes, sizes=sizes, seconds=None, repeats=1, threads=None, peers=False, their_scenes=False,
-        pictures=None, roofline=False, search=True, bodies=False, page=False, start_up=False, compare=None, arch="cpu",
-    )  # fmt: skip
+        scenes=scenes,
+        sizes=sizes,
+        seconds=None,
+        repeats=1,
+        threads=None,
+        peers=False,
+        their_scenes=False,
+        pictures=None,
+        roofline=False,
+        search=True,
+        bodies=False,
+        page=False,
+        start_up=False,
+        compare=None,
+        arch="cpu",
+    )
     with pytest.raises(WavetankError, match=said):
         perform(order, print)

@@ -24,10 +24,32 @@ from wavetank.scene.fluids import Points
 from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
 
-QUICK = ["still-tank", "column", "martin-moyce", "lobovsky", "standing-wave", "elliptical-drop", "drop", "energy",
-         "momentum", "rest", "solids-at-rest", "creep", "seeds", "layers", "lock-exchange", "shear-wave",
-         "gravity-current", "buckling", "tension-drop", "calm-vorticity", "emitter", "buoyancy", "heave",
-         "water-entry"]  # fmt: skip
+QUICK = [
+    "still-tank",
+    "column",
+    "martin-moyce",
+    "lobovsky",
+    "standing-wave",
+    "elliptical-drop",
+    "drop",
+    "energy",
+    "momentum",
+    "rest",
+    "solids-at-rest",
+    "creep",
+    "seeds",
+    "layers",
+    "lock-exchange",
+    "shear-wave",
+    "gravity-current",
+    "buckling",
+    "tension-drop",
+    "calm-vorticity",
+    "emitter",
+    "buoyancy",
+    "heave",
+    "water-entry",
+]
 
 
 def test_the_help_names_all_cases():
@@ -196,11 +218,14 @@ def test_command(value, code, monkeypatch, capsys, tmp_path):
     assert (tmp_path / "invented" / "invented.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize(("value", "quick", "said"), [
-    (1.5, True, "bounds, all of them known: invented: depth (known: the floor is young)"),
-    (3.0, True, "bounds: invented: depth."),  # worse than what is known
-    (1.5, False, "bounds: invented: depth."),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("value", "quick", "said"),
+    [
+        (1.5, True, "bounds, all of them known: invented: depth (known: the floor is young)"),
+        (3.0, True, "bounds: invented: depth."),  # worse than what is known
+        (1.5, False, "bounds: invented: depth."),
+    ],
+)
 def test_quick_runs_say_which_failures_are_known(value, quick, said, monkeypatch, capsys):
     monkeypatch.setattr(room, "CASES", (invented(value),))
     monkeypatch.setitem(KNOWN, "invented: depth", Known(0.0, 2.0, "the floor is young"))

@@ -15,8 +15,10 @@ def with_diffuse(scene: Scene, positions, velocities=None, life=100.0) -> Simula
     rows = {
         "foam_positions": x,
         "foam_velocities": np.zeros_like(x) if velocities is None else np.asarray(velocities, np.float32),
-        "foam_kinds": np.ones(n, np.int32), "foam_ages": np.zeros(n, np.float32),
-        "foam_lives": np.broadcast_to(np.float32(life), n), "foam_ids": np.arange(n, dtype=np.int32),
-    }  # fmt: skip
+        "foam_kinds": np.ones(n, np.int32),
+        "foam_ages": np.zeros(n, np.float32),
+        "foam_lives": np.broadcast_to(np.float32(life), n),
+        "foam_ids": np.arange(n, dtype=np.int32),
+    }
     sim.world.pool = pool_from(rows, n, sim.scene.foam_capacity, scene.dim, sim.count)
     return sim

@@ -13,9 +13,11 @@ def test_a_full_tank_reads_rest_density_on_its_faces(dim, kernel):
     """A lattice that fills a tank: inside and on flat walls rho_0 exactly; the product rule keeps edges close."""
     n, d = 8, 0.05
     scene = wt.Scene(
-        spacing=d, kernel=kernel, tank=wt.Tank(size=(n * d,) * dim),
+        spacing=d,
+        kernel=kernel,
+        tank=wt.Tank(size=(n * d,) * dim),
         fluids=[wt.Block(lower=(0,) * dim, upper=(n * d,) * dim)],
-    )  # fmt: skip
+    )
     sim = Simulation(scene)
     layers = np.round(sim.positions / d - 0.5).astype(int)
     walls = np.sum((layers < 2) | (layers >= n - 2), axis=1)
@@ -29,9 +31,12 @@ def test_a_solid_is_a_wall_like_any_other():
     d, tank, weightless = 0.05, wt.Tank(size=(0.4, 0.8, 0.4)), (0.0, 0.0, 0.0)  # so that both begin as their rows
     low = wt.Scene(spacing=d, tank=tank, gravity=weightless, fluids=[wt.Block(lower=(0, 0, 0), upper=(0.4, 0.3, 0.4))])
     high = wt.Scene(
-        spacing=d, tank=tank, gravity=weightless, fluids=[wt.Block(lower=(0, 0.2, 0), upper=(0.4, 0.5, 0.4))],
+        spacing=d,
+        tank=tank,
+        gravity=weightless,
+        fluids=[wt.Block(lower=(0, 0.2, 0), upper=(0.4, 0.5, 0.4))],
         solids=[wt.Box(center=(0.2, 0.05, 0.2), size=(1.0, 0.3, 1.0))],
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(Simulation(low).densities, Simulation(high).densities, rtol=1e-4)
 
 
@@ -61,10 +66,13 @@ def test_a_cup_holds_its_water_while_it_moves():
     """Walls one spacing thick, carried and tipped at 1.5 m/s: no particle inside ever gets out through the wall."""
     d = 0.02
     cup = wt.Difference(
-        name="cup", center=(0.4, 0.4, 0.4),
-        parts=[wt.Box(center=(0, 0, 0), size=(0.24, 0.24, 0.24)),
-               wt.Box(center=(0, d, 0), size=(0.24 - 2 * d, 0.24, 0.24 - 2 * d))],
-    )  # fmt: skip
+        name="cup",
+        center=(0.4, 0.4, 0.4),
+        parts=[
+            wt.Box(center=(0, 0, 0), size=(0.24, 0.24, 0.24)),
+            wt.Box(center=(0, d, 0), size=(0.24 - 2 * d, 0.24, 0.24 - 2 * d)),
+        ],
+    )
     inside = wt.Block(lower=(0.31, 0.31, 0.31), upper=(0.49, 0.41, 0.49))
     sim = Simulation(wt.Scene(spacing=d, tank=wt.Tank(size=(0.8, 0.8, 0.8)), solids=[cup], fluids=[inside]))
     last = sim.positions - 1e9
@@ -97,9 +105,11 @@ def test_an_impossible_squeeze_stays_in_the_tank():
     """A piston at the far wall leaves no room: particles may overlap, but none leaves the tank and none is NaN."""
     piston = wt.Box(name="piston", center=(0.1, 0.2, 0.2), size=(0.1, 0.4, 0.4))
     scene = wt.Scene(
-        spacing=0.04, tank=wt.Tank(size=(0.6, 0.4, 0.4)), solids=[piston],
+        spacing=0.04,
+        tank=wt.Tank(size=(0.6, 0.4, 0.4)),
+        solids=[piston],
         fluids=[wt.Block(lower=(0.2, 0, 0), upper=(0.6, 0.4, 0.4))],
-    )  # fmt: skip
+    )
     sim = Simulation(scene)
     for k in range(40):
         sim.move("piston", position=(0.1 + 0.0125 * k, 0.2, 0.2))

@@ -80,9 +80,10 @@ def test_a_pool_in_the_open_comes_to_rest():
     walls = [wt.Box(center=(x, 0.2), size=(0.1, 0.5)) for x in (-0.05, 0.45)]
     floor = wt.Box(center=(0.2, -0.05), size=(0.8, 0.1))
     sim = Simulation(
-        wt.Scene(spacing=0.01, gravity=(0, -9.81), solids=[*walls, floor],
-                 fluids=[wt.Block(lower=(0, 0), upper=(0.4, 0.2))])
-    )  # fmt: skip
+        wt.Scene(
+            spacing=0.01, gravity=(0, -9.81), solids=[*walls, floor], fluids=[wt.Block(lower=(0, 0), upper=(0.4, 0.2))]
+        )
+    )
     sim.advance(4.0)
     assert np.linalg.norm(sim.velocities, axis=1).max() < 0.01
     assert 2.0 * sim.positions[:, 1].mean() == pytest.approx(0.2, rel=0.01)

@@ -17,12 +17,22 @@ cases = pytest.mark.parametrize(("dim", "kernel"), CASES)
 def solve(cloud: Cloud) -> None:
     world, count = cloud.world, cloud.count
     start_multipliers(
-        world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, cloud.method, 0,
-    )  # fmt: skip
+        world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, cloud.method, 0
+    )
     correct_positions(
-        world.spare, world.particles, world.scratch, world.scratch.dlam, world.grid, world.solids, world.walls, cloud.c,
-        count, cloud.method, int(cloud.scene.tensile_strength > 0), 0,
-    )  # fmt: skip
+        world.spare,
+        world.particles,
+        world.scratch,
+        world.scratch.dlam,
+        world.grid,
+        world.solids,
+        world.walls,
+        cloud.c,
+        count,
+        cloud.method,
+        int(cloud.scene.tensile_strength > 0),
+        0,
+    )
 
 
 def smooth(cloud: Cloud, turning: int) -> None:

@@ -11,9 +11,9 @@ from wavetank.physics.foam.update import BUBBLE_RISE, MOST_FRAMES, SPRAY_DRAG, a
 def pool_of_water(dim: int, **keys) -> wt.Scene:
     """Half a metre of water in a tank of a metre."""
     size, upper = (0.5, 1.0, 0.5)[:dim], (0.5, 0.5, 0.5)[:dim]
-    return wt.Scene(**{
-        "spacing": 0.05, "tank": wt.Tank(size=size), "fluids": [wt.Block(lower=(0.0,) * dim, upper=upper)], **keys,
-    })  # fmt: skip
+    return wt.Scene(
+        **{"spacing": 0.05, "tank": wt.Tank(size=size), "fluids": [wt.Block(lower=(0.0,) * dim, upper=upper)], **keys}
+    )
 
 
 def size_and_speed(scene: wt.Scene) -> tuple[float, float]:
@@ -114,9 +114,11 @@ def test_spray_does_not_enter_solids(dim, speed):
     ball = wt.Sphere(center=(0.5, 0.6, 0.5)[:dim], radius=0.12)
     box = wt.Box(center=(0.2, 0.3, 0.5)[:dim], size=(0.02, 0.4, 0.6)[:dim])
     scene = wt.Scene(
-        spacing=0.05, tank=wt.Tank(size=(1.0,) * dim), solids=[ball, box],
+        spacing=0.05,
+        tank=wt.Tank(size=(1.0,) * dim),
+        solids=[ball, box],
         fluids=[wt.Block(lower=(0.6,) + (0.0,) * (dim - 1), upper=(0.8,) + (0.1,) * (dim - 1))],
-    )  # fmt: skip
+    )
     rng = np.random.default_rng(0)
     x = rng.uniform(0.02, 0.98, (3000, dim))
     center = np.array((0.5, 0.6, 0.5)[:dim])
@@ -135,9 +137,12 @@ def test_spray_does_not_enter_solids(dim, speed):
 def test_a_moving_solid_pushes_spray_aside():
     paddle = wt.Box(name="paddle", center=(0.1, 0.5, 0.5), size=(0.1, 0.98, 0.98))
     scene = wt.Scene(
-        spacing=0.05, tank=wt.Tank(size=(1.0, 1.0, 1.0)), solids=[paddle], gravity=(0, -1e-3, 0),
+        spacing=0.05,
+        tank=wt.Tank(size=(1.0, 1.0, 1.0)),
+        solids=[paddle],
+        gravity=(0, -1e-3, 0),
         fluids=[wt.Block(lower=(0.8, 0, 0), upper=(1.0, 0.1, 1.0))],
-    )  # fmt: skip
+    )
     x = np.random.default_rng(0).uniform(0.2, 0.5, (500, 3)) * (1, 1, 1) + (0, 0.3, 0.2)
     sim = with_diffuse(scene, x)
     for k in range(20):

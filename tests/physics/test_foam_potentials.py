@@ -17,9 +17,16 @@ from wavetank.solids.distance import SolidSet
 
 @qd.kernel
 def find_surface(
-    births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
-    count: qd.i32, method: qd.template(),
-):  # fmt: skip
+    births: Births,
+    particles: Particles,
+    grid: Grid,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    a: Air,
+    count: qd.i32,
+    method: qd.template(),
+):
     for team in range(teams(grid, count)):
         find_normals(births, team, particles, grid, solids, walls, c, a, count, method)
 
@@ -31,9 +38,15 @@ def scan(values: qd.types.ndarray(), blocks: qd.types.ndarray(), count: qd.i32, 
 
 @qd.kernel
 def fill_potentials(
-    out: qd.types.ndarray(), births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air,
-    count: qd.i32, method: qd.template(),
-):  # fmt: skip
+    out: qd.types.ndarray(),
+    births: Births,
+    particles: Particles,
+    grid: Grid,
+    c: Coefficients,
+    a: Air,
+    count: qd.i32,
+    method: qd.template(),
+):
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
             sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)

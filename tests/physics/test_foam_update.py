@@ -22,8 +22,14 @@ def born(scene: wt.Scene, seconds: float) -> int:
 
 def foam_of(sim: Simulation) -> list[np.ndarray]:
     frame = sim.frame()
-    return [frame.foam_positions, frame.foam_velocities, frame.foam_kinds, frame.foam_ages, frame.foam_lives,
-            frame.foam_ids]  # fmt: skip
+    return [
+        frame.foam_positions,
+        frame.foam_velocities,
+        frame.foam_kinds,
+        frame.foam_ages,
+        frame.foam_lives,
+        frame.foam_ids,
+    ]
 
 
 @pytest.mark.parametrize("name", ["still-tank", "still-tank-2d"])

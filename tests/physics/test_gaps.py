@@ -29,9 +29,12 @@ def test_rows_that_are_drawn_apart_have_gaps():
     d = 0.025
     places = np.stack(np.meshgrid((np.arange(40) + 0.5) * 1.125 * d, (np.arange(40) + 0.5) * d), -1).reshape(-1, 2)
     scene = wt.Scene(
-        spacing=d, tank=wt.Tank(size=(1.125, 1.2)), fluids=[Points(positions=places)], gravity=(0.0, -1e-3),
+        spacing=d,
+        tank=wt.Tank(size=(1.125, 1.2)),
+        fluids=[Points(positions=places)],
+        gravity=(0.0, -1e-3),
         solids=[wt.Box(center=(1.05, 0.05), size=(0.1, 0.1))],
-    )  # fmt: skip
+    )
     sim = Simulation(scene)
     sim.step()
     level = sim.world.levels[0]

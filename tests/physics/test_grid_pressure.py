@@ -212,12 +212,11 @@ def test_deep_water_rests_in_few_steps_a_frame(wall, steps, error):
 def test_layers_of_different_density_rest():
     d = 0.025
     scene = wt.Scene(
-        spacing=d, tank=wt.Tank(size=(0.5, 1.2)), materials=[Material(name="heavy", density=3000.0)],
-        fluids=[
-            wt.Block(lower=(0, 0), upper=(0.5, 0.4), material="heavy"),
-            wt.Block(lower=(0, 0.4), upper=(0.5, 0.8)),
-        ],
-    )  # fmt: skip
+        spacing=d,
+        tank=wt.Tank(size=(0.5, 1.2)),
+        materials=[Material(name="heavy", density=3000.0)],
+        fluids=[wt.Block(lower=(0, 0), upper=(0.5, 0.4), material="heavy"), wt.Block(lower=(0, 0.4), upper=(0.5, 0.8))],
+    )
     sim = Simulation(scene)
     assert has_grid_pressure(sim.world, sim.scene)
     assert rms_speed(sim, 1.0) < 0.02

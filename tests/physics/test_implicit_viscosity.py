@@ -18,7 +18,7 @@ from wavetank.physics.dynamic_viscosity.implicit_viscosity import (
     is_viscous,
     iterations,
     solve_viscosity,
-)  # fmt: skip
+)
 from wavetank.physics.mixture import blend
 from wavetank.physics.plan import has_grid_pressure
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
@@ -32,9 +32,12 @@ def solved(x: np.ndarray, v: np.ndarray, viscosity: float, most: int = 400, **se
     """Positions and velocities, in device order, before and after one solve; the number of iterations."""
     dim = x.shape[1]
     scene = wt.Scene(
-        spacing=D, gravity=(0.0,) * dim, dynamic_viscosity=viscosity,
-        fluids=[wt.Points(positions=x, velocities=v)], **settings,
-    )  # fmt: skip
+        spacing=D,
+        gravity=(0.0,) * dim,
+        dynamic_viscosity=viscosity,
+        fluids=[wt.Points(positions=x, velocities=v)],
+        **settings,
+    )
     sim = Simulation(scene)
     sim.frame()
     world = sim.world
@@ -76,8 +79,10 @@ def test_momentum_is_exact_and_energy_falls_wherever_the_iterations_end(dim, mos
     place, before, after, number = solved(x, v, 1e5, most)
     assert number <= most
     assert np.abs((after - before).sum(axis=0)).max() < 1e-5 * np.abs(before).sum()
-    turn = [np.cross(place, w).sum(axis=0) if dim == 3 else np.sum(place[:, 0] * w[:, 1] - place[:, 1] * w[:, 0])
-            for w in (before, after)]  # fmt: skip
+    turn = [
+        np.cross(place, w).sum(axis=0) if dim == 3 else np.sum(place[:, 0] * w[:, 1] - place[:, 1] * w[:, 0])
+        for w in (before, after)
+    ]
     assert np.abs(np.subtract(*turn)).max() < 1e-5 * np.abs(before).sum()
     assert np.sum(after**2) <= np.sum(before**2)
 
@@ -202,9 +207,17 @@ def test_what_presses_is_carried_on_by_thick_fluids_only():
 
 @pytest.mark.parametrize(
     ("viscosity", "spacing", "size", "above"),
-    [(1e6, 0.01, (1, 1), 0.0), (10.0, 0.001, (30, 18), 0.0), (70.0, 0.0015, (30, 18), 0.0), (1e5, 0.01, (30, 18), 0.0),
-     (1e3, 0.01, (60, 10), 0.0), (1e6, 0.01, (1, 1), 10.0), (1e4, 0.01, (20, 10), 10.0), (1e4, 0.01, (8, 8, 8), 10.0)],
-)  # fmt: skip
+    [
+        (1e6, 0.01, (1, 1), 0.0),
+        (10.0, 0.001, (30, 18), 0.0),
+        (70.0, 0.0015, (30, 18), 0.0),
+        (1e5, 0.01, (30, 18), 0.0),
+        (1e3, 0.01, (60, 10), 0.0),
+        (1e6, 0.01, (1, 1), 10.0),
+        (1e4, 0.01, (20, 10), 10.0),
+        (1e4, 0.01, (8, 8, 8), 10.0),
+    ],
+)
 def test_thick_fluids_lie_where_they_lie_and_do_not_bounce(viscosity, spacing, size, above):
     """What pressed in the last step presses no more once the floor is left; lengths in spacings."""
     wide = 2 * size[0] + 10
@@ -213,9 +226,10 @@ def test_thick_fluids_lie_where_they_lie_and_do_not_bounce(viscosity, spacing, s
     tank = wt.Tank(size=tuple(spacing * np.array([wide, size[1] + above + 20, wide]))[: len(size)])
     gravity = (0.0, -9.81, 0.0)[: len(size)]
     sim = Simulation(
-        wt.Scene(spacing=spacing, gravity=gravity, rest_density=1400, dynamic_viscosity=viscosity, tank=tank,
-                 fluids=[block])
-    )  # fmt: skip
+        wt.Scene(
+            spacing=spacing, gravity=gravity, rest_density=1400, dynamic_viscosity=viscosity, tank=tank, fluids=[block]
+        )
+    )
     sim.advance(math.sqrt(2.0 * above * spacing / 9.81) + 0.05)
     for _ in range(30):
         sim.step()
@@ -273,10 +287,15 @@ def test_dough_that_falls_does_not_bounce(viscosity, dim):
     d, n, fall = 0.01, 20 if dim == 2 else 8, 0.3
     lower = np.array([2 * n * d, fall, 2 * n * d])[:dim]
     sim = Simulation(
-        wt.Scene(spacing=d, gravity=(0, -9.81, 0)[:dim], rest_density=1400, dynamic_viscosity=viscosity,
-                 tank=wt.Tank(size=(5 * n * d, fall + 2 * n * d, 5 * n * d)[:dim]),
-                 fluids=[wt.Block(lower=tuple(lower), upper=tuple(lower + n * d))])
-    )  # fmt: skip
+        wt.Scene(
+            spacing=d,
+            gravity=(0, -9.81, 0)[:dim],
+            rest_density=1400,
+            dynamic_viscosity=viscosity,
+            tank=wt.Tank(size=(5 * n * d, fall + 2 * n * d, 5 * n * d)[:dim]),
+            fluids=[wt.Block(lower=tuple(lower), upper=tuple(lower + n * d))],
+        )
+    )
     sim.advance(math.sqrt(2.0 * fall / 9.81) - 0.02)
     assert sim.velocities[:, 1].mean() < -2.0
     lowest, rise = math.inf, 0.0
@@ -299,9 +318,16 @@ def test_a_paddle_neither_flings_dough_nor_presses_it_together(viscosity, d, spe
     x, frames = 0.3, round(0.33 * 60 / speed)
     paddle = wt.Box(name="paddle", center=(x, 0.25), size=(0.04, 0.5))
     sim = Simulation(
-        wt.Scene(spacing=d, gravity=(0, -9.81), rest_density=1400, dynamic_viscosity=viscosity,
-                 tank=wt.Tank(size=(1.0, 0.6)), solids=[paddle], fluids=[wt.Block(lower=(0, 0), upper=(1.0, 0.2))])
-    )  # fmt: skip
+        wt.Scene(
+            spacing=d,
+            gravity=(0, -9.81),
+            rest_density=1400,
+            dynamic_viscosity=viscosity,
+            tank=wt.Tank(size=(1.0, 0.6)),
+            solids=[paddle],
+            fluids=[wt.Block(lower=(0, 0), upper=(1.0, 0.2))],
+        )
+    )
     sim.advance(0.2)
     for _ in range(frames):
         x += speed / 60
@@ -315,9 +341,16 @@ def test_without_no_slip_a_body_still_stops_on_the_floor_and_slides():
     """`no_slip` = 0 is of the drag along the wall; across it the fluid is held all the same."""
     block = wt.Block(lower=(0.2, 0.3), upper=(0.4, 0.5), velocity=(1.0, 0.0))
     sim = Simulation(
-        wt.Scene(spacing=0.01, gravity=(0, -9.81), rest_density=1400, dynamic_viscosity=1e4, no_slip=0.0,
-                 tank=wt.Tank(size=(1.5, 0.7)), fluids=[block])
-    )  # fmt: skip
+        wt.Scene(
+            spacing=0.01,
+            gravity=(0, -9.81),
+            rest_density=1400,
+            dynamic_viscosity=1e4,
+            no_slip=0.0,
+            tank=wt.Tank(size=(1.5, 0.7)),
+            fluids=[block],
+        )
+    )
     sim.advance(math.sqrt(2.0 * 0.3 / 9.81) + 0.05)
     assert abs(sim.velocities[:, 1].mean()) < 0.2
     assert sim.velocities[:, 0].mean() == pytest.approx(1.0, abs=0.1)
@@ -327,9 +360,9 @@ def test_honey_at_rest_does_not_creep_up_its_walls():
     """Walls bear nothing of its weight: pressure does, from the start of each step on (hydrostatics)."""
     honey = {"name": "honey", "density": 1400.0, "viscosity": 70.0}
     block = {"lower": [0.015, 0], "upper": [0.045, 0.05], "material": "honey"}
-    sim = Simulation(wt.Scene.parse(
-        {"spacing": 0.002, "tank": {"size": [0.06, 0.06]}, "materials": [honey], "fluids": [block]}
-    ))  # fmt: skip
+    sim = Simulation(
+        wt.Scene.parse({"spacing": 0.002, "tank": {"size": [0.06, 0.06]}, "materials": [honey], "fluids": [block]})
+    )
     sim.advance(3.0)
     start, height = sim.positions.astype(float), sim.positions[:, 1].mean()
     sim.advance(2.0)
@@ -340,10 +373,17 @@ def test_honey_at_rest_does_not_creep_up_its_walls():
 
 def test_a_sheet_of_honey_does_not_hop():
     """What its floor bore in one step it bears in the next, where nothing moves (hydrostatics): 0.006 m/s before."""
-    sim = Simulation(wt.Scene.parse({
-        "spacing": 0.0015, "rest_density": 1400.0, "dynamic_viscosity": 70.0, "tank": {"size": [0.06, 0.03]},
-        "fluids": [{"lower": [0, 0], "upper": [0.03, 0.00675], "velocity": [0.01, -0.3]}],
-    }))  # fmt: skip
+    sim = Simulation(
+        wt.Scene.parse(
+            {
+                "spacing": 0.0015,
+                "rest_density": 1400.0,
+                "dynamic_viscosity": 70.0,
+                "tank": {"size": [0.06, 0.03]},
+                "fluids": [{"lower": [0, 0], "upper": [0.03, 0.00675], "velocity": [0.01, -0.3]}],
+            }
+        )
+    )
     sim.advance(5.0)
     speeds = []
     for _ in range(60):

@@ -24,15 +24,7 @@ def mixed_cloud(dim: int, ratio: float = 100.0, **settings) -> tuple[Cloud, np.n
 def solve(cloud: Cloud, mixed: int, correction: int = 0) -> np.ndarray:
     world = cloud.world
     start_multipliers(
-        world.scratch,
-        world.particles,
-        world.grid,
-        world.solids,
-        world.walls,
-        cloud.c,
-        cloud.count,
-        cloud.method,
-        mixed,
+        world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, cloud.count, cloud.method, mixed
     )
     changes = world.scratch.dlam
     correction = correction or 3 * mixed
@@ -40,9 +32,19 @@ def solve(cloud: Cloud, mixed: int, correction: int = 0) -> np.ndarray:
         changes = world.fluids.array("packed")
         pack_multipliers(changes, world.scratch, cloud.count)
     correct_positions(
-        world.spare, world.particles, world.scratch, changes, world.grid, world.solids, world.walls, cloud.c,
-        cloud.count, cloud.method, correction, 0,
-    )  # fmt: skip
+        world.spare,
+        world.particles,
+        world.scratch,
+        changes,
+        world.grid,
+        world.solids,
+        world.walls,
+        cloud.c,
+        cloud.count,
+        cloud.method,
+        correction,
+        0,
+    )
     return cloud.predictions(world.spare) - cloud.x
 
 

@@ -63,9 +63,10 @@ def test_eight_particles_are_computed_at_once(scene, most, tmp_path):
     Where there are two dimensions the first pass of an iteration is; it is computed as vectors nevertheless.
     """
     told = {
-        "QD_OFFLINE_CACHE_FILE_PATH": str(tmp_path / "cache"), "XDG_CACHE_HOME": str(tmp_path / "cache"),
+        "QD_OFFLINE_CACHE_FILE_PATH": str(tmp_path / "cache"),
+        "XDG_CACHE_HOME": str(tmp_path / "cache"),
         "QD_PRINT_KERNEL_ASM": "1",
-    }  # fmt: skip
+    }
     program = tmp_path / "one.py"
     program.write_text(PROGRAM)
     command, env = [sys.executable, str(program), scene], {**os.environ, **told}

@@ -16,9 +16,14 @@ UNIT = float(1 << 24)
 
 @qd.kernel
 def add(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, spacing: qd.f32, count: qd.i32, lanes: qd.template(),
+    grid: CoarseGrid,
+    particles: Particles,
+    scratch: Scratch,
+    spacing: qd.f32,
+    count: qd.i32,
+    lanes: qd.template(),
     searched: qd.template(),
-):  # fmt: skip
+):
     """Add what nodes have of these particles to the sums."""
     qd.loop_config(serialize=True)
     for team in range((count + lanes - 1) // lanes):

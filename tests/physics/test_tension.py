@@ -18,9 +18,11 @@ def drop(dim: int, number: int = 10, **settings) -> Simulation:
     side = 0.01
     settings = {"surface_tension": 0.072, "frame_time": 2e-3, "largest_substeps": 100, "viscosity": 0.05, **settings}
     scene = wt.Scene(
-        spacing=side / number, gravity=(0.0,) * dim, fluids=[wt.Block(lower=(0,) * dim, upper=(side,) * dim)],
+        spacing=side / number,
+        gravity=(0.0,) * dim,
+        fluids=[wt.Block(lower=(0,) * dim, upper=(side,) * dim)],
         **settings,
-    )  # fmt: skip
+    )
     return Simulation(scene)
 
 
@@ -72,10 +74,17 @@ def test_limit_and_time_steps_agree():
 def test_a_drop_on_a_wetted_floor_comes_to_rest(angle):
     """Adhesion holds it; with time steps for the tension of its surface alone, it boils, and climbs up the walls."""
     block = wt.Block(lower=(0.007, 0), upper=(0.013, 0.004))
-    sim = Simulation(wt.Scene(
-        spacing=0.0005, tank=wt.Tank(size=(0.02, 0.01)), fluids=[block], surface_tension=0.072, contact_angle=angle,
-        dynamic_viscosity=0.005, gravity=(0.0, -9.81),
-    ))  # fmt: skip
+    sim = Simulation(
+        wt.Scene(
+            spacing=0.0005,
+            tank=wt.Tank(size=(0.02, 0.01)),
+            fluids=[block],
+            surface_tension=0.072,
+            contact_angle=angle,
+            dynamic_viscosity=0.005,
+            gravity=(0.0, -9.81),
+        )
+    )
     sim.advance(1.0)
     assert sim.positions[:, 1].max() < 0.006
     assert np.linalg.norm(sim.velocities, axis=1).max() < 0.1
@@ -101,9 +110,16 @@ def hanging(angle: float, radius: float) -> float:
     x = np.stack(np.meshgrid(axis, axis, indexing="ij"), -1).reshape(-1, 2)
     x = x[(np.sum(x**2, axis=1) < radius**2) & (x[:, 1] < 0)] + [0.01, size[1]]
     scene = wt.Scene(
-        spacing=d, tank=wt.Tank(size=size), surface_tension=0.072, contact_angle=angle, dynamic_viscosity=0.005,
-        frame_time=2e-3, largest_substeps=100, gravity=(0.0, -9.81), fluids=[wt.Points(positions=x)],
-    )  # fmt: skip
+        spacing=d,
+        tank=wt.Tank(size=size),
+        surface_tension=0.072,
+        contact_angle=angle,
+        dynamic_viscosity=0.005,
+        frame_time=2e-3,
+        largest_substeps=100,
+        gravity=(0.0, -9.81),
+        fluids=[wt.Points(positions=x)],
+    )
     sim = Simulation(scene)
     sim.advance(0.06)
     return float(np.median(sim.positions[:, 1]))

@@ -11,9 +11,9 @@ from wavetank.simulation.simulation import Simulation
 def alone(dim: int, at, velocity=None) -> Simulation:
     """One particle in the open, without gravity."""
     zero = (0.0,) * dim
-    return Simulation(wt.Scene(spacing=0.01, gravity=zero, fluids=[
-        wt.Points(positions=[at], velocities=[velocity or zero]),
-    ]))  # fmt: skip
+    return Simulation(
+        wt.Scene(spacing=0.01, gravity=zero, fluids=[wt.Points(positions=[at], velocities=[velocity or zero])])
+    )
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -76,9 +76,11 @@ def test_a_swaying_tank_throws_water_the_other_way():
 
 def test_forces_live_in_scene_files(tmp_path):
     scene = wt.Scene(
-        spacing=0.05, tank=wt.Tank(size=(1, 1)), fluids=[wt.Block(lower=(0, 0), upper=(0.5, 0.5))],
+        spacing=0.05,
+        tank=wt.Tank(size=(1, 1)),
+        fluids=[wt.Block(lower=(0, 0), upper=(0.5, 0.5))],
         forces=[Wind(velocity=(2, 0)), Attract(center=(0.5, 0.5), radius=0.2, strength=3)],
-    )  # fmt: skip
+    )
     scene.save(tmp_path / "windy.toml")
     again = wt.Scene.load(tmp_path / "windy.toml")
     assert again == scene
@@ -91,13 +93,19 @@ def test_forces_live_in_scene_files(tmp_path):
     with pytest.raises(wt.WavetankError, match=r"kind|wind"):
         again.changed(forces=[{"kind": "storm"}])
     assert {force.model_fields["kind"].default for force in FORCES} == {
-        "wind", "attract", "vortex", "drag", "burst", "sway",
-    }  # fmt: skip
+        "wind",
+        "attract",
+        "vortex",
+        "drag",
+        "burst",
+        "sway",
+    }
 
 
 def test_the_speed_limit_makes_room_for_forces():
-    scene = wt.Scene(spacing=0.05, gravity=(0, 0), tank=wt.Tank(size=(2, 1)),
-                     fluids=[wt.Points(positions=[[0.3, 0.5]])])  # fmt: skip
+    scene = wt.Scene(
+        spacing=0.05, gravity=(0, 0), tank=wt.Tank(size=(2, 1)), fluids=[wt.Points(positions=[[0.3, 0.5]])]
+    )
     sim = Simulation(scene)
     sim.push(Burst(center=(0.2, 0.5), radius=5.0, speed=3.0))
     sim.step()

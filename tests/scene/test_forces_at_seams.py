@@ -32,11 +32,12 @@ def test_without_seams_there_are_no_images():
         (Wind(velocity=(2.0, 0.0), center=(0.9, 0.5), radius=0.3), RING, [(0.9, 0.5)]),
         (Vortex(center=(1.9, 0.5, 1.0), radius=0.5, speed=1.0), BOTH, [(1.9, 0.5, 1.0), (-0.1, 0.5, 1.0)]),
         (
-            Attract(center=(0.1, 0.5, 1.9), radius=0.3, strength=1.0), BOTH,
+            Attract(center=(0.1, 0.5, 1.9), radius=0.3, strength=1.0),
+            BOTH,
             [(0.1, 0.5, 1.9), (0.1, 0.5, -0.1), (2.1, 0.5, 1.9), (2.1, 0.5, -0.1)],
         ),
     ],
-)  # fmt: skip
+)
 def test_what_reaches_over_a_seam_acts_at_the_other_side(force, tank, expected):
     np.testing.assert_allclose(centers(force, tank), expected, atol=1e-6)
 

@@ -7,10 +7,14 @@ from wavetank.foundation.errors import WavetankError
 
 
 def pool(**others):
-    return wt.Scene(**{
-        "spacing": 0.05, "tank": wt.Tank(size=(1, 1, 1)),
-        "fluids": [wt.Block(lower=(0, 0, 0), upper=(1, 0.3, 1))], **others,
-    })  # fmt: skip
+    return wt.Scene(
+        **{
+            "spacing": 0.05,
+            "tank": wt.Tank(size=(1, 1, 1)),
+            "fluids": [wt.Block(lower=(0, 0, 0), upper=(1, 0.3, 1))],
+            **others,
+        }
+    )
 
 
 def crate(**others):
@@ -32,9 +36,10 @@ def test_a_target_that_no_motor_reaches():
 
 def test_an_aim_that_asks_for_no_body():
     goal = {
-        "text": "Bring it.", "seconds": 5,
+        "text": "Bring it.",
+        "seconds": 5,
         "aims": [{"kind": "bring", "body": "boat", "lower": [0, 0, 0], "upper": [1, 1, 1], "share": 0.5}],
-    }  # fmt: skip
+    }
     with pytest.raises(WavetankError, match=r"goal\.aims\[0\]\.body = 'boat' is no body of the scene; they are: crate"):
         pool(solids=[crate()], goal=goal)
     assert pool(solids=[crate(name="boat")], goal=goal).goal is not None

@@ -72,17 +72,29 @@ def test_everything_survives_a_round_trip(tmp_path):
         preset="paper",
         viscosity=0.25,
         gravity=(0.0, -1.0, 0.5),
-        fluids=[BLOCK, wt.Ball(center=(0.7, 0.7, 0.7), radius=0.1, velocity=(0, -1, 0)),
-                wt.Points(positions=[[0.9, 0.1, 0.1]], velocities=[[0, 0, 1]])],
+        fluids=[
+            BLOCK,
+            wt.Ball(center=(0.7, 0.7, 0.7), radius=0.1, velocity=(0, -1, 0)),
+            wt.Points(positions=[[0.9, 0.1, 0.1]], velocities=[[0, 0, 1]]),
+        ],
         solids=[
-            wt.Difference(name="cup", center=(0.5, 0.5, 0.5), rotation=(0, 1, 0, 0), parts=[
-                wt.Cylinder(start=(0, 0, 0), end=(0, 0.3, 0), radius=0.1),
-                wt.Union(parts=[wt.Sphere(center=(0, 0, 0), radius=0.1),
-                                wt.Capsule(start=(0, 0, 0), end=(1, 0, 0), radius=0.1)]),
-            ]),
+            wt.Difference(
+                name="cup",
+                center=(0.5, 0.5, 0.5),
+                rotation=(0, 1, 0, 0),
+                parts=[
+                    wt.Cylinder(start=(0, 0, 0), end=(0, 0.3, 0), radius=0.1),
+                    wt.Union(
+                        parts=[
+                            wt.Sphere(center=(0, 0, 0), radius=0.1),
+                            wt.Capsule(start=(0, 0, 0), end=(1, 0, 0), radius=0.1),
+                        ]
+                    ),
+                ],
+            ),
             wt.HalfSpace(point=(0, 0.1, 0), normal=(0, 1, 1), friction=0.3),
         ],
-    )  # fmt: skip
+    )
     first.save(tmp_path / "scene.toml")
     again = wt.Scene.load(tmp_path / "scene.toml")
     assert again.table() == first.table()
@@ -162,9 +174,11 @@ def test_scaling_scales_lengths_alone():
 def test_scaling_leaves_shares_alone():
     """A tool's radius is a share of the world's length, whatever it is called."""
     goal = {
-        "text": "Fill it.", "seconds": 5, "tools": {"push": {"radius": 0.1}},
+        "text": "Fill it.",
+        "seconds": 5,
+        "tools": {"push": {"radius": 0.1}},
         "aims": {"kind": "fill", "lower": (0, 0), "upper": (0.5, 0.5), "share": 0.5},
-    }  # fmt: skip
+    }
     ball = wt.Ball(center=(0.5, 0.5), radius=0.2, velocity=(1, 2))
     gust = {"kind": "wind", "velocity": (3, 0), "center": (0.5, 0.25)}
     holes = wt.Union(parts=[wt.Sphere(center=(0.1, 0.2), radius=0.1), wt.Box(center=(0.5, 0.1), size=(0.1, 0.2))])
@@ -185,11 +199,41 @@ def test_scaling_leaves_shares_alone():
 def test_every_number_of_a_scene_is_a_length_or_known_not_to_be():
     """Who adds a field says which: see `model.METRES`."""
     others = {
-        "velocity", "velocities", "rotation", "friction", "normal", "share", "drag", "strength", "speed", "axis",
-        "duration", "acceleration", "frequency", "phase", "tilt", "tilt_axis", "direction", "side", "flow", "spread",
-        "Emitter.start", "Drain.start", "suction", "time", "heights", "density", "mass",
-        "angular_velocity", "restitution", "stiffness", "damping", "response", "target", "limits",
-    }  # fmt: skip
+        "velocity",
+        "velocities",
+        "rotation",
+        "friction",
+        "normal",
+        "share",
+        "drag",
+        "strength",
+        "speed",
+        "axis",
+        "duration",
+        "acceleration",
+        "frequency",
+        "phase",
+        "tilt",
+        "tilt_axis",
+        "direction",
+        "side",
+        "flow",
+        "spread",
+        "Emitter.start",
+        "Drain.start",
+        "suction",
+        "time",
+        "heights",
+        "density",
+        "mass",
+        "angular_velocity",
+        "restitution",
+        "stiffness",
+        "damping",
+        "response",
+        "target",
+        "limits",
+    }
     models = {Tank, Emitter, Drain, Gauge, Motion, Keyframe, *model._MODEL_OF_TAG.values()}
     assert len(models) > 20
     for kind in models:

@@ -55,10 +55,13 @@ def test_level_is_lost_by_doing_nothing(name):
 
 def scene(goal: dict, **more) -> wt.Scene:
     return wt.Scene(
-        spacing=0.05, tank=wt.Tank(size=(1.0, 0.6)),
+        spacing=0.05,
+        tank=wt.Tank(size=(1.0, 0.6)),
         fluids=[{"lower": (0, 0), "upper": (0.5, 0.4)}, {"lower": (0.5, 0), "upper": (1, 0.4), "material": "red"}],
-        materials=[{"name": "red"}], goal={"text": "Do it.", "seconds": 5, **goal}, **more,
-    )  # fmt: skip
+        materials=[{"name": "red"}],
+        goal={"text": "Do it.", "seconds": 5, **goal},
+        **more,
+    )
 
 
 def aim(kind: str, share: float, lower=(0, 0), upper=(0.5, 0.6), **more) -> dict:
@@ -71,11 +74,15 @@ def measured(*aims: dict) -> list[float]:
 
 def test_aims_measure_what_they_say():
     values = measured(
-        aim("fill", 0.5), aim("dry", 0.9), aim("deliver", 0.9), aim("deliver", 0.9, material="red"),
+        aim("fill", 0.5),
+        aim("dry", 0.9),
+        aim("deliver", 0.9),
+        aim("deliver", 0.9, material="red"),
         aim("apart", 0.9, lower=(0.5, 0), upper=(1, 0.6), material="red"),
-        aim("apart", 0.9, upper=(1, 0.6), material="red"), aim("fill", 0.5, color="#e0446a"),
+        aim("apart", 0.9, upper=(1, 0.6), material="red"),
+        aim("fill", 0.5, color="#e0446a"),
         aim("mix", 0.9, upper=(1, 0.6), material="red"),
-    )  # fmt: skip
+    )
     assert values[:-1] == pytest.approx([2 / 3, 2 / 3, 0.5, 0.0, 1.0, 0.5, 0.0], abs=0.08)
     assert values[-1] == pytest.approx(0.2), "one of five columns of cells has both halves in it"
 

@@ -24,17 +24,38 @@ from wavetank.simulation.snapshot import Packed
 
 RAY = {"origin": (0.3, 0.2, 5.0), "direction": (0.0, 0.0, -1.0)}
 EXAMPLES = [
-    c.SetParameter(name="viscosity", value=0.2), c.SetParameter(name="gravity", value=(1.0, -2.0)),
-    c.Reset(parameters={"spacing": 0.06}), c.LoadScene(name="drop-2d"), c.LoadScene(text="spacing = 0.1"),
-    c.LoadScene(name="drop", particles=4000), c.Undo(), c.SetView(axis="x", place=0.25), c.Zoom(factor=0.8, x=0.2),
-    c.ToolBegin(tool="pour", options={"aim": "ahead", "width": 0.2, "keep": True}, **RAY), c.ToolMove(**RAY, pointer=3),
-    c.ToolEnd(pointer=3), c.ToolStop(tool="pour"), c.MoveSolid(name="ball", position=(0.5, 0.3), rotation=0.5),
-    c.AddSolid(solid=wt.Box(center=(0.1, 0.2), size=(0.1, 0.1))), c.RemoveSolid(name="ball"), c.Pause(on=False),
-    c.Step(frames=3), c.Speed(factor=0.25), c.FrameLength(parts=2, filled=True), c.Rewind(time=0.3),
-    c.Bookmark(name="here", action="go"), c.SetCamera(eye=(1, 2, 3), target=(0, 0, 0)), c.Orbit(azimuth=0.1),
-    c.Pan(right=0.2), c.Zoom(factor=0.9), c.Home(), c.SetView(color_by="density"),
-    c.SetLight(environment="evening"), c.SetLight(azimuth=40.0, elevation=12.0), c.SetLight(turn=-10.0),
-]  # fmt: skip
+    c.SetParameter(name="viscosity", value=0.2),
+    c.SetParameter(name="gravity", value=(1.0, -2.0)),
+    c.Reset(parameters={"spacing": 0.06}),
+    c.LoadScene(name="drop-2d"),
+    c.LoadScene(text="spacing = 0.1"),
+    c.LoadScene(name="drop", particles=4000),
+    c.Undo(),
+    c.SetView(axis="x", place=0.25),
+    c.Zoom(factor=0.8, x=0.2),
+    c.ToolBegin(tool="pour", options={"aim": "ahead", "width": 0.2, "keep": True}, **RAY),
+    c.ToolMove(**RAY, pointer=3),
+    c.ToolEnd(pointer=3),
+    c.ToolStop(tool="pour"),
+    c.MoveSolid(name="ball", position=(0.5, 0.3), rotation=0.5),
+    c.AddSolid(solid=wt.Box(center=(0.1, 0.2), size=(0.1, 0.1))),
+    c.RemoveSolid(name="ball"),
+    c.Pause(on=False),
+    c.Step(frames=3),
+    c.Speed(factor=0.25),
+    c.FrameLength(parts=2, filled=True),
+    c.Rewind(time=0.3),
+    c.Bookmark(name="here", action="go"),
+    c.SetCamera(eye=(1, 2, 3), target=(0, 0, 0)),
+    c.Orbit(azimuth=0.1),
+    c.Pan(right=0.2),
+    c.Zoom(factor=0.9),
+    c.Home(),
+    c.SetView(color_by="density"),
+    c.SetLight(environment="evening"),
+    c.SetLight(azimuth=40.0, elevation=12.0),
+    c.SetLight(turn=-10.0),
+]
 
 
 OTHER = """
@@ -55,16 +76,21 @@ def test_commands_survive_the_way_through_json():
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        (None, "must be a table"), ([], "must be a table"), ({}, "do = 'None' is not a command"),
+        (None, "must be a table"),
+        ([], "must be a table"),
+        ({}, "do = 'None' is not a command"),
         ({"do": "swim"}, "'swim' is not a command; it must be one of set, reset"),
-        ({"do": "speed", "factor": float("nan")}, "factor = nan"), ({"do": "speed", "factor": 100}, "at most 4"),
-        ({"do": "speed"}, "factor is missing"), ({"do": "speed", "factr": 1}, "did you mean 'factor'"),
+        ({"do": "speed", "factor": float("nan")}, "factor = nan"),
+        ({"do": "speed", "factor": 100}, "at most 4"),
+        ({"do": "speed"}, "factor is missing"),
+        ({"do": "speed", "factr": 1}, "did you mean 'factor'"),
         ({"do": "tool-move", "origin": [0, 0], "direction": [0, 0, 1]}, "origin"),
         ({"do": "tool-move", "origin": [0, 0, 1e9], "direction": [0, 0, 1]}, "at most 1"),
         ({"do": "tool-move", "origin": [0, 0, 0], "direction": [0, 0, 0]}, "too short"),
-        ({"do": "add-solid", "solid": {"shape": "cone"}}, "cone"), ({"do": "load"}, "either the name"),
+        ({"do": "add-solid", "solid": {"shape": "cone"}}, "cone"),
+        ({"do": "load"}, "either the name"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_command_is_one_sentence(table, words):
     with pytest.raises(wt.WavetankError, match=re.escape(words)) as report:
         command_of(table)
@@ -98,11 +124,16 @@ def test_refusals_become_notes_and_leave_no_trace():
     session = Session(pool())
     log = len(session.log)
     for command in (
-        c.SetParameter(name="viscosity", value=-1.0), c.SetParameter(name="spacing", value=0.1),
-        c.RemoveSolid(name="whale"), c.RemoveSolid(name="tank x lower"), c.LoadScene(text="spacing = 0"),
-        c.Reset(parameters={"spacing": 1e-4}), c.Bookmark(name="x", action="go"), c.SetView(view="x-ray"),
+        c.SetParameter(name="viscosity", value=-1.0),
+        c.SetParameter(name="spacing", value=0.1),
+        c.RemoveSolid(name="whale"),
+        c.RemoveSolid(name="tank x lower"),
+        c.LoadScene(text="spacing = 0"),
+        c.Reset(parameters={"spacing": 1e-4}),
+        c.Bookmark(name="x", action="go"),
+        c.SetView(view="x-ray"),
         c.MoveSolid(name="ball", position=(0.1, 0.2, 0.3)),
-    ):  # fmt: skip
+    ):
         session.submit(command)
     before = session.sim.scene.model_copy(deep=True)
     session.drain()
@@ -248,11 +279,13 @@ def test_a_recording_that_is_none(tmp_path):
     path = tmp_path / "r.toml"
     good = Recording.of(Session(pool()), pool())
     for text, words in (
-        ("frames =", "cannot be read"), ("frames = 1", "scene is missing"), ("format = 2\n[scene]\n", "format = 2"),
+        ("frames =", "cannot be read"),
+        ("frames = 1", "scene is missing"),
+        ("format = 2\n[scene]\n", "format = 2"),
         (good.text() + '[[commands]]\nframe = 3\ndo = "home"\n', "commands[0].frame = 3"),
         (good.text() + '[[commands]]\nframe = 0\ndo = "swim"\n', "commands[0]: do = 'swim'"),
         (good.text() + '[[commands]]\nframe = 0\ndo = "remove-solid"\nname = "whale"\n', "before frame 0 is refused"),
-    ):  # fmt: skip
+    ):
         path.write_text(text.replace("commands = []\n", ""))
         with pytest.raises(wt.WavetankError, match=re.escape(words)) as report:
             list(replay(Recording.load(path), origin=str(path)))
@@ -269,8 +302,11 @@ def test_a_killed_session_keeps_its_recording(tmp_path):
     path = tmp_path / "session.toml"
     process = subprocess.Popen(
         [sys.executable, "-c", OFTEN, "play", "drop-2d", "--web", "--no-browser", "--port", "0", "--record", str(path)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
     port, token = re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", process.stdout.readline()).groups()
     with connect(f"ws://127.0.0.1:{port}/socket?token={token}", max_size=None) as socket:
         socket.send('{"do": "point-begin", "x": 0.5, "y": 0.7, "tool": "stir"}')
@@ -299,9 +335,12 @@ def test_play_records_and_replay_repeats(tmp_path):
     wavetank = [sys.executable, "-m", "wavetank"]
     process = subprocess.Popen(
         [*wavetank, "play", "drop-2d", "--web", "--no-browser", "--port", "0", "--record", str(path)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )  # fmt: skip
+    )
     line = process.stdout.readline()
     port, token = re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", line).groups()
     with connect(f"ws://127.0.0.1:{port}/socket?token={token}", max_size=None) as socket:
@@ -320,8 +359,10 @@ def test_play_records_and_replay_repeats(tmp_path):
     assert {"tool-begin", "set"} <= {command["do"] for command in table["commands"]}
     result = subprocess.run(
         [*wavetank, "replay", str(path), "--video", str(film), "--size", "160x96", "--json"],
-        capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
     assert result.returncode == 0, result.stderr
     figures = json.loads(result.stdout.splitlines()[-1])
     assert figures["same"] is True

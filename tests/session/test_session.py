@@ -19,12 +19,19 @@ COUNT = int(os.environ.get("WAVETANK_RANDOM_COMMANDS", "10000"))
 def pool(dim: int = 2, **keys) -> wt.Scene:
     """A small basin with a ball in it."""
     size = (1.0, 0.6, 0.4)[:dim]
-    return wt.Scene(**{
-        "spacing": 0.05, "tank": wt.Tank(size=size), "substeps": 2, "iterations": 2,
-        "largest_substeps": 4, "wave_courant": 2.0,
-        "fluids": [wt.Block(lower=(0.0,) * dim, upper=(0.6, 0.4, 0.4)[:dim])],
-        "solids": [wt.Sphere(name="ball", center=(0.8, 0.1, 0.2)[:dim], radius=0.08)], **keys,
-    })  # fmt: skip
+    return wt.Scene(
+        **{
+            "spacing": 0.05,
+            "tank": wt.Tank(size=size),
+            "substeps": 2,
+            "iterations": 2,
+            "largest_substeps": 4,
+            "wave_courant": 2.0,
+            "fluids": [wt.Block(lower=(0.0,) * dim, upper=(0.6, 0.4, 0.4)[:dim])],
+            "solids": [wt.Sphere(name="ball", center=(0.8, 0.1, 0.2)[:dim], radius=0.08)],
+            **keys,
+        }
+    )
 
 
 def down(x: float, y: float) -> dict:
@@ -41,10 +48,7 @@ class Monkey:
     def ray(self) -> dict:
         spot = self.random.uniform
         if self.random.random() < 0.1:
-            return {
-                "origin": [spot(-9, 9) for _ in range(3)],
-                "direction": [spot(-1, 1), spot(-1, 1), spot(0.01, 1)],
-            }
+            return {"origin": [spot(-9, 9) for _ in range(3)], "direction": [spot(-1, 1), spot(-1, 1), spot(0.01, 1)]}
         return down(spot(-0.2, 1.2), spot(-0.2, 0.9))
 
     def tool(self) -> dict:
@@ -67,34 +71,57 @@ class Monkey:
     def command(self) -> dict:
         r = self.random
         number = r.choice((0.0, -1.0, 0.3, 1.0, 5.0, 1e9, float("nan"), float("inf")))
-        return r.choice((
-            lambda: {"do": "tool-begin", "pointer": r.randrange(3), **self.tool(), **self.ray()},
-            lambda: {"do": "tool-begin", "pointer": r.randrange(3), **self.tool(), **self.ray()},
-            lambda: {"do": "tool-move", "pointer": r.randrange(3), **self.ray()},
-            lambda: {"do": "tool-move", "pointer": r.randrange(3), **self.ray()},
-            lambda: {"do": "tool-end", "pointer": r.randrange(3)},
-            lambda: {"do": "tool-stop"},
-            lambda: {"do": "set", "name": r.choice(("viscosity", "vorticity", "tensile_strength")), "value": number},
-            lambda: {"do": "set", "name": "gravity", "value": (r.uniform(-20, 20), r.uniform(-20, 20))},
-            lambda: {"do": "set", "name": "iterations", "value": r.choice((1, 2, 3, 0, -5, "many"))},
-            lambda: {"do": "set", "name": r.choice(("spacing", "taste")), "value": number},
-            lambda: {"do": "move-solid", "name": "ball", "position": (r.uniform(-1, 2), r.uniform(-1, 2))},
-            lambda: {"do": "move-solid", "name": "ball", "rotation": number},
-            lambda: {"do": "add-solid", "solid": {"shape": "box", "center": [r.random(), r.random() * 0.6],
-                                                  "size": [0.1, r.choice((0.1, -1.0))]}},
-            lambda: {"do": "remove-solid", "name": r.choice(("ball", "solid 1", "solid 2", "solid 3", "tank x lower"))},
-            lambda: {"do": "pause", "on": r.random() < 0.3},
-            lambda: {"do": "step", "frames": r.choice((1, 2, 0))},
-            lambda: {"do": "speed", "factor": r.choice((0.1, 0.5, 1.0, 2.0, 0.0, number))},
-            lambda: {"do": "rewind", "time": number},
-            lambda: {"do": "bookmark", "name": r.choice("abc"), "action": r.choice(("set", "go", "forget", "burn"))},
-            lambda: {"do": "camera", "eye": [1, 1, number], "target": [0, 0, 0]},
-            lambda: {"do": "orbit", "azimuth": number}, lambda: {"do": "pan", "right": number},
-            lambda: {"do": "zoom", "factor": number}, lambda: {"do": "home"},
-            lambda: {"do": "view", "color_by": r.choice(("speed", "density", "#123456", "taste"))},
-            lambda: {"do": "light", "environment": r.choice(("", "evening", "disco")), "rise": number},
-            lambda: {"do": "fly"}, lambda: {"do": ["set"]}, lambda: {"don't": 1},
-        ))()  # fmt: skip
+        return r.choice(
+            (
+                lambda: {"do": "tool-begin", "pointer": r.randrange(3), **self.tool(), **self.ray()},
+                lambda: {"do": "tool-begin", "pointer": r.randrange(3), **self.tool(), **self.ray()},
+                lambda: {"do": "tool-move", "pointer": r.randrange(3), **self.ray()},
+                lambda: {"do": "tool-move", "pointer": r.randrange(3), **self.ray()},
+                lambda: {"do": "tool-end", "pointer": r.randrange(3)},
+                lambda: {"do": "tool-stop"},
+                lambda: {
+                    "do": "set",
+                    "name": r.choice(("viscosity", "vorticity", "tensile_strength")),
+                    "value": number,
+                },
+                lambda: {"do": "set", "name": "gravity", "value": (r.uniform(-20, 20), r.uniform(-20, 20))},
+                lambda: {"do": "set", "name": "iterations", "value": r.choice((1, 2, 3, 0, -5, "many"))},
+                lambda: {"do": "set", "name": r.choice(("spacing", "taste")), "value": number},
+                lambda: {"do": "move-solid", "name": "ball", "position": (r.uniform(-1, 2), r.uniform(-1, 2))},
+                lambda: {"do": "move-solid", "name": "ball", "rotation": number},
+                lambda: {
+                    "do": "add-solid",
+                    "solid": {
+                        "shape": "box",
+                        "center": [r.random(), r.random() * 0.6],
+                        "size": [0.1, r.choice((0.1, -1.0))],
+                    },
+                },
+                lambda: {
+                    "do": "remove-solid",
+                    "name": r.choice(("ball", "solid 1", "solid 2", "solid 3", "tank x lower")),
+                },
+                lambda: {"do": "pause", "on": r.random() < 0.3},
+                lambda: {"do": "step", "frames": r.choice((1, 2, 0))},
+                lambda: {"do": "speed", "factor": r.choice((0.1, 0.5, 1.0, 2.0, 0.0, number))},
+                lambda: {"do": "rewind", "time": number},
+                lambda: {
+                    "do": "bookmark",
+                    "name": r.choice("abc"),
+                    "action": r.choice(("set", "go", "forget", "burn")),
+                },
+                lambda: {"do": "camera", "eye": [1, 1, number], "target": [0, 0, 0]},
+                lambda: {"do": "orbit", "azimuth": number},
+                lambda: {"do": "pan", "right": number},
+                lambda: {"do": "zoom", "factor": number},
+                lambda: {"do": "home"},
+                lambda: {"do": "view", "color_by": r.choice(("speed", "density", "#123456", "taste"))},
+                lambda: {"do": "light", "environment": r.choice(("", "evening", "disco")), "rise": number},
+                lambda: {"do": "fly"},
+                lambda: {"do": ["set"]},
+                lambda: {"don't": 1},
+            )
+        )()
 
 
 def ids(session: Session) -> np.ndarray:

@@ -14,10 +14,14 @@ SPACING = 0.05
 def basin(dim: int = 2, **keys) -> wt.Scene:
     """Still water, 0.3 m deep, in a tank of 1.2 m."""
     size = (1.2, 0.8, 0.5)[:dim]
-    return wt.Scene(**{
-        "spacing": SPACING, "tank": wt.Tank(size=size),
-        "fluids": [wt.Block(lower=(0,) * dim, upper=(1.2, 0.3, 0.5)[:dim])], **keys,
-    })  # fmt: skip
+    return wt.Scene(
+        **{
+            "spacing": SPACING,
+            "tank": wt.Tank(size=size),
+            "fluids": [wt.Block(lower=(0,) * dim, upper=(1.2, 0.3, 0.5)[:dim])],
+            **keys,
+        }
+    )
 
 
 def ray(x: float, y: float, z: float = 0.25) -> dict:

@@ -10,9 +10,11 @@ from wavetank.session.commands import command_of
 from wavetank.session.recording import Recording, replay
 
 POOL = wt.Scene(
-    title="Pool", spacing=0.04, tank=wt.Tank(size=(1.2, 0.8, 0.4)),
+    title="Pool",
+    spacing=0.04,
+    tank=wt.Tank(size=(1.2, 0.8, 0.4)),
     fluids=[wt.Block(lower=(0, 0, 0), upper=(1.2, 0.32, 0.4))],
-)  # fmt: skip
+)
 
 
 def ray(session, u, v):

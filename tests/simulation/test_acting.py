@@ -12,10 +12,17 @@ pytest.importorskip("rapier3d")
 
 
 def above_a_puddle(*bodies, joints=(), forces=(), gravity=(0, -9.81, 0)) -> wt.Simulation:
-    return wt.Simulation(wt.Scene(
-        spacing=0.1, tank=wt.Tank(size=(2, 2, 1)), fluids=[wt.Block(lower=(0, 0, 0), upper=(2, 0.2, 1))],
-        solids=list(bodies), joints=list(joints), forces=list(forces), gravity=gravity,
-    ))  # fmt: skip
+    return wt.Simulation(
+        wt.Scene(
+            spacing=0.1,
+            tank=wt.Tank(size=(2, 2, 1)),
+            fluids=[wt.Block(lower=(0, 0, 0), upper=(2, 0.2, 1))],
+            solids=list(bodies),
+            joints=list(joints),
+            forces=list(forces),
+            gravity=gravity,
+        )
+    )
 
 
 def test_wind_takes_bodies_along_as_it_takes_water():
@@ -82,10 +89,13 @@ def test_a_ring_of_joints_has_no_effort_of_its_own():
 def test_what_clings_to_a_body_pulls_it():
     """Newton's third law for adhesion: a drop that wets a box draws it near, and the sum of momenta stays zero."""
     scene = wt.Scene(
-        spacing=0.002, gravity=(0, 0, 0), calming=0, surface_tension=0.07,
+        spacing=0.002,
+        gravity=(0, 0, 0),
+        calming=0,
+        surface_tension=0.07,
         fluids=[wt.Block(lower=(-0.01, -0.01, -0.01), upper=(0.01, 0.01, 0.01))],
         solids=[wt.Box(name="box", center=(0.021, 0, 0), size=(0.02, 0.03, 0.03), density=600)],
-    )  # fmt: skip
+    )
     sim, largest = wt.Simulation(scene), 0.0
     box, mass = sim.bodies["box"], 1000 * 0.002**3
     for _ in range(24):

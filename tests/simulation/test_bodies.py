@@ -30,8 +30,14 @@ def level(sim: wt.Simulation, displaced: float) -> float:
 def test_a_box_floats_as_deep_as_archimedes_says(ratio):
     """Draft = density ratio times height; at rest it does not jitter."""
     tall = 0.2
-    sim = pool(wt.Box(name="box", center=(0.48, DEEP + tall * (0.5 - ratio), 0.48), size=(0.32, tall, 0.32),
-                      density=1000.0 * ratio))  # fmt: skip
+    sim = pool(
+        wt.Box(
+            name="box",
+            center=(0.48, DEEP + tall * (0.5 - ratio), 0.48),
+            size=(0.32, tall, 0.32),
+            density=1000.0 * ratio,
+        )
+    )
     box, heights, speeds, forces = sim.bodies["box"], [], [], []
     for frame in range(240):
         sim.step()
@@ -75,9 +81,11 @@ def test_what_is_heavier_than_water_sinks_at_a_pace():
 def test_a_disc_floats_in_a_plane():
     """The same in 2-D, where a body has the mass of a metre of it."""
     scene = wt.Scene(
-        spacing=0.02, tank=wt.Tank(size=(1.0, 0.8)), fluids=[wt.Block(lower=(0, 0), upper=(1.0, 0.4))],
+        spacing=0.02,
+        tank=wt.Tank(size=(1.0, 0.8)),
+        fluids=[wt.Block(lower=(0, 0), upper=(1.0, 0.4))],
         solids=[wt.Sphere(name="disc", center=(0.5, 0.42), radius=0.12, density=500)],
-    )  # fmt: skip
+    )
     sim = wt.Simulation(scene)
     disc = sim.bodies["disc"]
     assert disc.mass == pytest.approx(500 * np.pi * 0.12**2, rel=2e-3)
@@ -94,9 +102,11 @@ def test_a_disc_floats_in_a_plane():
 def test_half_of_a_body_is_under_water(spacing):
     """Whatever the unit of the sums, which depends on the spacing."""
     scene = wt.Scene(
-        spacing=spacing, tank=wt.Tank(size=(1.0, 0.8)), fluids=[wt.Block(lower=(0, 0), upper=(1.0, 0.4))],
+        spacing=spacing,
+        tank=wt.Tank(size=(1.0, 0.8)),
+        fluids=[wt.Block(lower=(0, 0), upper=(1.0, 0.4))],
         solids=[wt.Box(name="box", center=(0.5, 0.4), size=(0.3, 0.2), density=500, held=True)],
-    )  # fmt: skip
+    )
     sim = wt.Simulation(scene)
     sim.advance(0.5)
     assert sim.bodies["box"].immersed == pytest.approx(0.5, abs=0.1)
@@ -105,12 +115,14 @@ def test_half_of_a_body_is_under_water(spacing):
 def test_momentum_goes_from_water_to_body():
     """Without gravity the sum of momenta and of their moments stays, and energy does not rise."""
     scene = wt.Scene(
-        spacing=0.03, gravity=(0, 0, 0), calming=0,
+        spacing=0.03,
+        gravity=(0, 0, 0),
+        calming=0,
         fluids=[wt.Block(lower=(-0.2, -0.2, -0.2), upper=(0.2, 0.2, 0.2), velocity=(1, 0, 0))],
         solids=[
             wt.Box(name="box", center=(0.4, 0.05, 0), size=(0.2, 0.2, 0.2), density=600, rotation=(0.9, 0.1, 0.3, 0.2))
         ],
-    )  # fmt: skip
+    )
     sim, mass = wt.Simulation(scene), 1000 * 0.03**3
     body = sim.bodies["box"]
 
@@ -258,19 +270,23 @@ def test_bodies_come_and_go():
 def test_joints_hold():
     """A pendulum's rope keeps its length, a hinge its place, a motor its speed, a slider its line."""
     tank = wt.Tank(size=(2.0, 2.0, 2.0))
-    sim = wt.Simulation(wt.Scene(
-        spacing=0.1, tank=tank, fluids=[wt.Block(lower=(0, 0, 0), upper=(2, 0.2, 2))],
-        solids=[
-            wt.Sphere(name="bob", center=(1.5, 1.5, 1.0), radius=0.1, density=3000),
-            wt.Box(name="wheel", center=(0.5, 1.2, 0.5), size=(0.6, 0.1, 0.2), density=500),
-            wt.Box(name="gate", center=(1.0, 1.4, 0.3), size=(0.2, 0.2, 0.1), density=500),
-        ],
-        joints=[
-            wt.Rope(first="bob", at=(1.5, 1.5, 1.0), to=(1.0, 1.5, 1.0)),
-            wt.Hinge(first="wheel", at=(0.5, 1.2, 0.5), axis=(0, 0, 1), speed=2.0),
-            wt.Slider(first="gate", at=(1.0, 1.4, 0.3), axis=(0, 1, 0), limits=(-0.3, 0.0)),
-        ],
-    ))  # fmt: skip
+    sim = wt.Simulation(
+        wt.Scene(
+            spacing=0.1,
+            tank=tank,
+            fluids=[wt.Block(lower=(0, 0, 0), upper=(2, 0.2, 2))],
+            solids=[
+                wt.Sphere(name="bob", center=(1.5, 1.5, 1.0), radius=0.1, density=3000),
+                wt.Box(name="wheel", center=(0.5, 1.2, 0.5), size=(0.6, 0.1, 0.2), density=500),
+                wt.Box(name="gate", center=(1.0, 1.4, 0.3), size=(0.2, 0.2, 0.1), density=500),
+            ],
+            joints=[
+                wt.Rope(first="bob", at=(1.5, 1.5, 1.0), to=(1.0, 1.5, 1.0)),
+                wt.Hinge(first="wheel", at=(0.5, 1.2, 0.5), axis=(0, 0, 1), speed=2.0),
+                wt.Slider(first="gate", at=(1.0, 1.4, 0.3), axis=(0, 1, 0), limits=(-0.3, 0.0)),
+            ],
+        )
+    )
     lengths, lowest = [], 2.0
     for _ in range(60):
         sim.step()
@@ -301,7 +317,7 @@ def test_joints_hold():
             "has no direction",
         ),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_body_and_no_joint_is_said(solids, joints, what):
     """One sentence: what, where, what is allowed."""
     with pytest.raises(WavetankError, match=what) as said:
@@ -312,10 +328,12 @@ def test_what_is_no_body_and_no_joint_is_said(solids, joints, what):
 def test_a_body_falls_as_gravity_does_that_changes():
     """Of its own motion, in the air, v = the integral of g."""
     scene = wt.Scene(
-        spacing=0.05, gravity=("4*sin(pi*t)", 0, 0), tank=wt.Tank(size=(4, 4, 4)),
+        spacing=0.05,
+        gravity=("4*sin(pi*t)", 0, 0),
+        tank=wt.Tank(size=(4, 4, 4)),
         fluids=[wt.Block(lower=(0, 0, 0), upper=(0.2, 0.1, 0.2))],
         solids=[wt.Sphere(name="ball", center=(1, 2, 2), radius=0.1, density=500)],
-    )  # fmt: skip
+    )
     sim = wt.Simulation(scene)
     sim.advance(1.0)
     assert sim.bodies["ball"].velocity == pytest.approx([8 / np.pi, 0, 0], rel=0.01)
@@ -326,13 +344,21 @@ def test_a_cup_rests_on_the_walls_of_the_tank(dim):
     """A cup, which is a difference, slides down a wall to the floor, in a tilted gravity, or to what it caught."""
     outer, inner = (0.3, 0.3, 0.3)[:dim], (0.2, 0.3, 0.2)[:dim]
     cup = wt.Difference(
-        name="cup", center=(0.4, 0.5, 0.5)[:dim], density=3000.0, friction=0.0,
+        name="cup",
+        center=(0.4, 0.5, 0.5)[:dim],
+        density=3000.0,
+        friction=0.0,
         parts=[wt.Box(center=(0, 0, 0)[:dim], size=outer), wt.Box(center=(0, 0.1, 0)[:dim], size=inner)],
-    )  # fmt: skip
-    sim = wt.Simulation(wt.Scene(
-        spacing=0.05, tank=wt.Tank(size=(1.0, 1.0, 1.0)[:dim]), solids=[cup], gravity=(-3.0, -9.0, 0.0)[:dim],
-        fluids=[wt.Block(lower=(0.7, 0, 0)[:dim], upper=(1.0, 0.1, 1.0)[:dim])],
-    ))  # fmt: skip
+    )
+    sim = wt.Simulation(
+        wt.Scene(
+            spacing=0.05,
+            tank=wt.Tank(size=(1.0, 1.0, 1.0)[:dim]),
+            solids=[cup],
+            gravity=(-3.0, -9.0, 0.0)[:dim],
+            fluids=[wt.Block(lower=(0.7, 0, 0)[:dim], upper=(1.0, 0.1, 1.0)[:dim])],
+        )
+    )
     sim.advance(2.0)
     assert sim.bodies["cup"].position[:2].tolist() == pytest.approx([0.15, 0.15], abs=0.05)
     assert np.linalg.norm(sim.bodies["cup"].velocity) < 0.15
@@ -385,8 +411,9 @@ def test_what_sinks_lies_on_the_ground_and_rests(ratio, on):
     The layer takes up to 6 s to give way, with a box a tenth heavier than water.
     """
     ground, solids = (0.0, []) if on == "floor" else (0.1, [wt.Box(center=(0.48, 0.05, 0.48), size=(0.6, 0.1, 0.6))])
-    sim = pool(wt.Box(name="box", center=(0.48, ground + 0.16, 0.48), size=(0.32, 0.2, 0.32), density=1000.0 * ratio),
-               *solids)  # fmt: skip
+    sim = pool(
+        wt.Box(name="box", center=(0.48, ground + 0.16, 0.48), size=(0.32, 0.2, 0.32), density=1000.0 * ratio), *solids
+    )
     box, speeds = sim.bodies["box"], []
     for frame in range(480):
         sim.step()
@@ -463,9 +490,10 @@ def test_bodies_of_a_plane_stay_in_it():
     places = [(0.2 + 0.15 * (k % 5), 0.3 + 0.2 * (k // 5)) for k in range(10)]
     solids = [
         wt.Capsule(start=(x - 0.05, y), end=(x + 0.05, y + 0.02), radius=0.03, density=300.0 + 150.0 * k)
-        if k % 2 else wt.Box(center=(x, y), size=(0.1, 0.08), density=1500.0 - 150.0 * k, rotation=0.1 * k)
+        if k % 2
+        else wt.Box(center=(x, y), size=(0.1, 0.08), density=1500.0 - 150.0 * k, rotation=0.1 * k)
         for k, (x, y) in enumerate(places)
-    ]  # fmt: skip
+    ]
     block = wt.Block(lower=(0, 0), upper=(1.0, 0.2))
     sim = wt.Simulation(wt.Scene(spacing=0.025, tank=wt.Tank(size=(1.0, 1.2)), fluids=[block], solids=solids))
     sim.advance(1.5)

@@ -19,13 +19,14 @@ def ball_in_duct(ratio, viscosity, start, seconds=0.6, **others):
     """
     density, radius, wide, high = 1400.0, 0.06, 0.48, 0.48
     scene = wt.Scene(
-        spacing=0.02, tank=wt.Tank(size=(wide, high + 0.1, wide)), foam=0,
+        spacing=0.02,
+        tank=wt.Tank(size=(wide, high + 0.1, wide)),
+        foam=0,
         materials=[{"name": "honey", "density": density, "viscosity": viscosity}],
         fluids=[wt.Block(lower=(0, 0, 0), upper=(wide, high, wide), material="honey")],
-        solids=[
-            wt.Sphere(name="b", center=(wide / 2, start * high, wide / 2), radius=radius, density=density * ratio)
-        ], **others,
-    )  # fmt: skip
+        solids=[wt.Sphere(name="b", center=(wide / 2, start * high, wide / 2), radius=radius, density=density * ratio)],
+        **others,
+    )
     sim = wt.Simulation(scene)
     sim.advance(seconds - 0.2)
     before = sim.bodies["b"].position[1]
@@ -46,11 +47,14 @@ def test_a_ball_moves_at_stokes_speed(ratio, viscosity, start):
 def test_the_fluid_takes_the_momentum_that_its_drag_takes_from_a_body(viscosity):
     """Without gravity the sum of momenta stays (Newton's third law): none went to the fluid that drag held."""
     scene = wt.Scene(
-        spacing=0.03, gravity=(0, 0, 0), calming=0, viscosity=0,
+        spacing=0.03,
+        gravity=(0, 0, 0),
+        calming=0,
+        viscosity=0,
         materials=[{"name": "honey", "density": 1400.0, "viscosity": viscosity}],
         fluids=[wt.Block(lower=(-0.24,) * 3, upper=(0.24,) * 3, material="honey")],
         solids=[wt.Sphere(name="b", center=(0, 0, 0), radius=0.09, density=700, velocity=(1, 0, 0))],
-    )  # fmt: skip
+    )
     sim = wt.Simulation(scene)
     body, mass = sim.bodies["b"], 1400 * 0.03**3
 
@@ -66,10 +70,13 @@ def test_the_fluid_takes_the_momentum_that_its_drag_takes_from_a_body(viscosity)
 def test_a_box_floats_in_honey_as_deep_as_it_is_heavy():
     """Archimedes; what holds it is its weight, all of which is the fluid's push."""
     scene = wt.Scene(
-        spacing=0.03, tank=wt.Tank(size=(0.48, 0.5, 0.48)), foam=0, materials=HONEY,
+        spacing=0.03,
+        tank=wt.Tank(size=(0.48, 0.5, 0.48)),
+        foam=0,
+        materials=HONEY,
         fluids=[wt.Block(lower=(0, 0, 0), upper=(0.48, 0.36, 0.48), material="honey")],
         solids=[wt.Box(name="b", center=(0.24, 0.36, 0.24), size=(0.18, 0.18, 0.18), density=700)],
-    )  # fmt: skip
+    )
     sim = wt.Simulation(scene)
     sim.advance(1.5)
     body = sim.bodies["b"]
@@ -82,10 +89,12 @@ def test_a_box_floats_in_honey_as_deep_as_it_is_heavy():
 
 def test_it_goes_on_from_a_saved_state_to_the_last_bit(tmp_path):
     scene = wt.Scene(
-        spacing=0.05, tank=wt.Tank(size=(0.6, 0.6, 0.6)), materials=HONEY,
+        spacing=0.05,
+        tank=wt.Tank(size=(0.6, 0.6, 0.6)),
+        materials=HONEY,
         fluids=[wt.Block(lower=(0, 0, 0), upper=(0.6, 0.4, 0.6), material="honey")],
         solids=[wt.Sphere(name="b", center=(0.3, 0.3, 0.3), radius=0.1, density=2000)],
-    )  # fmt: skip
+    )
     sim = wt.Simulation(scene)
     sim.advance(0.1)
     sim.save(tmp_path / "a.npz")

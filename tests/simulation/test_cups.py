@@ -54,9 +54,12 @@ def test_a_cup_on_a_table_is_filled_and_knocked():
 def test_a_cup_in_an_arm_is_shaken_for_twenty_seconds():
     grip = wt.Slider(name="arm", first="cup", at=(0.6, 0.6, 0.5), axis=(1, 0.15, 0), target="0.03*sin(11*t)")
     scene = wt.Scene(
-        spacing=0.0375, tank=wt.Tank(size=(1.2, 1.2, 1.0)), fluids=[water_in(0.4)], solids=[cup(0.4)],
+        spacing=0.0375,
+        tank=wt.Tank(size=(1.2, 1.2, 1.0)),
+        fluids=[water_in(0.4)],
+        solids=[cup(0.4)],
         joints=[grip.model_copy(update={"strength": 5000.0})],
-    )  # fmt: skip
+    )
     sim, ways = wt.Simulation(scene), []
     over = np.zeros(sim.count, bool)
     for _ in range(1200):

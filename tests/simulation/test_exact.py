@@ -33,8 +33,9 @@ def test_restored_worlds_have_the_same_digest_at_every_later_step(name, tmp_path
 @pytest.mark.parametrize("quality", ["draft", "standard", "high"])
 def test_a_digest_knows_no_order_of_keys(quality, tmp_path):
     """Scenes of any quality, before and after they were assigned to: levels are of another one."""
-    scene = wt.Scene(spacing=0.1, tank=wt.Tank(size=(1, 1)), fluids=[wt.Block(lower=(0, 0), upper=(0.5, 0.5))],
-                     quality=quality)  # fmt: skip
+    scene = wt.Scene(
+        spacing=0.1, tank=wt.Tank(size=(1, 1)), fluids=[wt.Block(lower=(0, 0), upper=(0.5, 0.5))], quality=quality
+    )
     sim = wt.Simulation(scene)
     sim.step()
     sim.save(tmp_path / "a.npz")

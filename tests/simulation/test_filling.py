@@ -8,11 +8,23 @@ from wavetank.simulation.simulation import Simulation
 
 BOX = (
     np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]),
-    np.array([
-        (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
-        (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3),
-    ]),
-)  # fmt: skip
+    np.array(
+        [
+            (0, 1, 3),
+            (0, 3, 2),
+            (4, 6, 7),
+            (4, 7, 5),
+            (0, 4, 5),
+            (0, 5, 1),
+            (2, 3, 7),
+            (2, 7, 6),
+            (0, 2, 6),
+            (0, 6, 4),
+            (1, 5, 7),
+            (1, 7, 3),
+        ]
+    ),
+)
 D = 0.03
 TURNED = (0.9, 0.3, 0.2, 0.24)
 
@@ -130,8 +142,9 @@ def test_water_on_a_solid_floor_rests_wherever_it_cuts_the_cells(height):
 
 def test_water_on_a_slope_rests():
     slope = wt.HalfSpace(point=(0.5, 0.2), normal=(-np.sin(0.3), np.cos(0.3)))
-    scene = wt.Scene(spacing=0.02, tank=wt.Tank(size=(1, 1)), solids=[slope],
-                     fluids=[wt.Block(lower=(0, 0), upper=(1, 0.5))])  # fmt: skip
+    scene = wt.Scene(
+        spacing=0.02, tank=wt.Tank(size=(1, 1)), solids=[slope], fluids=[wt.Block(lower=(0, 0), upper=(1, 0.5))]
+    )
     assert fastest(Simulation(scene), 6.0)[240:].max() < 0.02  # the waves of what fell at first are gone by then
 
 
@@ -194,8 +207,11 @@ def test_a_tank_may_stand_anywhere(dim):
         assert (sim.positions >= lower - 1e-6).all() and (sim.positions <= lower + size + 1e-6).all()
     assert np.linalg.norm(found[0].mean(0) - found[1].mean(0)) < 3e-3
     with pytest.raises(wt.WavetankError, match="outside the tank"):
-        wt.Scene(spacing=0.03, tank=wt.Tank(size=size, lower=tuple(shift)), fluids=[wt.Block(
-            lower=tuple(block[0]), upper=tuple(block[1]))])  # fmt: skip
+        wt.Scene(
+            spacing=0.03,
+            tank=wt.Tank(size=size, lower=tuple(shift)),
+            fluids=[wt.Block(lower=tuple(block[0]), upper=tuple(block[1]))],
+        )
     wt.render(sim, width=64, height=48)
 
 
@@ -233,12 +249,13 @@ def test_water_is_packed_around_bodies_under_a_tap():
     """While it is packed bodies stay where they are, and nothing comes or goes."""
     pytest.importorskip("rapier3d")
     scene = wt.Scene(
-        spacing=0.05, tank=wt.Tank(size=(1.0, 1.0, 1.0)),
+        spacing=0.05,
+        tank=wt.Tank(size=(1.0, 1.0, 1.0)),
         fluids=[wt.Filled(inside=wt.Sphere(center=(0.5, 0.5, 0.5), radius=0.4))],
         solids=[wt.Sphere(name="ball", center=(0.5, 0.5, 0.5), radius=0.15, density=500)],
         joints=[wt.Rope(first="ball", at=(0.5, 0.5, 0.5), to=(0.5, 0.0, 0.5))],
         emitters=[wt.Emitter(position=(0.5, 0.9, 0.5), direction=(0, -1, 0), radius=0.1, speed=1.0)],
-    )  # fmt: skip
+    )
     sim = wt.Simulation(scene)
     assert sim.count == pytest.approx(4 / 3 * np.pi * (0.4**3 - 0.15**3) / 0.05**3, rel=0.02)
     assert np.linalg.norm(sim.positions - 0.5, axis=1).min() > 0.15

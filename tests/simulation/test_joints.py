@@ -14,7 +14,9 @@ pytest.importorskip("rapier3d")
 def crane(**more) -> wt.Scene:
     """A mast that leans by 0.4 rad, an arm that hinges on it, a hook that slides out of the arm."""
     return wt.Scene(
-        spacing=0.1, tank=wt.Tank(size=(2.0, 2.0, 1.0)), fluids=[wt.Block(lower=(0, 0, 0), upper=(2, 0.2, 1))],
+        spacing=0.1,
+        tank=wt.Tank(size=(2.0, 2.0, 1.0)),
+        fluids=[wt.Block(lower=(0, 0, 0), upper=(2, 0.2, 1))],
         solids=[
             wt.Box(name="mast", center=(0.4, 1.0, 0.5), size=(0.1, 0.5, 0.1), mass=4.0, rotation=0.4, held=True),
             wt.Box(name="arm", center=(0.8, 1.25, 0.5), size=(0.7, 0.08, 0.1), mass=2.0, rotation=0.2),
@@ -24,7 +26,7 @@ def crane(**more) -> wt.Scene:
             wt.Hinge(name="elbow", first="arm", second="mast", at=(0.4, 1.25, 0.5), **more),
             wt.Slider(name="tele", first="hook", second="arm", at=(1.2, 1.33, 0.5), axis=(1, 0.2, 0), target=0.0),
         ],
-    )  # fmt: skip
+    )
 
 
 def test_a_motor_turns_to_its_target():
@@ -76,14 +78,18 @@ def test_what_a_hand_sets_is_saved_and_outlives_other_solids(tmp_path):
 
 def test_a_rope_between_bodies_keeps_its_ends_when_another_solid_comes():
     """Ends are where they were at the start, in the frames of their solids, however these have moved since."""
-    sim = wt.Simulation(wt.Scene(
-        spacing=0.1, tank=wt.Tank(size=(2.0, 2.0, 1.0)), fluids=[wt.Block(lower=(0, 0, 0), upper=(2, 0.2, 1))],
-        solids=[
-            wt.Sphere(name="a", center=(0.6, 1.7, 0.5), radius=0.1, mass=3.0, velocity=(1.0, 0, 0)),
-            wt.Sphere(name="b", center=(1.0, 1.7, 0.5), radius=0.1, mass=3.0, velocity=(1.0, 0, 0)),
-        ],
-        joints=[wt.Rope(first="a", second="b", at=(0.6, 1.7, 0.5), to=(1.0, 1.7, 0.5))],
-    ))  # fmt: skip
+    sim = wt.Simulation(
+        wt.Scene(
+            spacing=0.1,
+            tank=wt.Tank(size=(2.0, 2.0, 1.0)),
+            fluids=[wt.Block(lower=(0, 0, 0), upper=(2, 0.2, 1))],
+            solids=[
+                wt.Sphere(name="a", center=(0.6, 1.7, 0.5), radius=0.1, mass=3.0, velocity=(1.0, 0, 0)),
+                wt.Sphere(name="b", center=(1.0, 1.7, 0.5), radius=0.1, mass=3.0, velocity=(1.0, 0, 0)),
+            ],
+            joints=[wt.Rope(first="a", second="b", at=(0.6, 1.7, 0.5), to=(1.0, 1.7, 0.5))],
+        )
+    )
     sim.advance(0.3)
     before = sim.bodies["a"].velocity
     sim.add_solid(wt.Sphere(name="ball", center=(0.3, 0.6, 0.5), radius=0.1, density=300))

@@ -17,9 +17,12 @@ pytest.importorskip("rapier3d")
 
 def pool(**others):
     return wt.Scene(
-        spacing=0.05, tank=wt.Tank(size=(0.8, 0.8, 0.8)), foam=0,
-        fluids=[wt.Block(lower=(0, 0, 0), upper=(0.8, 0.4, 0.8))], **others,
-    )  # fmt: skip
+        spacing=0.05,
+        tank=wt.Tank(size=(0.8, 0.8, 0.8)),
+        foam=0,
+        fluids=[wt.Block(lower=(0, 0, 0), upper=(0.8, 0.4, 0.8))],
+        **others,
+    )
 
 
 def arm(**motor):
@@ -27,7 +30,7 @@ def arm(**motor):
     return pool(
         solids=[wt.Box(name="bar", center=(0.4, 0.65, 0.4), size=(0.4, 0.06, 0.06), mass=2)],
         joints=[wt.Hinge(name="hip", first="bar", at=(0.2, 0.65, 0.4), axis=(0, 0, 1), **motor)],
-    )  # fmt: skip
+    )
 
 
 def test_a_motor_that_lifts_takes_the_weight_times_its_speed():
@@ -53,9 +56,7 @@ def test_a_hinge_without_a_motor_has_no_power_to_be_shown():
 def test_between_two_fluids_each_has_its_share(tmp_path):
     """Archimedes in layers: the lower fluid is 1000, the upper 850 kg/m^3; drag was -8 % of the weight at rest."""
     block = {"spacing": 0.02, "tank": wt.Tank(size=(0.8, 0.8)), "materials": [{"name": "light", "density": 850.0}]}
-    layers = [
-        wt.Block(lower=(0, 0), upper=(0.8, 0.3)), wt.Block(lower=(0, 0.3), upper=(0.8, 0.54), material="light")
-    ]  # fmt: skip
+    layers = [wt.Block(lower=(0, 0), upper=(0.8, 0.3)), wt.Block(lower=(0, 0.3), upper=(0.8, 0.54), material="light")]
     box = wt.Box(name="box", center=(0.4, 0.3), size=(0.24, 0.15), density=925)
     sim = wt.Simulation(wt.Scene(fluids=layers, solids=[box], **block))
     sim.advance(2.0)
@@ -79,16 +80,24 @@ def test_force_is_buoyancy_and_drag():
     row = figures(sim.bodies)
     assert row["bodies.crate.force_y"] == pytest.approx(crate.force[1])
     assert {name.rsplit(".", 1)[1] for name in row} == {
-        "force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "immersed",
-    }  # fmt: skip
+        "force_x",
+        "force_y",
+        "force_z",
+        "torque_x",
+        "torque_y",
+        "torque_z",
+        "immersed",
+    }
 
 
 def test_a_flat_world_has_two_parts_and_one_torque():
     scene = wt.Scene(
-        spacing=0.05, tank=wt.Tank(size=(0.8, 0.8)), fluids=[wt.Block(lower=(0, 0), upper=(0.8, 0.4))],
+        spacing=0.05,
+        tank=wt.Tank(size=(0.8, 0.8)),
+        fluids=[wt.Block(lower=(0, 0), upper=(0.8, 0.4))],
         solids=[wt.Box(name="b", center=(0.4, 0.4), size=(0.2, 0.2), density=500)],
         joints=[wt.Hinge(name="pin", first="b", at=(0.4, 0.4), speed=0.0)],
-    )  # fmt: skip
+    )
     sim = wt.Simulation(scene)
     sim.step()
     keys = {name.removeprefix("bodies.b.") for name in sim.stats() if name.startswith("bodies")}
@@ -135,5 +144,10 @@ def test_they_are_arrows_and_numbers_over_the_picture_where_asked_for():
 
 def test_numbers_have_three_digits():
     assert [three(value) for value in (0.0, 0.0312, -0.5, 7.0, 78.4812, 12345.6)] == [
-        "0.00", "0.0312", "-0.500", "7.00", "78.5", "12346",
-    ]  # fmt: skip
+        "0.00",
+        "0.0312",
+        "-0.500",
+        "7.00",
+        "78.5",
+        "12346",
+    ]

@@ -34,10 +34,14 @@ def apart(a, b, length=1.0):
 def test_a_stream_through_a_world_without_walls_stays_as_it_is(dim):
     """No force acts: the velocity of each particle, and with it the momentum, is kept to rounding (Newton)."""
     size, v = (0.6, 0.5, 0.28)[:dim], (1.3, -0.7, 0.4)[:dim]
-    sim = wt.Simulation(wt.Scene(
-        spacing=D, gravity=(0,) * dim, tank=wt.Tank(size=size, periodic=["x", "y", "z"][:dim]),
-        fluids=[wt.Block(lower=(0,) * dim, upper=size, velocity=v)],
-    ))  # fmt: skip
+    sim = wt.Simulation(
+        wt.Scene(
+            spacing=D,
+            gravity=(0,) * dim,
+            tank=wt.Tank(size=size, periodic=["x", "y", "z"][:dim]),
+            fluids=[wt.Block(lower=(0,) * dim, upper=size, velocity=v)],
+        )
+    )
     start = sim.positions.astype(float)
     for _ in range(60):
         sim.step()
@@ -89,11 +93,17 @@ def test_still_water_rests(axes, size):
 
 def river(**changes):
     """A stream downhill over a stone in the middle of a tank, and one at its seam."""
-    return wt.Simulation(wt.Scene(
-        spacing=D, gravity=(0.5, -9.8), friction=0.2, tank=wt.Tank(size=(1.2, 0.5), periodic=["x"]),
-        fluids=[wt.Block(lower=(0, 0), upper=(1.2, 0.16), velocity=(0.5, 0))],
-        solids=[wt.Sphere(center=(1.19, 0.0), radius=0.06), wt.Sphere(center=(0.55, 0.0), radius=0.08)], **changes,
-    ))  # fmt: skip
+    return wt.Simulation(
+        wt.Scene(
+            spacing=D,
+            gravity=(0.5, -9.8),
+            friction=0.2,
+            tank=wt.Tank(size=(1.2, 0.5), periodic=["x"]),
+            fluids=[wt.Block(lower=(0, 0), upper=(1.2, 0.16), velocity=(0.5, 0))],
+            solids=[wt.Sphere(center=(1.19, 0.0), radius=0.06), wt.Sphere(center=(0.55, 0.0), radius=0.08)],
+            **changes,
+        )
+    )
 
 
 def test_a_river_passes_its_seam_without_a_jump():

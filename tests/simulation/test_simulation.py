@@ -11,10 +11,14 @@ from wavetank.simulation.simulation import Simulation
 
 def small(dim: int = 3, **keys) -> wt.Scene:
     size = (0.6, 0.4, 0.3)[:dim]
-    return wt.Scene(**{
-        "spacing": 0.04, "tank": wt.Tank(size=size),
-        "fluids": [wt.Block(lower=(0.0,) * dim, upper=(0.3, 0.3, 0.3)[:dim])], **keys,
-    })  # fmt: skip
+    return wt.Scene(
+        **{
+            "spacing": 0.04,
+            "tank": wt.Tank(size=size),
+            "fluids": [wt.Block(lower=(0.0,) * dim, upper=(0.3, 0.3, 0.3)[:dim])],
+            **keys,
+        }
+    )
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -31,8 +35,17 @@ def test_the_contract(dim):
     times = [frame.time for frame in sim.frames(seconds=0.1, fps=30)]
     np.testing.assert_allclose(np.diff(times), 1 / 30, atol=1e-9)
     assert len(times) == 4
-    keys = {"density_error_mean", "density_error_p99", "density_error_max", "kinetic_energy", "speed_max",
-            "neighbors_mean", "milliseconds_per_frame", "time", "count"}  # fmt: skip
+    keys = {
+        "density_error_mean",
+        "density_error_p99",
+        "density_error_max",
+        "kinetic_energy",
+        "speed_max",
+        "neighbors_mean",
+        "milliseconds_per_frame",
+        "time",
+        "count",
+    }
     assert keys <= set(sim.stats())
 
 
@@ -388,9 +401,12 @@ def test_places_in_a_plane_are_two_numbers_and_what_is_no_place_is_one_sentence(
     sim.freeze_inside([*middle, 0.0], (*middle, 0.0), 0.06)
     assert 0 < frozen == sim.frame().frozen_count < sim.count
     for start, radius, words in (
-        ("here", 0.1, "start = 'here'"), ([0.1, np.nan], 0.1, "nan"), ([0.1], 0.1, "two or three"),
-        (middle, -1.0, "radius = -1.0"), (middle, "wide", "radius = 'wide'"),
-    ):  # fmt: skip
+        ("here", 0.1, "start = 'here'"),
+        ([0.1, np.nan], 0.1, "nan"),
+        ([0.1], 0.1, "two or three"),
+        (middle, -1.0, "radius = -1.0"),
+        (middle, "wide", "radius = 'wide'"),
+    ):
         for act in (sim.remove_inside, lambda *where: sim.paint_inside(*where, 1), sim.freeze_inside):
             with pytest.raises(wt.WavetankError, match=re.escape(words)):
                 act(start, middle, radius)

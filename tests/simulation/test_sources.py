@@ -57,7 +57,7 @@ def test_a_row_of_too_many_particles_is_refused():
         wt.Emitter(mesh=wt.Mesh(path="wavetank/knot.obj", center=(0.3, 0.4, 0.3), size=0.3), speed=0.05),
     ],
     ids=["flow", "rectangle", "ring", "shower", "mesh"],
-)  # fmt: skip
+)
 def test_flow_is_right_within_a_row(emitter):
     d = 0.02
     sim = wt.Simulation(wt.Scene(spacing=d, tank=wt.Tank(size=(0.6, 0.8, 0.6)), emitters=[emitter], foam=0.0))
@@ -219,7 +219,7 @@ def test_drains_take_what_they_say():
         (lambda: world(jet(material="oil")), r"emitters\[0\].material = 'oil' is not one"),
         (lambda: world(jet(name="a"), jet(name="a")), "the name 'a' is used twice"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_source_is_told_in_one_sentence(make, complaint):
     with pytest.raises(wt.WavetankError, match=complaint) as told:
         make()
@@ -229,10 +229,13 @@ def test_what_is_no_source_is_told_in_one_sentence(make, complaint):
 def test_sources_go_to_a_file_and_back_and_scale():
     gauge = wt.Gauge(lower=(0, 0), upper=(1, 1))
     scene = wt.Scene(
-        spacing=0.05, tank=wt.Tank(size=(1, 1)), most_particles=5000, when_full="recycle",
+        spacing=0.05,
+        tank=wt.Tank(size=(1, 1)),
+        most_particles=5000,
+        when_full="recycle",
         emitters=[jet(speed="1 + t", level=0.3, gauge=gauge, feed="d")],
         drains=[wt.Drain(name="d", center=(0.5, 0.5), radius=0.1, flow="0.1*t")],
-    )  # fmt: skip
+    )
     assert wt.Scene.from_text(scene.text()) == scene
     big = scene.scaled(2.0)
     assert (big.emitters[0].width, big.emitters[0].level, big.emitters[0].at(1.0).speed) == (0.2, 0.6, 2.0)
@@ -241,8 +244,13 @@ def test_sources_go_to_a_file_and_back_and_scale():
 
 def test_mouths_are_outlined_where_they_are():
     """What page and window draw over the picture: closed lines, at the pose of the moment."""
-    moved = wt.Emitter(position=(0.3, 0.5, 0.3), direction=(0, 0, 2), size=(0.2, 0.1), speed=1,
-                       motion={"position": ["0.3 + t", 0.5, 0.3]})  # fmt: skip
+    moved = wt.Emitter(
+        position=(0.3, 0.5, 0.3),
+        direction=(0, 0, 2),
+        size=(0.2, 0.1),
+        speed=1,
+        motion={"position": ["0.3 + t", 0.5, 0.3]},
+    )
     drain = wt.Drain(center=(0.5, 0, 0.3), radius=0.1, direction=(0, 1, 0))
     scene = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1, 1, 1)), emitters=[moved], drains=[drain])
     (first, mouth), (second, hole) = outlines(scene, 0.2)

@@ -11,9 +11,12 @@ from wavetank.simulation.simulation import Simulation
 
 def dam(**more) -> wt.Simulation:
     scene = wt.Scene(
-        spacing=0.04, tank=wt.Tank(size=(1.2, 0.8)), fluids=[wt.Block(lower=(0, 0), upper=(0.4, 0.5))],
-        solids=[wt.Box(name="gate", center=(0.8, 0.1), size=(0.1, 0.2))], **more,
-    )  # fmt: skip
+        spacing=0.04,
+        tank=wt.Tank(size=(1.2, 0.8)),
+        fluids=[wt.Block(lower=(0, 0), upper=(0.4, 0.5))],
+        solids=[wt.Box(name="gate", center=(0.8, 0.1), size=(0.1, 0.2))],
+        **more,
+    )
     return wt.Simulation(scene)
 
 
@@ -116,8 +119,11 @@ def test_velocities_and_positions_are_set_by_id():
 
 def test_velocities_that_are_set_are_not_cut():
     """The speed limit makes room for what a person gives the water."""
-    sim = wt.Simulation(wt.Scene(spacing=0.1, tank=wt.Tank(size=(9, 1)), gravity=(0, 0),
-        fluids=[wt.Block(lower=(0, 0), upper=(1, 0.5))]))  # fmt: skip
+    sim = wt.Simulation(
+        wt.Scene(
+            spacing=0.1, tank=wt.Tank(size=(9, 1)), gravity=(0, 0), fluids=[wt.Block(lower=(0, 0), upper=(1, 0.5))]
+        )
+    )
     sim.velocities = np.tile([8.0, 0.0], (sim.count, 1))
     sim.step()
     assert sim.velocities[:, 0].mean() > 7.0

@@ -45,9 +45,12 @@ def test_expressions_in_the_places_of_numbers_are_a_motion():
 def test_motion_goes_to_a_file_and_back_and_scales():
     solids = [
         wt.Box(center=["0.5 + 0.1*sin(t)", 0.3], size=(0.1, 0.1)),
-        wt.Sphere(center=(0.2, 0.2), radius=0.05, motion=[{"time": 0, "position": [0.2, 0.2]},
-                                                          {"time": 1, "position": ["0.1*2", 0.4]}]),
-    ]  # fmt: skip
+        wt.Sphere(
+            center=(0.2, 0.2),
+            radius=0.05,
+            motion=[{"time": 0, "position": [0.2, 0.2]}, {"time": 1, "position": ["0.1*2", 0.4]}],
+        ),
+    ]
     scene = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1, 1), tilt="0.1*t"), gravity=["sin(t)", -9.81], solids=solids)
     assert wt.Scene.from_text(scene.text()) == scene
     assert wt.Scene.model_validate_json(scene.model_dump_json()) == scene

@@ -178,8 +178,15 @@ def rough_of(found: qd.types.ndarray(), depth: qd.types.ndarray(), lens: Lens, w
 
 def uneven(depth_of, walls=OPEN):
     """`unevenness` in the middle of a map of 81 x 81 pixels of 0.05 spacings, by a function of u and v [m]."""
-    lens = lens_at(np.zeros(3), basis(np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])), 81, 81, 400.0,
-                   perspective=False, near=0.0)  # fmt: skip
+    lens = lens_at(
+        np.zeros(3),
+        basis(np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])),
+        81,
+        81,
+        400.0,
+        perspective=False,
+        near=0.0,
+    )
     u, v = np.meshgrid((np.arange(81) - 40) / 400.0, (40 - np.arange(81)) / 400.0)
     depth, found = qd.ndarray(qd.i32, shape=(81, 81)), qd.ndarray(qd.f32, shape=(1,))
     upload(depth, np.asarray(depth_of(u, v), np.float32).view(np.int32))
@@ -212,12 +219,16 @@ def test_a_plane_is_even_beside_the_edge_of_its_tank_whatever_lies_beyond():
 
 
 @qd.kernel
-def meet(found: qd.types.ndarray(), solids: SolidSet, paints: qd.types.ndarray(), heights: qd.types.ndarray(),
-         wide: qd.f32, count: qd.i32):  # fmt: skip
+def meet(
+    found: qd.types.ndarray(),
+    solids: SolidSet,
+    paints: qd.types.ndarray(),
+    heights: qd.types.ndarray(),
+    wide: qd.f32,
+    count: qd.i32,
+):
     for k in range(count):
-        hit, _, cover = solid_ahead(
-            solids, paints, vec3(0.0, heights[k], 0.5), vec3(1.0, 0.0, 0.0), 2.0, 0.001, wide
-        )  # fmt: skip
+        hit, _, cover = solid_ahead(solids, paints, vec3(0.0, heights[k], 0.5), vec3(1.0, 0.0, 0.0), 2.0, 0.001, wide)
         found[k] = vec2(hit.w, cover)
 
 

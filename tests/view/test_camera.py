@@ -88,10 +88,16 @@ def test_framing_without_a_tank_shows_fluids_and_solids():
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"target": (1.0, 2.0, 3.0)}, {"eye": (math.nan, 0, 0)}, {"eye": (0, 0)}, {"field_of_view": 0.0},
-        {"field_of_view": 4.0}, {"near": 0.0}, {"height": -1.0}, {"up": (0, 0, 0)},
+        {"target": (1.0, 2.0, 3.0)},
+        {"eye": (math.nan, 0, 0)},
+        {"eye": (0, 0)},
+        {"field_of_view": 0.0},
+        {"field_of_view": 4.0},
+        {"near": 0.0},
+        {"height": -1.0},
+        {"up": (0, 0, 0)},
     ],
-)  # fmt: skip
+)
 def test_impossible_cameras_are_refused(wrong):
     with pytest.raises(WavetankError, match="camera"):
         Camera(**({"eye": (1.0, 2.0, 3.0), "target": (0.0, 0.0, 0.0)} | wrong))

@@ -58,10 +58,7 @@ def test_a_drop_turns_the_world_round():
     row, column = int(row), int(column)
     left, right = (
         (slice(row - 3, row + 3), slice(column - 8, column - 3)),
-        (
-            slice(row - 3, row + 3),
-            slice(column + 3, column + 8),
-        ),
+        (slice(row - 3, row + 3), slice(column + 3, column + 8)),
     )
     assert bare[left].mean() < bare[right].mean() - 40
     assert image[left].mean() > image[right].mean() + 30

@@ -46,9 +46,18 @@ def in_white(look):
     """The same light, the same from everywhere."""
     white, black = vector(1.0, 1.0, 1.0), vector(0.0, 0.0, 0.0)
     return dataclasses.replace(
-        look, outdoors=0, horizon=white, zenith=white, below=white, sky=white, sun=black, line_strength=0.0, paving=0,
-        tile=0.0, floor=white,
-    )  # fmt: skip
+        look,
+        outdoors=0,
+        horizon=white,
+        zenith=white,
+        below=white,
+        sky=white,
+        sun=black,
+        line_strength=0.0,
+        paving=0,
+        tile=0.0,
+        floor=white,
+    )
 
 
 def clear_medium(*absorption):
@@ -109,12 +118,15 @@ def test_a_layer_of_dye_dims_as_beer_and_lambert_say():
     """Half of the tank is dyed: what crosses that half alone sees the dye's absorption."""
     sim = wt.Simulation(
         wt.Scene(
-            spacing=0.05, tank=wt.Tank(size=(1.0, 1.0, 0.6)), fluids=[
+            spacing=0.05,
+            tank=wt.Tank(size=(1.0, 1.0, 0.6)),
+            fluids=[
                 wt.Block(lower=(0, 0, 0), upper=(0.5, 0.8, 0.6)),
                 wt.Block(lower=(0.5, 0, 0), upper=(1.0, 0.8, 0.6), material="red"),
-            ], materials=[{"name": "red", "color": "#ff4030"}],
+            ],
+            materials=[{"name": "red", "color": "#ff4030"}],
         )
-    )  # fmt: skip
+    )
     renderer, shot = shot_of(sim.frame(), eye=(0.8, 0.4, 3.0), target=(0.8, 0.4, 0.3))
     shot = dataclasses.replace(shot, look=in_white(shot.look))
     shot = dataclasses.replace(
@@ -141,9 +153,11 @@ def test_no_water_and_one_drop_have_pictures(tank):
 def stuff(clarity, *, size=(2.0, 1.6, 2.0), **more):
     """A tank of a pale yellow that is not clear, seen from above."""
     scene = wt.Scene(
-        spacing=0.1, tank=wt.Tank(size=size), materials=[{"name": "m", "color": "#e8e6a0", "clarity": clarity, **more}],
+        spacing=0.1,
+        tank=wt.Tank(size=size),
+        materials=[{"name": "m", "color": "#e8e6a0", "clarity": clarity, **more}],
         fluids=[wt.Block(lower=(0, 0, 0), upper=(size[0], 1.4, size[2]), material="m")],
-    )  # fmt: skip
+    )
     return shot_of(wt.Simulation(scene).frame(), eye=(1.0, 6.0, 1.0), target=(1.0, 1.4, 1.0))
 
 
@@ -186,9 +200,16 @@ def test_a_floor_in_the_sun_is_darker_under_water():
     renderer, shot = shot_of(frame, (64, 64), (2.0, 6.0, 2.0), (2.0, 0.4, 2.0), sun="0,89.5", environment="studio")
     white, black = vector(1.0, 1.0, 1.0), vector(0.0, 0.0, 0.0)
     look = dataclasses.replace(
-        in_white(shot.look), sun=white, sky=black, horizon=black, zenith=black, below=black, sparkle=0.0, sun_size=1e-3,
+        in_white(shot.look),
+        sun=white,
+        sky=black,
+        horizon=black,
+        zenith=black,
+        below=black,
+        sparkle=0.0,
+        sun_size=1e-3,
         floor=vector(0.3, 0.3, 0.3),
-    )  # fmt: skip
+    )
     seen = mean_radiance(dataclasses.replace(shot, look=look), renderer, clear_medium(), 64).mean()
     mirror = ((ETA - 1.0) / (ETA + 1.0)) ** 2
     assert seen == pytest.approx((1.0 - mirror) ** 2 * 0.3 / ETA**2 / (1.0 - 0.472 * 0.3), rel=0.03)
@@ -196,10 +217,11 @@ def test_a_floor_in_the_sun_is_darker_under_water():
 
 def test_lava_shines_on_what_is_beside_it():
     scene = wt.Scene(
-        spacing=0.1, tank=wt.Tank(size=(1.0, 1.0, 1.0)),
+        spacing=0.1,
+        tank=wt.Tank(size=(1.0, 1.0, 1.0)),
         materials=[{"name": "m", "color": "#ff4a08", "clarity": "opaque", "glow": 2.0}],
         fluids=[wt.Block(lower=(0, 0, 0), upper=(1.0, 0.8, 1.0), material="m")],
-    )  # fmt: skip
+    )
     renderer, shot = shot_of(wt.Simulation(scene).frame(), (16, 16), (0.5, 3.0, 1.4), (0.5, 0.0, 1.4))
     black = vector(0.0, 0.0, 0.0)
     look = dataclasses.replace(in_white(shot.look), sky=black, horizon=black, zenith=black, below=black)
@@ -257,11 +279,13 @@ def test_glass_is_left_away_by_drafts():
     ball = {"center": (0.5, 0.7, 0.5), "radius": 0.2}
     bare, glass, matte = (
         wt.render(
-            wt.Simulation(wt.Scene(spacing=0.1, tank=tank, fluids=[water], solids=solids)).frame(), 64, 48,
+            wt.Simulation(wt.Scene(spacing=0.1, tank=tank, fluids=[water], solids=solids)).frame(),
+            64,
+            48,
             quality="draft",
         )
         for solids in ([], [wt.Sphere(**ball, finish="glass")], [wt.Sphere(**ball)])
-    )  # fmt: skip
+    )
     # Light from the floor and in the water still knows of it.
     assert np.abs(glass.astype(int) - bare).mean() < 0.2 * np.abs(matte.astype(int) - bare).mean()
 
@@ -323,9 +347,11 @@ def test_what_is_left_of_the_noise_goes_and_edges_stay():
     rng = np.random.default_rng(1)
     shape = (48, 64)
     film = paths.Film(
-        mean=qd.ndarray(vec3, shape=shape), half=qd.ndarray(vec3, shape=shape), albedo=qd.ndarray(vec3, shape=shape),
+        mean=qd.ndarray(vec3, shape=shape),
+        half=qd.ndarray(vec3, shape=shape),
+        albedo=qd.ndarray(vec3, shape=shape),
         shape=qd.ndarray(vec4, shape=shape),
-    )  # fmt: skip
+    )
     truth = np.where(np.arange(64) < 32, 0.3, 0.6)[None, :, None] * np.ones((48, 64, 3), np.float32)
     noise = rng.normal(0.0, 0.02, (2, *shape, 1)).astype(np.float32)
     upload(film.mean, (truth + 0.5 * (noise[0] + noise[1])).astype(np.float32))
@@ -340,9 +366,11 @@ def test_what_is_left_of_the_noise_goes_and_edges_stay():
 
 def dam():
     scene = wt.Scene(
-        spacing=0.08, tank=wt.Tank(size=(1.2, 0.8, 0.6)), fluids=[wt.Block(lower=(0, 0, 0), upper=(0.5, 0.6, 0.6))],
+        spacing=0.08,
+        tank=wt.Tank(size=(1.2, 0.8, 0.6)),
+        fluids=[wt.Block(lower=(0, 0, 0), upper=(0.5, 0.6, 0.6))],
         solids=[wt.Sphere(center=(0.8, 0.2, 0.3), radius=0.15)],
-    )  # fmt: skip
+    )
     sim = wt.Simulation(scene)
     sim.advance(0.2)
     return sim
@@ -378,9 +406,11 @@ def moving(velocity, motion):
     body = wt.Sphere(name="ball", **ball, density=500.0, velocity=velocity)
     carried = wt.Sphere(name="ball", **(ball | {"center": ("0.5 + 2*t", 0.5, 0.5)}))
     scene = wt.Scene(
-        spacing=0.1, gravity=(0, 0, 0), fluids=[wt.Points(positions=[[0.5, 2.5, 0.5]])],
+        spacing=0.1,
+        gravity=(0, 0, 0),
+        fluids=[wt.Points(positions=[[0.5, 2.5, 0.5]])],
         solids=[carried if motion else body],
-    )  # fmt: skip
+    )
     camera = wt.Camera(eye=(0.5, 0.5, 5.0), target=(0.5, 0.5, 0.5), field_of_view=math.radians(20.0))
     frame = wt.Simulation(scene).frame()
     return [
@@ -422,11 +452,14 @@ print(hashlib.sha256(wt.render(sim, 40, 24, quality="film", samples=3, shutter=0
 def test_one_thread_and_two_take_the_same_picture():
     found = {
         subprocess.run(
-            [sys.executable, "-c", PICTURE], env=os.environ | {"QD_CPU_MAX_NUM_THREADS": threads}, check=True,
-            capture_output=True, text=True,
+            [sys.executable, "-c", PICTURE],
+            env=os.environ | {"QD_CPU_MAX_NUM_THREADS": threads},
+            check=True,
+            capture_output=True,
+            text=True,
         ).stdout
         for threads in ("1", "2")
-    }  # fmt: skip
+    }
     assert len(found) == 1
 
 

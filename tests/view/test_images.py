@@ -10,8 +10,9 @@ def frame(**changes):
     ball = wt.Sphere(center=(1.95, 0.2, 0.5), radius=0.15, color="#ff0000", name="ball", **changes)
     stone = wt.Sphere(center=(0.7, 0.1, 0.5), radius=0.1, color="#00ff00")
     tank = wt.Tank(size=(2.0, 0.6, 1.0), periodic=["x"])
-    sim = wt.Simulation(wt.Scene(spacing=0.05, tank=tank, solids=[ball, stone],
-                                 fluids=[wt.Block(lower=(0, 0, 0), upper=(2, 0.1, 1))]))  # fmt: skip
+    sim = wt.Simulation(
+        wt.Scene(spacing=0.05, tank=tank, solids=[ball, stone], fluids=[wt.Block(lower=(0, 0, 0), upper=(2, 0.1, 1))])
+    )
     return sim, sim.frame()
 
 

@@ -93,14 +93,19 @@ GOOD = written(under(SUN), True)
 
 
 @pytest.mark.parametrize(
-    ("data", "said"), [
-        (b"", "no environment"), (b"#?RADIANCE\n\n-Y 4 +X 8\n" + bytes(128), "no environment"),
-        (HEAD + b"+Y 4 +X 8\n" + bytes(128), "no environment"), (HEAD + b"-Y 999999 +X 999999\n", "pixels"),
-        (HEAD + b"-Y 1 +X 1\n" + bytes(4), "pixels"), (GOOD[:-1], "too soon"), (GOOD[:200], "too soon"),
+    ("data", "said"),
+    [
+        (b"", "no environment"),
+        (b"#?RADIANCE\n\n-Y 4 +X 8\n" + bytes(128), "no environment"),
+        (HEAD + b"+Y 4 +X 8\n" + bytes(128), "no environment"),
+        (HEAD + b"-Y 999999 +X 999999\n", "pixels"),
+        (HEAD + b"-Y 1 +X 1\n" + bytes(4), "pixels"),
+        (GOOD[:-1], "too soon"),
+        (GOOD[:200], "too soon"),
         (HEAD + b"-Y 4 +X 8\n" + bytes((2, 2, 0, 8)) + bytes((0,)) * 400, "damaged"),
         (HEAD + b"-Y 4 +X 8\n" + bytes((2, 2, 0, 8)) + bytes((255, 1)) * 400, "damaged"),
     ],
-)  # fmt: skip
+)
 def test_what_is_damaged_is_refused_in_a_sentence(data, said, tmp_path):
     path = tmp_path / "sky.hdr"
     path.write_bytes(data)

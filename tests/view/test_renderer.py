@@ -56,16 +56,24 @@ def test_the_order_of_particles_does_not_matter(make_frame, splash, view):
 def test_water_that_rests_is_looked_at_from_all_sides_for_less(monkeypatch):
     """From the third picture of a moment on, its shape and the sun in it are kept; what moves or changes is seen."""
     sim = Simulation(Scene.load("drop").changed(spacing=0.05))
-    renderer, eyes = Renderer(*SIZE), [Camera(eye=(3.0 * np.sin(a), 1.5, 3.0 * np.cos(a)), target=(0.4, 0.3, 0.4))
-                                       for a in (0.1, 0.4, 0.7, 1.0)]  # fmt: skip
+    renderer, eyes = (
+        Renderer(*SIZE),
+        [Camera(eye=(3.0 * np.sin(a), 1.5, 3.0 * np.cos(a)), target=(0.4, 0.3, 0.4)) for a in (0.1, 0.4, 0.7, 1.0)],
+    )
     fitted = []
     monkeypatch.setattr(ellipsoids, "fit", lambda *a, fit=ellipsoids.fit: (fitted.append(1), fit(*a)))
     for eye in eyes:
         np.testing.assert_array_equal(renderer.render(sim.frame(), eye), Renderer(*SIZE).render(sim.frame(), eye))
     assert len(fitted) == len(eyes) + 2
     sim.step()
-    for change in (lambda: None, lambda: None, lambda: None, sim.step, lambda: sim.remove(range(40)),
-                   lambda: sim.paint_inside(np.zeros(3), np.ones(3), 0.2, 127 << 24 | 0xE0446A)):  # fmt: skip
+    for change in (
+        lambda: None,
+        lambda: None,
+        lambda: None,
+        sim.step,
+        lambda: sim.remove(range(40)),
+        lambda: sim.paint_inside(np.zeros(3), np.ones(3), 0.2, 127 << 24 | 0xE0446A),
+    ):
         change()
         image = renderer.render(sim.frame(), eyes[0])
         np.testing.assert_array_equal(image, Renderer(*SIZE).render(sim.frame(), eyes[0]))
@@ -139,9 +147,11 @@ def test_nothing_breaks_from_any_eye(make_frame, eye, dim, count, tank, view):
         HalfSpace(point=(0.8, 0.0, 0.0)[:dim], normal=(-1.0, 1.0, 0.0)[:dim]),
     ]
     scene = Scene(
-        spacing=0.05, tank=Tank(size=(1.0, 1.0, 1.0)[:dim]) if tank else None, solids=solids,
+        spacing=0.05,
+        tank=Tank(size=(1.0, 1.0, 1.0)[:dim]) if tank else None,
+        solids=solids,
         gravity=(0.0, -9.81, 0.0)[:dim],
-    )  # fmt: skip
+    )
     frame = make_frame(scene, np.random.default_rng(0).uniform(0.1, 0.9, (count, dim)))
     renderer = Renderer(*SIZE)
     image = renderer.render(frame, camera=EYES[eye], view=view)

@@ -132,8 +132,9 @@ def test_a_coloured_world_that_was_saved_has_its_colours(tmp_path):
     """A state that comes back shows the very picture that it was saved with; its scene has no fluids any more."""
     red = Material(name="ink", color="#c03020")
     blocks = [
-        Block(lower=(0, 0, 0), upper=(0.5, 0.4, 0.5), material="ink"), Block(lower=(0.5, 0, 0), upper=(1, 0.4, 0.5))
-    ]  # fmt: skip
+        Block(lower=(0, 0, 0), upper=(0.5, 0.4, 0.5), material="ink"),
+        Block(lower=(0.5, 0, 0), upper=(1, 0.4, 0.5)),
+    ]
     scene = Scene(spacing=D, tank=Tank(size=(1.0, 1.0, 0.5)), fluids=blocks, materials=[red])
     sim = Simulation(scene, arch="cpu")
     sim.step()
@@ -219,9 +220,13 @@ def test_the_sky_is_seen_from_below_through_a_window_of_its_size(make_frame, mon
     pictures = []
     for color in (0.0, 3.0):
         look = dataclasses.replace(
-            pool_look(), zenith=vector(color, color, color), horizon=vector(color, color, color),
-            lamp=vector(0.0, 0.0, 0.0), sparkle=0.0, outdoors=0,
-        )  # fmt: skip
+            pool_look(),
+            zenith=vector(color, color, color),
+            horizon=vector(color, color, color),
+            lamp=vector(0.0, 0.0, 0.0),
+            sparkle=0.0,
+            outdoors=0,
+        )
         monkeypatch.setattr(Style, "look", lambda style, frame, look=look: look)
         pictures.append(Renderer(160, 120).render(frame, camera).astype(int))
     change = np.abs(pictures[1] - pictures[0]).max(axis=2)

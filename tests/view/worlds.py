@@ -28,9 +28,15 @@ def frame_of(scene, positions, velocities=None, densities=None, spare=3, kinds=N
     walls = scene.tank.walls() if scene.tank is not None else []
     vector = qd.types.vector(scene.dim, qd.f32)
     return Frame(
-        scene=scene, number=0, time=0.0, count=count,
-        x=device(x, vector, count + spare), v=device(v, vector, count + spare),
-        rho=device(rho, qd.f32, count + spare), id=device(np.arange(count), qd.i32, count + spare),
-        solids=build([*walls, *scene.solids], len(walls), 0.0, scene.spacing), dye=device([], qd.i32, count + spare),
+        scene=scene,
+        number=0,
+        time=0.0,
+        count=count,
+        x=device(x, vector, count + spare),
+        v=device(v, vector, count + spare),
+        rho=device(rho, qd.f32, count + spare),
+        id=device(np.arange(count), qd.i32, count + spare),
+        solids=build([*walls, *scene.solids], len(walls), 0.0, scene.spacing),
+        dye=device([], qd.i32, count + spare),
         material=device(np.zeros(count) if kinds is None else kinds, qd.i32, count + spare),
-    )  # fmt: skip
+    )

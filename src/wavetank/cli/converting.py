@@ -27,9 +27,7 @@ def export(
     """Write the frames of a run's folder, a saved state, a recording or an HDF5 file for other programs."""
     from wavetank.front.exporting import export as convert
 
-    figures = convert(
-        source, names_in(to), out=out, only=names_in([only]), every=every, arch=arch, console=console
-    )  # fmt: skip
+    figures = convert(source, names_in(to), out=out, only=names_in([only]), every=every, arch=arch, console=console)
     if as_json:
         print(json.dumps(figures))
         return

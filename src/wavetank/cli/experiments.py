@@ -96,10 +96,22 @@ def bench(
     from wavetank.lab.bench import run as bench_run
 
     order = bench_run.Order(
-        scenes=scenes, sizes=sizes, seconds=seconds, repeats=repeats, threads=threads, peers=peers,
-        their_scenes=their_scenes, pictures=pictures, roofline=roofline, search=search, bodies=bodies,
-        page=page, start_up=start_up, compare=compare, arch=arch,
-    )  # fmt: skip
+        scenes=scenes,
+        sizes=sizes,
+        seconds=seconds,
+        repeats=repeats,
+        threads=threads,
+        peers=peers,
+        their_scenes=their_scenes,
+        pictures=pictures,
+        roofline=roofline,
+        search=search,
+        bodies=bodies,
+        page=page,
+        start_up=start_up,
+        compare=compare,
+        arch=arch,
+    )
     result, tables = bench_run.perform(order, console.print)
     if out is not None:
         bench_run.save_result(result, out)

@@ -53,9 +53,17 @@ def film(
     changes = {"quality": quality, "samples": samples, "fps": fps, "duration": duration, "speed": speed}
     with large_worlds_allowed(allow_large):
         figures = make(
-            world, path, arch=arch, console=console, keep=keep, environment=environment, sun=sun, floor=floor,
-            size=size_of(size) if size else None, **changes,
-        )  # fmt: skip
+            world,
+            path,
+            arch=arch,
+            console=console,
+            keep=keep,
+            environment=environment,
+            sun=sun,
+            floor=floor,
+            size=size_of(size) if size else None,
+            **changes,
+        )
     if as_json:
         print(json.dumps(figures))
     elif figures["interrupted"]:

@@ -43,9 +43,17 @@ def play(
     if wanted:
         world = with_particles(world, wanted)
     begin(
-        world, arch, window=window, web=web, host=host, port=port, browser=not no_browser, record=record, most=most,
+        world,
+        arch,
+        window=window,
+        web=web,
+        host=host,
+        port=port,
+        browser=not no_browser,
+        record=record,
+        most=most,
         token=token,
-    )  # fmt: skip
+    )
 
 
 @app.command()

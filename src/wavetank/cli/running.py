@@ -115,14 +115,22 @@ def run(
 
     world = configured(scene, settings)
     order = Order(
-        out, seconds, fps, size_of(size or "1280x720"), name or Path(scene).stem, small_gif=not size,
-        video=video, gif=gif, frames=frames,
-        exports=names_in(export), only=names_in([only]), every=every, quality=quality,
-        look={
-            "view": view, "color_by": color_by, "cut": cut, "environment": environment, "sun": sun, "floor": floor,
-        },
+        out,
+        seconds,
+        fps,
+        size_of(size or "1280x720"),
+        name or Path(scene).stem,
+        small_gif=not size,
+        video=video,
+        gif=gif,
+        frames=frames,
+        exports=names_in(export),
+        only=names_in([only]),
+        every=every,
+        quality=quality,
+        look={"view": view, "color_by": color_by, "cut": cut, "environment": environment, "sun": sun, "floor": floor},
         checkpoint_every=checkpoint_every,
-    )  # fmt: skip
+    )
     with large_worlds_allowed(allow_large):
         _finish(record(Simulation(world, arch=arch), order, console), as_json)
 
@@ -201,14 +209,43 @@ def render(
     across, down = size_of(size)
     across, down = (across if width is None else width), (down if height is None else height)
     if out.suffix.lower() in FILMS:
-        _film(world, out, (across, down), at, kept, as_json, arch=arch, quality=quality or "draft",
-              view=view, color_by=color_by, cut=cut, environment=environment, sun=sun, floor=floor)  # fmt: skip
+        _film(
+            world,
+            out,
+            (across, down),
+            at,
+            kept,
+            as_json,
+            arch=arch,
+            quality=quality or "draft",
+            view=view,
+            color_by=color_by,
+            cut=cut,
+            environment=environment,
+            sun=sun,
+            floor=floor,
+        )
         return
     figures = take(
-        world, scene, out, across, down, at=at, arch=arch, quality=quality or "standard", samples=samples, eye=eye,
-        target=target, timings=timings, view=view, color_by=color_by, cut=cut, environment=environment, sun=sun,
+        world,
+        scene,
+        out,
+        across,
+        down,
+        at=at,
+        arch=arch,
+        quality=quality or "standard",
+        samples=samples,
+        eye=eye,
+        target=target,
+        timings=timings,
+        view=view,
+        color_by=color_by,
+        cut=cut,
+        environment=environment,
+        sun=sun,
         floor=floor,
-    )  # fmt: skip
+    )
     if as_json:
         print(json.dumps(figures))
     if figures.get("interrupted"):

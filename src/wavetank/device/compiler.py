@@ -32,9 +32,23 @@ patches.apply_all()
 warnings.filterwarnings("ignore", module=r"quadrants\.lang\._fast_caching")
 
 __all__ = [
-    "BACKENDS", "LANES", "Mirror", "available_backends", "cache_folder", "current_backend", "download", "lanes", "qd",
-    "shares_memory", "start", "synchronize", "threads", "upload", "watched", "worth_sharing",
-]  # fmt: skip
+    "BACKENDS",
+    "LANES",
+    "Mirror",
+    "available_backends",
+    "cache_folder",
+    "current_backend",
+    "download",
+    "lanes",
+    "qd",
+    "shares_memory",
+    "start",
+    "synchronize",
+    "threads",
+    "upload",
+    "watched",
+    "worth_sharing",
+]
 
 #: Names a user may pass as ``arch``; ``gpu`` means the best one present.
 BACKENDS = ("cpu", "gpu", "cuda", "vulkan", "metal", "amdgpu")

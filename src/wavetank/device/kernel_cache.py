@@ -15,9 +15,9 @@ import numpy as np
 
 NAME = "kernel_compilation_manager/qdcache.qdb"
 HEAD, KEY = 30, 65  # bytes
-ENTRY = np.dtype([
-    ("length", "<u8"), ("key", "u1", KEY), ("again_length", "<u8"), ("again", "u1", KEY), ("numbers", "<u8", 3),
-])  # fmt: skip
+ENTRY = np.dtype(
+    [("length", "<u8"), ("key", "u1", KEY), ("again_length", "<u8"), ("again", "u1", KEY), ("numbers", "<u8", 3)]
+)
 
 
 def is_whole(content: bytes) -> bool:

@@ -19,10 +19,15 @@ NUMBERS = (int, float, bool)
 MOST = 64  # launches of a kernel that are kept; when there are more, all are forgotten
 #: of the compiler's module of kernels
 NEEDED = (
-    "Kernel.__call__", "Kernel._recursive_set_args", "Kernel.construct_kernel_ret", "LaunchContextBufferCache.cache",
-    "LaunchContextBufferCache.populate_launch_ctx_from_cache", "primitive_types.integer_type_ids",
-    "primitive_types.real_type_ids", "runtime_ops.sync",
-)  # fmt: skip
+    "Kernel.__call__",
+    "Kernel._recursive_set_args",
+    "Kernel.construct_kernel_ret",
+    "LaunchContextBufferCache.cache",
+    "LaunchContextBufferCache.populate_launch_ctx_from_cache",
+    "primitive_types.integer_type_ids",
+    "primitive_types.real_type_ids",
+    "runtime_ops.sync",
+)
 
 
 @dataclasses.dataclass

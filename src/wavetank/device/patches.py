@@ -174,9 +174,10 @@ def place_in_source(place_in_lines: Any) -> Any:
 
 
 @patch(
-    "flat fields", "_kernel_impl_dataclass:unpack_ast_struct_expressions",
+    "flat fields",
+    "_kernel_impl_dataclass:unpack_ast_struct_expressions",
     needs=("_kernel_impl_dataclass:FlattenAttributeNameTransformer",),
-)  # fmt: skip
+)
 def flatten_fields(_: Any) -> Any:
     """Walks over a function for the fields of its arguments only where it has some."""
     transformer = _part("_kernel_impl_dataclass").FlattenAttributeNameTransformer
@@ -188,9 +189,11 @@ def flatten_fields(_: Any) -> Any:
 
 
 @patch(
-    "final fields", "_func_base:subtree_has_final_fields", "_template_mapper_hotpath:subtree_has_final_fields",
+    "final fields",
+    "_func_base:subtree_has_final_fields",
+    "_template_mapper_hotpath:subtree_has_final_fields",
     "_template_mapper:annotation_has_final_subtree",
-)  # fmt: skip
+)
 def trust_final_fields(_: Any) -> Any:
     """Reads numbers of a frozen object that are compiled into a kernel (`Final`) once, as ours are plain integers."""
     return lambda _: False
@@ -285,9 +288,7 @@ def keep_no_stale_launches(_: Any) -> Any:
     return lambda *_: None
 
 
-@patch(
-    "prepared launches", "kernel:Kernel", needs=("impl:get_runtime", *(f"kernel:{part}" for part in NEEDED))
-)  # fmt: skip
+@patch("prepared launches", "kernel:Kernel", needs=("impl:get_runtime", *(f"kernel:{part}" for part in NEEDED)))
 def keep_launches(kernel: Any) -> Any:
     """Keeps prepared launches by their arguments, and launches them at once."""
     keep_prepared_launches(_part("kernel"), _part("impl").get_runtime)
@@ -297,9 +298,7 @@ def keep_launches(kernel: Any) -> Any:
 # --- arrays ---
 
 
-@patch(
-    "freed arrays", "impl:_qd_core.Program", needs=("impl:_qd_core.Program.get_ndarray_data_ptr_as_int",)
-)  # fmt: skip
+@patch("freed arrays", "impl:_qd_core.Program", needs=("impl:_qd_core.Program.get_ndarray_data_ptr_as_int",))
 def keep_freed_arrays(program: Any) -> Any:
     """Gives arrays of the CPU that nobody uses any more away again: of each one made it keeps some bytes for ever."""
     on_host = {_part("impl")._qd_core.Arch.x64, _part("impl")._qd_core.Arch.arm64}

@@ -63,9 +63,7 @@ def image_shift(difference, period):
 
     A single period: what is nowhere, see `state.nowhere`, stays there.
     """
-    return period * (
-        qd.cast(difference < -0.5 * period, qd.f32) - qd.cast(difference > 0.5 * period, qd.f32)
-    )  # fmt: skip
+    return period * (qd.cast(difference < -0.5 * period, qd.f32) - qd.cast(difference > 0.5 * period, qd.f32))
 
 
 @qd.func

@@ -375,10 +375,20 @@ def new_scratch(capacity: int) -> Scratch:
     rho, lam, dlam, squares, weight = (scalars(rows) for _ in range(5))
     weight.fill(1.0)
     return Scratch(
-        rho, lam, dlam, squares, omega=vectors(3, rows), wall=vectors(4, rows), weight=weight,
-        puddle=scalars(rows), solids=integers(1), seen=vectors(3, 1), solid=integers(1), facing=vectors(4, 1),
+        rho,
+        lam,
+        dlam,
+        squares,
+        omega=vectors(3, rows),
+        wall=vectors(4, rows),
+        weight=weight,
+        puddle=scalars(rows),
+        solids=integers(1),
+        seen=vectors(3, 1),
+        solid=integers(1),
+        facing=vectors(4, 1),
         push=vectors(3, 1),
-    )  # fmt: skip
+    )
 
 
 def with_solids(scratch: Scratch, places: int) -> Scratch:
@@ -387,9 +397,13 @@ def with_solids(scratch: Scratch, places: int) -> Scratch:
     if scratch.solids.shape[0] == rows:
         return scratch
     return dataclasses.replace(
-        scratch, solids=integers(rows), seen=vectors(3, rows), solid=integers(places * rows),
-        facing=vectors(4, places * rows), push=vectors(3, places * rows),
-    )  # fmt: skip
+        scratch,
+        solids=integers(rows),
+        seen=vectors(3, rows),
+        solid=integers(places * rows),
+        facing=vectors(4, places * rows),
+        push=vectors(3, places * rows),
+    )
 
 
 def new_diffuse(dim: int, capacity: int) -> Diffuse:

@@ -41,9 +41,15 @@ def count_one(values: qd.template(), at, shared: qd.template()):
 
 @qd.func
 def sort_by(
-    key: qd.template(), order: qd.template(), start: qd.template(), fill: qd.template(), blocks: qd.template(), keys,
-    count, shared: qd.template(),
-):  # fmt: skip
+    key: qd.template(),
+    order: qd.template(),
+    start: qd.template(),
+    fill: qd.template(),
+    blocks: qd.template(),
+    keys,
+    count,
+    shared: qd.template(),
+):
     """Write the numbers below `count` into `order` so that their `key` rises, and where each of so many `keys` starts.
 
     One thread does it, or all threads share it where `shared`, and then the order within a key is chance. `fill` and

@@ -77,13 +77,16 @@ class _Reader:
         place = Placed(self.dim, self.spacing, float(self.domain[0][1]), self.notes)
         materials, material = self._material()
         table: dict[str, Any] = {
-            "title": self.path.stem.removesuffix("_Def").replace("_", " "), "spacing": self.spacing, "tank": tank,
-            "fluids": [*self._fluids(items, tank, place, material)], "materials": materials,
+            "title": self.path.stem.removesuffix("_Def").replace("_", " "),
+            "spacing": self.spacing,
+            "tank": tank,
+            "fluids": [*self._fluids(items, tank, place, material)],
+            "materials": materials,
             "gravity": self._ours(self._vector("casedef/constantsdef/gravity", (0.0, 0.0, -9.81))),
             "solids": placed_solids(
                 rows, drawn, self._floatings(), courses(self.root, self.drawing, seconds, self.notes), seconds, place
             ),
-        }  # fmt: skip
+        }
         self._tell_the_rest()
         return Imported(Scene.parse(table, str(self.path)), tuple(dict.fromkeys(self.notes)))
 
@@ -106,10 +109,15 @@ class _Reader:
         """Return the box of walls that becomes the tank: the largest one that holds the middle of the most fluid."""
         moving = {int(row.get("ref", -1)) for row in self.root.findall("casedef/motion/objreal")} | {*self._floatings()}
         boxes = [
-            item for item in items
-            if item.what == "bound" and item.shape == "box" and item.faces and item.is_straight
-            and "bottom" in item.faces and item.mk not in moving
-        ]  # fmt: skip
+            item
+            for item in items
+            if item.what == "bound"
+            and item.shape == "box"
+            and item.faces
+            and item.is_straight
+            and "bottom" in item.faces
+            and item.mk not in moving
+        ]
         largest = max(fluids, key=_volume)
         middle = 0.5 * sum(largest.corners())
         around = [box for box in boxes if (box.corners()[0] <= middle).all() and (middle <= box.corners()[1]).all()]
@@ -162,8 +170,11 @@ class _Reader:
                 for box in _without(item.corners(), holes):
                     yield from self._block(box, tank, fields)
             elif item.shape == "sphere":
-                yield Ball(center=self._ours(item.corners()[0] + item.radius * item.scale),
-                           radius=item.radius * item.scale, **fields)  # fmt: skip
+                yield Ball(
+                    center=self._ours(item.corners()[0] + item.radius * item.scale),
+                    radius=item.radius * item.scale,
+                    **fields,
+                )
             else:
                 for solid in place.shapes(item, "fluid"):
                     yield Filled(inside=solid, **fields)

@@ -25,10 +25,31 @@ FACES = ("bottom", "top", "left", "right", "front", "back")  # -z, +z, -x, +x, -
 _NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]*")
 #: commands that say how something is drawn, shown or kept, which a shape of ours does not need to be told
 _SILENT = {
-    "setshapemode", "setdrawmode", "shapeout", "resetdraw", "setdpctes", "dpctessave", "dpctesload", "dpctesreset",
-    "setactive", "setboxlimitmode", "setnormalinvert", "debugout", "cellsout", "pointsmkout", "printf", "exportvar",
-    "setfrdrawmode", "delvar", "newvarstr", "newvarstrcte", "setvarstr", "varssave", "varsload", "list",
-}  # fmt: skip
+    "setshapemode",
+    "setdrawmode",
+    "shapeout",
+    "resetdraw",
+    "setdpctes",
+    "dpctessave",
+    "dpctesload",
+    "dpctesreset",
+    "setactive",
+    "setboxlimitmode",
+    "setnormalinvert",
+    "debugout",
+    "cellsout",
+    "pointsmkout",
+    "printf",
+    "exportvar",
+    "setfrdrawmode",
+    "delvar",
+    "newvarstr",
+    "newvarstrcte",
+    "setvarstr",
+    "varssave",
+    "varsload",
+    "list",
+}
 
 
 @dataclasses.dataclass(frozen=True)

@@ -83,8 +83,15 @@ class Placed:
             thickness = {"thickness": WALL * self.spacing}
             self.notes.append(f"{name}: its surface is not closed; it becomes walls two particles thick.")
         middle = tuple(map(float, 0.5 * (placed.min(axis=0) + placed.max(axis=0))))
-        yield Mesh.of(placed, item.faces, name=name, center=middle, size=float(np.ptp(placed, axis=0).max()),
-                      **thickness, **fields)  # fmt: skip
+        yield Mesh.of(
+            placed,
+            item.faces,
+            name=name,
+            center=middle,
+            size=float(np.ptp(placed, axis=0).max()),
+            **thickness,
+            **fields,
+        )
 
     def faces(self, item: Item) -> Iterator[Item]:
         """Yield the faces of a box as boxes that lie outside of it."""
@@ -97,9 +104,13 @@ class Placed:
 
 
 def placed_solids(
-    items: list[Item], fluids: list[Item], bodies: dict[int, dict[str, Any]], courses: dict[int, Course],
-    seconds: float, place: Placed,
-) -> list[Solid]:  # fmt: skip
+    items: list[Item],
+    fluids: list[Item],
+    bodies: dict[int, dict[str, Any]],
+    courses: dict[int, Course],
+    seconds: float,
+    place: Placed,
+) -> list[Solid]:
     """Return the solids of these items: those of a mk that moves or floats as one."""
     found: list[Solid] = []
     for mk in dict.fromkeys(item.mk for item in items):
@@ -107,9 +118,10 @@ def placed_solids(
         for item in items:
             if item.mk == mk:
                 parts += [
-                    solid for piece in _pieces(item, fluids, place)
+                    solid
+                    for piece in _pieces(item, fluids, place)
                     for solid in place.shapes(piece, f"mk {mk}" if not parts else f"mk {mk}, {len(parts) + 1}")
-                ]  # fmt: skip
+                ]
         fields = {**bodies.get(mk, {})}
         if not parts:
             continue

@@ -25,12 +25,18 @@ KIND = "series"
 VERSION_OF_LAYOUT = 1
 COUNTER = "NFrames"
 SOLIDS: dict[str, tuple[Any, tuple[int, ...]]] = {
-    "names": ("S64", ()), "positions": ("f8", (3,)), "rotations": ("f8", (4,)), "velocities": ("f8", (3,)),
+    "names": ("S64", ()),
+    "positions": ("f8", (3,)),
+    "rotations": ("f8", (4,)),
+    "velocities": ("f8", (3,)),
     "angular_velocities": ("f8", (3,)),
-}  # fmt: skip
+}
 VERTICES: dict[str, tuple[Any, tuple[int, ...]]] = {
-    "positions": ("f4", (3,)), "normals": ("f4", (3,)), "velocities": ("f4", (3,)), "materials": ("i4", ()),
-}  # fmt: skip
+    "positions": ("f4", (3,)),
+    "normals": ("f4", (3,)),
+    "velocities": ("f4", (3,)),
+    "materials": ("i4", ()),
+}
 
 
 def check(scene: Scene) -> None:
@@ -47,8 +53,14 @@ class Hdf5Series:
         path = plan.path(SUFFIXES[0])
         self.files = [str(path)]
         file = self.file = GrowingFile(path, "/", COUNTER, plan.patience)
-        about = {"format": "wavetank", "layout": VERSION_OF_LAYOUT, "wavetank": VERSION, "dim": plan.scene.dim,
-                 "spacing": plan.scene.spacing, "fps": plan.fps}  # fmt: skip
+        about = {
+            "format": "wavetank",
+            "layout": VERSION_OF_LAYOUT,
+            "wavetank": VERSION,
+            "dim": plan.scene.dim,
+            "spacing": plan.scene.spacing,
+            "fps": plan.fps,
+        }
         for name, value in about.items():
             file.file.attrs[name] = value
         file.file.create_dataset("scene", data=np.bytes_(plan.scene.text().encode()), track_times=False)
@@ -78,13 +90,15 @@ class Hdf5Series:
         self.water.append({name: getattr(instant, name) for name in WATER})
         self.foam.append({name.removeprefix("foam_"): getattr(instant, name) for name in FOAM})
         standing = instant.standing
-        self.solids.append({
-            "names": np.array([one.name.encode()[:64] for one in standing], "S64"),
-            "positions": _rows([one.position for one in standing], 3),
-            "rotations": _rows([one.rotation for one in standing], 4),
-            "velocities": _rows([one.velocity for one in standing], 3),
-            "angular_velocities": _rows([one.angular_velocity for one in standing], 3),
-        })  # fmt: skip
+        self.solids.append(
+            {
+                "names": np.array([one.name.encode()[:64] for one in standing], "S64"),
+                "positions": _rows([one.position for one in standing], 3),
+                "rotations": _rows([one.rotation for one in standing], 4),
+                "velocities": _rows([one.velocity for one in standing], 3),
+                "angular_velocities": _rows([one.angular_velocity for one in standing], 3),
+            }
+        )
         if self.surface is not None:
             vertices, corners = _joined(instant)
             self.surface[0].append(vertices)
@@ -160,10 +174,17 @@ def read(path: str | Path, first: int = 0) -> Iterator[Instant]:
         foam = {f"foam_{name}": rows for name, rows in table_rows(file["foam"], frame).items()}
         solids = table_rows(file["solids"], frame)
         standing = tuple(
-            Standing(name, known[name], solids["positions"][k], solids["rotations"][k], solids["velocities"][k],
-                     solids["angular_velocities"][k])
-            for k, name in enumerate(row.decode() for row in solids["names"]) if name in known
-        )  # fmt: skip
+            Standing(
+                name,
+                known[name],
+                solids["positions"][k],
+                solids["rotations"][k],
+                solids["velocities"][k],
+                solids["angular_velocities"][k],
+            )
+            for k, name in enumerate(row.decode() for row in solids["names"])
+            if name in known
+        )
         arrays = table_rows(file["water"], frame) | foam
         frames = file["frames"]
         read = Instant.read(scene, int(frames["number"][frame]), float(frames["time"][frame]), arrays, standing)

@@ -29,7 +29,7 @@ from wavetank.formats.robot import (
     tiny,
     weight_of,
     whole,
-)  # fmt: skip
+)
 from wavetank.foundation.door import named, parse_xml, read_text
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import turned
@@ -116,7 +116,7 @@ class _Reader:
 
     def _flat(
         self, row: ElementTree.Element, pose: Pose, around: str
-    ) -> Iterator[tuple[ElementTree.Element, Pose, str]]:  # fmt: skip
+    ) -> Iterator[tuple[ElementTree.Element, Pose, str]]:
         """Yield what is in a body, with the frame that it is in and its class; <frame> only groups."""
         around = row.get("childclass") or around
         for child in row:
@@ -150,7 +150,7 @@ class _Reader:
 
     def _gather(
         self, row: ElementTree.Element, at: Pose, around: str, owner: str, link: _Link
-    ) -> list[tuple[ElementTree.Element, Pose, str]]:  # fmt: skip
+    ) -> list[tuple[ElementTree.Element, Pose, str]]:
         """Add what a body at `at` consists of to a link; return its joints, with their frames and classes."""
         joints, geoms, told = [], 0.0, None
         self.bodies += 1
@@ -233,9 +233,7 @@ class _Reader:
 
     # --- joints ---
 
-    def _join(
-        self, name: str, place: Pose, rows: list[tuple[ElementTree.Element, Pose, str]], before: str
-    ) -> None:  # fmt: skip
+    def _join(self, name: str, place: Pose, rows: list[tuple[ElementTree.Element, Pose, str]], before: str) -> None:
         """Add the joints of a body that is at `place` to what it hangs on."""
         kinds = [self._with(row, around, "joint").get("type", "hinge") for row, _, around in rows]
         if kinds == ["hinge"] * 3:

@@ -28,10 +28,13 @@ def write_npz(path: str | Path, frame: Any) -> None:
     poses = [np.concatenate([getattr(one, name) for name, _ in POSES]) for one in frame.standing]
     with replacing(path) as partial, partial.open("wb") as file:
         np.savez_compressed(
-            file, **arrays, time=np.float64(frame.time), number=np.int64(frame.number),
+            file,
+            **arrays,
+            time=np.float64(frame.time),
+            number=np.int64(frame.number),
             solid_names=np.array([one.name for one in frame.standing], "U"),
             solid_poses=np.array(poses, float).reshape(-1, sum(width for _, width in POSES)),
-        )  # fmt: skip
+        )
 
 
 def read_npz(path: str | Path) -> dict[str, np.ndarray]:

@@ -56,9 +56,18 @@ class Outputs:
     """Writes frames into files beside the simulation."""
 
     def __init__(
-        self, base: Path, scene: Scene, names: Sequence[str], *, fps: float, only: Collection[str] = (),
-        view: Viewpoint | None = None, kept: int = 0, frames: int = 0, tell: Callable[[str], None] = lambda text: None,
-    ) -> None:  # fmt: skip
+        self,
+        base: Path,
+        scene: Scene,
+        names: Sequence[str],
+        *,
+        fps: float,
+        only: Collection[str] = (),
+        view: Viewpoint | None = None,
+        kept: int = 0,
+        frames: int = 0,
+        tell: Callable[[str], None] = lambda text: None,
+    ) -> None:
         modules = check_exports(names, only, scene)
         self.parts, self.shapes, self.patience = parts_named(only), Shapes(scene), Patience(tell)
         plan = Plan(base, scene, fps, self.parts, self.shapes, view, kept, self.patience)

@@ -39,8 +39,11 @@ def write_ply(path: str | Path, frame: Any) -> None:
     foam = _records(_FOAM_RECORD, frame.foam_positions, frame.foam_velocities)
     foam["age"], foam["kind"], foam["id"] = frame.foam_ages, frame.foam_kinds, frame.foam_ids
     header = [
-        *_opening(frame), *_element("vertex", water), *(_element("foam", foam) if len(foam) else ()), "end_header",
-    ]  # fmt: skip
+        *_opening(frame),
+        *_element("vertex", water),
+        *(_element("foam", foam) if len(foam) else ()),
+        "end_header",
+    ]
     with replacing(path) as partial:
         partial.write_bytes("\n".join(header).encode("ascii") + b"\n" + water.tobytes() + foam.tobytes())
 
@@ -61,8 +64,13 @@ def write_surface(path: str | Path, instant: Any) -> None:
             own[name] = int(surface.color[1 + 2 * k : 3 + 2 * k], 16)
         faces["corners"][done : done + len(surface.triangles)] = surface.triangles + first
         done += len(surface.triangles)
-    header = [*_opening(instant), *_element("vertex", vertices), f"element face {len(faces)}",
-              "property list uchar int vertex_indices", "end_header"]  # fmt: skip
+    header = [
+        *_opening(instant),
+        *_element("vertex", vertices),
+        f"element face {len(faces)}",
+        "property list uchar int vertex_indices",
+        "end_header",
+    ]
     with replacing(path) as partial:
         partial.write_bytes("\n".join(header).encode("ascii") + b"\n" + vertices.tobytes() + faces.tobytes())
 

@@ -22,24 +22,48 @@ class Piece:
 def pieces_of(plan: Plan, instant: Instant) -> Iterator[tuple[str, Piece]]:
     """Yield the parts that are asked for: particles, foam, solids, surface; the same ones in every frame."""
     if "particles" in plan.parts:
-        yield "particles", _vertices(instant.positions, {
-            "velocity": in_space(instant.velocities), "density": instant.densities, "id": instant.ids,
-            "material": instant.materials, "color": colors_of(instant),
-        })  # fmt: skip
+        yield (
+            "particles",
+            _vertices(
+                instant.positions,
+                {
+                    "velocity": in_space(instant.velocities),
+                    "density": instant.densities,
+                    "id": instant.ids,
+                    "material": instant.materials,
+                    "color": colors_of(instant),
+                },
+            ),
+        )
     if "foam" in plan.parts and plan.scene.foam > 0.0:
-        yield "foam", _vertices(instant.foam_positions, {
-            "velocity": in_space(instant.foam_velocities), "kind": instant.foam_kinds, "age": instant.foam_ages,
-            "life": instant.foam_lives, "id": instant.foam_ids,
-        })  # fmt: skip
+        yield (
+            "foam",
+            _vertices(
+                instant.foam_positions,
+                {
+                    "velocity": in_space(instant.foam_velocities),
+                    "kind": instant.foam_kinds,
+                    "age": instant.foam_ages,
+                    "life": instant.foam_lives,
+                    "id": instant.foam_ids,
+                },
+            ),
+        )
     if "solids" in plan.parts and plan.scene.solids:
         yield "solids", _solids(plan, instant)
     if "surface" in plan.parts:
         parts = [
-            (surface.vertices, surface.triangles, {
-                "velocity": surface.velocities, "Normals": surface.normals,
-                "material": np.full(len(surface.vertices), surface.material, np.int32),
-            }) for surface in instant.surfaces
-        ]  # fmt: skip
+            (
+                surface.vertices,
+                surface.triangles,
+                {
+                    "velocity": surface.velocities,
+                    "Normals": surface.normals,
+                    "material": np.full(len(surface.vertices), surface.material, np.int32),
+                },
+            )
+            for surface in instant.surfaces
+        ]
         usual = {"velocity": ("f4", (3,)), "Normals": ("f4", (3,)), "material": ("i4", ())}
         yield "surface", _polygons(parts, usual)
 
@@ -54,8 +78,13 @@ def _solids(plan: Plan, instant: Instant) -> Piece:
     parts = []
     for one, points, faces in plan.shapes.placed(instant):
         velocity = one.velocity + np.cross(one.angular_velocity, points - one.position)
-        parts.append((points, faces, {"solid": np.full(len(points), numbers[one.name], np.int32),
-                                      "velocity": velocity.astype(np.float32)}))  # fmt: skip
+        parts.append(
+            (
+                points,
+                faces,
+                {"solid": np.full(len(points), numbers[one.name], np.int32), "velocity": velocity.astype(np.float32)},
+            )
+        )
     return _polygons(parts, {"solid": ("i4", ()), "velocity": ("f4", (3,))})
 
 

@@ -109,9 +109,7 @@ def mesh_of(vertices: np.ndarray, faces: np.ndarray, place: Pose) -> Mesh:
     lower, upper = vertices.min(axis=0), vertices.max(axis=0)
     middle = place[0] + turned(place[1], 0.5 * (lower + upper))
     size = tuple(map(float, np.maximum(upper - lower, 1e-6)))
-    return Mesh.of(
-        vertices, faces, center=tuple(map(float, middle)), size=size, rotation=tuple(map(float, place[1]))
-    )  # fmt: skip
+    return Mesh.of(vertices, faces, center=tuple(map(float, middle)), size=size, rotation=tuple(map(float, place[1])))
 
 
 def hex_of(rgba: Any) -> str:

@@ -32,10 +32,13 @@ UNREADABLE = (KeyError, TypeError, ValueError, AttributeError, IndexError, Overf
 ZORILLA = 5  # surfaceTensionMethod in N/m
 #: viscosityMethod -> name of its table, and how its number is meant
 VISCOSITIES = {
-    1: ("Standard viscosity", "kinematic"), 2: ("Bender and Koschier 2017", "share"), 3: ("Peer et al. 2015", "share"),
-    4: ("Peer et al. 2016", "share"), 5: ("Takahashi et al. 2015 (improved)", "kinematic"),
+    1: ("Standard viscosity", "kinematic"),
+    2: ("Bender and Koschier 2017", "share"),
+    3: ("Peer et al. 2015", "share"),
+    4: ("Peer et al. 2016", "share"),
+    5: ("Takahashi et al. 2015 (improved)", "kinematic"),
     6: ("Weiler et al. 2018", "kinematic"),
-}  # fmt: skip
+}
 STEP = 0.001  # s: time step for which their shares of the strain rate that stays are meant
 #: keys of `Configuration` that are read here; the others are about how it is solved, shown and written
 READ = {"particleRadius", "sim2D", "gravitation", "scriptFile"}
@@ -89,12 +92,18 @@ class _Reader:
             )
         used = {fluid.material for fluid in fluids} | {emitter.material for emitter in emitters}
         table: dict[str, Any] = {
-            "title": self.path.stem.replace("_", " "), "spacing": self.spacing, "tank": solids.tank, "fluids": fluids,
-            "materials": [material for name, material in materials.items() if name in used], "solids": solids.found,
-            "joints": [*self._joints(solids)], "emitters": emitters,
+            "title": self.path.stem.replace("_", " "),
+            "spacing": self.spacing,
+            "tank": solids.tank,
+            "fluids": fluids,
+            "materials": [material for name, material in materials.items() if name in used],
+            "solids": solids.found,
+            "joints": [*self._joints(solids)],
+            "emitters": emitters,
             "gravity": tuple(map(float, self.settings.get("gravitation", (0.0, -9.81, 0.0))))[: self.dim],
-            "no_slip": self._hold_of_walls(used), **self._most(fluids),
-        }  # fmt: skip
+            "no_slip": self._hold_of_walls(used),
+            **self._most(fluids),
+        }
         self._tell_the_rest()
         return Imported(Scene.parse(table, str(self.path)), tuple(dict.fromkeys(self.notes)))
 
@@ -116,9 +125,11 @@ class _Reader:
                 self.notes.append(f"{name}: elastic solids have no counterpart; what is made of it is left out.")
             density = float(row.get("density0", 1000.0))
             found[name] = Material(
-                name=name, density=self._allowed("rest_density", density, f"{name}: density0"),
-                viscosity=self._viscosity(name, row, density), surface_tension=self._tension(name, row),
-            )  # fmt: skip
+                name=name,
+                density=self._allowed("rest_density", density, f"{name}: density0"),
+                viscosity=self._viscosity(name, row, density),
+                surface_tension=self._tension(name, row),
+            )
             for key, what in (("vorticityMethod", "its micropolar vorticity"), ("dragMethod", "the drag of the air")):
                 if row.get(key, 0):
                     self.notes.append(f"{name}: {key}, {what}, has no counterpart; it is left out.")
@@ -179,9 +190,10 @@ class _Reader:
         for number, row in enumerate(self._list("FluidBlocks")):
             if self._is_elastic(row):
                 continue
-            scale, shift = (np.array(row.get(key, usual), float) for key, usual in (
-                ("scale", (1, 1, 1)), ("translation", (0, 0, 0)),
-            ))  # fmt: skip
+            scale, shift = (
+                np.array(row.get(key, usual), float)
+                for key, usual in (("scale", (1, 1, 1)), ("translation", (0, 0, 0)))
+            )
             ends = np.sort([np.array(row[key], float) * scale + shift for key in ("start", "end")], axis=0)
             lower, upper = ends[:, : self.dim]
             if tank is not None:
@@ -199,9 +211,11 @@ class _Reader:
                     f"FluidBlocks[{number}]: denseMode {row['denseMode']} packs more closely; it becomes cubic."
                 )
             yield Block(
-                lower=tuple(map(float, lower)), upper=tuple(map(float, upper)), material=str(row.get("id", "Fluid")),
+                lower=tuple(map(float, lower)),
+                upper=tuple(map(float, upper)),
+                material=str(row.get("id", "Fluid")),
                 velocity=velocity if any(velocity) else None,
-            )  # fmt: skip
+            )
 
     def _models(self) -> Iterator[Points]:
         for number, row in enumerate(self._list("FluidModels")):
@@ -216,9 +230,10 @@ class _Reader:
             points = turned(turn_of(row), points) + np.array(row.get("translation", (0, 0, 0)), float)
             velocity = tuple(map(float, row.get("initialVelocity", ())))[: self.dim]
             yield Points(
-                positions=points[:, : self.dim], material=str(row.get("id", "Fluid")),
+                positions=points[:, : self.dim],
+                material=str(row.get("id", "Fluid")),
                 velocity=velocity if any(velocity) else None,
-            )  # fmt: skip
+            )
 
     def _particles(self, name: str) -> np.ndarray:
         place = Solids.find_file(self.path, name)
@@ -238,10 +253,13 @@ class _Reader:
         width, height = float(row.get("width", 5)) * d, float(row.get("height", 5)) * d
         name = str(row.get("id", "Fluid"))
         fields: dict[str, Any] = {
-            "position": tuple(map(float, row["translation"]))[: self.dim], "direction": tuple(map(float, ahead)),
-            "speed": float(row.get("velocity", 1.0)), "start": start,
-            "duration": lasts if lasts < 86400.0 else None, "material": name if name in materials else None,
-        }  # fmt: skip
+            "position": tuple(map(float, row["translation"]))[: self.dim],
+            "direction": tuple(map(float, ahead)),
+            "speed": float(row.get("velocity", 1.0)),
+            "start": start,
+            "duration": lasts if lasts < 86400.0 else None,
+            "material": name if name in materials else None,
+        }
         is_disc = int(row.get("type", 0)) == 1
         if self.dim == 2:
             return Emitter(width=width if is_disc else height, **fields)

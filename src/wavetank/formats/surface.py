@@ -86,11 +86,17 @@ def reconstruct(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return vertices [m], normals, velocities [m/s], float32 [vertices, 3], and triangles, int32 [triangles, 3]."""
     mesh, _ = _pipeline()(
-        np.ascontiguousarray(positions, np.float32), particle_radius=0.5 * scene.spacing,
+        np.ascontiguousarray(positions, np.float32),
+        particle_radius=0.5 * scene.spacing,
         attributes_to_interpolate={"velocity": np.ascontiguousarray(velocities, np.float32)},
-        smoothing_length=SMOOTHING_LENGTH, cube_size=CUBE_SIZE, iso_surface_threshold=THRESHOLD, mesh_cleanup=True,
-        mesh_smoothing_iters=MESH_SMOOTHING, compute_normals=True, normals_smoothing_iters=NORMAL_SMOOTHING,
-    )  # fmt: skip
+        smoothing_length=SMOOTHING_LENGTH,
+        cube_size=CUBE_SIZE,
+        iso_surface_threshold=THRESHOLD,
+        mesh_cleanup=True,
+        mesh_smoothing_iters=MESH_SMOOTHING,
+        compute_normals=True,
+        normals_smoothing_iters=NORMAL_SMOOTHING,
+    )
     triangles = mesh.mesh.triangles.astype(np.int32)
     vertices = mesh.mesh.vertices.astype(np.float64)
     normals = np.nan_to_num(mesh.point_attributes["normals"].astype(np.float64))  # of a speck there may be none

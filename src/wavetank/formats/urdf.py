@@ -25,7 +25,7 @@ from wavetank.formats.robot import (
     tiny,
     weight_of,
     whole,
-)  # fmt: skip
+)
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import product, turned, unit_quaternion
 from wavetank.scene.joints import Hinge, Joint, Slider
@@ -74,9 +74,11 @@ class _Reader:
         if len({solid.name for solid in self.solids}) < len(self.solids) or not self.solids:
             raise WavetankError("it has no links with a shape, or two of the same name.")
         return Robot(
-            str(self.root.get("name", self.path.stem)), tuple(self.solids), tuple(self.made),
+            str(self.root.get("name", self.path.stem)),
+            tuple(self.solids),
+            tuple(self.made),
             tuple(dict.fromkeys(self.notes)),
-        )  # fmt: skip
+        )
 
     def _add(self, name: str, place: Pose, before: str) -> str:
         """Add a link at that pose with all that is fixed to it, then what moves on it; return the solid's name."""
@@ -131,9 +133,13 @@ class _Reader:
             return
         axis = turned(place[1], np.array(numbers(row.find("axis"), "xyz", (1.0, 0.0, 0.0))))
         fields: dict[str, Any] = {
-            "name": name, "first": child, "second": before, "at": tuple(map(float, place[0])),
-            "axis": tuple(map(float, np.round(axis, 12))), "target": 0.0,
-        }  # fmt: skip
+            "name": name,
+            "first": child,
+            "second": before,
+            "at": tuple(map(float, place[0])),
+            "axis": tuple(map(float, np.round(axis, 12))),
+            "target": 0.0,
+        }
         limit = row.find("limit")
         if limit is not None and kind != "continuous":
             lower, upper = float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))

@@ -97,10 +97,16 @@ class UsdSeries:
 
     def _write_stage(self, last: int) -> None:
         with replacing(self.path) as partial:
-            partial.write_text(_STAGE % {
-                "last": last, "fps": f"{self.plan.fps:g}", "folder": self.folder.name,
-                "title": self.plan.scene.title.replace("\\", "").replace('"', "'").replace("\n", " "),
-            }, encoding="utf-8")  # fmt: skip
+            partial.write_text(
+                _STAGE
+                % {
+                    "last": last,
+                    "fps": f"{self.plan.fps:g}",
+                    "folder": self.folder.name,
+                    "title": self.plan.scene.title.replace("\\", "").replace('"', "'").replace("\n", " "),
+                },
+                encoding="utf-8",
+            )
 
 
 _STAGE = """#usda 1.0
@@ -164,10 +170,15 @@ def _value(kind: str, value: Any) -> Any:
     from pxr import Gf, Vt
 
     arrays = {
-        "point3f[]": Vt.Vec3fArray, "vector3f[]": Vt.Vec3fArray, "normal3f[]": Vt.Vec3fArray,
-        "color3f[]": Vt.Vec3fArray, "float3[]": Vt.Vec3fArray, "float[]": Vt.FloatArray, "int[]": Vt.IntArray,
+        "point3f[]": Vt.Vec3fArray,
+        "vector3f[]": Vt.Vec3fArray,
+        "normal3f[]": Vt.Vec3fArray,
+        "color3f[]": Vt.Vec3fArray,
+        "float3[]": Vt.Vec3fArray,
+        "float[]": Vt.FloatArray,
+        "int[]": Vt.IntArray,
         "int64[]": Vt.Int64Array,
-    }  # fmt: skip
+    }
     if kind in arrays:
         dtype = {"int[]": np.int32, "int64[]": np.int64}.get(kind, np.float32)
         return arrays[kind].FromNumpy(np.ascontiguousarray(value, dtype))

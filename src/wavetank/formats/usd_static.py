@@ -17,22 +17,35 @@ SOLID = (0.694, 0.361, 0.224)  # linear colour of solids
 APERTURE = 24.0  # mm: height of a film
 #: attributes that clips hold: kind of prim -> name, type, interpolation
 POINTS = (
-    ("points", "point3f[]", ""), ("velocities", "vector3f[]", ""), ("ids", "int64[]", ""),
-    ("widths", "float[]", "vertex"), ("extent", "float3[]", ""), ("primvars:id", "int[]", "vertex"),
-)  # fmt: skip
+    ("points", "point3f[]", ""),
+    ("velocities", "vector3f[]", ""),
+    ("ids", "int64[]", ""),
+    ("widths", "float[]", "vertex"),
+    ("extent", "float3[]", ""),
+    ("primvars:id", "int[]", "vertex"),
+)
 PARTICLES = (
-    *POINTS, ("primvars:material", "int[]", "vertex"), ("primvars:density", "float[]", "vertex"),
+    *POINTS,
+    ("primvars:material", "int[]", "vertex"),
+    ("primvars:density", "float[]", "vertex"),
     ("primvars:displayColor", "color3f[]", "vertex"),
-)  # fmt: skip
+)
 FOAM = (*POINTS, ("primvars:age", "float[]", "vertex"), ("primvars:life", "float[]", "vertex"))
 SURFACE = (
-    ("points", "point3f[]", ""), ("normals", "normal3f[]", "vertex"), ("velocities", "vector3f[]", ""),
-    ("faceVertexCounts", "int[]", ""), ("faceVertexIndices", "int[]", ""), ("extent", "float3[]", ""),
-)  # fmt: skip
+    ("points", "point3f[]", ""),
+    ("normals", "normal3f[]", "vertex"),
+    ("velocities", "vector3f[]", ""),
+    ("faceVertexCounts", "int[]", ""),
+    ("faceVertexIndices", "int[]", ""),
+    ("extent", "float3[]", ""),
+)
 SOLIDS = (
-    ("visibility", "token", ""), ("xformOp:translate", "double3", ""), ("xformOp:orient", "quatd", ""),
-    ("wavetank:velocity", "vector3d", ""), ("wavetank:angularVelocity", "vector3d", ""),
-)  # fmt: skip
+    ("visibility", "token", ""),
+    ("xformOp:translate", "double3", ""),
+    ("xformOp:orient", "quatd", ""),
+    ("wavetank:velocity", "vector3d", ""),
+    ("wavetank:angularVelocity", "vector3d", ""),
+)
 
 
 def names_of(names: Sequence[str]) -> dict[str, str]:
@@ -108,8 +121,13 @@ def _materials(stage: Any, plan: Plan) -> None:
     palette = plan.scene.palette()
     for fluid, name in zip(palette, names_of([fluid.name for fluid in palette]).values(), strict=True):
         color = Gf.Vec3f(*_linear(str(fluid.color)))
-        look = {"diffuseColor": ("color3f", color), "roughness": ("float", 0.05), "ior": ("float", 1.333),
-                "opacity": ("float", 0.35), "metallic": ("float", 0.0)}  # fmt: skip
+        look = {
+            "diffuseColor": ("color3f", color),
+            "roughness": ("float", 0.05),
+            "ior": ("float", 1.333),
+            "opacity": ("float", 0.35),
+            "metallic": ("float", 0.0),
+        }
         bind(f"/World/surface/{name}", material(name, look))
         if stage.GetPrimAtPath(f"/World/surface/{name}"):
             UsdGeom.Mesh.Get(stage, f"/World/surface/{name}").CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)

@@ -138,8 +138,9 @@ def read_piece(file: Any, step: int) -> Piece:
     return Piece(
         root["Points"][first : first + count],
         {name: root[f"PointData/{name}"][first : first + count] for name in root["PointData"]},
-        kind, root[f"{kind}/Connectivity"][start : start + width * numbers[kind]].reshape(-1, width),
-    )  # fmt: skip
+        kind,
+        root[f"{kind}/Connectivity"][start : start + width * numbers[kind]].reshape(-1, width),
+    )
 
 
 write = VtkHdfSeries

@@ -70,13 +70,20 @@ def write_piece(path: str | Path, piece: Piece, time: float) -> None:
     cells = {"Verts" if verts or piece.kind == "Vertices" else "Polys": corners}
     text = [
         '<?xml version="1.0"?>',
-        '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">', "<PolyData>",
-        "<FieldData>", array("TimeValue", np.array([time])), "</FieldData>",
+        '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">',
+        "<PolyData>",
+        "<FieldData>",
+        array("TimeValue", np.array([time])),
+        "</FieldData>",
         f'<Piece NumberOfPoints="{len(piece.points)}" NumberOfVerts="{verts}" NumberOfLines="0" NumberOfStrips="0" '
         f'NumberOfPolys="{polys}">',
-        "<PointData>", *(array(name, rows) for name, rows in piece.data.items()), "</PointData>",
-        "<Points>", array("Points", piece.points), "</Points>",
-    ]  # fmt: skip
+        "<PointData>",
+        *(array(name, rows) for name, rows in piece.data.items()),
+        "</PointData>",
+        "<Points>",
+        array("Points", piece.points),
+        "</Points>",
+    ]
     for name, rows in cells.items():
         offsets = width * np.arange(1, len(rows) + 1, dtype=np.int64)
         text += [f"<{name}>", array("connectivity", rows.reshape(-1).astype(np.int64)), array("offsets", offsets)]

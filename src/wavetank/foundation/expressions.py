@@ -40,17 +40,35 @@ def _mod(x: float, y: float) -> float:
 
 #: name -> function, and how many numbers it takes, at least and at most
 FUNCTIONS: dict[str, tuple[Callable[..., float], int, int]] = {
-    "sin": (math.sin, 1, 1), "cos": (math.cos, 1, 1), "tan": (math.tan, 1, 1), "asin": (math.asin, 1, 1),
-    "acos": (math.acos, 1, 1), "atan": (math.atan, 1, 1), "atan2": (math.atan2, 2, 2), "exp": (math.exp, 1, 1),
-    "log": (math.log, 1, 1), "sqrt": (math.sqrt, 1, 1), "abs": (abs, 1, 1), "floor": (math.floor, 1, 1),
-    "min": (min, 2, 8), "max": (max, 2, 8), "clamp": (_clamp, 3, 3), "step": (_step, 2, 2),
-    "smoothstep": (smoothstep, 3, 3), "mod": (_mod, 2, 2),
-}  # fmt: skip
+    "sin": (math.sin, 1, 1),
+    "cos": (math.cos, 1, 1),
+    "tan": (math.tan, 1, 1),
+    "asin": (math.asin, 1, 1),
+    "acos": (math.acos, 1, 1),
+    "atan": (math.atan, 1, 1),
+    "atan2": (math.atan2, 2, 2),
+    "exp": (math.exp, 1, 1),
+    "log": (math.log, 1, 1),
+    "sqrt": (math.sqrt, 1, 1),
+    "abs": (abs, 1, 1),
+    "floor": (math.floor, 1, 1),
+    "min": (min, 2, 8),
+    "max": (max, 2, 8),
+    "clamp": (_clamp, 3, 3),
+    "step": (_step, 2, 2),
+    "smoothstep": (smoothstep, 3, 3),
+    "mod": (_mod, 2, 2),
+}
 CONSTANTS = {"pi": math.pi, "tau": math.tau, "e": math.e, "deg": math.pi / 180.0}
 _OPERATIONS: dict[type[ast.AST], Callable[..., float]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
-    ast.Pow: math.pow, ast.USub: operator.neg, ast.UAdd: operator.pos,
-}  # fmt: skip
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: math.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
 
 
 def shown(text: str) -> str:

@@ -12,9 +12,17 @@ Result = TypeVar("Result")
 
 #: what may be over soon
 PASSING = {
-    errno.EAGAIN, errno.EBUSY, errno.EINTR, errno.ENOSPC, errno.EDQUOT, errno.ETIMEDOUT, errno.ENFILE, errno.EMFILE,
-    getattr(errno, "ESTALE", errno.ETIMEDOUT), getattr(errno, "EHOSTDOWN", errno.ETIMEDOUT),
-}  # fmt: skip
+    errno.EAGAIN,
+    errno.EBUSY,
+    errno.EINTR,
+    errno.ENOSPC,
+    errno.EDQUOT,
+    errno.ETIMEDOUT,
+    errno.ENFILE,
+    errno.EMFILE,
+    getattr(errno, "ESTALE", errno.ETIMEDOUT),
+    getattr(errno, "EHOSTDOWN", errno.ETIMEDOUT),
+}
 LONGEST = 60.0  # s of waiting, all in all
 FIRST, MOST = 0.2, 5.0  # s between two tries
 

@@ -86,11 +86,13 @@ def interpolate(a: np.ndarray, b: np.ndarray, share: float) -> np.ndarray:
 def quaternion_of(matrix: np.ndarray) -> tuple[float, ...]:
     """Return (w, x, y, z) of a rotation matrix (Bar-Itzhack 2000, 10.2514/2.4654)."""
     m = matrix
-    whole = np.array([
-        [m[0, 0] - m[1, 1] - m[2, 2], 0.0, 0.0, 0.0],
-        [m[1, 0] + m[0, 1], m[1, 1] - m[0, 0] - m[2, 2], 0.0, 0.0],
-        [m[2, 0] + m[0, 2], m[2, 1] + m[1, 2], m[2, 2] - m[0, 0] - m[1, 1], 0.0],
-        [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], np.trace(m)],
-    ])  # fmt: skip
+    whole = np.array(
+        [
+            [m[0, 0] - m[1, 1] - m[2, 2], 0.0, 0.0, 0.0],
+            [m[1, 0] + m[0, 1], m[1, 1] - m[0, 0] - m[2, 2], 0.0, 0.0],
+            [m[2, 0] + m[0, 2], m[2, 1] + m[1, 2], m[2, 2] - m[0, 0] - m[1, 1], 0.0],
+            [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], np.trace(m)],
+        ]
+    )
     x, y, z, w = np.linalg.eigh(whole / 3.0)[1][:, -1]
     return (float(w), float(x), float(y), float(z))

@@ -151,9 +151,11 @@ def _keyed(plain: dict[str, Any]) -> Track:
     values = [track(row["value"])(time) for row, time in zip(rows, times, strict=True)]
     if len({value.shape for value in values}) > 1:
         raise WavetankError("every keyframe must have a value of the same number of components.")
-    keys = Keys(times, np.array([np.atleast_1d(value) for value in values]), *(
-        plain.get(key, allowed[0]) for key, allowed in (("between", BETWEEN), ("after", AFTER))
-    ))  # fmt: skip
+    keys = Keys(
+        times,
+        np.array([np.atleast_1d(value) for value in values]),
+        *(plain.get(key, allowed[0]) for key, allowed in (("between", BETWEEN), ("after", AFTER))),
+    )
     return (lambda time: keys(time)) if values[0].shape else (lambda time: np.array(keys(time)[0]))
 
 

@@ -97,15 +97,24 @@ def status(session: Session, painter: Painter) -> dict[str, Any]:
     """Return what changes all the time."""
     pace, times = session.pace, session.history.times
     return {
-        "time": session.sim.time, "frame": session.sim.frame_number, "ticks": session.ticks,
-        "count": session.sim.count, "paused": session.paused, "waits": session.waits, "speed": session.speed,
-        "pace": pace.measured if not session.paused else 0.0, "fps": pace.frames_per_second,
+        "time": session.sim.time,
+        "frame": session.sim.frame_number,
+        "ticks": session.ticks,
+        "count": session.sim.count,
+        "paused": session.paused,
+        "waits": session.waits,
+        "speed": session.speed,
+        "pace": pace.measured if not session.paused else 0.0,
+        "fps": pace.frames_per_second,
         "late": pace.is_late(session.speed) and not session.paused,
-        "picture_ms": 1e3 * painter.seconds, "frame_ms": 1e3 * session.sim.seconds_per_frame,
-        "running": list(session.running), "held": [tool.name for tool, _ in session.hands.values()],
+        "picture_ms": 1e3 * painter.seconds,
+        "frame_ms": 1e3 * session.sim.seconds_per_frame,
+        "running": list(session.running),
+        "held": [tool.name for tool, _ in session.hands.values()],
         "past": [times[0], max(times[-1], session.sim.time)] if times else [0.0, 0.0],
-        "bookmarks": list(session.history.bookmarks), "height": session.camera.visible_height,
-    }  # fmt: skip
+        "bookmarks": list(session.history.bookmarks),
+        "height": session.camera.visible_height,
+    }
 
 
 def figures(session: Session) -> dict[str, float]:
@@ -120,10 +129,18 @@ def _parameter(p: Any) -> dict[str, Any]:
     if isinstance(p.default, str):
         choices = list(getattr(Parameters.model_fields[p.name].annotation, "__args__", ()))
     return {
-        "name": p.name, "default": p.default, "low": p.low, "high": p.high, "unit": readable(p.unit),
-        "symbol": p.symbol, "sentence": p.sentence, "live": p.live, "everyday": p.name in EVERYDAY, "choices": choices,
+        "name": p.name,
+        "default": p.default,
+        "low": p.low,
+        "high": p.high,
+        "unit": readable(p.unit),
+        "symbol": p.symbol,
+        "sentence": p.sentence,
+        "live": p.live,
+        "everyday": p.name in EVERYDAY,
+        "choices": choices,
         "whole": isinstance(p.default, int),
-    }  # fmt: skip
+    }
 
 
 @functools.cache
@@ -158,9 +175,15 @@ def _outline(name: str, scene: Scene) -> dict[str, Any]:
             is_round = solid.shape in ("sphere", "capsule")
             shapes.append({"what": "solid", "round": is_round, **_box(solid.origin - half, solid.origin + half)})
     return {
-        "name": name, "title": scene.title or name, "dim": scene.dim, "count": bundled_counts()[name], "shapes": shapes,
-        "lower": extent.lower.tolist(), "upper": extent.upper.tolist(), "goal": scene.goal.text if scene.goal else "",
-    }  # fmt: skip
+        "name": name,
+        "title": scene.title or name,
+        "dim": scene.dim,
+        "count": bundled_counts()[name],
+        "shapes": shapes,
+        "lower": extent.lower.tolist(),
+        "upper": extent.upper.tolist(),
+        "goal": scene.goal.text if scene.goal else "",
+    }
 
 
 def _box(lower: np.ndarray, upper: np.ndarray) -> dict[str, Any]:

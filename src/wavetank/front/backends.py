@@ -37,10 +37,14 @@ def compare(arch: str, views: tuple[str, ...] = VIEWS, seconds: float = SECONDS)
         pictures = [np.load(Path(folder) / f"{name}.npz") for name in ("cpu", arch)]
         seen = {view: _difference(*(side[view] for side in pictures)) for view in views}
     return {
-        "arch": arch, "scene": SCENE, "particles": sides[0]["particles"], "seconds": seconds,
+        "arch": arch,
+        "scene": SCENE,
+        "particles": sides[0]["particles"],
+        "seconds": seconds,
         "figures": {name: [side["stats"][name] for side in sides] for name in FIGURES},
-        "height": [side["height"] for side in sides], "views": seen,
-    }  # fmt: skip
+        "height": [side["height"] for side in sides],
+        "views": seen,
+    }
 
 
 def _side(arch: str, folder: Path, views: tuple[str, ...], seconds: float) -> dict[str, Any]:

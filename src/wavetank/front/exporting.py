@@ -36,9 +36,15 @@ class Source:
 
 
 def export(
-    source: Path, names: tuple[str, ...], *, out: Path | None, only: tuple[str, ...] = (), every: int = 1,
-    arch: str = "", console: Console | None = None,
-) -> dict[str, Any]:  # fmt: skip
+    source: Path,
+    names: tuple[str, ...],
+    *,
+    out: Path | None,
+    only: tuple[str, ...] = (),
+    every: int = 1,
+    arch: str = "",
+    console: Console | None = None,
+) -> dict[str, Any]:
     """Write the frames of a run's folder, a state, a recording or an HDF5 file in these formats; return what it wrote.
 
     Raises `WavetankError` for what is none of these.
@@ -53,9 +59,15 @@ def export(
         console.print(found.note)
     folder, written = make_folder(out or found.folder), 0
     outputs = Outputs(
-        folder / found.name, found.scene, names, fps=found.fps / every, only=only, view=view_of(found.scene),
-        frames=(found.count or 0) // every, tell=console.print,
-    )  # fmt: skip
+        folder / found.name,
+        found.scene,
+        names,
+        fps=found.fps / every,
+        only=only,
+        view=view_of(found.scene),
+        frames=(found.count or 0) // every,
+        tell=console.print,
+    )
     with outputs, Progress(console=console, transient=True) as progress:
         task = progress.add_task("export", total=found.count)
         for number, frame in enumerate(found.frames):

@@ -37,8 +37,8 @@ KEEP_EVERY = 8  # frames between two states of the water
 
 
 def film(
-    scene: Scene, path: Path, *, arch: str = "cpu", console: Console | None = None, keep: bool = False, **changes: Any,
-) -> dict[str, Any]:  # fmt: skip
+    scene: Scene, path: Path, *, arch: str = "cpu", console: Console | None = None, keep: bool = False, **changes: Any
+) -> dict[str, Any]:
     """Simulate `scene`, write its film to `path` and return what it shows.
 
     `changes` take the place of what the scene's film says, or of its light; None changes nothing. With `keep` the
@@ -63,9 +63,15 @@ def film(
     with asked_to_end(say="asked to end; what is there is being kept (once more stops at once)") as asked:
         done = _frames(scene, order, folder, renderer, {**style, **look}, (arch, asked, console))
     figures = {
-        "file": str(path), "scene": scene.title, "frames": len(done), "of": order.frames, "fps": order.fps,
-        "rendered": sum(done), "interrupted": len(done) < order.frames, "exit_code": asked.code,
-    }  # fmt: skip
+        "file": str(path),
+        "scene": scene.title,
+        "frames": len(done),
+        "of": order.frames,
+        "fps": order.fps,
+        "rendered": sum(done),
+        "interrupted": len(done) < order.frames,
+        "exit_code": asked.code,
+    }
     if figures["interrupted"]:
         return figures | {"file": str(folder)}
     with writer.write(path, *order.size, order.fps) as out:
@@ -83,9 +89,11 @@ def camera_at(order: Film, scene: Scene, time: float, water: float) -> Camera:
     if scene.dim == 2:
         return usual
     camera = Camera(
-        eye=now.eye or usual.eye, target=now.target or usual.target, field_of_view=math.radians(now.field_of_view),
+        eye=now.eye or usual.eye,
+        target=now.target or usual.target,
+        field_of_view=math.radians(now.field_of_view),
         near=usual.near,
-    )  # fmt: skip
+    )
     return camera.tilted(scene, water, 1.0 if now.eye else ROOM)
 
 
@@ -112,9 +120,13 @@ def _begin(folder: Path, scene: Scene, order: Film, look: dict[str, Any]) -> Non
 
 
 def _frames(
-    scene: Scene, order: Film, folder: Path, renderer: Renderer, style: dict[str, Any],
+    scene: Scene,
+    order: Film,
+    folder: Path,
+    renderer: Renderer,
+    style: dict[str, Any],
     how: tuple[str, Asked, Console | None],
-) -> list[bool]:  # fmt: skip
+) -> list[bool]:
     """Make the frames that are not there, and say for every one that is there whether it was made now."""
     arch, asked, console = how
     times, done = order.times(), []
@@ -123,8 +135,13 @@ def _frames(
     if missing == order.frames:
         return [False] * order.frames
     sim, at = _water(scene, folder, arch, times, missing)
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[frame]}"), TimeElapsedColumn(),
-               TimeRemainingColumn(elapsed_when_finished=True))  # fmt: skip
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[frame]}"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(elapsed_when_finished=True),
+    )
     with Progress(*columns, console=console or Console(stderr=True), transient=True) as bar:
         each = style["samples"] if style["traced"] else 1
         task = bar.add_task("film", total=each * (order.frames - sum(there)), frame="")

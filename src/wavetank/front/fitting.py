@@ -71,9 +71,10 @@ def fits(session: Session) -> dict[str, Any]:
         scene = _bundled(name)
         fit = fitting(scene, cost)
         scenes[name] = {
-            "particles": fit, "pace": expected_pace(scene, fit, cost),
+            "particles": fit,
+            "pace": expected_pace(scene, fit, cost),
             "full": expected_pace(scene, _count(scene), cost),
-        }  # fmt: skip
+        }
     return {"type": "fit", "scenes": scenes, "here": _choices(session, cost)}
 
 
@@ -118,6 +119,8 @@ def _facts(scene: Scene) -> Any:
     speed = math.sqrt(2.0 / 3.0 * math.hypot(*scene.gravity) * height)
     return types.SimpleNamespace(
         params=types.SimpleNamespace(**{name: getattr(scene, name) for name in Parameters.model_fields}),
-        speed=speed, depth=0.5 * height, thick=bool(scene.dynamic_viscosity),
+        speed=speed,
+        depth=0.5 * height,
+        thick=bool(scene.dynamic_viscosity),
         on_grid=scene.tank is not None and bool(scene.grid_pressure),
-    )  # fmt: skip
+    )

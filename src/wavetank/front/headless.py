@@ -106,11 +106,21 @@ class Order:
     def run(self, sim: Simulation, start: float) -> Run:
         """Return this as the file of a run's folder has it, which began at the time `start` [s] of the water."""
         return Run(
-            name=self.name, arch=sim.arch or "cpu", seconds=self.seconds, start=start, fps=self.fps, size=self.size,
-            video=self.video, gif=self.gif, frames=self.frames, exports=[*self.exports], only=[*self.only],
-            every=self.every, quality=self.quality,
+            name=self.name,
+            arch=sim.arch or "cpu",
+            seconds=self.seconds,
+            start=start,
+            fps=self.fps,
+            size=self.size,
+            video=self.video,
+            gif=self.gif,
+            frames=self.frames,
+            exports=[*self.exports],
+            only=[*self.only],
+            every=self.every,
+            quality=self.quality,
             look={name: str(value) for name, value in self.look.items() if value is not None},
-        )  # fmt: skip
+        )
 
     @property
     def gif_size(self) -> tuple[int, int]:
@@ -123,9 +133,7 @@ class Order:
         return self.out / f"{self.name}{suffix}"
 
 
-def record(
-    sim: Simulation, order: Order, console: Console | None = None, begun: Begun | None = None
-) -> dict[str, Any]:  # fmt: skip
+def record(sim: Simulation, order: Order, console: Console | None = None, begun: Begun | None = None) -> dict[str, Any]:
     """Advance `sim`, write what is ordered and return the figures of the run, which may have `begun` before.
 
     Ctrl-C and other wishes to end (`signals.py`) end the run early; every file is complete then, and the figures say
@@ -147,9 +155,8 @@ def record(
         if summary.broken is None:
             fine = Renderer(*order.size, 2 if order.quality == "draft" else supersample)
             write_png(
-                still, fine.render(sim.frame(), **order.style),
-                {"scene": sim.scene.title, "time": f"{sim.time:.4f} s"},
-            )  # fmt: skip
+                still, fine.render(sim.frame(), **order.style), {"scene": sim.scene.title, "time": f"{sim.time:.4f} s"}
+            )
             sinks[str(still)] = lambda number, frame, image: None
         stats = order.out / SUMMARY
         files = [*sinks, *work.outputs.files, str(work.folder.write_table()), str(stats)]
@@ -223,10 +230,16 @@ class _Work:
         """Open the files of frames; those before a checkpoint are kept."""
         order = self.order
         self.outputs = Outputs(
-            self.folder.base, self.folder.scene, order.exports, fps=order.fps / order.every, only=order.only,
-            view=view_of(self.folder.scene), kept=self.done // order.every + 1, tell=tell,
+            self.folder.base,
+            self.folder.scene,
+            order.exports,
+            fps=order.fps / order.every,
+            only=order.only,
+            view=view_of(self.folder.scene),
+            kept=self.done // order.every + 1,
+            tell=tell,
             frames=int(order.seconds * order.fps / order.every) + 1,
-        )  # fmt: skip
+        )
         stack.enter_context(self.outputs)
 
     def export(self, number: int, frame: Frame, image: Any) -> None:
@@ -266,9 +279,13 @@ def _run(work: _Work, renderer: Renderer | None, sinks: Sequence[Sink], console:
     summary = _Summary(sim, work.begun.checkpoint.figures if work.begun else None)
     moving = order.style | {"shutter": min(sim.scene.frame_time, 1.0 / order.fps)}
     progress = Progress(
-        TextColumn("{task.description}"), BarColumn(), _Figures(), TimeRemainingColumn(),
-        console=console or Console(stderr=True), transient=False,
-    )  # fmt: skip
+        TextColumn("{task.description}"),
+        BarColumn(),
+        _Figures(),
+        TimeRemainingColumn(),
+        console=console or Console(stderr=True),
+        transient=False,
+    )
     with progress:
         total = order.seconds or 1.0
         task = progress.add_task("wavetank", total=total, time=sim.time, fps=0.0, count=sim.count, error=0.0)
@@ -284,9 +301,13 @@ def _run(work: _Work, renderer: Renderer | None, sinks: Sequence[Sink], console:
                 first = elapsed if shown == 0 else first
                 speed, shown = shown / (elapsed - first) if elapsed > first else 0.0, shown + 1
                 progress.update(
-                    task, completed=sim.time - work.start, time=sim.time, fps=speed, count=sim.count,
+                    task,
+                    completed=sim.time - work.start,
+                    time=sim.time,
+                    fps=speed,
+                    count=sim.count,
                     error=summary.last["density_error_mean"],
-                )  # fmt: skip
+                )
                 work.keep(number, summary)
                 if work.asked:
                     summary.interrupted = True
@@ -297,9 +318,14 @@ def _run(work: _Work, renderer: Renderer | None, sinks: Sequence[Sink], console:
 
 
 def replay_session(
-    path: Path, *, video: Path | None = None, fps: float = 60.0, size: tuple[int, int] = (1280, 720), arch: str = "",
+    path: Path,
+    *,
+    video: Path | None = None,
+    fps: float = 60.0,
+    size: tuple[int, int] = (1280, 720),
+    arch: str = "",
     console: Console | None = None,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Do a recorded session again, with a video if `video` is given, and return what came out.
 
     The video follows the recorded camera and shows one frame of the session in each of its own, so slow motion is slow.
@@ -331,10 +357,15 @@ def replay_session(
     assert session is not None
     digest = session.sim.digest()
     return {
-        "frames": session.ticks, "seconds_of_water": session.sim.time, "count": session.sim.count,
-        "arch": session.sim.arch, "same": digest == recording.digest, "digest": digest, "interrupted": bool(asked),
+        "frames": session.ticks,
+        "seconds_of_water": session.sim.time,
+        "count": session.sim.count,
+        "arch": session.sim.arch,
+        "same": digest == recording.digest,
+        "digest": digest,
+        "interrupted": bool(asked),
         "exit_code": asked.code,
-    }  # fmt: skip
+    }
 
 
 class _Summary:

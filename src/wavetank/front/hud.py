@@ -48,10 +48,13 @@ class Hud:
         for aim in told["aims"]:
             aim["label"] = _label(aim)
         return {
-            **told, "level": self._level, "next": levels[place] if 0 < place < len(levels) else "",
+            **told,
+            "level": self._level,
+            "next": levels[place] if 0 < place < len(levels) else "",
             "heading": f"Level {place} of {len(levels)}" if place else "Level",
-            "headline": _headline(game, place == len(levels)), "verdict": self._verdict(game),
-        }  # fmt: skip
+            "headline": _headline(game, place == len(levels)),
+            "verdict": self._verdict(game),
+        }
 
     def _keep_score(self, game: Game) -> None:
         try:

@@ -81,9 +81,16 @@ def frame_at(world: str, at: float | None, arch: str = "") -> Frame:
 
 
 def film(
-    world: str, path: Path, width: int, height: int, *, arch: str = "", quality: str = "draft",
-    console: Console | None = None, **options: Any,
-) -> dict[str, Any]:  # fmt: skip
+    world: str,
+    path: Path,
+    width: int,
+    height: int,
+    *,
+    arch: str = "",
+    quality: str = "draft",
+    console: Console | None = None,
+    **options: Any,
+) -> dict[str, Any]:
     """Write a film of all frames of a run's folder, a recording or an HDF5 file, and return what it shows.
 
     Nothing is computed again where frames were written. Raises `WavetankError`.
@@ -113,9 +120,14 @@ def film(
             bar.update(task, completed=count)
             frame = next(frames, None)
     return {
-        "file": str(path), "scene": source.scene.title, "frames": count, "fps": source.fps, "time": time,
-        "interrupted": bool(asked), "exit_code": asked.code,
-    }  # fmt: skip
+        "file": str(path),
+        "scene": source.scene.title,
+        "frames": count,
+        "fps": source.fps,
+        "time": time,
+        "interrupted": bool(asked),
+        "exit_code": asked.code,
+    }
 
 
 def _shown(scene: Scene, frames: Any, arch: str) -> Iterator[Frame]:

@@ -50,11 +50,16 @@ SPEEDS = ((1 / 16, "1/16 ×"), (1 / 8, "1/8 ×"), (1 / 4, "1/4 ×"), (1 / 2, "1/
 
 #: a tool of the fronts alone, which makes no command
 LOOK: dict[str, Any] = {
-    "name": "look", "label": "Look", "key": "l", "options": [], "cursor": False, "takes": "",
+    "name": "look",
+    "label": "Look",
+    "key": "l",
+    "options": [],
+    "cursor": False,
+    "takes": "",
     "icon": "M2 12c3-5 6.500-7 10-7s7 2 10 7c-3 5-6.500 7-10 7s-7-2-10-7zM12 9a3 3 0 1 1 0 6 3 3 0 0 1 0-6",
     "sentence": "Drag to turn the view. With any tool: right button or two fingers turn, wheel or pinch zooms, middle "
     "button or Shift moves.",
-}  # fmt: skip
+}
 
 
 def nearest_speed(factor: float) -> int:

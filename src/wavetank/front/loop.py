@@ -135,9 +135,13 @@ class Loop:
         """Return how the session stands."""
         game = self.hud.status()
         return News(
-            status(self.session, self.painter), world(self.session), self._figures, self._measured, game,
+            status(self.session, self.painter),
+            world(self.session),
+            self._figures,
+            self._measured,
+            game,
             self.hud.scores,
-        )  # fmt: skip
+        )
 
     def _paint(self, now: float) -> None:
         """Show a picture where something has changed, or is to be seen sharply, and someone waits for it."""

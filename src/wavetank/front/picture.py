@@ -93,10 +93,13 @@ class Painter:
         self.last_size = (width, height)
         began, session = time.perf_counter(), self.session
         image = self._renderer(width, height).render(
-            session.sim.frame(measured=self._needs_densities), session.sight, legend=False,
-            hasty=share < 1.0, shutter=0.0 if sharp or session.paused else session.sim.scene.frame_time,
+            session.sim.frame(measured=self._needs_densities),
+            session.sight,
+            legend=False,
+            hasty=share < 1.0,
+            shutter=0.0 if sharp or session.paused else session.sim.scene.frame_time,
             **self._options(),
-        )  # fmt: skip
+        )
         self.seconds = time.perf_counter() - began
         self.session.picture_seconds += 0.2 * (self.seconds - self.session.picture_seconds)
         self._make_time()

@@ -19,9 +19,18 @@ from wavetank.session.session import Session
 
 
 def play(
-    scene: Scene, arch: str, *, window: bool = False, web: bool = False, host: str = "127.0.0.1",
-    port: int | None = None, browser: bool = True, record: Path | None = None, most: int = 200_000, token: str = "",
-) -> None:  # fmt: skip
+    scene: Scene,
+    arch: str,
+    *,
+    window: bool = False,
+    web: bool = False,
+    host: str = "127.0.0.1",
+    port: int | None = None,
+    browser: bool = True,
+    record: Path | None = None,
+    most: int = 200_000,
+    token: str = "",
+) -> None:
     """Open a window where there can be one, else serve the page and say why; `window` insists, `web` never tries.
 
     Who asks for a port or another host asks for the page. Raises `WavetankError` where `window` cannot be had.
@@ -89,9 +98,16 @@ def play_in_window(scene: Scene, arch: str, *, record: Path | None = None, most:
 
 
 def play_in_browser(
-    scene: Scene, arch: str, *, host: str = "127.0.0.1", port: int | None = None, browser: bool = True,
-    record: Path | None = None, most: int = 200_000, token: str = "",
-) -> None:  # fmt: skip
+    scene: Scene,
+    arch: str,
+    *,
+    host: str = "127.0.0.1",
+    port: int | None = None,
+    browser: bool = True,
+    record: Path | None = None,
+    most: int = 200_000,
+    token: str = "",
+) -> None:
     """Serve a page until Ctrl-C and print one line with its address, token included: `token`, or one made anew."""
     from wavetank.front.page.server import PORT, WebFront
 

@@ -30,19 +30,52 @@ PARTS = ("{task.description}", BarColumn(), MofNCompleteColumn(), TimeRemainingC
 USUAL_TIME = 0.5  # s: when a scene is shown unless told
 #: the same for bundled scenes whose best moment is another one
 SHOWN_AT = {
-    "still-tank": 1.0, "still-tank-2d": 1.0, "drop": 0.42, "drop-2d": 0.35, "obstacle-tank": 0.62, "knot": 0.35,
-    "fountain": 2.0, "fountain-2d": 1.5, "sluice": 2.0, "sluice-2d": 1.5, "wave-machine": 4.0, "wave-machine-2d": 4.0,
-    "ducks": 3.0, "boats": 4.0, "sinking-ship": 4.0, "deer-scarer": 6.3, "robot": 6.6, "logs": 2.0,
-    "paddle-boat": 4.5, "lighthouse": 0.62, "rain": 0.32, "jug": 2.4, "river": 5.0, "honey": 0.4,
-    "mountain-lake": 0.8, "vase": 0.28,
-}  # fmt: skip
+    "still-tank": 1.0,
+    "still-tank-2d": 1.0,
+    "drop": 0.42,
+    "drop-2d": 0.35,
+    "obstacle-tank": 0.62,
+    "knot": 0.35,
+    "fountain": 2.0,
+    "fountain-2d": 1.5,
+    "sluice": 2.0,
+    "sluice-2d": 1.5,
+    "wave-machine": 4.0,
+    "wave-machine-2d": 4.0,
+    "ducks": 3.0,
+    "boats": 4.0,
+    "sinking-ship": 4.0,
+    "deer-scarer": 6.3,
+    "robot": 6.6,
+    "logs": 2.0,
+    "paddle-boat": 4.5,
+    "lighthouse": 0.62,
+    "rain": 0.32,
+    "jug": 2.4,
+    "river": 5.0,
+    "honey": 0.4,
+    "mountain-lake": 0.8,
+    "vase": 0.28,
+}
 
 
 def take(
-    world: str, scene: Scene | None, path: Path, width: int, height: int, *, at: float | None = None,
-    arch: str = "", quality: str = "standard", eye: str | None = None, target: str | None = None,
-    timings: bool = False, samples: int | None = None, console: Console | None = None, **options: Any,
-) -> dict[str, Any]:  # fmt: skip
+    world: str,
+    scene: Scene | None,
+    path: Path,
+    width: int,
+    height: int,
+    *,
+    at: float | None = None,
+    arch: str = "",
+    quality: str = "standard",
+    eye: str | None = None,
+    target: str | None = None,
+    timings: bool = False,
+    samples: int | None = None,
+    console: Console | None = None,
+    **options: Any,
+) -> dict[str, Any]:
     """Write a picture with its scene, time and view as metadata, and return what it cost.
 
     `world` is the name of `scene`, or without one the file of a saved state, or the folder of a run. With
@@ -69,13 +102,21 @@ def take(
         image = renderer.render(frame, camera, watch=watch, **style)
     if not watch.whole:
         return {
-            "file": str(watch.path), "samples": watch.done, "of": style["samples"], "interrupted": True,
+            "file": str(watch.path),
+            "samples": watch.done,
+            "of": style["samples"],
+            "interrupted": True,
             "exit_code": asked.code,
-        }  # fmt: skip
+        }
     figures: dict[str, Any] = {
-        "file": str(path), "scene": frame.scene.title, "time": frame.time, "view": view.name, "particles": frame.count,
-        "seconds_to_draw": time.perf_counter() - began, "arch": current_backend(),
-    }  # fmt: skip
+        "file": str(path),
+        "scene": frame.scene.title,
+        "time": frame.time,
+        "view": view.name,
+        "particles": frame.count,
+        "seconds_to_draw": time.perf_counter() - began,
+        "arch": current_backend(),
+    }
     if timings:
         measured: dict[str, float] = {}
         figures["milliseconds"] = measured

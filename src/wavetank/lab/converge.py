@@ -109,9 +109,13 @@ def over_iterations(scene: Scene, start: float, most: int, preset: str, arch: st
 def _row(sim: Simulation, preset: str, **place: float) -> Row:
     stats = sim.stats()
     return {
-        "preset": preset, **place, "density_max": stats["density_max"], "density_mean": stats["density_mean"],
-        "error_mean": stats["density_error_mean"], "error_p99": stats["density_error_p99"],
-    }  # fmt: skip
+        "preset": preset,
+        **place,
+        "density_max": stats["density_max"],
+        "density_mean": stats["density_mean"],
+        "error_mean": stats["density_error_mean"],
+        "error_p99": stats["density_error_p99"],
+    }
 
 
 def _write(path: Path, rows: list[Row]) -> None:

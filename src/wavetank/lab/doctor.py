@@ -13,7 +13,14 @@ from wavetank.foundation.folders import cache_folder
 from wavetank.foundation.memory import in_words
 
 _PACKAGES = {
-    "quadrants": "", "numpy": "", "pydantic": "", "typer": "", "rich": "", "pillow": "", "av": "", "tomli-w": "",
+    "quadrants": "",
+    "numpy": "",
+    "pydantic": "",
+    "typer": "",
+    "rich": "",
+    "pillow": "",
+    "av": "",
+    "tomli-w": "",
     "platformdirs": "",
     **dict.fromkeys(
         ("imgui-bundle", "moderngl", "glfw", "svg.path"), "the window of `wavetank play`: pip install wavetank[window]"
@@ -25,7 +32,7 @@ _PACKAGES = {
     "h5py": "VTKHDF and tables: pip install wavetank[hdf5]",
     "anywidget": "`wt.show` in notebooks: pip install wavetank[notebook]",
     "matplotlib": "plots of `wavetank converge` and `validate`: pip install wavetank[plot]",
-}  # fmt: skip
+}
 
 
 IN_FORCE = "in force"

@@ -83,9 +83,14 @@ def table(result: dict[str, Any]) -> Table:
             failed = "[yellow]known[/yellow]" if figure.get("known") else "[bold red]fail[/bold red]"
             verdict = {True: "[green]pass[/green]", False: failed, None: ""}[figure["pass"]]
             rows.add_row(
-                name if number == 0 else "", figure["name"], number_text(figure["value"], figure["unit"]),
-                bounds_text(figure), figure["reference"], figure["source"], verdict,
-            )  # fmt: skip
+                name if number == 0 else "",
+                figure["name"],
+                number_text(figure["value"], figure["unit"]),
+                bounds_text(figure),
+                figure["reference"],
+                figure["source"],
+                verdict,
+            )
         rows.add_section()
     return rows
 

@@ -30,7 +30,7 @@ from wavetank.solids.distance import (
     to_local,
     vec3,
     vec4,
-)  # fmt: skip
+)
 
 vec2i = qd.types.vector(2, qd.i32)
 
@@ -97,7 +97,7 @@ def add_wall(sums: qd.template(), lane, value, walls: Walls, c: Coefficients):
 @qd.func
 def add_solids(
     sums: qd.template(), lane, p: qd.template(), near, behind, solids: SolidSet, walls: Walls, c: Coefficients
-):  # fmt: skip
+):
     """Add the marked solids behind number `behind`, as `add_wall` does, at the place `p` of a lane."""
     k = next_near(near, behind, solids)
     while k < solids.count:

@@ -57,9 +57,14 @@ def add_central_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, meth
 
 @qd.kernel(fastcache=True)
 def apply_central_xsph(
-    smoothed: Particles, particles: Particles, packed: qd.types.ndarray(), grid: Grid, c: Coefficients, count: qd.i32,
+    smoothed: Particles,
+    particles: Particles,
+    packed: qd.types.ndarray(),
+    grid: Grid,
+    c: Coefficients,
+    count: qd.i32,
     method: qd.template(),
-):  # fmt: skip
+):
     """Smooth the velocities along the lines between neighbours, and make up for the torque of the constraint."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):

@@ -24,9 +24,15 @@ CALM = 0.1  # of sqrt(g / h), the rate of the shortest waves: water that turns s
 
 
 def coefficients(
-    params: Parameters, dt: float, speed_limit: float = math.inf, *, carries: float = 0.0, parts: int = 0,
-    held: float = 0.0, iterations: int = 0,
-) -> Coefficients:  # fmt: skip
+    params: Parameters,
+    dt: float,
+    speed_limit: float = math.inf,
+    *,
+    carries: float = 0.0,
+    parts: int = 0,
+    held: float = 0.0,
+    iterations: int = 0,
+) -> Coefficients:
     """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here.
 
     Artificial pressure comes in so many `parts`, one an iteration where 0. Pushes of thick fluids are `held` back.

@@ -154,9 +154,16 @@ def set_multiplier(i, before, change, scratch: Scratch, c: Coefficients):
 
 @qd.kernel(fastcache=True)
 def start_multipliers(
-    scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
-    count: qd.i32, method: qd.template(), mixed: qd.template(),
-):  # fmt: skip
+    scratch: Scratch,
+    particles: Particles,
+    grid: Grid,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    count: qd.i32,
+    method: qd.template(),
+    mixed: qd.template(),
+):
     """Find the denominators of all iterations of a substep, and the multipliers of the first (Eq. 1 to 5)."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
@@ -181,9 +188,15 @@ def start_multipliers(
 
 @qd.kernel(fastcache=True)
 def solve_multipliers(
-    scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
-    count: qd.i32, method: qd.template(),
-):  # fmt: skip
+    scratch: Scratch,
+    particles: Particles,
+    grid: Grid,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    count: qd.i32,
+    method: qd.template(),
+):
     """Estimate densities (Eq. 1) and move the multipliers on towards the solution (Eq. 5)."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
@@ -200,10 +213,19 @@ def solve_multipliers(
 
 @qd.kernel(fastcache=True)
 def correct_positions(
-    corrected: Particles, particles: Particles, scratch: Scratch, changes: qd.types.ndarray(), grid: Grid,
-    solids: SolidSet, walls: Walls, c: Coefficients, count: qd.i32, method: qd.template(), correction: qd.template(),
+    corrected: Particles,
+    particles: Particles,
+    scratch: Scratch,
+    changes: qd.types.ndarray(),
+    grid: Grid,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    count: qd.i32,
+    method: qd.template(),
+    correction: qd.template(),
     searched: qd.template(),
-):  # fmt: skip
+):
     """Move the predicted positions by the corrections (Eq. 6 or 8, by its number in CORRECTIONS), inside the tank.
 
     `changes` are those of the multipliers, `scratch.dlam`, with inverse masses behind where the correction asks for
@@ -246,9 +268,16 @@ def correct_positions(
 
 @qd.kernel(fastcache=True)
 def measure_density(
-    scratch: Scratch, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients,
-    largest_density: qd.f32, count: qd.i32, method: qd.template(),
-):  # fmt: skip
+    scratch: Scratch,
+    particles: Particles,
+    grid: Grid,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    largest_density: qd.f32,
+    count: qd.i32,
+    method: qd.template(),
+):
     """Estimate the densities [kg/m^3] at the positions p (Eq. 1), walls included."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):

@@ -37,9 +37,16 @@ from wavetank.solids.distance import SolidSet, image_near, lift, plane_distance,
 
 @qd.kernel(fastcache=True)
 def apply_friction(
-    particles: Particles, scratch: Scratch, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, count: qd.i32,
-    on_grid: qd.template(), felt: qd.template(),
-):  # fmt: skip
+    particles: Particles,
+    scratch: Scratch,
+    grid: Grid,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    count: qd.i32,
+    on_grid: qd.template(),
+    felt: qd.template(),
+):
     """Reduce the velocities along walls and solids, and slow ones towards them and away.
 
     Where the step was taken `on_grid`, the floor of the tank lets puddles come to rest. Bodies are `felt` where there
@@ -95,9 +102,18 @@ def rubbed(i, k, distance, slip, scratch: Scratch, solids: SolidSet, walls: Wall
 
 @qd.func
 def slow_at_wall(
-    v_of: qd.template(), calmings: qd.template(), lane, k, first, particles: Particles, scratch: Scratch,
-    solids: SolidSet, walls: Walls, c: Coefficients, on_grid: qd.template(),
-):  # fmt: skip
+    v_of: qd.template(),
+    calmings: qd.template(),
+    lane,
+    k,
+    first,
+    particles: Particles,
+    scratch: Scratch,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    on_grid: qd.template(),
+):
     """Let wall `k` of the tank slow the particle in a `lane` of the team from number `first` on, if that is near."""
     i = first + lane
     value = plane_distance(solids, k, lift(predicted(particles, i)))
@@ -118,7 +134,7 @@ def slow_at_wall(
 @qd.func
 def slowed_at_solids(
     v, calmings, i, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients
-):  # fmt: skip
+):
     """The velocity `v` [m/s] of particle `i` as the solids that it knows leave it; bodies feel what they take."""
     p, left = lift(predicted(particles, i)), v
     for number in range(known(scratch, i)):

@@ -38,9 +38,14 @@ def mass_of(particles: Particles, i, rows: qd.template()):
 
 @qd.kernel(fastcache=True)
 def predict(
-    particles: Particles, grid: Grid, solids: SolidSet, rows: qd.types.ndarray(), c: Coefficients, count: qd.i32,
+    particles: Particles,
+    grid: Grid,
+    solids: SolidSet,
+    rows: qd.types.ndarray(),
+    c: Coefficients,
+    count: qd.i32,
     searched: qd.template(),
-):  # fmt: skip
+):
     """Accelerate, move freely (Algorithm 1, lines 2-3), mark what is near, stay out of it, and find the cell.
 
     With gravity acts the share of the grid's pressure that is carried on (`grid_pressure/correction.py`). Where solids

@@ -27,9 +27,16 @@ def update_densities(world: World, params: Parameters) -> None:
         world.keep_solids()
         look_at_solids(world.scratch, world.particles, world.solids, c, count)
     measure_density(
-        world.scratch, world.particles, world.grid, world.solids, world.walls, c, kinds.largest_density, count,
+        world.scratch,
+        world.particles,
+        world.grid,
+        world.solids,
+        world.walls,
+        c,
+        kinds.largest_density,
+        count,
         method_number(params),
-    )  # fmt: skip
+    )
 
 
 def neighbor_numbers(world: World, params: Parameters) -> np.ndarray:

@@ -143,7 +143,7 @@ def look_at_solids(scratch: Scratch, particles: Particles, solids: SolidSet, c: 
 @qd.kernel(fastcache=True)
 def look_again(
     scratch: Scratch, particles: Particles, solids: SolidSet, c: Coefficients, farthest: qd.f32, count: qd.i32
-):  # fmt: skip
+):
     """Ask solids anew for their distances to particles that have gone farther than `farthest` [m]."""
     for i in range(count):
         if scratch.solids[i] > 0:
@@ -171,7 +171,7 @@ def hand_over_pushes(scratch: Scratch, particles: Particles, solids: SolidSet, c
 @qd.func
 def find_walls(
     sums: qd.template(), team, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients
-):  # fmt: skip
+):
     """Find, in a column for each particle of a team, (gradient [1/m], free share) by the solids near it.
 
     Returns the bits of the solids that one of them is near. All are computed in all lanes at once; a particle that

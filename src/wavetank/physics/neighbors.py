@@ -251,7 +251,7 @@ def for_each_row_around(sums: qd.template(), visit: qd.template(), point, partic
 
 def new_grid(
     dim: int, capacity: int, size: tuple[float, ...] | None, h: float, room: int, periods: Periods = NONE
-) -> Grid:  # fmt: skip
+) -> Grid:
     """Allocate a grid for `capacity` particles.
 
     `size` [m] is that of the tank, or None in the open. The number of cells follows the tank as long as that is not
@@ -272,14 +272,23 @@ def new_grid(
         cells[int(np.argmax(cells))] = max(3, cells.max() // 2)
     total = int(cells.prod())
     return Grid(
-        cell=integers(capacity), start=integers(total + 1), fill=integers(total),
-        blocks=integers(blocks_of(total)), order=integers(capacity), number=integers(_groups(capacity)),
-        list=entries, room=room, lanes=lanes(),
+        cell=integers(capacity),
+        start=integers(total + 1),
+        fill=integers(total),
+        blocks=integers(blocks_of(total)),
+        order=integers(capacity),
+        number=integers(_groups(capacity)),
+        list=entries,
+        room=room,
+        lanes=lanes(),
         parts=PARTS * max(threads(), 1),
         nowhere=capacity,
-        nx=int(cells[0]), ny=int(cells[1]), nz=int(cells[2]), cells=total,
+        nx=int(cells[0]),
+        ny=int(cells[1]),
+        nz=int(cells[2]),
+        cells=total,
         periods=periods,
-    )  # fmt: skip
+    )
 
 
 def list_room(dim: int, support: float) -> int:

@@ -28,9 +28,15 @@ from wavetank.physics.teams import end_of, end_team, first_team, group_of, place
 
 @qd.func
 def add_neighbors(
-    sums: qd.template(), visit: qd.template(), team, particles: Particles, data: qd.template(), grid: Grid,
-    c: Coefficients, method: qd.template(),
-):  # fmt: skip
+    sums: qd.template(),
+    visit: qd.template(),
+    team,
+    particles: Particles,
+    data: qd.template(),
+    grid: Grid,
+    c: Coefficients,
+    method: qd.template(),
+):
     """Add up what ``visit(sum, r, square, a, b, c, method)`` adds for each neighbour j of each i of a team.
 
     `sums` has a column for each of the team's particles, r = p_i - p_j [m] has the `square` |r|^2 [m^2], a and b are
@@ -42,18 +48,30 @@ def add_neighbors(
 
 @qd.func
 def add_kept(
-    sums: qd.template(), visit: qd.template(), team, particles: Particles, data: qd.template(), kept: qd.template(),
-    grid: Grid, c: Coefficients, method: qd.template(),
-):  # fmt: skip
+    sums: qd.template(),
+    visit: qd.template(),
+    team,
+    particles: Particles,
+    data: qd.template(),
+    kept: qd.template(),
+    grid: Grid,
+    c: Coefficients,
+    method: qd.template(),
+):
     """Add up like `add_neighbors`, where `visit` is given what `keep_pairs` kept of a pair instead of its `square`."""
     _add(sums, visit, team, particles, data, kept, True, grid, c, method)
 
 
 @qd.func
 def keep_pairs(
-    kept: qd.template(), strength: qd.template(), team, particles: Particles, data: qd.template(), grid: Grid,
+    kept: qd.template(),
+    strength: qd.template(),
+    team,
+    particles: Particles,
+    data: qd.template(),
+    grid: Grid,
     c: Coefficients,
-):  # fmt: skip
+):
     """Keep ``strength(square, a, b, c)`` of each neighbour j of each i of a team, for several sums by `add_kept`.
 
     `kept` has room for `grid.room` numbers of each particle. What follows from a distance takes a root and divisions;
@@ -78,9 +96,17 @@ def keep_pairs(
 
 @qd.func
 def _add(
-    sums: qd.template(), visit: qd.template(), team, particles: Particles, data: qd.template(), kept: qd.template(),
-    is_kept: qd.template(), grid: Grid, c: Coefficients, method: qd.template(),
-):  # fmt: skip
+    sums: qd.template(),
+    visit: qd.template(),
+    team,
+    particles: Particles,
+    data: qd.template(),
+    kept: qd.template(),
+    is_kept: qd.template(),
+    grid: Grid,
+    c: Coefficients,
+    method: qd.template(),
+):
     """Add up as `add_kept` does where `is_kept`, else as `add_neighbors`."""
     lanes = qd.static(sums.m)
     first = team * lanes

@@ -13,7 +13,7 @@ from wavetank.physics.dynamic_viscosity.implicit_viscosity import (
     is_viscous,
     steps_with_bodies,
     thick_share,
-)  # fmt: skip
+)
 from wavetank.physics.grid_pressure.correction import carried
 from wavetank.physics.mixture import Blend, blend
 from wavetank.physics.tension import substeps_for

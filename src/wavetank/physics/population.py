@@ -142,9 +142,15 @@ def stop_frozen(particles: Particles, count: qd.i32):
 
 @qd.kernel(fastcache=True)
 def append_rows(
-    particles: Particles, x: qd.types.ndarray(), v: qd.types.ndarray(), dye: qd.types.ndarray(),
-    material: qd.types.ndarray(), first: qd.i32, first_id: qd.i32, count: qd.i32,
-):  # fmt: skip
+    particles: Particles,
+    x: qd.types.ndarray(),
+    v: qd.types.ndarray(),
+    dye: qd.types.ndarray(),
+    material: qd.types.ndarray(),
+    first: qd.i32,
+    first_id: qd.i32,
+    count: qd.i32,
+):
     """Write `count` new particles from place `first` on, with ids from `first_id` on."""
     for i in range(count):
         particles.x[first + i] = x[i]
@@ -179,9 +185,16 @@ def clear_forces(particles: Particles, count: qd.i32):
 
 @qd.kernel(fastcache=True)
 def find_taken(
-    taken: qd.types.ndarray(), places: qd.types.ndarray(), particles: Particles, solids: SolidSet, free: Clearance,
-    middle: vec3, reach: qd.f32, count: qd.i32, number: qd.i32,
-):  # fmt: skip
+    taken: qd.types.ndarray(),
+    places: qd.types.ndarray(),
+    particles: Particles,
+    solids: SolidSet,
+    free: Clearance,
+    middle: vec3,
+    reach: qd.f32,
+    count: qd.i32,
+    number: qd.i32,
+):
     """Mark places that are not `free`; all of them are within `reach` of `middle`."""
     for k in range(number):
         taken[k] = 0
@@ -218,7 +231,7 @@ def inside_box(particles: Particles, marks: Any, lower: np.ndarray, upper: np.nd
 
 def free_places(
     places: np.ndarray, particles: Particles, solids: SolidSet, count: int, clearance: Clearance
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Say which of the places [n, dim] have that `clearance`, bool [n]."""
     if not len(places):
         return np.zeros(0, bool)

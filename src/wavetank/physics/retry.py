@@ -10,7 +10,7 @@ from wavetank.physics.world import World
 @qd.kernel(fastcache=True)
 def copy_motion(
     to_v: qd.types.ndarray(), to_a: qd.types.ndarray(), v: qd.types.ndarray(), a: qd.types.ndarray(), count: qd.i32
-):  # fmt: skip
+):
     """Copy velocities and accelerations."""
     for i in range(count):
         to_v[i] = v[i]

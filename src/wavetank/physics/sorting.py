@@ -78,14 +78,7 @@ def copy_marks(target: Particles, to, source: Particles, i):
 #: All that is known of a particle. Arrays begin at the same place of a page: where more than eight of one kind are
 #: copied at once, each drives another one out of a processor's first cache, and it took three times as long.
 #: Append only.
-PARTS_OF_PARTICLE = (
-    copy_place,
-    copy_prediction,
-    copy_velocity,
-    copy_acceleration,
-    copy_identity,
-    copy_marks,
-)
+PARTS_OF_PARTICLE = (copy_place, copy_prediction, copy_velocity, copy_acceleration, copy_identity, copy_marks)
 
 
 @qd.func

@@ -13,12 +13,7 @@ from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import keep_out_of_solids
 from wavetank.physics.central_xsph import apply_central_xsph
 from wavetank.physics.coefficients import before_fall, coefficients, in_iteration, relaxations
-from wavetank.physics.density_constraint import (
-    correct_positions,
-    measure_density,
-    solve_multipliers,
-    start_multipliers,
-)
+from wavetank.physics.density_constraint import correct_positions, measure_density, solve_multipliers, start_multipliers
 from wavetank.physics.dynamic_viscosity.implicit_viscosity import carry_on, solve_viscosity
 from wavetank.physics.friction import apply_friction
 from wavetank.physics.grid_pressure.correction import correct_pressure
@@ -40,7 +35,7 @@ Settle = Callable[[], bool | None]
 
 def step(
     world: World, params: Parameters, dt: float, speed_limit: float = math.inf, settle: Settle | None = None
-) -> bool:  # fmt: skip
+) -> bool:
     """Advance `world` by `dt` [s]; no particle leaves it faster than `speed_limit` [m/s].
 
     `settle` lets bodies yield to what the water has done to them so far. True: they have, and the water is to follow.
@@ -79,9 +74,16 @@ def step(
     update_velocities(world.particles, c, world.count)  # 21, 23
     if plan.is_rubbed:
         apply_friction(
-            world.particles, world.scratch, world.grid, world.solids, world.walls, c, world.count, int(plan.on_grid),
+            world.particles,
+            world.scratch,
+            world.grid,
+            world.solids,
+            world.walls,
+            c,
+            world.count,
+            int(plan.on_grid),
             int(plan.searched == 2),
-        )  # fmt: skip
+        )
     if plan.searched == 2:
         hand_over_pushes(world.scratch, world.particles, world.solids, world.count)
     if plan.is_smoothed or plan.turning:
@@ -117,8 +119,8 @@ def correct_on_grid(world: World, plan: Plan, params: Parameters, c: Coefficient
     grid, of_heaviest = world.grid, 1.0
     c = before_fall(c)
     measure_density(
-        world.scratch, world.particles, grid, world.solids, world.walls, c, of_heaviest, world.count, plan.method,
-    )  # fmt: skip
+        world.scratch, world.particles, grid, world.solids, world.walls, c, of_heaviest, world.count, plan.method
+    )
     correct_pressure(world, plan.kinds, params, c)
 
 
@@ -142,9 +144,19 @@ def apply_corrections(world: World, plan: Plan, c: Coefficients, *, first: bool)
         changes = world.fluids.array("packed")
         pack_multipliers(changes, world.scratch, world.count)
     correct_positions(
-        world.spare, world.particles, world.scratch, changes, world.grid, world.solids, world.walls, c, world.count,
-        plan.method, correction, plan.searched,
-    )  # fmt: skip
+        world.spare,
+        world.particles,
+        world.scratch,
+        changes,
+        world.grid,
+        world.solids,
+        world.walls,
+        c,
+        world.count,
+        plan.method,
+        correction,
+        plan.searched,
+    )
     world.exchange("px", "py", "pz")
     if world.frozen:
         hold_frozen(world.particles, world.count)

@@ -183,9 +183,14 @@ def find_tensions(tension: qd.types.ndarray(), particles: Particles, rows: qd.ty
 
 @qd.kernel(fastcache=True)
 def find_surface(
-    surface: qd.types.ndarray(), tension: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients,
-    pull: Pull, count: qd.i32,
-):  # fmt: skip
+    surface: qd.types.ndarray(),
+    tension: qd.types.ndarray(),
+    particles: Particles,
+    grid: Grid,
+    c: Coefficients,
+    pull: Pull,
+    count: qd.i32,
+):
     """Find where the surface is and which way it faces: g, without what is noise."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
@@ -200,10 +205,18 @@ def find_surface(
 
 @qd.kernel(fastcache=True)
 def attract(
-    pulled: qd.types.ndarray(), surface: qd.types.ndarray(), particles: Particles, scratch: Scratch,
-    rows: qd.types.ndarray(), grid: Grid, solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, pull: Pull,
+    pulled: qd.types.ndarray(),
+    surface: qd.types.ndarray(),
+    particles: Particles,
+    scratch: Scratch,
+    rows: qd.types.ndarray(),
+    grid: Grid,
+    solids: SolidSet,
+    table: qd.types.ndarray(),
+    c: Coefficients,
+    pull: Pull,
     count: qd.i32,
-):  # fmt: skip
+):
     """Find the velocities after the pull of neighbours and solids."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):

@@ -33,9 +33,15 @@ LEVELS = 64  # whole steps of height that are summed; their rounding cancels
 
 
 def steps_needed(
-    params: Parameters, duration: float, speed: float, depth: float, *, on_grid: bool, forced: bool = False,
+    params: Parameters,
+    duration: float,
+    speed: float,
+    depth: float,
+    *,
+    on_grid: bool,
+    forced: bool = False,
     carried: float = 0.0,
-) -> float:  # fmt: skip
+) -> float:
     """Return how many of the longest time steps that are allowed make up `duration` [s], which is no whole number.
 
     Pressure that is solved `on_grid` reaches any depth. Where iterations alone carry it, the shallowest water needs two
@@ -128,9 +134,13 @@ def level_at(particles: Particles, i, up, base, step):
 
 @qd.kernel(fastcache=True)
 def summed_levels(
-    particles: Particles, up: qd.types.vector(3, qd.f32), base: qd.f32, step: qd.f32, count: qd.i32,
+    particles: Particles,
+    up: qd.types.vector(3, qd.f32),
+    base: qd.f32,
+    step: qd.f32,
+    count: qd.i32,
     lanes: qd.template(),
-) -> qd.i32:  # fmt: skip
+) -> qd.i32:
     """Sum the heights along `up` above `base`, each in whole steps of `step` [m]: whole numbers repeat in any order."""
     levels = 0
     if qd.static(lanes == 1):

@@ -36,8 +36,8 @@ def add_eta(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.te
 
 @qd.kernel(fastcache=True)
 def confine_vorticity(
-    particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, method: qd.template(),
-):  # fmt: skip
+    particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, method: qd.template()
+):
     """Push around every vortex: dv = dt eps_w s (N x omega), N = eta / |eta| (Eq. 10)."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):

@@ -18,7 +18,7 @@ from wavetank.device.state import (
     with_solids,
     with_viscosity,
     without_viscosity,
-)  # fmt: skip
+)
 from wavetank.foundation.materials import Material
 from wavetank.physics.bodies import Pieces
 from wavetank.physics.foam.pool import Pool

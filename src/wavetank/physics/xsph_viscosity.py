@@ -70,9 +70,15 @@ def add_mixed_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, method
 
 @qd.kernel(fastcache=True)
 def apply_xsph(
-    smoothed: Particles, particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32,
-    method: qd.template(), turning: qd.template(),
-):  # fmt: skip
+    smoothed: Particles,
+    particles: Particles,
+    scratch: Scratch,
+    grid: Grid,
+    c: Coefficients,
+    count: qd.i32,
+    method: qd.template(),
+    turning: qd.template(),
+):
     """Smooth the velocities (Eq. 11); where `turning`, estimate the vorticity (Eq. 9)."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
@@ -106,9 +112,14 @@ def pack_velocities(packed: qd.types.ndarray(), particles: Particles, values: qd
 
 @qd.kernel(fastcache=True)
 def apply_mixed_xsph(
-    smoothed: Particles, particles: Particles, packed: qd.types.ndarray(), grid: Grid, c: Coefficients, count: qd.i32,
+    smoothed: Particles,
+    particles: Particles,
+    packed: qd.types.ndarray(),
+    grid: Grid,
+    c: Coefficients,
+    count: qd.i32,
     method: qd.template(),
-):  # fmt: skip
+):
     """Smooth the velocities (Eq. 11) of fluids of different density; `packed` holds inverse masses too."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):

@@ -13,9 +13,11 @@ LITRE = 1e-3  # m^3
 DEPTH = 1.5  # d: how far from its plane a mouth without a flow takes what comes
 #: shape -> the keys that it needs
 NEEDS = {
-    "box": ("lower", "upper"), "sphere": ("center", "radius"), "mouth": ("center", "radius", "direction"),
+    "box": ("lower", "upper"),
+    "sphere": ("center", "radius"),
+    "mouth": ("center", "radius", "direction"),
     "outside": ("lower", "upper"),
-}  # fmt: skip
+}
 
 
 class Drain(Timed):

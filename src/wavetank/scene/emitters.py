@@ -17,9 +17,12 @@ from wavetank.solids.motion import AnyMotion
 
 #: shape -> the keys that say how large it is
 NEEDS: dict[str, tuple[str, ...]] = {
-    "disc": ("radius",), "ring": ("radius", "inner_radius"), "rectangle": ("size",), "line": ("width",),
+    "disc": ("radius",),
+    "ring": ("radius", "inner_radius"),
+    "rectangle": ("size",),
+    "line": ("width",),
     "mesh": ("mesh",),
-}  # fmt: skip
+}
 SLACK = 1.001  # by how much a flow may exceed what the mouth passes, by rounding
 
 

@@ -45,7 +45,7 @@ class Fluid(Model):
 
     def placed(
         self, spacing: float, tank: Tank | None, fluids: Sequence["Fluid"], solids: Sequence[Solid]
-    ) -> np.ndarray:  # fmt: skip
+    ) -> np.ndarray:
         """Positions [n, dim] of this fluid's particles where it lies in a `tank` beside all `fluids` and `solids`."""
         return self.particles(spacing)
 
@@ -80,9 +80,7 @@ class Block(Fluid):
         return np.all((points > lower) & (points < upper), axis=1)
 
     @override
-    def placed(
-        self, spacing: float, tank: Tank | None, fluids: Sequence[Fluid], solids: Sequence[Solid]
-    ) -> np.ndarray:  # fmt: skip
+    def placed(self, spacing: float, tank: Tank | None, fluids: Sequence[Fluid], solids: Sequence[Solid]) -> np.ndarray:
         lower, upper = self.bounds()
         touched = np.zeros((2, len(lower)), bool) if tank is None else tank.touched_by(lower, upper, spacing)
         for other in fluids:

@@ -111,8 +111,11 @@ def _line(shape: dict[str, Any], spacing: float) -> tuple[np.ndarray, float, tup
 
 #: shape -> what makes a row of it: points [n, 2], area and half its edges
 SHAPES: dict[str, Callable[[dict[str, Any], float], tuple[np.ndarray, float, tuple[float, float]]]] = {
-    "disc": _disc, "rectangle": _rectangle, "ring": _ring, "line": _line,
-}  # fmt: skip
+    "disc": _disc,
+    "rectangle": _rectangle,
+    "ring": _ring,
+    "line": _line,
+}
 
 
 def _fitted(inside: Callable[[np.ndarray], np.ndarray], area: float, half: float, spacing: float) -> np.ndarray | None:

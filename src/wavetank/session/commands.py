@@ -241,9 +241,10 @@ class Pan(Command):
         """Ways add up."""
         assert isinstance(earlier, Pan)
         return Pan.model_construct(
-            right=_within(self.right + earlier.right), up=_within(self.up + earlier.up),
+            right=_within(self.right + earlier.right),
+            up=_within(self.up + earlier.up),
             ahead=_within(self.ahead + earlier.ahead),
-        )  # fmt: skip
+        )
 
 
 class Zoom(Command):
@@ -258,9 +259,7 @@ class Zoom(Command):
     def after(self, earlier: Command) -> Command:
         """Factors multiply."""
         assert isinstance(earlier, Zoom)
-        return Zoom.model_construct(
-            factor=min(100.0, max(0.01, self.factor * earlier.factor)), x=self.x, y=self.y
-        )  # fmt: skip
+        return Zoom.model_construct(factor=min(100.0, max(0.01, self.factor * earlier.factor)), x=self.x, y=self.y)
 
 
 class Home(Command):
@@ -284,10 +283,12 @@ class SetView(Command):
         """What is not said again stays as it was said."""
         assert isinstance(earlier, SetView)
         return SetView.model_construct(
-            view=self.view or earlier.view, color_by=self.color_by or earlier.color_by,
-            axis=self.axis or earlier.axis, place=earlier.place if self.place is None else self.place,
+            view=self.view or earlier.view,
+            color_by=self.color_by or earlier.color_by,
+            axis=self.axis or earlier.axis,
+            place=earlier.place if self.place is None else self.place,
             forces=earlier.forces if self.forces is None else self.forces,
-        )  # fmt: skip
+        )
 
 
 class SetLight(Command):
@@ -311,17 +312,40 @@ class SetLight(Command):
             return self
         placed, raised = self.azimuth is not None, self.elevation is not None
         return SetLight.model_construct(
-            environment=earlier.environment, azimuth=self.azimuth if placed else earlier.azimuth,
+            environment=earlier.environment,
+            azimuth=self.azimuth if placed else earlier.azimuth,
             elevation=self.elevation if raised else earlier.elevation,
             turn=self.turn if placed else (self.turn + earlier.turn) % 360.0,
             rise=self.rise if raised else min(360.0, max(-360.0, self.rise + earlier.rise)),
-        )  # fmt: skip
+        )
 
 
 COMMANDS: tuple[type[Command], ...] = (
-    SetParameter, Reset, LoadScene, Undo, ToolBegin, ToolMove, ToolEnd, ToolStop, MoveSolid, AddSolid, RemoveSolid,
-    Pause, Step, Speed, FrameLength, Rewind, Bookmark, SetCamera, Orbit, Pan, Zoom, Home, SetView, SetLight,
-)  # fmt: skip
+    SetParameter,
+    Reset,
+    LoadScene,
+    Undo,
+    ToolBegin,
+    ToolMove,
+    ToolEnd,
+    ToolStop,
+    MoveSolid,
+    AddSolid,
+    RemoveSolid,
+    Pause,
+    Step,
+    Speed,
+    FrameLength,
+    Rewind,
+    Bookmark,
+    SetCamera,
+    Orbit,
+    Pan,
+    Zoom,
+    Home,
+    SetView,
+    SetLight,
+)
 _BY_NAME: dict[str, type[Command]] = {kind.model_fields["do"].default: kind for kind in COMMANDS}
 _TABLE: TypeAdapter[dict[str, Any]] = TypeAdapter(dict[str, Any])
 

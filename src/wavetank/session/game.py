@@ -94,16 +94,30 @@ class Game:
         """Return the goal and how it stands as plain data, for fronts."""
         goal = self.goal
         return {
-            "text": goal.text, "hint": goal.hint, "seconds": goal.seconds, "elapsed": self.elapsed, "hold": goal.hold,
-            "held": self.held, "progress": self.progress, "outcome": self.outcome, "stars": self.stars,
-            "endured": goal.is_endured, "tools": goal.tools,
+            "text": goal.text,
+            "hint": goal.hint,
+            "seconds": goal.seconds,
+            "elapsed": self.elapsed,
+            "hold": goal.hold,
+            "held": self.held,
+            "progress": self.progress,
+            "outcome": self.outcome,
+            "stars": self.stars,
+            "endured": goal.is_endured,
+            "tools": goal.tools,
             "strokes": None if goal.strokes is None else goal.strokes - self.strokes,
             "aims": [
-                {"kind": aim.kind, "name": aim.name, "value": value, "share": aim.share, "forbids": aim.forbids,
-                 "progress": aim.progress(value)}
+                {
+                    "kind": aim.kind,
+                    "name": aim.name,
+                    "value": value,
+                    "share": aim.share,
+                    "forbids": aim.forbids,
+                    "progress": aim.progress(value),
+                }
                 for aim, value in self._measured_aims()
             ],
-        }  # fmt: skip
+        }
 
     def _measure(self, frame: Frame) -> None:
         self.values = [measure(aim, frame, start) for aim, start in zip(self.goal.aims, self.start, strict=True)]

@@ -94,6 +94,10 @@ def brought_share(aim: Aim, frame: Frame, start: int) -> float:
 
 
 MEASURES: dict[type[Aim], Callable[[Aim, Frame, int], float]] = {
-    Fill: wet_share, Dry: wet_share, Deliver: delivered_share, Apart: gathered_share, Mix: mixed_share,
+    Fill: wet_share,
+    Dry: wet_share,
+    Deliver: delivered_share,
+    Apart: gathered_share,
+    Mix: mixed_share,
     Bring: brought_share,
-}  # fmt: skip
+}

@@ -39,9 +39,13 @@ class Recording(Model):
 
     @classmethod
     def of(
-        cls, session: Session, start: Scene, frames: int | None = None, digest: str = "",
+        cls,
+        session: Session,
+        start: Scene,
+        frames: int | None = None,
+        digest: str = "",
         log: Sequence[tuple[int, Command]] | None = None,
-    ) -> "Recording":  # fmt: skip
+    ) -> "Recording":
         """Return all that was done in `session`, which began with the scene `start`.
 
         Or all that had been done when it had computed `frames`, with the `digest` and the `log` of that moment.

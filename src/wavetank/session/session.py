@@ -12,16 +12,7 @@ from typing import Any
 from wavetank.foundation.door import guarded
 from wavetank.foundation.errors import NotFiniteError, WavetankError
 from wavetank.scene.scene import Scene
-from wavetank.session.commands import (
-    AddSolid,
-    Bookmark,
-    Command,
-    FrameLength,
-    LoadScene,
-    RemoveSolid,
-    Reset,
-    Rewind,
-)
+from wavetank.session.commands import AddSolid, Bookmark, Command, FrameLength, LoadScene, RemoveSolid, Reset, Rewind
 from wavetank.session.history import History
 from wavetank.session.rules import RULES
 from wavetank.session.state import SessionState
@@ -48,9 +39,14 @@ class Session(SessionState):
     """
 
     def __init__(
-        self, scene: Scene, arch: str = "cpu", *, most_particles: int = MOST_PARTICLES, history: History | None = None,
+        self,
+        scene: Scene,
+        arch: str = "cpu",
+        *,
+        most_particles: int = MOST_PARTICLES,
+        history: History | None = None,
         own: Simulation | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(scene, arch, most_particles, history or History(), own)
         self.ticks = 0  # frames computed since the session began, whatever was rewound
         self.log: list[tuple[int, Command]] = []

@@ -145,9 +145,7 @@ class SessionState:
 
     def _present(self) -> World:
         sim = self.sim if self.own is None else copy.copy(self.sim)  # someone's own object goes on as another world
-        return World(
-            self.scene, sim, self.game, self.history, self.chosen_camera, self.paused, self.waits
-        )  # fmt: skip
+        return World(self.scene, sim, self.game, self.history, self.chosen_camera, self.paused, self.waits)
 
     def wait_for_hand(self) -> None:
         """Let a level that has just begun wait for the first touch, where the front is `patient`."""

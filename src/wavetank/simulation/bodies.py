@@ -85,10 +85,12 @@ class Bodies(Mapping[str, Body]):
         self._see()
         self._weigh_all(numbers)
         far, along = scene.support * scene.spacing, ALONG * self.coupling.added
-        solids.feel({
-            body.number: (body.dry.center, body.unit, grip(self.dim, body.dry, body.wet, along[body.row], far))
-            for body in self.members
-        })  # fmt: skip
+        solids.feel(
+            {
+                body.number: (body.dry.center, body.unit, grip(self.dim, body.dry, body.wet, along[body.row], far))
+                for body in self.members
+            }
+        )
         self.units = np.array([body.unit for body in self.members])  # 1/m
         self.wet_masses = np.array([body.wet.mass for body in self.members])  # kg
         displaced = self.wet_masses / self.density
@@ -167,9 +169,19 @@ class Bodies(Mapping[str, Body]):
         around = LAYERS * self.dim * (solid.reach() / spacing + 3.0) ** (self.dim - 1)
         unit = 2.0**31 / (4.0 * (wet.mass / (self.density * spacing**self.dim) + around) * spacing)
         body = Body(
-            self.solids.names[number], number, solid, lambda: self.world.rigid_bodies[handle],
-            lambda: self.solids.poses[number], lambda: self.gravity, self.dim, dry, wet, unit, self.coupling, row,
-        )  # fmt: skip
+            self.solids.names[number],
+            number,
+            solid,
+            lambda: self.world.rigid_bodies[handle],
+            lambda: self.solids.poses[number],
+            lambda: self.gravity,
+            self.dim,
+            dry,
+            wet,
+            unit,
+            self.coupling,
+            row,
+        )
         self.members.append(body)
         if solid.velocity is not None:
             body.velocity = solid.velocity

@@ -113,12 +113,23 @@ class Contents:
             self._measure()
         world = self.world
         return Frame(
-            scene=self.scene, number=self.frame_number, time=self.time, count=world.count, x=world.particles.x,
-            v=world.particles.v, rho=world.scratch.rho, id=world.particles.id, material=world.particles.material,
+            scene=self.scene,
+            number=self.frame_number,
+            time=self.time,
+            count=world.count,
+            x=world.particles.x,
+            v=world.particles.v,
+            rho=world.scratch.rho,
+            id=world.particles.id,
+            material=world.particles.material,
             solids=world.solids,
-            diffuse=world.pool.now if world.pool else None, foam_count=world.pool.count if world.pool else 0,
-            frozen=world.particles.frozen, frozen_count=world.frozen, dye=world.particles.dye, stand=self.standing,
-        )  # fmt: skip
+            diffuse=world.pool.now if world.pool else None,
+            foam_count=world.pool.count if world.pool else 0,
+            frozen=world.particles.frozen,
+            frozen_count=world.frozen,
+            dye=world.particles.dye,
+            stand=self.standing,
+        )
 
     def standing(self) -> tuple[Standing, ...]:
         """Return the solids but for the walls of the tank, where they stand."""

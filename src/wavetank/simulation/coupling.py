@@ -58,8 +58,18 @@ STAYS = 0.9  # share that is left after a step of what was seen of how much wate
 MOST = 4.0  # of the water that goes along with an immersed body: most that is believed
 BLOCKS = (slice(0, 3), slice(3, 6))  # motion and turn, columns of a row
 ROWS = (
-    "impulse", "due", "given", "change", "carried", "by_grid", "velocity", "before", "seen_push", "seen_gain", "later",
-)  # fmt: skip
+    "impulse",
+    "due",
+    "given",
+    "change",
+    "carried",
+    "by_grid",
+    "velocity",
+    "before",
+    "seen_push",
+    "seen_gain",
+    "later",
+)
 DENSITY = 4  # where the density is in the last row of what is remembered
 REMEMBERED = len(ROWS) + 2  # rows of `Coupling.memory`
 
@@ -89,7 +99,7 @@ class Coupling:
 
     def __init__(
         self, weights: np.ndarray, masses: np.ndarray, tensors: np.ndarray, reaches: np.ndarray, added: np.ndarray
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Begin at rest.
 
         Gravity pulls at `weights` [n] [kg]; `masses` [n] [kg], `tensors` [n, 3, 3] [kg m^2], `reaches` [n] [m] and the
@@ -161,9 +171,8 @@ class Coupling:
         self.rubbed = np.stack([mass, mass * self.reaches**2], axis=1)
 
     def begin(
-        self, rotations: np.ndarray, held: np.ndarray, gravity: np.ndarray, dt: float,
-        pushes: np.ndarray | None = None,
-    ) -> None:  # fmt: skip
+        self, rotations: np.ndarray, held: np.ndarray, gravity: np.ndarray, dt: float, pushes: np.ndarray | None = None
+    ) -> None:
         """Find the velocities `wanted` [n, 6] for a step of `dt` [s] of bodies that are turned so [n, 4].
 
         Besides gravity, forces of the scene give them the momentum `pushes` [n, 6]. Those that were `held` [n] in the

@@ -78,15 +78,35 @@ def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulat
             f"{name} has no room for its {number:,} particles; use a smaller spacing or a larger shape."
         )
     container = _inside_out(fluid.inside, scene.dim)
-    fixed = {"name": "", "density": None, "mass": None, "hollow": False, "held": False, "velocity": None,
-             "angular_velocity": None}  # fmt: skip
+    fixed = {
+        "name": "",
+        "density": None,
+        "mass": None,
+        "hollow": False,
+        "held": False,
+        "velocity": None,
+        "angular_velocity": None,
+    }
     solids = [solid.model_copy(update=fixed) for solid in (*obstacles, container)]
-    world = scene.model_copy(update={
-        "fluids": [Points(positions=places)], "solids": solids, "forces": [], "materials": [], "goal": None,
-        "joints": [], "emitters": [], "drains": [],
-        "gravity": (0.0,) * scene.dim, "surface_tension": 0.0, "grid_pressure": 0.0, "vorticity": 0.0, "foam": 0.0,
-        "friction": 0.0, "frame_time": 1.0 / 60.0,
-    })  # fmt: skip
+    world = scene.model_copy(
+        update={
+            "fluids": [Points(positions=places)],
+            "solids": solids,
+            "forces": [],
+            "materials": [],
+            "goal": None,
+            "joints": [],
+            "emitters": [],
+            "drains": [],
+            "gravity": (0.0,) * scene.dim,
+            "surface_tension": 0.0,
+            "grid_pressure": 0.0,
+            "vorticity": 0.0,
+            "foam": 0.0,
+            "friction": 0.0,
+            "frame_time": 1.0 / 60.0,
+        }
+    )
     water = simulate(world)
     for step in range(MOST_STEPS):
         water.step()
@@ -145,9 +165,7 @@ def _measure(name: str, fluid: Filled, scene: Scene, obstacles: list[Solid]) -> 
     wide = int(np.ceil(0.5 * finest))
     for axis in range(dim):
         padded = np.pad(deep, [(wide, wide) if k == axis else (0, 0) for k in range(dim)])
-        deep = np.logical_or.reduce([
-            np.take(padded, range(k, k + counts[axis]), axis) for k in range(2 * wide + 1)
-        ])  # fmt: skip
+        deep = np.logical_or.reduce([np.take(padded, range(k, k + counts[axis]), axis) for k in range(2 * wide + 1)])
     cell = (d / finest) ** dim
     whole, held = float(room.sum()) * cell, float(room[deep].sum()) * cell
     if held < LEAST_ROOM * max(whole, 1e-30):

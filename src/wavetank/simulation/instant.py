@@ -13,13 +13,21 @@ from wavetank.solids.solid import Solid
 PARTS = ("particles", "foam", "solids", "surface")
 #: name -> type and numbers a row (0: one number, no axis; -1: as many as the world has dimensions)
 WATER: dict[str, tuple[type, int]] = {
-    "ids": (np.int32, 0), "positions": (np.float32, -1), "velocities": (np.float32, -1), "densities": (np.float32, 0),
-    "materials": (np.int32, 0), "dyes": (np.int32, 0),
-}  # fmt: skip
+    "ids": (np.int32, 0),
+    "positions": (np.float32, -1),
+    "velocities": (np.float32, -1),
+    "densities": (np.float32, 0),
+    "materials": (np.int32, 0),
+    "dyes": (np.int32, 0),
+}
 FOAM: dict[str, tuple[type, int]] = {
-    "foam_ids": (np.int32, 0), "foam_positions": (np.float32, -1), "foam_velocities": (np.float32, -1),
-    "foam_kinds": (np.int32, 0), "foam_ages": (np.float32, 0), "foam_lives": (np.float32, 0),
-}  # fmt: skip
+    "foam_ids": (np.int32, 0),
+    "foam_positions": (np.float32, -1),
+    "foam_velocities": (np.float32, -1),
+    "foam_kinds": (np.int32, 0),
+    "foam_ages": (np.float32, 0),
+    "foam_lives": (np.float32, 0),
+}
 
 
 @dataclasses.dataclass(frozen=True)

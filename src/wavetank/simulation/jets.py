@@ -58,7 +58,7 @@ def row(mouth: Mouth) -> Due:
 
 def flown(
     scene: Scene, emitter: Emitter, mouth: Mouth, due: Due, end: float, dt: float
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """Return positions and velocities, [n, dim], of particles that left at their ages [s] before the clock shows `end`.
 
     They have flown freely since; `dt` [s] is the length of a time step.
@@ -112,10 +112,17 @@ def jet_of(scene: Scene, emitter: Emitter, clock: float) -> Jet:
     g = np.zeros(3)
     g[:dim] = gravity_at(scene, clock - scene.start_time)
     half = (mouth.half[0] + 0.5 * scene.spacing, mouth.half[1] + 0.5 * scene.spacing)
-    return Jet(opening=opening_of(
-        middle, axes, half, is_round=int(emitter.shape in ("disc", "ring")), length=HELD * scene.spacing,
-        speed=emitter.pace(mouth) * math.cos(emitter.spread), fall=float(g @ axes[2]),
-    ))  # fmt: skip
+    return Jet(
+        opening=opening_of(
+            middle,
+            axes,
+            half,
+            is_round=int(emitter.shape in ("disc", "ring")),
+            length=HELD * scene.spacing,
+            speed=emitter.pace(mouth) * math.cos(emitter.spread),
+            fall=float(g @ axes[2]),
+        )
+    )
 
 
 def closing_speed(jets: Iterable[Jet]) -> float:

@@ -34,9 +34,14 @@ class MovingSolids:
     """Solids by name; the first `tank_count` are the walls of the tank."""
 
     def __init__(
-        self, walls: Sequence[Solid], others: Sequence[Solid], friction: float, spacing: float, start: float = 0.0,
+        self,
+        walls: Sequence[Solid],
+        others: Sequence[Solid],
+        friction: float,
+        spacing: float,
+        start: float = 0.0,
         periods: Periods = NONE,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.tank_count, self.friction, self.spacing, self.periods = len(walls), friction, spacing, periods
         self.members = [*walls, *others]
         self.names: list[str] = []
@@ -93,9 +98,10 @@ class MovingSolids:
         name, number = self._free_name(solid.name), len(self.members)
         self.courses.add(solid, name)
         columns: tuple[tuple[list[Any], Any], ...] = (
-            (self.names, name), (self.poses, (solid.origin, solid.quaternion)),
+            (self.names, name),
+            (self.poses, (solid.origin, solid.quaternion)),
             (self.starts, (solid.origin, solid.quaternion)),
-        )  # fmt: skip
+        )
         for column, value in columns:
             column.append(value)
         if grow > 0.0:

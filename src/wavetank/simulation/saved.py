@@ -207,9 +207,7 @@ def _check_header(header: Header, scene: Scene, refuse: str) -> None:
         raise WavetankError(f"{refuse}: start_box must be two corners of {scene.dim} numbers.")
 
 
-def _checked_arrays(
-    parts: dict[str, np.ndarray], header: Header, scene: Scene, refuse: str
-) -> dict[str, np.ndarray]:  # fmt: skip
+def _checked_arrays(parts: dict[str, np.ndarray], header: Header, scene: Scene, refuse: str) -> dict[str, np.ndarray]:
     """Return the arrays of a snapshot, each of the type, shape and range that it must have."""
     numbers, dim = header.numbers, scene.dim
 

@@ -34,9 +34,13 @@ LIVELY = 0.002  # of the particles: where fewer move by more than that, steps en
 
 
 def settle(
-    world: World, step: Callable[[], None], fall: np.ndarray, spacing: float, *,
+    world: World,
+    step: Callable[[], None],
+    fall: np.ndarray,
+    spacing: float,
+    *,
     near: Callable[[np.ndarray], np.ndarray] | None,
-) -> bool:  # fmt: skip
+) -> bool:
     """Let a world take such steps, and say whether the water stands; `step` takes one, `fall` has shape [dim].
 
     What moves where not all is calm begins where it was, but for what began too near to a solid: `near` says of places

@@ -12,8 +12,14 @@ from wavetank.simulation.frame import Frame
 from wavetank.simulation.instant import Instant
 from wavetank.simulation.moving_solids import MovingSolids, solids_of
 
-FOAM_ROWS = {"foam_positions": "x", "foam_velocities": "v", "foam_kinds": "kind", "foam_ages": "age",
-             "foam_lives": "life", "foam_ids": "id"}  # fmt: skip
+FOAM_ROWS = {
+    "foam_positions": "x",
+    "foam_velocities": "v",
+    "foam_kinds": "kind",
+    "foam_ages": "age",
+    "foam_lives": "life",
+    "foam_ids": "id",
+}
 
 
 class Shown:
@@ -30,18 +36,28 @@ class Shown:
         """Return a frame of an instant for a renderer, valid until the next one is asked for."""
         self._make_room(instant.count, len(instant.foam_ids))
         arrays: dict[str, Any] = {
-            "x": instant.positions, "v": instant.velocities, "rho": instant.densities, "id": instant.ids,
-            "dye": instant.dyes, "material": instant.materials,
-        }  # fmt: skip
+            "x": instant.positions,
+            "v": instant.velocities,
+            "rho": instant.densities,
+            "id": instant.ids,
+            "dye": instant.dyes,
+            "material": instant.materials,
+        }
         for name, values in arrays.items():
             upload(self._water[name], values)
         for name, row in FOAM_ROWS.items():
             upload(getattr(self._foam, row), getattr(instant, name))
         return Frame(
-            scene=self.scene, number=instant.number, time=instant.time, count=instant.count,
-            solids=self._place(instant).device, diffuse=self._foam, foam_count=len(instant.foam_ids),
-            stand=lambda: instant.standing, **self._water,
-        )  # fmt: skip
+            scene=self.scene,
+            number=instant.number,
+            time=instant.time,
+            count=instant.count,
+            solids=self._place(instant).device,
+            diffuse=self._foam,
+            foam_count=len(instant.foam_ids),
+            stand=lambda: instant.standing,
+            **self._water,
+        )
 
     def _make_room(self, count: int, foam: int) -> None:
         dim = self.scene.dim

@@ -123,9 +123,7 @@ class Simulation(States):
         for _, frame in self.numbered_frames(seconds, fps, self.time):
             yield frame
 
-    def numbered_frames(
-        self, seconds: float, fps: float, start: float, done: int = -1
-    ) -> Iterator[tuple[int, Frame]]:  # fmt: skip
+    def numbered_frames(self, seconds: float, fps: float, start: float, done: int = -1) -> Iterator[tuple[int, Frame]]:
         """Yield such frames from the time `start` [s] on with their numbers, but for those up to number `done`."""
         check_frames(self.count, self.scene, seconds, fps)
         for number in range(done + 1, round(seconds * fps) + 1):
@@ -166,7 +164,7 @@ class Simulation(States):
 
     def _take_step(
         self, scene: Scene, acting: Sequence[Force], start: float, dt: float, shares: tuple[float, float], limit: float
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Let bodies, solids and water take a step of `dt` [s] from `start` [s] on, those `shares` of a frame."""
         if self.bodies:
             self.bodies.push(acting, dt, start)
@@ -186,9 +184,12 @@ class Simulation(States):
         fall = np.array(scene.gravity, np.float32) * np.float32(dt) ** 2
         with self.bodies.standing() if self.bodies else contextlib.nullcontext():
             stands = settle(
-                self.world, lambda: self._take_step(scene, (), 0.0, dt, (0.0, 1.0), limit), fall, scene.spacing,
+                self.world,
+                lambda: self._take_step(scene, (), 0.0, dt, (0.0, 1.0), limit),
+                fall,
+                scene.spacing,
                 near=None if self.bodies else self._too_near,
-            )  # fmt: skip
+            )
         self.solids.passing = None
         self.solids.move_to(0.0, 1.0)
         return stands

@@ -69,9 +69,13 @@ def take_snapshot(scene: Scene, world: World, solids: MovingSolids, ledger: Ledg
         ),
         arrays={name: download(getattr(particles, name))[: world.count].copy() for name in names}
         | pool_rows(pool, scene.dim),
-        solids=[*scene.solids], names=[*solids.names], poses=[*solids.poses], targets={**solids.targets},
-        growing={**solids.growing}, courses=solids.courses.plain(),
-    )  # fmt: skip
+        solids=[*scene.solids],
+        names=[*solids.names],
+        poses=[*solids.poses],
+        targets={**solids.targets},
+        growing={**solids.growing},
+        courses=solids.courses.plain(),
+    )
 
 
 def restore_solids(scene: Scene, walls: list[Solid], snapshot: Snapshot) -> MovingSolids:

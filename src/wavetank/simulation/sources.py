@@ -209,7 +209,7 @@ class Sources:
 
     def _put(
         self, sim: Water, emitter: Emitter, x: np.ndarray, v: np.ndarray, gap: float, most: int | None = None
-    ) -> int:  # fmt: skip
+    ) -> int:
         """Add the particles that have room, at most so many, and return how many; the world's oldest may go for it."""
         scene = sim.scene
         free = np.flatnonzero(sim.free_places(x, gap * scene.spacing, scene.wall_gap * scene.spacing))[:most]

@@ -241,11 +241,14 @@ def grid_distance(solids: SolidSet, number, p, scale):
     eh, gk = e + (h - e) * f.y, g + (k - g) * f.y
     near, far = ac + (bd - ac) * f.x, eh + (gk - eh) * f.x
     value = (near + (far - near) * f.z) / cell
-    slope = vec3(
-        (bd - ac) + ((gk - eh) - (bd - ac)) * f.z,
-        ((c - a) + ((d - b) - (c - a)) * f.x) * (1.0 - f.z) + ((h - e) + ((k - g) - (h - e)) * f.x) * f.z,
-        far - near,
-    ) / cell  # fmt: skip
+    slope = (
+        vec3(
+            (bd - ac) + ((gk - eh) - (bd - ac)) * f.z,
+            ((c - a) + ((d - b) - (c - a)) * f.x) * (1.0 - f.z) + ((h - e) + ((k - g) - (h - e)) * f.x) * f.z,
+            far - near,
+        )
+        / cell
+    )
     beyond = q - inside
     if beyond.dot(beyond) > 0.0:
         for axis in qd.static(range(3)):

@@ -133,10 +133,14 @@ class Motion(Model):
         rows = []
         for number in range(count + 1):
             position, rotation = function(number / rate)
-            rows.append({"time": number / rate} | {
-                name: value if isinstance(value, float | int) else np.asarray(value, float).tolist()
-                for name, value in (("position", position), ("rotation", rotation)) if value is not None
-            })  # fmt: skip
+            rows.append(
+                {"time": number / rate}
+                | {
+                    name: value if isinstance(value, float | int) else np.asarray(value, float).tolist()
+                    for name, value in (("position", position), ("rotation", rotation))
+                    if value is not None
+                }
+            )
         motion: Motion = cls(keyframes=rows, **fields)
         return motion
 

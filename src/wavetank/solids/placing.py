@@ -11,9 +11,7 @@ from wavetank.device.state import scalars
 from wavetank.solids.distance import SolidSet, vec2, vec3, vec4
 
 #: of `SolidSet`, with the numbers that each solid has
-PLACED = {
-    "old_position": 3, "old_rotation": 4, "position": 3, "rotation": 4, "center": 3, "plane": 4, "sweep": 2
-}  # fmt: skip
+PLACED = {"old_position": 3, "old_rotation": 4, "position": 3, "rotation": 4, "center": 3, "plane": 4, "sweep": 2}
 
 
 class Placing:

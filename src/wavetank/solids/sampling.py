@@ -27,9 +27,14 @@ def nearest_at(solids: SolidSet, first, at):
 
 @qd.kernel(fastcache=True)
 def measure_nearest(
-    distances: qd.types.ndarray(), numbers: qd.types.ndarray(), points: qd.types.ndarray(), solids: SolidSet,
-    first: qd.i32, touch: qd.f32, count: qd.i32,
-):  # fmt: skip
+    distances: qd.types.ndarray(),
+    numbers: qd.types.ndarray(),
+    points: qd.types.ndarray(),
+    solids: SolidSet,
+    first: qd.i32,
+    touch: qd.f32,
+    count: qd.i32,
+):
     """Write which of the solids from number `first` on is nearest to each point, and how far: negative inside.
 
     A point at a surface that another solid touches, up to `touch` [m], is as deep inside as can be.

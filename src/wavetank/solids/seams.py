@@ -23,10 +23,12 @@ NEVER = 1e30  # m: a period that no difference is half of
 
 def seen_periods(solids: Sequence[Solid], periods: Periods, spacing: float) -> np.ndarray:
     """Return the period [m] along each axis at which a solid is seen at its nearest image, [solids, 3]."""
-    return np.array([
-        [length if is_short(solid, length, spacing) else NEVER for length in (periods.x, periods.y, periods.z)]
-        for solid in solids
-    ]).reshape(-1, 3)  # fmt: skip
+    return np.array(
+        [
+            [length if is_short(solid, length, spacing) else NEVER for length in (periods.x, periods.y, periods.z)]
+            for solid in solids
+        ]
+    ).reshape(-1, 3)
 
 
 def check_seams(solids: Sequence[Solid], lower: np.ndarray, upper: np.ndarray, axes: Sequence[int], d: float) -> None:

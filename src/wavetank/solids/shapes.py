@@ -30,7 +30,7 @@ from wavetank.solids.distance import (
     vec2,
     vec3,
     vec4,
-)  # fmt: skip
+)
 from wavetank.solids.ground.height_field import HeightField
 from wavetank.solids.ground.polygon import Polygon
 from wavetank.solids.meshes.mesh import Mesh
@@ -43,10 +43,13 @@ def moved(solid: Solid, position: np.ndarray, rotation: np.ndarray) -> Solid:
     shift = position - solid.origin
     keys = [name for name in ("center", "start", "end", "point") if name in type(solid).model_fields]
     places = {name: tuple(float(a + b) for a, b in zip(getattr(solid, name), shift, strict=False)) for name in keys}
-    result: Solid = type(solid).model_validate({
-        **{name: getattr(solid, name) for name in type(solid).model_fields}, **places,
-        "rotation": tuple(map(float, unit_quaternion([*rotation]))),
-    })  # fmt: skip
+    result: Solid = type(solid).model_validate(
+        {
+            **{name: getattr(solid, name) for name in type(solid).model_fields},
+            **places,
+            "rotation": tuple(map(float, unit_quaternion([*rotation]))),
+        }
+    )
     return result
 
 
@@ -263,8 +266,18 @@ class Difference(_SetOperation):
 
 
 SHAPES: tuple[type[Solid], ...] = (
-    Box, Sphere, Capsule, Cylinder, HalfSpace, Union, Intersection, Difference, Mesh, Polygon, HeightField,
-)  # fmt: skip
+    Box,
+    Sphere,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Union,
+    Intersection,
+    Difference,
+    Mesh,
+    Polygon,
+    HeightField,
+)
 AnySolid = Annotated[
     Box | Sphere | Capsule | Cylinder | HalfSpace | Union | Intersection | Difference | Mesh | Polygon | HeightField,
     Field(discriminator="shape"),
@@ -276,7 +289,7 @@ for _shape in SHAPES:
 
 def build(
     solids: Sequence[Solid], tank_count: int, friction: float, spacing: float, repeats: tuple[int, Any] = (0, ())
-) -> SolidSet:  # fmt: skip
+) -> SolidSet:
     """Put `solids` on the device, for particles of that spacing [m]; the first `tank_count` are the tank's walls.
 
     `repeats`: bits of the axes along which the world repeats, and what `seams.seen_periods` says of the solids there.

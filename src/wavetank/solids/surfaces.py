@@ -94,8 +94,10 @@ def _turned_profile(profile: np.ndarray) -> Surface:
     after = np.roll(number, -1, axis=1)
     a, b, c, d = (part.reshape(-1) for part in (number[:-1], after[:-1], number[1:], after[1:]))
     low, high = np.full(AROUND, len(points) - 2), np.full(AROUND, len(points) - 1)
-    faces = [np.column_stack(corners) for corners in ((a, c, b), (b, c, d), (low, number[0], after[0]),
-             (high, after[-1], number[-1]))]  # fmt: skip
+    faces = [
+        np.column_stack(corners)
+        for corners in ((a, c, b), (b, c, d), (low, number[0], after[0]), (high, after[-1], number[-1]))
+    ]
     return points, np.concatenate(faces).astype(np.int32)
 
 

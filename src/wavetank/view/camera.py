@@ -63,9 +63,14 @@ class Camera:
     def lens(self, width: int, height: int) -> Lens:
         """Return this camera on the device for a picture of that many pixels."""
         return lens_at(
-            np.array(self.eye), self._axes, width, height, self._focal(height),
-            perspective=self.height is None, near=self.near,
-        )  # fmt: skip
+            np.array(self.eye),
+            self._axes,
+            width,
+            height,
+            self._focal(height),
+            perspective=self.height is None,
+            near=self.near,
+        )
 
     def orbit(self, azimuth: float, elevation: float) -> "Camera":
         """Turn around the target by `azimuth` about y and `elevation` towards the zenith [rad], distance kept."""

@@ -52,9 +52,19 @@ def new_cells(frame: Frame, extent: Extent, edge: float) -> Cells:
     x = qd.ndarray(vec3, shape=(capacity,))
     nx, ny, nz = sizes
     return Cells(
-        start=start, fill=fill, blocks=blocks, cell=cell, order=order, x=x, nx=nx, ny=ny, nz=nz, cells=total,
-        edge=float(edge), own=int(own),
-    )  # fmt: skip
+        start=start,
+        fill=fill,
+        blocks=blocks,
+        cell=cell,
+        order=order,
+        x=x,
+        nx=nx,
+        ny=ny,
+        nz=nz,
+        cells=total,
+        edge=float(edge),
+        own=int(own),
+    )
 
 
 def sort(frame: Frame, cells: Cells) -> None:

@@ -26,9 +26,12 @@ ENVIRONMENTS: tuple[str, ...] = get_args(Environment)
 FLOORS: tuple[str, ...] = get_args(Floor)
 #: albedo of each floor, None for the environment's own, and the size of its pattern [m]
 PAVINGS: dict[str, tuple[str | None, float]] = {
-    "plain": (None, 0.0), "tiles": ("#b9bcb9", 0.1), "stone": ("#a59c8f", 0.3), "sand": ("#cdb58c", 0.03),
+    "plain": (None, 0.0),
+    "tiles": ("#b9bcb9", 0.1),
+    "stone": ("#a59c8f", 0.3),
+    "sand": ("#cdb58c", 0.03),
     "table": ("#d2d0cc", 0.0),
-}  # fmt: skip
+}
 HAZES = {"pool": ("#d9e4ec", 3.5), "sky": ("#c9dcee", 2.3), "evening": ("#f0cfa4", 4.5)}  # horizon, turbidity
 OWN_FLOORS = {"sky": "stone", "evening": "sand", "overcast": "stone"}
 OWN_SUNS = {"sky": (-60.0, 42.0), "evening": (-125.0, 9.0)}
@@ -65,9 +68,12 @@ def chosen_light(own: Light | None, environment: str | None, sun: str | None, fl
 
 
 def look_of(
-    environment: str, azimuth: float | None = None, elevation: float | None = None, floor: str | None = None,
+    environment: str,
+    azimuth: float | None = None,
+    elevation: float | None = None,
+    floor: str | None = None,
     dim: int = 3,
-) -> Look:  # fmt: skip
+) -> Look:
     """Return a look by the name of its environment, or of a file; the same object for the same light."""
     if is_picture(environment):
         return _paved_once(panorama(environment).look, floor)
@@ -149,10 +155,18 @@ def _lit_by_the_sun(look: Look) -> Look:
 def _overcast() -> Look:
     """An even sky, three times as bright overhead as at the horizon (P. Moon, D. Spencer 1942)."""
     return dataclasses.replace(
-        studio(), sun=vector(0.16, 0.16, 0.16), sky=vector(0.86, 0.90, 0.94), horizon=linear("#c3c9ce"),
-        zenith=vector(1.35, 1.42, 1.5), ground=vector(0.32, 0.32, 0.31), sun_size=0.25, sparkle=0.0, caustic=0.15,
-        solid=pool().solid, line=pool().line,
-    )  # fmt: skip
+        studio(),
+        sun=vector(0.16, 0.16, 0.16),
+        sky=vector(0.86, 0.90, 0.94),
+        horizon=linear("#c3c9ce"),
+        zenith=vector(1.35, 1.42, 1.5),
+        ground=vector(0.32, 0.32, 0.31),
+        sun_size=0.25,
+        sparkle=0.0,
+        caustic=0.15,
+        solid=pool().solid,
+        line=pool().line,
+    )
 
 
 @functools.cache

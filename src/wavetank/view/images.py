@@ -21,9 +21,15 @@ from wavetank.solids.solid import ENDLESS, Solid
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 #: What makes a body of a solid, and moves it: a part has none of it.
 LIVELY = {
-    "name": "", "density": None, "mass": None, "hollow": False, "held": False, "velocity": None,
-    "angular_velocity": None, "motion": None,
-}  # fmt: skip
+    "name": "",
+    "density": None,
+    "mass": None,
+    "hollow": False,
+    "held": False,
+    "velocity": None,
+    "angular_velocity": None,
+    "motion": None,
+}
 
 
 class Images:
@@ -51,7 +57,7 @@ class Images:
 
 def _placed(
     frame: Frame, tank: Tank, standing: tuple[Standing, ...]
-) -> tuple[MovingSolids, tuple[Standing, ...]] | None:  # fmt: skip
+) -> tuple[MovingSolids, tuple[Standing, ...]] | None:
     """Return all solids where they stand, cut at the seams, with their images; None where none is at a seam."""
     crossing = [_crossed(one, tank) for one in standing]
     if not any(crossing):

@@ -70,8 +70,10 @@ def draw_scale(picture: np.ndarray, pixels_per_metre: float) -> None:
     pen, at, low = ImageDraw.Draw(plate), int(1.9 * unit), unit // 4
     pen.text((unit + bar // 2, unit), f"{length:g} m", INK, _font(unit), anchor="mm")
     for line in (
-        (unit, at, unit + bar, at), (unit, at - low, unit, at + low), (unit + bar, at - low, unit + bar, at + low)
-    ):  # fmt: skip
+        (unit, at, unit + bar, at),
+        (unit, at - low, unit, at + low),
+        (unit + bar, at - low, unit + bar, at + low),
+    ):
         pen.line(line, fill=INK, width=max(1, unit // 10))
     _lay(picture, np.asarray(plate), picture.shape[0] - plate.height - unit, picture.shape[1] - plate.width - unit)
 

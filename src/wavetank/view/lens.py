@@ -59,17 +59,19 @@ def lens_at(
 ) -> Lens:
     """Return the lens at `eye` [m] with the `basis` `axes` for a picture of `width` x `height` pixels."""
     right, up, forward = axes
-    return remembered(Lens(
-        eye=vector(*eye),
-        right=vector(*right),
-        up=vector(*up),
-        forward=vector(*forward),
-        middle=vector(0.5 * width, 0.5 * height),
-        focal=float(focal),
-        pixel=1.0 / float(focal),
-        perspective=float(perspective),
-        near=float(near),
-    ))  # fmt: skip
+    return remembered(
+        Lens(
+            eye=vector(*eye),
+            right=vector(*right),
+            up=vector(*up),
+            forward=vector(*forward),
+            middle=vector(0.5 * width, 0.5 * height),
+            focal=float(focal),
+            pixel=1.0 / float(focal),
+            perspective=float(perspective),
+            near=float(near),
+        )
+    )
 
 
 @qd.func

@@ -100,20 +100,22 @@ def studio() -> Look:
 @functools.cache
 def pool() -> Look:
     """A tiled floor in the open: worlds in space, seen as water."""
-    return under_sky(dataclasses.replace(
-        studio(),
-        sun=vector(1.25, 1.16, 1.02),
-        sky=vector(0.42, 0.50, 0.60),
-        ground=vector(0.30, 0.31, 0.31),
-        horizon=linear("#d9e4ec"),
-        zenith=linear("#4f7ba6"),
-        floor=linear("#b9bcb9"),
-        solid=linear("#e09a5c"),
-        line=linear("#eef4f7"),
-        tile=0.1,
-        paving=1,
-        sun_size=0.04,
-    ))  # fmt: skip
+    return under_sky(
+        dataclasses.replace(
+            studio(),
+            sun=vector(1.25, 1.16, 1.02),
+            sky=vector(0.42, 0.50, 0.60),
+            ground=vector(0.30, 0.31, 0.31),
+            horizon=linear("#d9e4ec"),
+            zenith=linear("#4f7ba6"),
+            floor=linear("#b9bcb9"),
+            solid=linear("#e09a5c"),
+            line=linear("#eef4f7"),
+            tile=0.1,
+            paving=1,
+            sun_size=0.04,
+        )
+    )
 
 
 @functools.cache

@@ -155,12 +155,16 @@ def panorama_of(radiance: np.ndarray) -> Panorama:
     low, high = (to[..., 1] > 0.0) & (to[..., 1] < 0.1), to[..., 1] > 0.8
     weights = _fitted(sky[above], to[above], per[above], to_sun)
     look = dataclasses.replace(
-        plain, to_sun=vector(*to_sun), sun=vector(*np.maximum(sun, 1e-3)), sky=vector(*white), outdoors=1,
+        plain,
+        to_sun=vector(*to_sun),
+        sun=vector(*np.maximum(sun, 1e-3)),
+        sky=vector(*white),
+        outdoors=1,
         horizon=vector(*np.average(sky[low], axis=0, weights=per[low])),
         zenith=vector(*np.average(sky[high], axis=0, weights=per[high])),
         sun_size=float(np.clip(np.sqrt(area / np.pi), 0.005, 0.12)),
         **{name: vector(*weight) for name, weight in zip(SKY, weights, strict=True)},
-    )  # fmt: skip
+    )
     look = dataclasses.replace(look, below=lit_floor(look), ground=vector(*(0.45 * np.asarray(lit_floor(look)))))
     return Panorama(sky.astype(np.float32), look)
 

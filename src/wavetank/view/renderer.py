@@ -46,9 +46,10 @@ class Renderer:
 
     def __init__(self, width: int, height: int, supersample: int = 1) -> None:
         for name, value, most in (
-            ("width", width, LARGEST_SIDE), ("height", height, LARGEST_SIDE),
+            ("width", width, LARGEST_SIDE),
+            ("height", height, LARGEST_SIDE),
             ("supersample", supersample, LARGEST_SUPERSAMPLE),
-        ):  # fmt: skip
+        ):
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= most:
                 raise WavetankError(f"render: {name} = {value!r} must be a whole number from 1 to {most}.")
         if current_backend() is None:
@@ -65,9 +66,14 @@ class Renderer:
         self._rounding = Rounding()
 
     def render(
-        self, frame: Frame, camera: Camera | None = None, *, timings: Timings = None, watch: Watch | None = None,
+        self,
+        frame: Frame,
+        camera: Camera | None = None,
+        *,
+        timings: Timings = None,
+        watch: Watch | None = None,
         **options: Any,
-    ) -> np.ndarray:  # fmt: skip
+    ) -> np.ndarray:
         """Return a picture of `frame`, uint8 [height, width, 3].
 
         `options` are the fields of `Style`; `timings`, a dict, receives the milliseconds of each pass. `watch` is told
@@ -252,9 +258,14 @@ _kept: collections.OrderedDict[tuple[int, int, int], Renderer] = collections.Ord
 
 
 def render(
-    world: Any, width: int = 1280, height: int = 720, *, quality: str | None = None, supersample: int | None = None,
+    world: Any,
+    width: int = 1280,
+    height: int = 720,
+    *,
+    quality: str | None = None,
+    supersample: int | None = None,
     **options: Any,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return a picture of a `Frame` or a `Simulation`, uint8 [height, width, 3].
 
     `options` are those of `Renderer.render`: a view by name, a camera and the fields of `Style`. `quality` is draft,

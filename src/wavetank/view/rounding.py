@@ -43,9 +43,7 @@ def rounded(samples: Any, places: list[list[int]]) -> Any:
 
 
 @qd.kernel(fastcache=True)
-def average(
-    a: qd.types.ndarray(), b: qd.types.ndarray(), first: qd.i32, along: qd.i32, nodes: qd.i32, count: qd.i32
-):  # fmt: skip
+def average(a: qd.types.ndarray(), b: qd.types.ndarray(), first: qd.i32, along: qd.i32, nodes: qd.i32, count: qd.i32):
     """Write to `b` the means of `count` nodes of `a` from `first` on and their two neighbours, `along` apart."""
     for k in range(count):
         at = first + k

@@ -167,8 +167,9 @@ def water_of(buffers: Buffers, shot: Shot) -> WaterBuffers:
         ellipsoids=_ellipsoids(capacity),
         sunlit=_sunlit(texels),
         sun_thickness=_thickness(texels, texels, shared, seen=False),
-        key=key, **fields,
-    )  # fmt: skip
+        key=key,
+        **fields,
+    )
     return buffers.water
 
 
@@ -205,9 +206,10 @@ def _shares(rows: int, columns: int, fluids: int, seen: bool) -> dict[str, Any]:
     shape, front = (rows, columns) if fluids else small, (rows, columns) if fluids and seen else small
     many = max(fluids, 1)
     return {
-        "shares": qd.ndarray(qd.i32, shape=(*shape, many)), "front": qd.ndarray(qd.i32, shape=(*front, many)),
+        "shares": qd.ndarray(qd.i32, shape=(*shape, many)),
+        "front": qd.ndarray(qd.i32, shape=(*front, many)),
         "edge": qd.ndarray(qd.f32, shape=front),
-    }  # fmt: skip
+    }
 
 
 def _fluids(fluids: np.ndarray) -> dict[str, Any]:

@@ -177,8 +177,9 @@ def test_all_faces_may_be_turned_and_parts_may_overlap():
     points = cloud(5000, 0.5)
     np.testing.assert_allclose(
         distances(wt.Mesh.of(vertices, faces[:, ::-1], size=0.5, **POSE), points)[1],
-        distances(wt.Mesh.of(vertices, faces, size=0.5, **POSE), points)[1], atol=1e-6,
-    )  # fmt: skip
+        distances(wt.Mesh.of(vertices, faces, size=0.5, **POSE), points)[1],
+        atol=1e-6,
+    )
     twice = wt.Mesh.of([*vertices, *(vertices + (0.5, 0, 0))], [*faces, *(faces + 8)], center=(0, 0, 0), size=0.75)
     _, found = distances(twice, [(0, 0, 0), (0.3, 0.2, 0.2), (0.4, 0, 0)])
     np.testing.assert_array_equal(found < 0, [True, True, False])

@@ -64,19 +64,23 @@ def test_a_mesh_is_a_wall_like_any_other():
     d, center, size = 0.05, (0.2, 0.05, 0.2), (0.5, 0.3, 0.5)
     scenes = [
         wt.Scene(
-            spacing=d, tank=wt.Tank(size=(0.4, 0.8, 0.4)), solids=[solid],
+            spacing=d,
+            tank=wt.Tank(size=(0.4, 0.8, 0.4)),
+            solids=[solid],
             fluids=[wt.Block(lower=(0, 0.2, 0), upper=(0.4, 0.5, 0.4))],
         )
         for solid in (wt.Box(center=center, size=size), wt.Mesh.of(*CUBE, center=center, size=size))
-    ]  # fmt: skip
+    ]
     boxed, meshed = (Simulation(scene).densities for scene in scenes)
     np.testing.assert_allclose(meshed, boxed, rtol=1e-3)
 
 
 SCENE = wt.Scene(
-    spacing=0.04, tank=wt.Tank(size=(0.8, 0.6, 0.5)), fluids=[wt.Block(lower=(0, 0, 0), upper=(0.3, 0.4, 0.5))],
+    spacing=0.04,
+    tank=wt.Tank(size=(0.8, 0.6, 0.5)),
+    fluids=[wt.Block(lower=(0, 0, 0), upper=(0.3, 0.4, 0.5))],
     solids=[wt.Mesh.of(*ball(16), name="ball", center=(0.5, 0.2, 0.25), size=0.3)],
-)  # fmt: skip
+)
 
 
 def test_a_saved_state_goes_on_the_same(tmp_path):
@@ -128,9 +132,11 @@ def test_a_cup_of_faces_is_shaken_and_keeps_its_water():
     d, place = 0.012, np.array([0.0, 0.2, 0.0])
     mesh = wt.Mesh.of(*cup(0.08, 0.2, d), center=tuple(place), size=0.2, name="cup")
     scene = wt.Scene(
-        spacing=d, tank=wt.Tank(size=(0.5, 0.5, 0.4), lower=(-0.25, 0, -0.2)), solids=[mesh],
+        spacing=d,
+        tank=wt.Tank(size=(0.5, 0.5, 0.4), lower=(-0.25, 0, -0.2)),
+        solids=[mesh],
         fluids=[wt.Filled(inside=wt.Cylinder(start=(0, 0.113, 0), end=(0, 0.19, 0), radius=0.067))],
-    )  # fmt: skip
+    )
     sim = Simulation(scene)
     for frame in range(240):
         t = frame / 60.0

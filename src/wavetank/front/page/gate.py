@@ -109,11 +109,15 @@ async def _refuse(scope: Any, receive: Any, send: Any) -> None:
     body = b"wavetank: this page opens with the link that the program printed, token included.\n"
     # What answers a socket tells the length by itself, and some versions of it a second time.
     length = [(b"content-length", str(len(body)).encode())] if scope["type"] == "http" else []
-    await send({
-        "type": f"{kind}.start", "status": 403,
-        "headers": [
-            (b"content-type", b"text/plain; charset=utf-8"), *length,
-            *((name.encode(), value.encode()) for name, value in HEADERS.items()),
-        ],
-    })  # fmt: skip
+    await send(
+        {
+            "type": f"{kind}.start",
+            "status": 403,
+            "headers": [
+                (b"content-type", b"text/plain; charset=utf-8"),
+                *length,
+                *((name.encode(), value.encode()) for name, value in HEADERS.items()),
+            ],
+        }
+    )
     await send({"type": f"{kind}.body", "body": body})

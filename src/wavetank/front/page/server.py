@@ -65,7 +65,7 @@ class WebFront:
 
     def __init__(
         self, session: Session, host: str = "127.0.0.1", port: int | None = None, token: str | None = None
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.session, self.start_scene = session, session.scene
         self.viewers = Viewers(session.submit, self._ray, lambda: {**self._hello, "run": self.run_number})
         self.viewers.wake, self.viewers.call = session.wake, self._call
@@ -77,18 +77,33 @@ class WebFront:
         self.port = self._socket.getsockname()[1]
         everywhere = host in ("0.0.0.0", "::")
         shown = socket.gethostname() if everywhere else f"[{host}]" if ":" in host and "[" not in host else host
-        app = Starlette(routes=[
-            Route("/", self._page), Route("/page/{file}", self._file), Route("/recording.toml", self._recording),
-            Route("/scene.toml", self._scene), Route("/picture.png", self._picture),
-            WebSocketRoute("/socket", self.viewers.serve),
-        ])  # fmt: skip
+        app = Starlette(
+            routes=[
+                Route("/", self._page),
+                Route("/page/{file}", self._file),
+                Route("/recording.toml", self._recording),
+                Route("/scene.toml", self._scene),
+                Route("/picture.png", self._picture),
+                WebSocketRoute("/socket", self.viewers.serve),
+            ]
+        )
         self.gate = Gate(app, host, self.port, token)
         self.url = f"http://{shown}:{self.port}/?token={self.gate.token}"
-        self._server = uvicorn.Server(uvicorn.Config(
-            self.gate, log_level="error", access_log=False, lifespan="off", ws="websockets-sansio",
-            ws_max_size=LONGEST_MESSAGE, ws_per_message_deflate=False, timeout_graceful_shutdown=1,
-            http=Protocol, server_header=False, limit_concurrency=MOST_CONNECTIONS,
-        ))  # fmt: skip
+        self._server = uvicorn.Server(
+            uvicorn.Config(
+                self.gate,
+                log_level="error",
+                access_log=False,
+                lifespan="off",
+                ws="websockets-sansio",
+                ws_max_size=LONGEST_MESSAGE,
+                ws_per_message_deflate=False,
+                timeout_graceful_shutdown=1,
+                http=Protocol,
+                server_header=False,
+                limit_concurrency=MOST_CONNECTIONS,
+            )
+        )
         self._events: asyncio.AbstractEventLoop | None = None
         self._thread = threading.Thread(target=self._serve, name="wavetank web", daemon=True)
         self._packer = concurrent.futures.ThreadPoolExecutor(1, "wavetank jpeg")
@@ -168,8 +183,13 @@ class WebFront:
     def tell(self, news: News, notes: list[str]) -> None:
         """Send how things stand to everyone, if anything has changed."""
         status = {
-            "type": "status", **news.status, "notes": notes, **news.figures, "game": news.game, "scores": news.scores
-        }  # fmt: skip
+            "type": "status",
+            **news.status,
+            "notes": notes,
+            **news.figures,
+            "game": news.game,
+            "scores": news.scores,
+        }
         if news.world != self._told_world:
             self._told_world = news.world
             self._hello = {**self._hello, **news.world}
@@ -250,15 +270,15 @@ class WebFront:
 
         return await self._download("wavetank.png", made, "image/png")
 
-    async def _download(
-        self, name: str, make: Callable[[], str | bytes], kind: str = "application/toml"
-    ) -> Response:  # fmt: skip
+    async def _download(self, name: str, make: Callable[[], str | bytes], kind: str = "application/toml") -> Response:
         """Return what the simulation's thread makes, as a file; not too many at once, which the water feels."""
         if self._downloads >= MOST_DOWNLOADS:
             return Response(
-                "too many downloads at once; try again\n", status_code=429, media_type="text/plain",
+                "too many downloads at once; try again\n",
+                status_code=429,
+                media_type="text/plain",
                 headers={"retry-after": "1"},
-            )  # fmt: skip
+            )
 
         def made() -> str | bytes:
             try:

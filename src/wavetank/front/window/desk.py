@@ -132,9 +132,11 @@ class Desk:
             if self.curves.get("time") and shown.status["time"] < self.curves["time"][-1]:
                 self.curves.clear()  # rewound, or another scene
             for name, value in {
-                "time": shown.status["time"], **shown.figures, "frame_ms": shown.status["frame_ms"],
+                "time": shown.status["time"],
+                **shown.figures,
+                "frame_ms": shown.status["frame_ms"],
                 "picture_ms": shown.status["picture_ms"],
-            }.items():  # fmt: skip
+            }.items():
                 self.curves.setdefault(name, deque(maxlen=KEPT)).append(value)
 
     def open(self, path: Path) -> None:

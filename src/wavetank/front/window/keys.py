@@ -12,10 +12,15 @@ from wavetank.session.commands import Bookmark, Pause, Reset, Rewind, SetView, S
 
 LONGEST_PAUSE = 1.0  # s between two signs of a key that is held
 POINTER = (
-    ("left button", "Use the tool"), ("right button", "Turn the view"), ("right, W A S D Q E", "Fly"),
-    ("middle, Shift", "Move the view"), ("wheel", "Zoom"), ("double click a slider", "Its default"),
-    ("Ctrl, click a slider", "Type a value"), ("drop a TOML file, an OBJ", "Open the scene, place a solid"),
-)  # fmt: skip
+    ("left button", "Use the tool"),
+    ("right button", "Turn the view"),
+    ("right, W A S D Q E", "Fly"),
+    ("middle, Shift", "Move the view"),
+    ("wheel", "Zoom"),
+    ("double click a slider", "Its default"),
+    ("Ctrl, click a slider", "Type a value"),
+    ("drop a TOML file, an OBJ", "Open the scene, place a solid"),
+)
 
 
 def toggle_pause(desk: Desk) -> None:
@@ -61,10 +66,16 @@ def toggle_forces(desk: Desk) -> None:
 
 
 ACTIONS: dict[str, Callable[[Desk], None]] = {
-    "pause": toggle_pause, "back": go_back, "again": begin_again, "bookmark": set_bookmark, "panel": show_panel,
-    "help": show_help, "forces": toggle_forces,
-    "slower": lambda desk: change_pace(desk, -1), "faster": lambda desk: change_pace(desk, 1),
-}  # fmt: skip
+    "pause": toggle_pause,
+    "back": go_back,
+    "again": begin_again,
+    "bookmark": set_bookmark,
+    "panel": show_panel,
+    "help": show_help,
+    "forces": toggle_forces,
+    "slower": lambda desk: change_pace(desk, -1),
+    "faster": lambda desk: change_pace(desk, 1),
+}
 HERE = {key.key: key for key in KEYS if not key.page_only}
 
 
@@ -108,9 +119,12 @@ def read_keys(desk: Desk) -> None:
     if imgui.is_key_pressed(name.escape):
         desk.help = False
     for key, which, repeats in (
-        ("Escape", name.escape, True), ("ArrowLeft", name.left_arrow, True),
-        ("ArrowRight", name.right_arrow, True), ("ArrowUp", name.up_arrow, True), ("ArrowDown", name.down_arrow, True),
-    ):  # fmt: skip
+        ("Escape", name.escape, True),
+        ("ArrowLeft", name.left_arrow, True),
+        ("ArrowRight", name.right_arrow, True),
+        ("ArrowUp", name.up_arrow, True),
+        ("ArrowDown", name.down_arrow, True),
+    ):
         if imgui.is_key_pressed(which, repeats):
             press(desk, HERE[key])
 

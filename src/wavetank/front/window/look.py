@@ -65,22 +65,47 @@ def set_style() -> None:
     style.window_padding, style.frame_padding, style.item_spacing = ImVec2(12, 10), ImVec2(8, 4), ImVec2(8, 7)
     style.grab_min_size, style.scrollbar_size, style.scrollbar_rounding = 5.0, 9.0, 6.0
     for which, color, alpha in (
-        (c.text, TEXT, 1), (c.text_disabled, SOFT, 1), (c.window_bg, PANEL, 1), (c.child_bg, PANEL, 0),
-        (c.popup_bg, CARD, 0.97), (c.border, LINE, 1), (c.frame_bg, RAISED, 1), (c.frame_bg_hovered, HOVER, 1),
-        (c.frame_bg_active, HOVER, 1), (c.button, RAISED, 1), (c.button_hovered, HOVER, 1),
-        (c.button_active, ACCENT_GROUND, 1), (c.slider_grab, ACCENT, 0.65), (c.slider_grab_active, ACCENT_BRIGHT, 1),
-        (c.check_mark, ACCENT, 1), (c.header, ACCENT_GROUND, 1), (c.header_hovered, HOVER, 1),
-        (c.header_active, ACCENT_GROUND, 1), (c.tab, PANEL, 0), (c.tab_hovered, HOVER, 1), (c.tab_selected, RAISED, 1),
-        (c.tab_selected_overline, ACCENT, 0), (c.scrollbar_bg, PANEL, 0), (c.scrollbar_grab, GRIP, 1),
-        (c.separator, LINE, 1), (c.text_selected_bg, ACCENT, 0.35), (c.modal_window_dim_bg, GROUND, 0.6),
+        (c.text, TEXT, 1),
+        (c.text_disabled, SOFT, 1),
+        (c.window_bg, PANEL, 1),
+        (c.child_bg, PANEL, 0),
+        (c.popup_bg, CARD, 0.97),
+        (c.border, LINE, 1),
+        (c.frame_bg, RAISED, 1),
+        (c.frame_bg_hovered, HOVER, 1),
+        (c.frame_bg_active, HOVER, 1),
+        (c.button, RAISED, 1),
+        (c.button_hovered, HOVER, 1),
+        (c.button_active, ACCENT_GROUND, 1),
+        (c.slider_grab, ACCENT, 0.65),
+        (c.slider_grab_active, ACCENT_BRIGHT, 1),
+        (c.check_mark, ACCENT, 1),
+        (c.header, ACCENT_GROUND, 1),
+        (c.header_hovered, HOVER, 1),
+        (c.header_active, ACCENT_GROUND, 1),
+        (c.tab, PANEL, 0),
+        (c.tab_hovered, HOVER, 1),
+        (c.tab_selected, RAISED, 1),
+        (c.tab_selected_overline, ACCENT, 0),
+        (c.scrollbar_bg, PANEL, 0),
+        (c.scrollbar_grab, GRIP, 1),
+        (c.separator, LINE, 1),
+        (c.text_selected_bg, ACCENT, 0.35),
+        (c.modal_window_dim_bg, GROUND, 0.6),
         (c.nav_cursor, ACCENT, 0),
-    ):  # fmt: skip
+    ):
         style.set_color_(which, rgba(color, alpha))
     plots, p = implot.get_style(), implot.Col_
     for part, tint, share in (
-        (p.frame_bg, PANEL, 0), (p.plot_bg, GROUND, 0.55), (p.plot_border, LINE, 1), (p.axis_grid, SOFT, 0.14),
-        (p.axis_text, SOFT, 1), (p.legend_bg, PANEL, 0), (p.legend_border, PANEL, 0), (p.inlay_text, SOFT, 1),
-    ):  # fmt: skip
+        (p.frame_bg, PANEL, 0),
+        (p.plot_bg, GROUND, 0.55),
+        (p.plot_border, LINE, 1),
+        (p.axis_grid, SOFT, 0.14),
+        (p.axis_text, SOFT, 1),
+        (p.legend_bg, PANEL, 0),
+        (p.legend_border, PANEL, 0),
+        (p.inlay_text, SOFT, 1),
+    ):
         plots.set_color_(part, rgba(tint, share))
     plots.plot_padding = ImVec2(0.9 * imgui.get_style().font_size_base, 6)  # room for half a label at either end
     plots.label_padding = ImVec2(4, 3)

@@ -32,8 +32,12 @@ TINTS = (ACCENT, WARM)
 def panel(desk: Desk) -> None:
     """Draw the tabs."""
     pages: tuple[tuple[str, Callable[[Desk], None]], ...] = (
-        ("Water", _water), ("Scenes", scenes.browser), ("Look", _look), ("Curves", _curves), ("Keep", _keep),
-    )  # fmt: skip
+        ("Water", _water),
+        ("Scenes", scenes.browser),
+        ("Look", _look),
+        ("Curves", _curves),
+        ("Keep", _keep),
+    )
     if not imgui.begin_tab_bar("pages"):
         return
     for name, draw in pages:
@@ -177,8 +181,9 @@ def _light(desk: Desk) -> None:
         desk.engine.do(SetLight, environment=name)
     limits = about["sun"]
     for key, text, low, high in (
-        ("azimuth", "Sun from %.0f°", 0.0, 360.0), ("elevation", "Sun at %.0f°", limits["lowest"], limits["highest"]),
-    ):  # fmt: skip
+        ("azimuth", "Sun from %.0f°", 0.0, 360.0),
+        ("elevation", "Sun at %.0f°", limits["lowest"], limits["highest"]),
+    ):
         imgui.set_next_item_width(-1)
         changed, value = imgui.slider_float(f"##{key}", light[key], low, high, text)
         low_corner, high_corner = imgui.get_item_rect_min(), imgui.get_item_rect_max()

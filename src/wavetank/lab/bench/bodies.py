@@ -55,9 +55,13 @@ def _body(number: int, center: np.ndarray, edge: float, rng: np.random.Generator
 
 
 def bodies(
-    particles: int = PARTICLES, *, seconds: float = SECONDS, arch: str = "cpu", threads: int | None = None,
+    particles: int = PARTICLES,
+    *,
+    seconds: float = SECONDS,
+    arch: str = "cpu",
+    threads: int | None = None,
     say: Callable[[str], None] = lambda text: None,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Measure the frames of all pools for `seconds` of water, in four parts, and return the figures.
 
     Raises `WavetankError` for a pool of fewer than 1,000 or more than a million particles, or a time out of range.
@@ -86,11 +90,16 @@ def bodies(
         for part, (own, alone) in enumerate(
             zip(np.array_split(times, 4), np.array_split(spent["none"], 4), strict=True)
         ):
-            rows.append({
-                "bodies": name, "from": part * seconds / 4, "to": (part + 1) * seconds / 4,
-                "milliseconds": 1e3 * float(own[:, 0].mean()), "processor_milliseconds": 1e3 * float(own[:, 1].mean()),
-                "ratio": float(own[:, 1].mean() / alone[:, 1].mean()),
-            })  # fmt: skip
+            rows.append(
+                {
+                    "bodies": name,
+                    "from": part * seconds / 4,
+                    "to": (part + 1) * seconds / 4,
+                    "milliseconds": 1e3 * float(own[:, 0].mean()),
+                    "processor_milliseconds": 1e3 * float(own[:, 1].mean()),
+                    "ratio": float(own[:, 1].mean() / alone[:, 1].mean()),
+                }
+            )
     return {"machine": machine(started, threads), "load": load(), "particles": worlds["none"].count, "bodies": rows}
 
 
@@ -99,8 +108,11 @@ def bodies_table(result: dict[str, Any]) -> Table:
     table = Table("fifty bodies", "seconds", "ms a frame", "of the processor", "over the pool alone")
     for row in result["bodies"]:
         table.add_row(
-            row["bodies"], f"{row['from']:g} to {row['to']:g}", f"{row['milliseconds']:.1f}",
-            f"{row['processor_milliseconds']:.1f}", f"{row['ratio']:.2f}",
-        )  # fmt: skip
+            row["bodies"],
+            f"{row['from']:g} to {row['to']:g}",
+            f"{row['milliseconds']:.1f}",
+            f"{row['processor_milliseconds']:.1f}",
+            f"{row['ratio']:.2f}",
+        )
     table.caption = f"A pool of {result['particles']:,} particles."
     return table

@@ -34,11 +34,22 @@ class Browser:
                 "there is no Chromium here; install one (on Debian and Ubuntu: apt-get install chromium)."
             )
         self.process = subprocess.Popen(
-            [program, "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
-             "--remote-debugging-port=0", f"--user-data-dir={folder}", f"--window-size={width},{height}",
-             "--no-first-run", "--disable-background-networking", "about:blank"],
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+            [
+                program,
+                "--headless=new",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--disable-dev-shm-usage",
+                "--remote-debugging-port=0",
+                f"--user-data-dir={folder}",
+                f"--window-size={width},{height}",
+                "--no-first-run",
+                "--disable-background-networking",
+                "about:blank",
+            ],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
         told = folder / "DevToolsActivePort"
         self._until(lambda: told.exists() and len(told.read_text().splitlines()) > 1, 60, "Chromium starts")
         port = told.read_text().splitlines()[0]
@@ -95,9 +106,14 @@ class Browser:
     def mouse(self, kind: str, x: float, y: float, button: str = "left") -> None:
         """Press, move or release the mouse."""
         self.call(
-            "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button,
-            buttons=0 if kind == "mouseReleased" else {"left": 1, "right": 2}.get(button, 0), clickCount=1,
-        )  # fmt: skip
+            "Input.dispatchMouseEvent",
+            type=kind,
+            x=x,
+            y=y,
+            button=button,
+            buttons=0 if kind == "mouseReleased" else {"left": 1, "right": 2}.get(button, 0),
+            clickCount=1,
+        )
 
     def click(self, selector: str) -> None:
         """Click on the middle of an element, once it rests: what has just appeared may still move."""

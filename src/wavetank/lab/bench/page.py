@@ -74,19 +74,36 @@ def measure(
         moving = _counted(browser, lambda: time.sleep(seconds))
         moving["water_per_second"] = (browser.run("watch.status.time") - began) / moving["seconds"]
         return {
-            "scene": scene, "particles": browser.run("watch.status.count"), "stage": list(_sides(browser)),
-            "arch": arch, "paused": paused, "moving": moving, "click_ms": _quartiles(delays), "clicks": len(delays),
+            "scene": scene,
+            "particles": browser.run("watch.status.count"),
+            "stage": list(_sides(browser)),
+            "arch": arch,
+            "paused": paused,
+            "moving": moving,
+            "click_ms": _quartiles(delays),
+            "clicks": len(delays),
             "machine": machine(arch),
-        }  # fmt: skip
+        }
 
 
 @contextlib.contextmanager
 def _served(scene: str, size: int, arch: str) -> Iterator[str]:
     """Serve a page in a process of its own and yield its address."""
     command = [
-        sys.executable, "-m", "wavetank", "play", scene, "--particles", str(size), "--web", "--no-browser", "--port",
-        "0", "--arch", arch,
-    ]  # fmt: skip
+        sys.executable,
+        "-m",
+        "wavetank",
+        "play",
+        scene,
+        "--particles",
+        str(size),
+        "--web",
+        "--no-browser",
+        "--port",
+        "0",
+        "--arch",
+        arch,
+    ]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}
     ) as server:
@@ -140,9 +157,11 @@ def _counted(browser: Browser, act: Callable[[], None]) -> dict[str, Any]:
     )
     share = np.sqrt(np.median(browser.run("watch.pixels") or [0]) / (STAGE[0] * STAGE[1]))
     return {
-        "seconds": seconds, "pictures_per_second": pictures / seconds, "sharpness": float(share),
+        "seconds": seconds,
+        "pictures_per_second": pictures / seconds,
+        "sharpness": float(share),
         "kilobytes_per_second": size / seconds / 1000,
-    }  # fmt: skip
+    }
 
 
 def _clicks(browser: Browser) -> list[float]:
@@ -169,9 +188,12 @@ def page_table(result: dict[str, Any]) -> Table:
     """Return the figures as a table."""
     sides, click = result["stage"], result["click_ms"]
     table = Table(
-        f"{result['scene']}, {result['particles']:,} particles, {sides[0]} x {sides[1]}", "pictures a second",
-        "share of width and height", "kB a second", "water a second",
-    )  # fmt: skip
+        f"{result['scene']}, {result['particles']:,} particles, {sides[0]} x {sides[1]}",
+        "pictures a second",
+        "share of width and height",
+        "kB a second",
+        "water a second",
+    )
     for title, one in (("paused, the eye goes round", result["paused"]), ("the water moves", result["moving"])):
         water = f"{one['water_per_second']:.3f} s" if "water_per_second" in one else ""
         table.add_row(

@@ -223,10 +223,14 @@ def roofline_table(result: dict[str, Any]) -> list[Table]:
             stage = row["stage"]
             table.add_row(stage, "", f"{total['ms']:.2f}", "", "", f"{100 * total['share']:.0f} %", "")
         table.add_row(
-            "", name, f"{row['ms']:.2f}", f"{row['bytes_per_second'] / 1e9:.1f}",
-            f"{row['operations_per_second'] / 1e9:.1f}", f"{100 * row['share']:.0f} % {row['bound']}",
+            "",
+            name,
+            f"{row['ms']:.2f}",
+            f"{row['bytes_per_second'] / 1e9:.1f}",
+            f"{row['operations_per_second'] / 1e9:.1f}",
+            f"{100 * row['share']:.0f} % {row['bound']}",
             "" if row["walk_ms"] is None else f"{100 * row['walk_ms'] / row['ms']:.0f} %",
-        )  # fmt: skip
+        )
     return [ceilings, table]
 
 

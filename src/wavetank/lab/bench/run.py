@@ -72,16 +72,25 @@ def perform(order: Order, say: Callable[[str], None]) -> tuple[dict[str, Any], l
         from wavetank.lab.bench.roofline import roofline, roofline_table
 
         result = roofline(
-            names[0] if names else SCENES[0], sizes[0] if sizes else SIZES[-1], arch=order.arch,
-            seconds=0.2 if order.seconds is None else order.seconds, repeats=order.repeats, threads=order.threads,
+            names[0] if names else SCENES[0],
+            sizes[0] if sizes else SIZES[-1],
+            arch=order.arch,
+            seconds=0.2 if order.seconds is None else order.seconds,
+            repeats=order.repeats,
+            threads=order.threads,
             say=say,
-        )  # fmt: skip
+        )
         return result, roofline_table(result)
     earlier = load_result(order.compare) if order.compare else None
     result = bench(
-        names or SCENES, sizes or SIZES, arch=order.arch, seconds=SECONDS if order.seconds is None else order.seconds,
-        repeats=order.repeats, threads=order.threads, say=say,
-    )  # fmt: skip
+        names or SCENES,
+        sizes or SIZES,
+        arch=order.arch,
+        seconds=SECONDS if order.seconds is None else order.seconds,
+        repeats=order.repeats,
+        threads=order.threads,
+        say=say,
+    )
     tables = [figures_table(result)]
     if order.start_up:
         say("start-up: a cold process, then warm ones")
@@ -110,9 +119,12 @@ def _page(
     if len(names) > 1 or len(sizes) > 1 or order.threads is not None:
         raise WavetankError("--page measures one scene at one size on all threads; give no more than that.")
     result = page.measure(
-        names[0] if names else page.SCENE, sizes[0] if sizes else page.SIZE,
-        seconds=page.SECONDS if order.seconds is None else order.seconds, arch=order.arch, say=say,
-    )  # fmt: skip
+        names[0] if names else page.SCENE,
+        sizes[0] if sizes else page.SIZE,
+        seconds=page.SECONDS if order.seconds is None else order.seconds,
+        arch=order.arch,
+        say=say,
+    )
     return result, [page.page_table(result)]
 
 
@@ -124,9 +136,12 @@ def _bodies(
     if names or len(sizes) > 1:
         raise WavetankError("--bodies measures a pool of its own; give no scene, and at most one of --sizes.")
     result = bodies.bodies(
-        sizes[0] if sizes else bodies.PARTICLES, seconds=bodies.SECONDS if order.seconds is None else order.seconds,
-        arch=order.arch, threads=order.threads, say=say,
-    )  # fmt: skip
+        sizes[0] if sizes else bodies.PARTICLES,
+        seconds=bodies.SECONDS if order.seconds is None else order.seconds,
+        arch=order.arch,
+        threads=order.threads,
+        say=say,
+    )
     return result, [bodies.bodies_table(result)]
 
 
@@ -140,9 +155,12 @@ def _peers(
             "--peers compares one dam break on the CPU; give no scene, and at most two --sizes, for PBF and for DFSPH."
         )
     result = compare_peers(
-        *(sizes * 2)[:2], seconds=SECONDS if order.seconds is None else order.seconds, repeats=order.repeats,
-        threads=order.threads, say=say,
-    )  # fmt: skip
+        *(sizes * 2)[:2],
+        seconds=SECONDS if order.seconds is None else order.seconds,
+        repeats=order.repeats,
+        threads=order.threads,
+        say=say,
+    )
     found, (pbf, dfsph) = result["peers"], result["settings"]["particles"]
     table = Table(
         "against SPlisHSPlasH", "ours / theirs", "(low, high)", "ours", "theirs", "density error, ours; theirs"
@@ -154,10 +172,12 @@ def _peers(
     ):
         factor = 1e-6 if name.startswith("particle") else 1.0
         table.add_row(
-            title, f"{one['ratio']:.2f}", f"[{one['low']:.2f}, {one['high']:.2f}]",
+            title,
+            f"{one['ratio']:.2f}",
+            f"[{one['low']:.2f}, {one['high']:.2f}]",
             *(f"{factor * one[side][name]:.4g}" for side in ("ours", "theirs")),
             "; ".join(f"{100 * one[side]['density_error_mean']:.3f} %" for side in ("ours", "theirs")),
-        )  # fmt: skip
+        )
     return result, [table]
 
 
@@ -171,7 +191,10 @@ def _their_scenes(
             "--scenes goes with --peers: scenes of theirs on the CPU, each at its own spacing; give no --sizes."
         )
     result = scenes.compare_scenes(
-        names or scenes.SCENES, order.pictures, seconds=scenes.SECONDS if order.seconds is None else order.seconds,
-        threads=order.threads, say=say,
-    )  # fmt: skip
+        names or scenes.SCENES,
+        order.pictures,
+        seconds=scenes.SECONDS if order.seconds is None else order.seconds,
+        threads=order.threads,
+        say=say,
+    )
     return result, [scenes.scenes_table(result)]

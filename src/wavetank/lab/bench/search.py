@@ -48,9 +48,13 @@ def places(count: int, layout: str) -> np.ndarray:
 
 
 def search(
-    sizes: Sequence[int] = SIZES, *, arch: str = "cpu", repeats: int = 3, threads: int | None = None,
+    sizes: Sequence[int] = SIZES,
+    *,
+    arch: str = "cpu",
+    repeats: int = 3,
+    threads: int | None = None,
     say: Callable[[str], None] = lambda text: None,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Measure both for each size and layout and return the figures; needs SciPy.
 
     Raises `WavetankError` without SciPy, or for a size below 1,000 or above 30 million.
@@ -81,12 +85,18 @@ def search(
                 began = time.perf_counter()
                 counted = int(tree.query_ball_point(x, c.h, return_length=True, workers=workers).sum()) - len(x)
                 query.append(time.perf_counter() - began)
-            rows.append({
-                "layout": layout, "particles": len(x), "pairs": pairs, "tree_pairs": counted,
-                "grid_seconds": statistics.median(grid_seconds),
-                "tree_seconds": statistics.median(build) + statistics.median(query),
-                "tree_build_seconds": statistics.median(build), "grid_bytes_per_particle": held / len(x),
-            })  # fmt: skip
+            rows.append(
+                {
+                    "layout": layout,
+                    "particles": len(x),
+                    "pairs": pairs,
+                    "tree_pairs": counted,
+                    "grid_seconds": statistics.median(grid_seconds),
+                    "tree_seconds": statistics.median(build) + statistics.median(query),
+                    "tree_build_seconds": statistics.median(build),
+                    "grid_bytes_per_particle": held / len(x),
+                }
+            )
     return {"machine": machine(arch, threads), "load": load(), "search": rows}
 
 
@@ -116,8 +126,11 @@ def search_table(result: dict[str, Any]) -> Table:
     for row in result["search"]:
         count = row["particles"]
         table.add_row(
-            f"{count:,}", row["layout"], f"{1e9 * row['grid_seconds'] / count:.0f}",
-            f"{1e9 * row['tree_seconds'] / count:.0f}", f"{row['tree_seconds'] / row['grid_seconds']:.1f}",
-        )  # fmt: skip
+            f"{count:,}",
+            row["layout"],
+            f"{1e9 * row['grid_seconds'] / count:.0f}",
+            f"{1e9 * row['tree_seconds'] / count:.0f}",
+            f"{row['tree_seconds'] / row['grid_seconds']:.1f}",
+        )
     table.caption = "The tree counts pairs only, on all cores; the grid also lists them."
     return table

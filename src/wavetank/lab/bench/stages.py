@@ -22,15 +22,21 @@ STAGES: dict[str, tuple[str, ...]] = {
     "grid": ("wavetank.physics.grid_pressure",),
     "constraint": ("wavetank.physics.density_constraint",),
     "velocities": (
-        "wavetank.physics.central_xsph", "wavetank.physics.dynamic_viscosity", "wavetank.physics.friction",
-        "wavetank.physics.integrate", "wavetank.physics.mixture", "wavetank.physics.population",
-        "wavetank.physics.tension", "wavetank.physics.vorticity", "wavetank.physics.xsph_viscosity",
+        "wavetank.physics.central_xsph",
+        "wavetank.physics.dynamic_viscosity",
+        "wavetank.physics.friction",
+        "wavetank.physics.integrate",
+        "wavetank.physics.mixture",
+        "wavetank.physics.population",
+        "wavetank.physics.tension",
+        "wavetank.physics.vorticity",
+        "wavetank.physics.xsph_viscosity",
     ),
     "foam": ("wavetank.physics.foam",),
     "time step": ("wavetank.physics.time_step",),
     "render": ("wavetank.view",),
     "other": ("wavetank.scene.forces", "wavetank.session.tools", "wavetank.solids", "wavetank.lab", "quadrants"),
-}  # fmt: skip
+}
 #: In the order of a frame, as tables show them.
 STAGE_NAMES = ("contact", "neighbours", "grid", "constraint", "velocities", "foam", "time step", "other", "host")
 

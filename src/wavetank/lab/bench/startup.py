@@ -55,8 +55,10 @@ def _run(arch: str, cache: str) -> dict[str, float]:
     began = time.perf_counter()
     result = subprocess.run(
         [sys.executable, "-c", _SCRIPT, SCENE, arch],
-        capture_output=True, text=True, env={**os.environ, "QD_OFFLINE_CACHE_FILE_PATH": cache},
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        env={**os.environ, "QD_OFFLINE_CACHE_FILE_PATH": cache},
+    )
     elapsed = time.perf_counter() - began
     if result.returncode:
         last = (result.stderr.strip().splitlines() or ["no message"])[-1]

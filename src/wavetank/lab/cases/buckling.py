@@ -35,9 +35,12 @@ def run(quick: bool, arch: str) -> Outcome:
             lower=(0.5 * (ROOM - WIDTH), 0), upper=(0.5 * (ROOM + WIDTH), FALL), velocity=(0.01 * SPEED, -SPEED)
         )
         scene = Scene(
-            spacing=d, tank=Tank(size=(ROOM, 1.3 * FALL)), rest_density=1400.0, dynamic_viscosity=1400.0 * nu,
+            spacing=d,
+            tank=Tank(size=(ROOM, 1.3 * FALL)),
+            rest_density=1400.0,
+            dynamic_viscosity=1400.0 * nu,
             fluids=[sheet],
-        )  # fmt: skip
+        )
         sim = Simulation(scene, arch)
         times, largest, shots = [], [], []
         for number, frame in enumerate(sim.frames(0.5, 60.0)):

@@ -117,16 +117,19 @@ def box_figures(name: str, ratio: float, track: Track, spacing: float) -> list[F
     if ratio < 1.0:
         draft = track.level - (mean - 0.5 * TALL)
         where = Figure(
-            f"{name}: draft less ratio, of the height", 100.0 * (draft / TALL - ratio), "%", -3.0, 3.0, "0",
+            f"{name}: draft less ratio, of the height",
+            100.0 * (draft / TALL - ratio),
+            "%",
+            -3.0,
+            3.0,
+            "0",
             "Archimedes",
-        )  # fmt: skip
+        )
     elif ratio == 1.0:
         way = float(np.abs(track.heights[track.times < 5.0] - track.heights[0]).max())
         where = Figure(f"{name}: farthest from its place in 5 s", way / spacing, "d", None, 1.0, "0", "Archimedes")
     else:
-        where = Figure(
-            f"{name}: above the floor", (mean - 0.5 * TALL) / spacing, "d", -0.5, 0.5, "0", "it is heavier",
-        )  # fmt: skip
+        where = Figure(f"{name}: above the floor", (mean - 0.5 * TALL) / spacing, "d", -0.5, 0.5, "0", "it is heavier")
     fastest = float(track.speeds.max())
     return [
         where,

@@ -36,10 +36,15 @@ class Figure:
     def as_dict(self) -> dict[str, Any]:
         """Return plain data for JSON; a number that is not finite becomes None."""
         return {
-            "name": self.name, "value": float(self.value) if math.isfinite(self.value) else None, "unit": self.unit,
-            "low": self.low, "high": self.high, "reference": self.reference, "source": self.source,
+            "name": self.name,
+            "value": float(self.value) if math.isfinite(self.value) else None,
+            "unit": self.unit,
+            "low": self.low,
+            "high": self.high,
+            "reference": self.reference,
+            "source": self.source,
             "pass": self.passed,
-        }  # fmt: skip
+        }
 
 
 @dataclasses.dataclass(frozen=True)

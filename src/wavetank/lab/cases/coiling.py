@@ -119,11 +119,16 @@ def pour(
     middle = np.array((0.5 * room, 0.0, 0.5 * room))
     down = np.array((0.0, -SPEED, 0.0))
     scene = Scene(
-        spacing=d, tank=Tank(size=(room, top + 4.0 * d, room)), rest_density=DENSITY, dynamic_viscosity=VISCOSITY,
-        frame_time=FRAME, substeps=2, courant=3.0,
+        spacing=d,
+        tank=Tank(size=(room, top + 4.0 * d, room)),
+        rest_density=DENSITY,
+        dynamic_viscosity=VISCOSITY,
+        frame_time=FRAME,
+        substeps=2,
+        courant=3.0,
         wave_courant=100.0,  # the jet is not a column that carries its weight by pressure
         fluids=[Points(positions=x + middle, velocities=np.tile(down, (len(x), 1)))],
-    )  # fmt: skip
+    )
     sim = Simulation(scene, arch)
     sim.forces.append(Nozzle(height=fall))
     times, path, shots = [], [], []

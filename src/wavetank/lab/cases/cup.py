@@ -94,10 +94,20 @@ def run(quick: bool, arch: str) -> Outcome:
         right.plot(x[near, 0], x[near, 1], ".", color=BLUE, ms=3)
         for foot in (SQUARE, ROUND):
             left_edge, right_edge = foot[0] + shift - 0.5 * WIDTH, foot[0] + shift + 0.5 * WIDTH
-            right.plot([left_edge, left_edge, right_edge, right_edge],
-                       [FLOOR + HEIGHT, FLOOR, FLOOR, FLOOR + HEIGHT], color=RED, lw=1)  # fmt: skip
-        right.set(title=f"slice at the end, {seconds:g} s", xlabel="x [m]", ylabel="y [m]", aspect="equal",
-                  xlim=(0, 0.9), ylim=(0, 0.3))  # fmt: skip
+            right.plot(
+                [left_edge, left_edge, right_edge, right_edge],
+                [FLOOR + HEIGHT, FLOOR, FLOOR, FLOOR + HEIGHT],
+                color=RED,
+                lw=1,
+            )
+        right.set(
+            title=f"slice at the end, {seconds:g} s",
+            xlabel="x [m]",
+            ylabel="y [m]",
+            aspect="equal",
+            xlim=(0, 0.9),
+            ylim=(0, 0.3),
+        )
         tidy(left)
 
     series: Series = {"time": times, "in_cups": in_cups, "through": through, "in_wall": in_wall}

@@ -117,14 +117,20 @@ def settled_error(dim: int, spacing: float, seconds: float, arch: str) -> list[F
         {"fluids": [Block(lower=(0.0,) * dim, upper=(*edges, 0.3)[:dim])]}
         for edges in ((0.2, 0.3), (0.12, 0.5), (0.3, 0.2))
     ]
-    poured, fallen = ([_density_error(parts, size, spacing, pouring + seconds, arch) for parts in starts]
-                      for starts in (taps, blocks))  # fmt: skip
+    poured, fallen = (
+        [_density_error(parts, size, spacing, pouring + seconds, arch) for parts in starts] for starts in (taps, blocks)
+    )
     return [
         Figure(
-            f"{dim}-D tank: density error, mean, poured less block", float(np.mean(poured) - np.mean(fallen)), "%",
-            None, 0.05, "0", "as much water that fell as a block",
-        ),
-    ]  # fmt: skip
+            f"{dim}-D tank: density error, mean, poured less block",
+            float(np.mean(poured) - np.mean(fallen)),
+            "%",
+            None,
+            0.05,
+            "0",
+            "as much water that fell as a block",
+        )
+    ]
 
 
 def _density_error(parts: dict[str, Any], size: tuple[float, ...], spacing: float, seconds: float, arch: str) -> float:
@@ -161,12 +167,24 @@ def tap_and_drain(dim: int, spacing: float, seconds: float, arch: str) -> tuple[
     source = "what comes in and goes out at equal rates"
     return [
         Figure(
-            f"{dim}-D tank: level, farthest of a second", 100.0 * float(np.abs(means / usual - 1.0).max()), "%",
-            None, 1.0, "0", source,
+            f"{dim}-D tank: level, farthest of a second",
+            100.0 * float(np.abs(means / usual - 1.0).max()),
+            "%",
+            None,
+            1.0,
+            "0",
+            source,
         ),
-        Figure(f"{dim}-D tank: water, farthest", 100.0 * float(np.abs(np.array(counts) - 1.0).max()), "%", None, 1.0,
-               "0", source),
-    ], {f"time_{dim}d": times, f"level_{dim}d": [level / usual for level in levels]}  # fmt: skip
+        Figure(
+            f"{dim}-D tank: water, farthest",
+            100.0 * float(np.abs(np.array(counts) - 1.0).max()),
+            "%",
+            None,
+            1.0,
+            "0",
+            source,
+        ),
+    ], {f"time_{dim}d": times, f"level_{dim}d": [level / usual for level in levels]}
 
 
 CASE = Case("emitter", "Jets, taps and drains", run)

@@ -23,12 +23,14 @@ def block_and_pool(dim: int) -> Scene:
     """Return a block of water beside a pool of about half its height, in a tank 1.2 m long."""
     across, spacing = ((), 0.025) if dim == 2 else ((0.4,), 0.04)
     return Scene(
-        spacing=spacing, gravity=(0.0, -9.81, 0.0)[:dim], tank=Tank(size=(1.2, 0.8, *across)),
+        spacing=spacing,
+        gravity=(0.0, -9.81, 0.0)[:dim],
+        tank=Tank(size=(1.2, 0.8, *across)),
         fluids=[
             Block(lower=(0.0,) * dim, upper=(0.4, 0.6, *across)),
             Block(lower=(0.4, 0.0, 0.0)[:dim], upper=(1.2, 0.28, *across)),
         ],
-    )  # fmt: skip
+    )
 
 
 def energies(scene: Scene, arch: str, seconds: float) -> tuple[list[float], np.ndarray, np.ndarray]:
@@ -58,10 +60,15 @@ def run(quick: bool, arch: str) -> Outcome:
         Figure("the same, of all that was lost", left_over, "%", reference="0", source="conservation of energy"),
         Figure("energy after 2 s, of the start's", 100.0 * float(total[-1] / total[0]), "%"),
         Figure(
-            "block and pool: most energy, over the start's", 100.0 * float(block.max() / block[0] - 1.0), "%",
-            None, 3.0, "0", "conservation of energy",
+            "block and pool: most energy, over the start's",
+            100.0 * float(block.max() / block[0] - 1.0),
+            "%",
+            None,
+            3.0,
+            "0",
+            "conservation of energy",
         ),
-    ]  # fmt: skip
+    ]
 
     def draw(plot: Any) -> None:
         both = (("obstacle", times, kinetic, potential), ("block and pool", block_times, moving, lifted))

@@ -24,9 +24,11 @@ def run(quick: bool, arch: str) -> Outcome:
     """Let a square of 0.2 m, nu = 0.02 m^2/s, spread for 3 s (quick: 1.5 s, coarser)."""
     d, seconds = SIDE / (16 if quick else 28), 1.5 if quick else 3.0
     scene = Scene(
-        spacing=d, tank=Tank(size=(LENGTH, 0.4)), dynamic_viscosity=VISCOSITY,
+        spacing=d,
+        tank=Tank(size=(LENGTH, 0.4)),
+        dynamic_viscosity=VISCOSITY,
         fluids=[Block(lower=(0, 0), upper=(SIDE, SIDE))],
-    )  # fmt: skip
+    )
     sim = Simulation(scene, arch)
     times, front = [], []
     for frame in sim.frames(seconds, 20.0):

@@ -82,9 +82,13 @@ def barge_decay(barge: Barge, spacing: float, arch: str, *, lift: float = 0.0, t
     middle, keel = 0.5 * barge.length, barge.depth - barge.draft
     start = (middle, keel + 0.5 * barge.height + lift)
     box = Box(
-        name="body", center=start, size=(barge.beam, barge.height), density=1000.0 * barge.ratio, held=True,
+        name="body",
+        center=start,
+        size=(barge.beam, barge.height),
+        density=1000.0 * barge.ratio,
+        held=True,
         rotation=tilt,
-    )  # fmt: skip
+    )
     block = Block(lower=(0.0, 0.0), upper=(barge.length, barge.depth))
     tank = Tank(size=(barge.length, 2.0 * BARGE.depth))
     sim = Simulation(Scene(spacing=spacing, tank=tank, fluids=[block], solids=[box], foam=0.0), arch)

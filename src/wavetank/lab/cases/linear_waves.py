@@ -109,9 +109,7 @@ def linear(barge: Barge, cell: float, *, rolls: bool) -> Linear:
     return Linear(added, push, schur, widths)
 
 
-def _sources(
-    bx: int, by: int, nx: int, ny: int, cell: float, above: float, *, rolls: bool
-) -> np.ndarray:  # fmt: skip
+def _sources(bx: int, by: int, nx: int, ny: int, cell: float, above: float, *, rolls: bool) -> np.ndarray:
     """Return the normals of the body, out of the water, times the length of boundary that each node stands for.
 
     `above` [m] is how high the body's middle is over the surface.

@@ -26,9 +26,12 @@ def settled(spacing: float, size: Sequence[float], arch: str = "cpu") -> np.ndar
     lattice = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(size))
     shaken = lattice + SHAKEN * spacing * np.random.default_rng(SEED).uniform(-1.0, 1.0, lattice.shape)
     weightless = Scene(
-        spacing=spacing, gravity=(0.0,) * len(size), tank=Tank(size=tuple(size)), viscosity=1.0,
+        spacing=spacing,
+        gravity=(0.0,) * len(size),
+        tank=Tank(size=tuple(size)),
+        viscosity=1.0,
         fluids=[Points(positions=shaken)],
-    )  # fmt: skip
+    )
     sim = Simulation(weightless, arch)
     sim.advance(SECONDS)
     return sim.positions.astype(float)

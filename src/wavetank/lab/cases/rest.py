@@ -146,7 +146,7 @@ def _figures(rest: Rest, seconds: float) -> list[Figure]:
             Figure(f"{rest.name}: roughness", float(rest.since("roughness", 3.0).max()), "d", None, ROUGH, "0", "rest"),
             Figure(f"{rest.name}: lowest level / filled", float(level.min()), "", 0.99, 1.01, "1", "hydrostatics"),
             Figure(f"{rest.name}: highest level / filled", float(level.max()), "", 0.99, 1.01, "1", "hydrostatics"),
-        ]  # fmt: skip
+        ]
     settled = SETTLED if seconds > SETTLED else seconds - 2.0
     bound = None if rest.driven or rest.name in RESTLESS or seconds < SETTLED else STILL
     source = DRIVEN if rest.driven else RESTLESS.get(rest.name, "rest")
@@ -154,11 +154,16 @@ def _figures(rest: Rest, seconds: float) -> list[Figure]:
     waves = rest.name in WAVES
     figures = [
         Figure(
-            f"{rest.name}: v_max after {settled:g} s", fastest, "m/s", None, None if waves else bound, "0",
+            f"{rest.name}: v_max after {settled:g} s",
+            fastest,
+            "m/s",
+            None,
+            None if waves else bound,
+            "0",
             WAVING if waves else source,
         ),
         Figure(f"{rest.name}: the same past those around", past, "m/s", None, bound, "0", source),
-    ]  # fmt: skip
+    ]
     if rest.driven and seconds > SETTLED:
         sooner, later = (float(np.median(half)) for half in np.array_split(rest.v_max, 2))
         growth = Figure(

@@ -59,9 +59,14 @@ def decay(viscosity: float, d: float, arch: str) -> tuple[list[float], list[floa
     shape = np.cos(K * x[:, 1])
     fluid = Points(positions=x, velocities=np.stack([start * shape, np.zeros(len(x))], axis=1))
     scene = Scene(
-        spacing=d, gravity=(0.0, 0.0), rest_density=DENSITY, dynamic_viscosity=viscosity, fluids=[fluid],
-        frame_time=min(1 / 60, 0.05 / rate), attraction=0.0,
-    )  # fmt: skip
+        spacing=d,
+        gravity=(0.0, 0.0),
+        rest_density=DENSITY,
+        dynamic_viscosity=viscosity,
+        fluids=[fluid],
+        frame_time=min(1 / 60, 0.05 / rate),
+        attraction=0.0,
+    )
     sim = Simulation(scene, arch)
     middle = np.abs(x[:, 0] - 0.5 * WIDTH) < 0.25 * WIDTH
     scaled, amplitude = [], []

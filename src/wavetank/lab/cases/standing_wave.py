@@ -79,9 +79,7 @@ def run(quick: bool, arch: str) -> Outcome:
     return Outcome(figures, {"time": t.tolist(), "amplitude": a.tolist()}, draw)
 
 
-def follow(
-    tank: Tank, start: np.ndarray, spacing: float, periods: int, arch: str
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+def follow(tank: Tank, start: np.ndarray, spacing: float, periods: int, arch: str) -> tuple[np.ndarray, np.ndarray]:
     """Return times [s] and the mode's amplitudes [m] of water that starts at these places."""
     sim = Simulation(Scene(spacing=spacing, tank=tank, fluids=[Points(positions=start)]), arch)
     times, amplitudes = [], []

@@ -67,9 +67,14 @@ def square(number: int, tension: float, arch: str) -> tuple[list[float], list[fl
     """Return times [s], spread of the radius over its mean [%], and the particles at start and end [m]."""
     block = Block(lower=(-SIDE / 2, -SIDE / 2), upper=(SIDE / 2, SIDE / 2))
     scene = Scene(
-        spacing=SIDE / number, gravity=(0.0, 0.0), surface_tension=tension, dynamic_viscosity=VISCOSITY, fluids=[block],
-        frame_time=1e-3, largest_substeps=100,
-    )  # fmt: skip
+        spacing=SIDE / number,
+        gravity=(0.0, 0.0),
+        surface_tension=tension,
+        dynamic_viscosity=VISCOSITY,
+        fluids=[block],
+        frame_time=1e-3,
+        largest_substeps=100,
+    )
     times, spread, shots = [], [], []
     sim = Simulation(scene, arch)
     for frame in sim.frames(0.2, 100.0):
@@ -93,9 +98,14 @@ def oscillation(dim: int, number: int, arch: str) -> tuple[list[float], list[flo
     x = x[np.sum((x / scale) ** 2, axis=1) < RADIUS**2]
     exact = 2.0 * math.pi / math.sqrt((6.0 if dim == 2 else 8.0) * SIGMA / (1000.0 * RADIUS**3))
     scene = Scene(
-        spacing=d, gravity=(0.0,) * dim, surface_tension=SIGMA, dynamic_viscosity=VISCOSITY,
-        fluids=[Points(positions=x)], frame_time=exact / 60, largest_substeps=100,
-    )  # fmt: skip
+        spacing=d,
+        gravity=(0.0,) * dim,
+        surface_tension=SIGMA,
+        dynamic_viscosity=VISCOSITY,
+        fluids=[Points(positions=x)],
+        frame_time=exact / 60,
+        largest_substeps=100,
+    )
     sim = Simulation(scene, arch)
     times, shape = [], []
     for frame in sim.frames(2.0 * exact, 40.0 / exact):

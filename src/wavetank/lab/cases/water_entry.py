@@ -86,7 +86,7 @@ def wedge(mass: float, spacing: float) -> Scene:
     points = [(0.0, 0.0), (HALF, rise), (HALF, rise + DECK), (-HALF, rise + DECK), (-HALF, rise)]
     solid = Polygon(
         name="body", center=(0.5, depth + spacing), points=points, density=mass / area, velocity=(0.0, -SPEED)
-    )  # fmt: skip
+    )
     return _pool(solid, spacing, (1.0, 0.7), depth, SPEED)
 
 
@@ -94,9 +94,7 @@ def sphere(ratio: float, spacing: float) -> Scene:
     """Return a sphere whose lowest point is a spacing over a pool in space."""
     width, depth = 12.0 * RADIUS, 10.0 * RADIUS
     center = (0.5 * width, depth + RADIUS + spacing, 0.5 * width)
-    solid = Sphere(
-        name="body", center=center, radius=RADIUS, density=WATER * ratio, velocity=(0.0, -IMPACT, 0.0)
-    )  # fmt: skip
+    solid = Sphere(name="body", center=center, radius=RADIUS, density=WATER * ratio, velocity=(0.0, -IMPACT, 0.0))
     return _pool(solid, spacing, (width, 14.0 * RADIUS, width), depth, IMPACT)
 
 
@@ -106,7 +104,7 @@ def _pool(solid: Solid, spacing: float, size: tuple[float, ...], depth: float, s
     block = Block(lower=(0.0,) * len(size), upper=upper)
     return Scene(
         spacing=spacing, tank=Tank(size=size), fluids=[block], solids=[solid], foam=0.0, frame_time=spacing / speed
-    )  # fmt: skip
+    )
 
 
 def fall(scene: Scene, arch: str, far: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
@@ -170,7 +168,7 @@ def course(motion: Motion, times: np.ndarray, speed: float) -> np.ndarray:
 
 def compare(
     name: str, times: np.ndarray, depths: np.ndarray, theory: np.ndarray, far: float, within: float
-) -> list[Figure]:  # fmt: skip
+) -> list[Figure]:
     """Compare depths when the body should have come as far as `far` [m], or at the end."""
     at = float(np.interp(far, theory, times))
     ratio = float(np.interp(at, times, depths) / np.interp(at, times, theory))

@@ -86,9 +86,15 @@ def along_walls(pull, normal):
 
 @qd.kernel(fastcache=True)
 def start_residual(
-    state: Iterates, particles: Particles, scratch: Scratch, damping: Damping, grid: Grid, c: Coefficients,
-    rate: qd.f32, count: qd.i32,
-):  # fmt: skip
+    state: Iterates,
+    particles: Particles,
+    scratch: Scratch,
+    damping: Damping,
+    grid: Grid,
+    c: Coefficients,
+    rate: qd.f32,
+    count: qd.i32,
+):
     """Set r = b - A x, where b are the velocities as they are and what moving walls add."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
@@ -112,9 +118,15 @@ def start_residual(
 
 @qd.kernel(fastcache=True)
 def multiply(
-    state: Iterates, particles: Particles, scratch: Scratch, damping: Damping, grid: Grid, c: Coefficients,
-    rate: qd.f32, count: qd.i32,
-):  # fmt: skip
+    state: Iterates,
+    particles: Particles,
+    scratch: Scratch,
+    damping: Damping,
+    grid: Grid,
+    c: Coefficients,
+    rate: qd.f32,
+    count: qd.i32,
+):
     """Set A r, and each team's share of (r, r), (r, A r) and (x - b, x - b)."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):

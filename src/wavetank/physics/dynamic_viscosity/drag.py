@@ -60,10 +60,17 @@ def wall_velocity(solids: SolidSet, k, i, p, particles: Particles, holding: Hold
 
 @qd.kernel(fastcache=True)
 def find_drag(
-    packed: qd.types.ndarray(), drag: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles,
-    rows: qd.types.ndarray(), solids: SolidSet, table: qd.types.ndarray(), c: Coefficients, holding: Holding,
+    packed: qd.types.ndarray(),
+    drag: qd.types.ndarray(),
+    normal: qd.types.ndarray(),
+    particles: Particles,
+    rows: qd.types.ndarray(),
+    solids: SolidSet,
+    table: qd.types.ndarray(),
+    c: Coefficients,
+    holding: Holding,
     count: qd.i32,
-):  # fmt: skip
+):
     """Pack velocities and viscosities [Pa s], and find how fast the walls hold every particle back.
 
     That is over B dt / rho, with the normal along which they do not, unless it strikes: what stands behind the normal
@@ -101,9 +108,18 @@ def find_drag(
 
 @qd.kernel(fastcache=True)
 def drag_bodies(
-    packed: qd.types.ndarray(), normal: qd.types.ndarray(), particles: Particles, scratch: Scratch, solids: SolidSet,
-    table: qd.types.ndarray(), c: Coefficients, holding: Holding, rate: qd.f32, per_damper: qd.f32, count: qd.i32,
-):  # fmt: skip
+    packed: qd.types.ndarray(),
+    normal: qd.types.ndarray(),
+    particles: Particles,
+    scratch: Scratch,
+    solids: SolidSet,
+    table: qd.types.ndarray(),
+    c: Coefficients,
+    holding: Holding,
+    rate: qd.f32,
+    per_damper: qd.f32,
+    count: qd.i32,
+):
     """Let bodies feel the opposite of their part of the drag, with the velocities that were found for the fluid.
 
     What strikes one was stopped there when it was predicted, which they felt: that is taken back, as the stop is.

@@ -112,9 +112,13 @@ def damper(square, a, b, c: Coefficients):
 
 @qd.kernel(fastcache=True)
 def find_dampers(
-    dampers: qd.types.ndarray(), packed: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients,
+    dampers: qd.types.ndarray(),
+    packed: qd.types.ndarray(),
+    particles: Particles,
+    grid: Grid,
+    c: Coefficients,
     count: qd.i32,
-):  # fmt: skip
+):
     """Keep the dampers of all pairs."""
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
@@ -132,8 +136,8 @@ def guess_velocities(velocities: qd.types.ndarray(), particles: Particles, c: Co
 
 @qd.kernel(fastcache=True)
 def take_velocities(
-    particles: Particles, packed: qd.types.ndarray(), normal: qd.types.ndarray(), c: Coefficients, count: qd.i32,
-):  # fmt: skip
+    particles: Particles, packed: qd.types.ndarray(), normal: qd.types.ndarray(), c: Coefficients, count: qd.i32
+):
     """Adopt the velocities that were found, and move the predicted positions with them.
 
     What strikes a wall was predicted to stop there already: its prediction begins anew, or it would be stopped twice.
@@ -231,10 +235,14 @@ def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficie
     packed, drag, normal = (fluids.array(name) for name in ("packed", "drag", "normal"))
     dampers = fluids.pairs(grid)
     table = fluids.arrays["drag table"]
-    holding = remembered(Holding(
-        no_slip=max(params.no_slip, SLIPS), most=largest, touching=TOUCHING * params.spacing,
-        to_come=(1.0 - c.carried) * c.dt if world.pieces else 0.0,
-    ))  # fmt: skip
+    holding = remembered(
+        Holding(
+            no_slip=max(params.no_slip, SLIPS),
+            most=largest,
+            touching=TOUCHING * params.spacing,
+            to_come=(1.0 - c.carried) * c.dt if world.pieces else 0.0,
+        )
+    )
     find_drag(packed, drag, normal, particles, fluids.rows, world.solids, table, c, holding, count)
     find_dampers(dampers, packed, particles, grid, c, count)
     guess_velocities(packed, particles, c, count)
@@ -272,10 +280,19 @@ def carry_on(world: World, kinds: Blend, params: Parameters, c: Coefficients, *,
     """Let thick fluids carry on a share of what pressed them in this step; where `stirred`, that gives little speed."""
     rate, gravity = thickness(1.0 / kinds.largest_density, params, c.dt), math.hypot(*params.gravity)
     own, falling = (PUSHED, PUSHED * math.sqrt(2.0 * gravity * c.h)) if stirred else (0.0, ANY)
-    carrying = remembered(Carrying(
-        rate=rate, most=CARRIED, half=HALF, largest=LARGEST * gravity, again=AGAIN, calm=CALM, lasts=LASTS, own=own,
-        falling=falling,
-    ))  # fmt: skip
+    carrying = remembered(
+        Carrying(
+            rate=rate,
+            most=CARRIED,
+            half=HALF,
+            largest=LARGEST * gravity,
+            again=AGAIN,
+            calm=CALM,
+            lasts=LASTS,
+            own=own,
+            falling=falling,
+        )
+    )
     carry_pressure(world.particles, world.fluids.rows, c, carrying, world.count)
 
 

@@ -98,9 +98,16 @@ def angular_velocity(sums, gate):
 
 @qd.kernel(fastcache=True)
 def rotate_guess(
-    particles: Particles, velocities: qd.types.ndarray(), dampers: qd.types.ndarray(), grid: Grid, c: Coefficients,
-    gate: qd.f32, forget: qd.f32, full: qd.f32, count: qd.i32,
-):  # fmt: skip
+    particles: Particles,
+    velocities: qd.types.ndarray(),
+    dampers: qd.types.ndarray(),
+    grid: Grid,
+    c: Coefficients,
+    gate: qd.f32,
+    forget: qd.f32,
+    full: qd.f32,
+    count: qd.i32,
+):
     """Turn what viscosity did in the last step with the `velocities` that particles have moved with since.
 
     Behind those stand the viscosities. Whoever has less than half of the `full` sum of weights of neighbours forgets.

@@ -98,9 +98,18 @@ def kind_in(share):
 
 @qd.kernel(fastcache=True)
 def move(
-    packed: Diffuse, diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients,
-    a: Air, frame: qd.i32, count: qd.i32, shared: qd.template(),
-) -> qd.i32:  # fmt: skip
+    packed: Diffuse,
+    diffuse: Diffuse,
+    births: Births,
+    water: Particles,
+    grid: Grid,
+    solids: SolidSet,
+    c: Coefficients,
+    a: Air,
+    frame: qd.i32,
+    count: qd.i32,
+    shared: qd.template(),
+) -> qd.i32:
     """Move everything by one frame, and copy those who live on to the front, in their order.
 
     Return the number of those. Each looks around every so many frames, tells anew what it is and takes the velocity

@@ -22,7 +22,7 @@ from wavetank.device.state import (
     new_diffuse,
     scalars,
     vectors,
-)  # fmt: skip
+)
 from wavetank.device.sums import blocks_of
 from wavetank.physics.foam.motion import kind_in, surroundings, water_at
 from wavetank.physics.foam.noise import stream, uniform
@@ -30,9 +30,13 @@ from wavetank.solids.distance import SolidSet, lift
 
 #: What a saved state holds of spray, foam and bubbles, and the array of it.
 ROWS = {
-    "foam_positions": "x", "foam_velocities": "v", "foam_kinds": "kind", "foam_ages": "age", "foam_lives": "life",
+    "foam_positions": "x",
+    "foam_velocities": "v",
+    "foam_kinds": "kind",
+    "foam_ages": "age",
+    "foam_lives": "life",
     "foam_ids": "id",
-}  # fmt: skip
+}
 
 
 @dataclasses.dataclass
@@ -60,9 +64,12 @@ class Pool:
 def new_pool(dim: int, capacity: int, water: int) -> Pool:
     """Allocate an empty pool beside room for `water` particles."""
     births = Births(
-        normal=vectors(dim, water + MARGIN), first=integers(water + 1), kept=integers(capacity + 1),
-        blocks=integers(blocks_of(max(capacity, water))), reluctance=scalars(1),
-    )  # fmt: skip
+        normal=vectors(dim, water + MARGIN),
+        first=integers(water + 1),
+        kept=integers(capacity + 1),
+        blocks=integers(blocks_of(max(capacity, water))),
+        reluctance=scalars(1),
+    )
     births.reluctance.fill(1.0)
     return Pool(new_diffuse(dim, capacity), new_diffuse(dim, capacity), births, capacity)
 
@@ -86,9 +93,18 @@ def pool_from(rows: dict[str, np.ndarray], born: int, capacity: int, dim: int, w
 
 @qd.kernel(fastcache=True)
 def append_births(
-    diffuse: Diffuse, births: Births, water: Particles, grid: Grid, solids: SolidSet, c: Coefficients, a: Air,
-    frame: qd.i32, old: qd.i32, born: qd.i32, count: qd.i32,
-):  # fmt: skip
+    diffuse: Diffuse,
+    births: Births,
+    water: Particles,
+    grid: Grid,
+    solids: SolidSet,
+    c: Coefficients,
+    a: Air,
+    frame: qd.i32,
+    old: qd.i32,
+    born: qd.i32,
+    count: qd.i32,
+):
     """Append the newborn behind the `old` ones, each around the way that its water particle came.
 
     Ihmsen et al. 2012, Sec. 3.2: a cylinder along the velocity. Here it lies behind the water particle rather than

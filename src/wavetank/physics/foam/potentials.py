@@ -79,9 +79,17 @@ def outward_normal(i, sum, particles: Particles, solids: SolidSet, walls: Walls,
 
 @qd.func
 def find_normals(
-    births: Births, team, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
-    count, method: qd.template(),
-):  # fmt: skip
+    births: Births,
+    team,
+    particles: Particles,
+    grid: Grid,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    a: Air,
+    count,
+    method: qd.template(),
+):
     """Set the normals of the surface at a team, except where the water is too slow to matter for a crest."""
     first = team * grid.lanes
     last = qd.min(first + grid.lanes, count)
@@ -116,9 +124,16 @@ def is_crest(i, births: Births, particles: Particles):
 
 @qd.func
 def add_potentials(
-    sums: qd.template(), team, births: Births, particles: Particles, grid: Grid, c: Coefficients, a: Air, count,
+    sums: qd.template(),
+    team,
+    births: Births,
+    particles: Particles,
+    grid: Grid,
+    c: Coefficients,
+    a: Air,
+    count,
     method: qd.template(),
-):  # fmt: skip
+):
     """Births of a team's particles where one of the most agitated makes one: Phi_k (Phi_ta + 2 Phi_wc), Eq. 8."""
     first = team * grid.lanes
     last = qd.min(first + grid.lanes, count)
@@ -145,9 +160,19 @@ def add_potentials(
 
 @qd.kernel(fastcache=True)
 def count_births(
-    births: Births, particles: Particles, grid: Grid, solids: SolidSet, walls: Walls, c: Coefficients, a: Air,
-    room: qd.f32, frame: qd.i32, count: qd.i32, method: qd.template(), shared: qd.template(),
-) -> qd.i32:  # fmt: skip
+    births: Births,
+    particles: Particles,
+    grid: Grid,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    a: Air,
+    room: qd.f32,
+    frame: qd.i32,
+    count: qd.i32,
+    method: qd.template(),
+    shared: qd.template(),
+) -> qd.i32:
     """Draw how many each water particle bears in an interval, of which the share `room` is wanted; return their sum.
 
     Threads share the sums where `shared`.

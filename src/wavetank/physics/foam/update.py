@@ -89,19 +89,27 @@ def air(params: Parameters, water: int, dt: float) -> Air:
     drag = _decay(SPRAY_DRAG * rate, dt)
     pull = BUBBLE_PULL * gravity / (BUBBLE_RISE * speed) if speed > 0.0 else math.inf
     follow, gained = _decay(pull, dt), _decay(pull, interval)
-    return remembered(Air(
-        dt=dt,
-        interval=interval,
-        speed=speed,
-        made=params.foam * RATE * rate * interval,
-        lifetime=params.foam_lifetime,
-        spread=SPREAD * params.spacing,
-        share=sigma("poly6", dim) / ratio**dim,
-        mean=1.0 / (math.pi / 3.0 * ratio**dim),
-        spray_keep=drag[0], spray_path=drag[1], spray_bend=drag[2],
-        bubble_path=follow[1], bubble_bend=follow[2], bubble_keep=gained[0], bubble_gain=gained[1],
-        every=every, seed=params.foam_seed,
-    ))  # fmt: skip
+    return remembered(
+        Air(
+            dt=dt,
+            interval=interval,
+            speed=speed,
+            made=params.foam * RATE * rate * interval,
+            lifetime=params.foam_lifetime,
+            spread=SPREAD * params.spacing,
+            share=sigma("poly6", dim) / ratio**dim,
+            mean=1.0 / (math.pi / 3.0 * ratio**dim),
+            spray_keep=drag[0],
+            spray_path=drag[1],
+            spray_bend=drag[2],
+            bubble_path=follow[1],
+            bubble_bend=follow[2],
+            bubble_keep=gained[0],
+            bubble_gain=gained[1],
+            every=every,
+            seed=params.foam_seed,
+        )
+    )
 
 
 def reluctance(materials: dict[int, Material], params: Parameters) -> np.ndarray:

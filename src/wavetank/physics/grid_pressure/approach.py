@@ -20,9 +20,19 @@ from wavetank.solids.distance import SolidSet, image_near, plane_distance, rotat
 
 @qd.func
 def approached(
-    i, x, p, driven, near, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
-    missing, spacing, searched: qd.template(),
-):  # fmt: skip
+    i,
+    x,
+    p,
+    driven,
+    near,
+    scratch: Scratch,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    missing,
+    spacing,
+    searched: qd.template(),
+):
     """Relative density that the solids near particle `i` have added on its way from `x` to `p`, in their motion."""
     added, free = 0.0, 1.0
     k = next_near(near, -1, solids)

@@ -36,7 +36,7 @@ def mark_known(grid: CoarseGrid):
 @qd.kernel(fastcache=True)
 def continue_pressure(
     grid: CoarseGrid, c: Coefficients, stiffness: qd.f32, turn: qd.i32, air: qd.f32, mixed: qd.template()
-):  # fmt: skip
+):
     """Continue multipliers by one node, from those that are known since an earlier `turn`; the `air` counts so much.
 
     Where fluids are `mixed`, so are their densities. At first they go on straight, farther on as at rest: where a body
@@ -122,9 +122,15 @@ def multiplier_at(grid: CoarseGrid, at, x: qd.template()):
 
 @qd.kernel(fastcache=True)
 def push_bodies(
-    grid: CoarseGrid, pieces: Pieces, solids: SolidSet, particles: Particles, stiffness: qd.f32,
-    per_lambda: qd.f32, c: Coefficients, mixed: qd.template(),
-):  # fmt: skip
+    grid: CoarseGrid,
+    pieces: Pieces,
+    solids: SolidSet,
+    particles: Particles,
+    stiffness: qd.f32,
+    per_lambda: qd.f32,
+    c: Coefficients,
+    mixed: qd.template(),
+):
     """Push each piece of each body as the water that it took the place of, by the difference between its faces.
 
     From piece to piece these differences add up to what is at the surface, whatever the field between is. `per_lambda`

@@ -217,7 +217,20 @@ def _new_level(shape: list[int], box: tuple[np.ndarray, np.ndarray], repeats: in
     numbers = (qd.i32, qd.f32, Final[int])
     fields = {name: scalars(rim) for name, kind in kinds.items() if kind not in numbers and name not in sums}
     return CoarseGrid(
-        **sums, **fields, nx=nx, ny=ny, nz=nz, pieces=-(-nx // piece_width()), dx=dx, dy=dy, dz=dz,
-        x0=x0, y0=y0, z0=z0, parts=parts, alone=int(parts > 1), width=piece_width(),
+        **sums,
+        **fields,
+        nx=nx,
+        ny=ny,
+        nz=nz,
+        pieces=-(-nx // piece_width()),
+        dx=dx,
+        dy=dy,
+        dz=dz,
+        x0=x0,
+        y0=y0,
+        z0=z0,
+        parts=parts,
+        alone=int(parts > 1),
+        width=piece_width(),
         repeats=repeats,
-    )  # fmt: skip
+    )

@@ -53,7 +53,7 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     ramp,
     taken,
     tents,
-)  # fmt: skip
+)
 from wavetank.physics.grid_pressure.couplings import LEAST_THETA, couple_nodes, has_lid, part_nodes
 from wavetank.physics.grid_pressure.films import left_to_grid
 from wavetank.physics.grid_pressure.gaps import across, gaps_at
@@ -69,13 +69,7 @@ from wavetank.physics.grid_pressure.weight import BORNE, flow_out
 from wavetank.physics.mixture import Blend
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.smoothing import rest_lattice
-from wavetank.physics.teams import (
-    end_of_part,
-    first_of_part,
-    part_of,
-    teams,
-    turns_over,
-)  # fmt: skip
+from wavetank.physics.teams import end_of_part, first_of_part, part_of, teams, turns_over
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, vec3
 
@@ -149,9 +143,18 @@ def inside_at(grid: CoarseGrid, n, e: Errors):
 
 @qd.func
 def find_errors(
-    at: qd.template(), amounts: qd.template(), added: qd.template(), grid: CoarseGrid, particles: Particles,
-    scratch: Scratch, e: Errors, first, part, lanes: qd.template(), searched: qd.template(),
-):  # fmt: skip
+    at: qd.template(),
+    amounts: qd.template(),
+    added: qd.template(),
+    grid: CoarseGrid,
+    particles: Particles,
+    scratch: Scratch,
+    e: Errors,
+    first,
+    part,
+    lanes: qd.template(),
+    searched: qd.template(),
+):
     """Find what a team's particles from number `first` on add to a `part`'s sums, and where."""
     dim = qd.static(particles.x[first].n)
     for lane in range(lanes):
@@ -171,9 +174,19 @@ def find_errors(
 
 @qd.func
 def add_errors(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, solids: SolidSet, walls: Walls, c: Coefficients,
-    e: Errors, cells: Grid, team, part, count, searched: qd.template(),
-):  # fmt: skip
+    grid: CoarseGrid,
+    particles: Particles,
+    scratch: Scratch,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    e: Errors,
+    cells: Grid,
+    team,
+    part,
+    count,
+    searched: qd.template(),
+):
     """Add the tents of a team's particles, if inside of the water, times their errors (Eq. 2) to a `part`'s sums."""
     lanes = qd.static(cells.lanes)
     first = team * lanes
@@ -205,9 +218,19 @@ def add_errors(
 
 @qd.kernel(fastcache=True)
 def gather(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, solids: SolidSet, walls: Walls,
-    c: Coefficients, e: Errors, count: qd.i32, searched: qd.template(), mixed: qd.template(), few: qd.template(),
-):  # fmt: skip
+    grid: CoarseGrid,
+    particles: Particles,
+    scratch: Scratch,
+    cells: Grid,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    e: Errors,
+    count: qd.i32,
+    searched: qd.template(),
+    mixed: qd.template(),
+    few: qd.template(),
+):
     """Sum what nodes have of all particles, find gaps, sum density errors (Eq. 2), and set up the equation.
 
     The sums are 0 before. There are only the walls of the tank unless solids are `searched`. Where fluids are `mixed`,
@@ -220,9 +243,18 @@ def gather(
         begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
         for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
             add_parcels(
-                grid, particles, scratch, e.spacing, e.unit, team, grid.alone * part_of(turn), count,
-                qd.static(cells.lanes), searched, mixed,
-            )  # fmt: skip
+                grid,
+                particles,
+                scratch,
+                e.spacing,
+                e.unit,
+                team,
+                grid.alone * part_of(turn),
+                count,
+                qd.static(cells.lanes),
+                searched,
+                mixed,
+            )
     qd.loop_config(serialize=bool(few))
     for n in range(grid.nx * grid.ny * grid.nz):
         total = taken(grid.sums, n, grid.nx * grid.ny * grid.nz, grid.parts)
@@ -306,9 +338,8 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     if world.room_version != world.solids_version or (world.pieces and world.room_gravity != gravity):
         world.room_found.fill(0)
         find_room(
-            finest, world.room_found, world.solids, c, LEAST_OPEN, UNIT, params.spacing, world.searched, params.dim,
-            few,
-        )  # fmt: skip
+            finest, world.room_found, world.solids, c, LEAST_OPEN, UNIT, params.spacing, world.searched, params.dim, few
+        )
         find_basins(finest, world.room_found)
         restrict_rooms(world.levels)
         world.room_version, world.room_gravity = world.solids_version, gravity
@@ -317,9 +348,19 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     numbers = errors(finest, params, stiffness, bodies=world.pieces is not None)
     gather(
-        finest, world.particles, world.scratch, cells, world.solids, world.walls, c,
-        numbers, count, searched * (1 + world.has_thin_walls), kinds.mixed, few,
-    )  # fmt: skip
+        finest,
+        world.particles,
+        world.scratch,
+        cells,
+        world.solids,
+        world.walls,
+        c,
+        numbers,
+        count,
+        searched * (1 + world.has_thin_walls),
+        kinds.mixed,
+        few,
+    )
     lid = int(-gravity[1] > 0.7 * math.hypot(*gravity))
     water = count * params.spacing**params.dim
     may_be_sealed = world.basins > 1 or water > MOSTLY_FULL * world.open_nodes * finest.dx * finest.dy * finest.dz
@@ -330,9 +371,18 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     if may_be_sealed:
         anchor(finest)
     move_particles(
-        finest, world.particles, world.scratch, cells, world.solids, c, push_of(params, stiffness, c.h), count, few,
-        searched * (1 + world.has_thin_walls), kinds.mixed,
-    )  # fmt: skip
+        finest,
+        world.particles,
+        world.scratch,
+        cells,
+        world.solids,
+        c,
+        push_of(params, stiffness, c.h),
+        count,
+        few,
+        searched * (1 + world.has_thin_walls),
+        kinds.mixed,
+    )
     if world.pieces:
         acting = (1.0 - carried(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2
         per_lambda = stiffness / acting if acting else 0.0  # nothing is deep without gravity
@@ -343,11 +393,29 @@ def errors(grid: CoarseGrid, params: Parameters, stiffness: float, *, bodies: bo
     """Return the numbers of `gather`, in a world with `bodies` or without."""
     h = params.support * params.spacing
     volume = params.spacing**params.dim / (grid.dx * grid.dy * grid.dz) / UNIT
-    return remembered(Errors(
-        unit=UNIT, volume=volume, scale=params.grid_pressure * volume / stiffness,
-        per_way=params.grid_pressure / stiffness, borne_from=BORNE[0], borne_to=BORNE[1], inner_from=INNER[0],
-        inner_to=INNER[1], below_from=BELOW[0] * h, below_to=BELOW[1] * h, missing=MISSING, full=FULL,
-        gap_share=GAP_SHARE, drawn_from=DRAWN[bodies][0], drawn_to=DRAWN[bodies][1], least_open=LEAST_OPEN,
-        slit=SLIT, closing=CLOSING * params.grid_pressure / stiffness, least_theta=LEAST_THETA, thin=FILM[0],
-        thick=FILM[1], spacing=params.spacing,
-    ))  # fmt: skip
+    return remembered(
+        Errors(
+            unit=UNIT,
+            volume=volume,
+            scale=params.grid_pressure * volume / stiffness,
+            per_way=params.grid_pressure / stiffness,
+            borne_from=BORNE[0],
+            borne_to=BORNE[1],
+            inner_from=INNER[0],
+            inner_to=INNER[1],
+            below_from=BELOW[0] * h,
+            below_to=BELOW[1] * h,
+            missing=MISSING,
+            full=FULL,
+            gap_share=GAP_SHARE,
+            drawn_from=DRAWN[bodies][0],
+            drawn_to=DRAWN[bodies][1],
+            least_open=LEAST_OPEN,
+            slit=SLIT,
+            closing=CLOSING * params.grid_pressure / stiffness,
+            least_theta=LEAST_THETA,
+            thin=FILM[0],
+            thick=FILM[1],
+            spacing=params.spacing,
+        )
+    )

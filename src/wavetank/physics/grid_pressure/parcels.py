@@ -25,9 +25,7 @@ from wavetank.solids.distance import vec3
 
 
 @qd.func
-def find_shares(
-    shares: qd.template(), nodes: qd.template(), lane, grid: CoarseGrid, s, spacing, dim: qd.template()
-):  # fmt: skip
+def find_shares(shares: qd.template(), nodes: qd.template(), lane, grid: CoarseGrid, s, spacing, dim: qd.template()):
     """Find for a `lane` what the nodes before, nearest to and behind the place `s` [cells] have, axis by axis.
 
     `nodes` are by how much these add to the number of a node, beyond the tank as the nearest one there. Along x they
@@ -89,7 +87,7 @@ def aside_of(grid: CoarseGrid, nodes: qd.template(), lane, k: qd.template()):
 @qd.func
 def add_to_open(
     grid: CoarseGrid, s, spacing, unit, density, begin, dim: qd.template(), thin: qd.template(), mixed: qd.template()
-):  # fmt: skip
+):
     """Add the shares of the particle at the place `s` [cells], where nodes closed to it leave theirs to the others."""
     shares, nodes = qd.Matrix.zero(qd.f32, 9, 1), qd.Matrix.zero(qd.i32, 10, 1)
     find_shares(shares, nodes, 0, grid, s, spacing, dim)
@@ -120,9 +118,18 @@ def add_to_open(
 
 @qd.func
 def add_parcels(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, spacing, unit, team, part, count, lanes: qd.template(),
-    searched: qd.template(), mixed: qd.template(),
-):  # fmt: skip
+    grid: CoarseGrid,
+    particles: Particles,
+    scratch: Scratch,
+    spacing,
+    unit,
+    team,
+    part,
+    count,
+    lanes: qd.template(),
+    searched: qd.template(),
+    mixed: qd.template(),
+):
     """Add to the sums of a `part` what nodes have of a team of `lanes` particles; where `mixed`, times their densities.
 
     Where solids are `searched`, nodes without room leave theirs to others; with 2, so do those behind a thin wall.

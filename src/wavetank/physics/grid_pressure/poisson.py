@@ -20,7 +20,7 @@ from wavetank.physics.grid_pressure.couplings import (
     restrict,
     restrict_in_block,
     restrict_room,
-)  # fmt: skip
+)
 
 SWEEPS, MOST_SWEEPS = 8, 200  # at once, and of the coarsest level
 ON_EACH = (2 * SWEEPS, 1.7)  # sweeps of a level and their relaxation: eight leave what drives calm water round
@@ -159,9 +159,8 @@ def relax_piece(grid: CoarseGrid, piece, colour, over_relaxation):
 
 @qd.kernel(fastcache=True)
 def solve(
-    grid: CoarseGrid, coarser: CoarseGrid, start: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32,
-    shared: qd.template(),
-):  # fmt: skip
+    grid: CoarseGrid, coarser: CoarseGrid, start: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32, shared: qd.template()
+):
     """Relax the equation of a level, whose couplings are set, in sweeps of two colours, starting as `start` says.
 
     One thread does the `sweeps`, or all threads share as many as `shared` says, `width` nodes of a row at once.
@@ -188,9 +187,8 @@ def solve(
 
 @qd.kernel(fastcache=True)
 def solve_in_block(
-    grid: CoarseGrid, coarser: CoarseGrid, start: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32,
-    fenced: qd.template(),
-):  # fmt: skip
+    grid: CoarseGrid, coarser: CoarseGrid, start: qd.i32, sweeps: qd.i32, over_relaxation: qd.f32, fenced: qd.template()
+):
     """Do what `solve` does, in one launch on a graphics processor: its threads wait for each other after each colour.
 
     Only those of a block can, so that this is for levels of some thousand nodes.

@@ -54,9 +54,15 @@ def slope_across(grid: CoarseGrid, coupled, edge, n, m):
 
 @qd.func
 def slope_along(
-    grid: CoarseGrid, slope: qd.template(), s, axis: qd.template(), at_rest, push: Push, dim: qd.template(),
+    grid: CoarseGrid,
+    slope: qd.template(),
+    s,
+    axis: qd.template(),
+    at_rest,
+    push: Push,
+    dim: qd.template(),
     searched: qd.template(),
-):  # fmt: skip
+):
     """Derivative of lambda [m] along `axis` at the place `s` [cells], from the faces around that lead into water.
 
     The `slope` of the others is 0. In a gap so narrow that there is none it is what holds water `at_rest`.
@@ -79,9 +85,15 @@ def slope_along(
 
 @qd.func
 def shares_by(
-    grid: CoarseGrid, scratch: Scratch, i, s, at: qd.template(), weights: qd.template(), push: Push,
+    grid: CoarseGrid,
+    scratch: Scratch,
+    i,
+    s,
+    at: qd.template(),
+    weights: qd.template(),
+    push: Push,
     mixed: qd.template(),
-):  # fmt: skip
+):
     """(share of the grid's push, how surely in a puddle) of particle `i` at `s` [cells], by its nodes `at`."""
     carried_at = carried_share(grid, at, weights, push.supported, push.fade)
     share = carried_at[0]
@@ -93,9 +105,18 @@ def shares_by(
 
 @qd.kernel(fastcache=True)
 def move_particles(
-    grid: CoarseGrid, particles: Particles, scratch: Scratch, cells: Grid, solids: SolidSet, c: Coefficients,
-    push: Push, count: qd.i32, few: qd.template(), searched: qd.template(), mixed: qd.template(),
-):  # fmt: skip
+    grid: CoarseGrid,
+    particles: Particles,
+    scratch: Scratch,
+    cells: Grid,
+    solids: SolidSet,
+    c: Coefficients,
+    push: Push,
+    count: qd.i32,
+    few: qd.template(),
+    searched: qd.template(),
+    mixed: qd.template(),
+):
     """Move the predicted positions by M grad lambda, inside the tank, and carry it on; what sticks out has less.
 
     Where solids are `searched`, 2 if some are thin walls: how deep water is on their other side is not asked. One

@@ -18,7 +18,7 @@ from wavetank.physics.grid_pressure.coarse_grid import (
     on_axis,
     taken,
     tents,
-)  # fmt: skip
+)
 from wavetank.physics.grid_pressure.couplings import open_faces
 from wavetank.physics.grid_pressure.listed_solids import listed, solids_near
 from wavetank.physics.grid_pressure.slits import mostly
@@ -285,9 +285,17 @@ def is_slit(grid: CoarseGrid, n, gravity):
 
 @qd.kernel(fastcache=True)
 def find_room(
-    grid: CoarseGrid, thin: qd.types.ndarray(), solids: SolidSet, c: Coefficients, least_open: qd.f32, unit: qd.f32,
-    spacing: qd.f32, searched: qd.template(), dim: qd.template(), few: qd.template(),
-):  # fmt: skip
+    grid: CoarseGrid,
+    thin: qd.types.ndarray(),
+    solids: SolidSet,
+    c: Coefficients,
+    least_open: qd.f32,
+    unit: qd.f32,
+    spacing: qd.f32,
+    searched: qd.template(),
+    dim: qd.template(),
+    few: qd.template(),
+):
     """Find which room each node has for water where solids are `searched`; else the tank ends where the cells do.
 
     Sums are of whole multiples of the inverse of `unit`, so that the order of threads does not matter; 0 before. Cells

@@ -76,6 +76,11 @@ def opening_of(middle: np.ndarray, axes: np.ndarray, half: tuple[float, float], 
     """Return a mouth at `middle` [m] with the rows of `axes` across, up and ahead and `half` its edges [m]."""
     across, up, ahead = (np.asarray(row, np.float32) for row in axes)
     return Opening(
-        middle=np.asarray(middle, np.float32), across=across, up=up, ahead=ahead, half_across=half[0], half_up=half[1],
+        middle=np.asarray(middle, np.float32),
+        across=across,
+        up=up,
+        ahead=ahead,
+        half_across=half[0],
+        half_up=half[1],
         **numbers,
-    )  # fmt: skip
+    )

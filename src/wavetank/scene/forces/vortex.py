@@ -22,9 +22,15 @@ from wavetank.solids.distance import lift, vec3
 
 @qd.kernel(fastcache=True)
 def stir(
-    particles: Particles, center: vec3, axis: vec3, radius: qd.f32, speed: qd.f32, drag: qd.f32, dt: qd.f32,
+    particles: Particles,
+    center: vec3,
+    axis: vec3,
+    radius: qd.f32,
+    speed: qd.f32,
+    drag: qd.f32,
+    dt: qd.f32,
     count: qd.i32,
-):  # fmt: skip
+):
     """Pull the velocities towards those of a body that turns; what flows along the axis is left alone."""
     for i in range(count):
         arm = away_from_line(lift(particles.x[i]), center, axis)

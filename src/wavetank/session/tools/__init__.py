@@ -23,9 +23,26 @@ from wavetank.session.tools.tool import Tool, describe
 from wavetank.session.tools.waves import Waves
 
 TOOLS: tuple[type[Tool], ...] = (
-    Push, Stir, Magnet, Pour, Drain, Blow, Explode, Freeze, Dye, Cut, Grab, Shove, Drop, Place, Remove, Paddle, Waves,
-    Tilt, Shake,
-)  # fmt: skip
+    Push,
+    Stir,
+    Magnet,
+    Pour,
+    Drain,
+    Blow,
+    Explode,
+    Freeze,
+    Dye,
+    Cut,
+    Grab,
+    Shove,
+    Drop,
+    Place,
+    Remove,
+    Paddle,
+    Waves,
+    Tilt,
+    Shake,
+)
 TOOL_NAMES: dict[str, type[Tool]] = {tool.name: tool for tool in TOOLS}
 
 __all__ = ["TOOLS", "TOOL_NAMES", "Hand", "Tool", "describe"]

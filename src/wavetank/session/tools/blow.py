@@ -30,7 +30,11 @@ class Blow(Tool):
         if np.linalg.norm(way) < 0.03 * hand.size:
             way = np.array([1.0, 0.0, 0.0]) if hand.sim.scene.dim == 2 else hand.normal * [1.0, 0.0, 1.0]
         way = way / max(float(np.linalg.norm(way)), 1e-9)
-        hand.sim.push(Wind(
-            velocity=hand.flat(self.speed * hand.speed * way), drag=self.drag, center=hand.flat(hand.anchor),
-            radius=hand.radius(self.radius),
-        ))  # fmt: skip
+        hand.sim.push(
+            Wind(
+                velocity=hand.flat(self.speed * hand.speed * way),
+                drag=self.drag,
+                center=hand.flat(hand.anchor),
+                radius=hand.radius(self.radius),
+            )
+        )

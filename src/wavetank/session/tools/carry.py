@@ -9,9 +9,7 @@ from wavetank.simulation.simulation import Simulation
 TOOL_SOLID = "tool: "  # front part of the names of solids that belong to a tool and go with it
 
 
-def carry(
-    sim: Simulation, name: str, goal: np.ndarray, rotation: Any, most: float, *, inside: bool = True
-) -> bool:  # fmt: skip
+def carry(sim: Simulation, name: str, goal: np.ndarray, rotation: Any, most: float, *, inside: bool = True) -> bool:
     """Move a solid towards `goal` [m] by at most `most` [m] in the next frame; say whether it gets there.
 
     With `inside` its origin stays in the tank, so that no one loses it behind a wall.

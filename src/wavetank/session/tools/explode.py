@@ -31,6 +31,4 @@ class Explode(Tool):
         self._done = True
         radius = hand.radius(self.radius)
         place = hand.anchor + 0.4 * radius * (np.array([0.0, -1.0, 0.0]) if hand.sim.scene.dim == 2 else hand.normal)
-        hand.sim.push(Burst(
-            center=hand.flat(place), radius=radius, speed=self.speed * hand.speed, duration=duration,
-        ))  # fmt: skip
+        hand.sim.push(Burst(center=hand.flat(place), radius=radius, speed=self.speed * hand.speed, duration=duration))

@@ -19,9 +19,13 @@ class Hand:
     """
 
     def __init__(
-        self, sim: Simulation, origin: Sequence[float], direction: Sequence[float], most: int,
+        self,
+        sim: Simulation,
+        origin: Sequence[float],
+        direction: Sequence[float],
+        most: int,
         through_water: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.sim, self.most_particles = sim, most
         self.notes: list[str] = []  # for the person, one sentence each
         extent = extent_of(sim.scene)

@@ -24,6 +24,6 @@ class Magnet(Tool):
 
     @override
     def hold(self, hand: Hand, duration: float) -> None:
-        hand.sim.push(Attract(
-            center=hand.flat(hand.point), radius=hand.radius(self.radius), strength=9.81 * self.strength,
-        ))  # fmt: skip
+        hand.sim.push(
+            Attract(center=hand.flat(hand.point), radius=hand.radius(self.radius), strength=9.81 * self.strength)
+        )

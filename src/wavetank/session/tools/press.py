@@ -55,9 +55,8 @@ class Spring:
 
 
 def hold(
-    sim: Simulation, body: Body, point: np.ndarray, goal: np.ndarray, speed: np.ndarray, spring: Spring,
-    duration: float,
-) -> np.ndarray:  # fmt: skip
+    sim: Simulation, body: Body, point: np.ndarray, goal: np.ndarray, speed: np.ndarray, spring: Spring, duration: float
+) -> np.ndarray:
     """Pull a point of a body towards a `goal` [m] that moves with a `speed` [m/s], and return the force [N].
 
     Implicit in time, (1 + (c dt + k dt^2) K) J = (k s + (c + k dt) ds/dt) dt for the impulse J, where ds/dt is what it

@@ -23,7 +23,11 @@ class Push(Tool):
 
     @override
     def hold(self, hand: Hand, duration: float) -> None:
-        hand.sim.push(Drag(
-            center=hand.flat(hand.point), radius=hand.radius(self.radius), velocity=hand.flat(hand.velocity),
-            drag=self.grip,
-        ))  # fmt: skip
+        hand.sim.push(
+            Drag(
+                center=hand.flat(hand.point),
+                radius=hand.radius(self.radius),
+                velocity=hand.flat(hand.velocity),
+                drag=self.grip,
+            )
+        )

@@ -25,6 +25,8 @@ class Stir(Tool):
     @override
     def hold(self, hand: Hand, duration: float) -> None:
         axis = (0.0, 0.0, 1.0) if hand.sim.scene.dim == 2 else (0.0, 1.0, 0.0)
-        hand.sim.push(Vortex(
-            center=hand.flat(hand.point), radius=hand.radius(self.radius), speed=self.speed * hand.speed, axis=axis,
-        ))  # fmt: skip
+        hand.sim.push(
+            Vortex(
+                center=hand.flat(hand.point), radius=hand.radius(self.radius), speed=self.speed * hand.speed, axis=axis
+            )
+        )

@@ -56,14 +56,27 @@ def describe(tool: type[Tool]) -> dict[str, Any]:
         high = next((m.le for m in field.metadata if hasattr(m, "le")), None)
         extra: Any = field.json_schema_extra or {}
         choices = list(getattr(field.annotation, "__args__", ())) if isinstance(field.default, str) else []
-        options.append({
-            "name": name, "default": field.default, "low": low, "high": high, "unit": extra.get("unit", ""),
-            "sentence": field.description, "choices": choices,
-        })  # fmt: skip
+        options.append(
+            {
+                "name": name,
+                "default": field.default,
+                "low": low,
+                "high": high,
+                "unit": extra.get("unit", ""),
+                "sentence": field.description,
+                "choices": choices,
+            }
+        )
     return {
-        "name": tool.name, "label": tool.label, "sentence": tool.sentence, "icon": tool.icon, "key": tool.key,
-        "cursor": tool.cursor_radius, "takes": tool.takes, "options": options,
-    }  # fmt: skip
+        "name": tool.name,
+        "label": tool.label,
+        "sentence": tool.sentence,
+        "icon": tool.icon,
+        "key": tool.key,
+        "cursor": tool.cursor_radius,
+        "takes": tool.takes,
+        "options": options,
+    }
 
 
 def dye_of(color: str, strength: float = 1.0) -> int:

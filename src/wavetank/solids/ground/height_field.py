@@ -170,7 +170,7 @@ def surface(heights: np.ndarray, edges: tuple[float, float], bottom: float) -> t
     rows, columns = heights.shape
     z, x = np.meshgrid(
         np.linspace(-0.5, 0.5, rows) * edges[1], np.linspace(-0.5, 0.5, columns) * edges[0], indexing="ij"
-    )  # fmt: skip
+    )
     top = np.stack([x, heights, z], axis=-1).reshape(-1, 3)
     number = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = (part.reshape(-1) for part in (number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]))

@@ -17,9 +17,7 @@ MOST_NODES = 4_000_000
 
 
 @qd.kernel(fastcache=True)
-def measure_nodes(
-    distances: qd.types.ndarray(), corners: qd.types.ndarray(), nx: qd.i32, ny: qd.i32, count: qd.i32
-):  # fmt: skip
+def measure_nodes(distances: qd.types.ndarray(), corners: qd.types.ndarray(), nx: qd.i32, ny: qd.i32, count: qd.i32):
     """Write the distance [cells] from every node to the closed line through `corners`, negative inside."""
     for n in range(nx * ny):
         p = vec2(qd.cast(n % nx, qd.f32), qd.cast(n // nx, qd.f32))

@@ -151,9 +151,16 @@ def part_faces(tree: Tree, thinnest: qd.f32, count: qd.i32):
 
 @qd.kernel(fastcache=True)
 def nearest_triangles(
-    tree: Tree, outer: qd.types.ndarray(), inner: qd.types.ndarray(), most: qd.f32, exact: qd.f32, nearly: qd.f32,
-    nx: qd.i32, ny: qd.i32, nz: qd.i32,
-):  # fmt: skip
+    tree: Tree,
+    outer: qd.types.ndarray(),
+    inner: qd.types.ndarray(),
+    most: qd.f32,
+    exact: qd.f32,
+    nearly: qd.f32,
+    nx: qd.i32,
+    ny: qd.i32,
+    nz: qd.i32,
+):
     """Distance [cells] at every node, were it outside and were it inside; no triangle swells by more than `most`."""
     for line in range(ny * nz):
         y, z = qd.cast(line % ny, qd.f32), qd.cast(line // ny, qd.f32)
@@ -205,9 +212,17 @@ def lean(py, pz, a, b):
 
 @qd.kernel(fastcache=True)
 def count_crossings(
-    a: qd.types.ndarray(), b: qd.types.ndarray(), c: qd.types.ndarray(), crossings: qd.types.ndarray(),
-    nx: qd.i32, ny: qd.i32, nz: qd.i32, aside_y: qd.f32, aside_z: qd.f32, count: qd.i32,
-):  # fmt: skip
+    a: qd.types.ndarray(),
+    b: qd.types.ndarray(),
+    c: qd.types.ndarray(),
+    crossings: qd.types.ndarray(),
+    nx: qd.i32,
+    ny: qd.i32,
+    nz: qd.i32,
+    aside_y: qd.f32,
+    aside_z: qd.f32,
+    count: qd.i32,
+):
     """Count where lines along x cross triangles: 1 at the first node behind a crossing into the solid, -1 out of it."""
     for t in range(count):
         low, high = qd.min(a[t], b[t], c[t]), qd.max(a[t], b[t], c[t])

@@ -45,9 +45,14 @@ def plant(corners: np.ndarray, swell: float) -> Tree:
             level = extreme(level.reshape(-1, 2, 3), axis=1) if first > 1 else level
             first //= 2
     return Tree(
-        lower=_device(lower), upper=_device(upper), a=_device(padded[:, 0]), b=_device(padded[:, 1]),
-        c=_device(padded[:, 2]), swell=_device(np.full(len(padded), swell, np.float32)), leaves=leaves,
-    )  # fmt: skip
+        lower=_device(lower),
+        upper=_device(upper),
+        a=_device(padded[:, 0]),
+        b=_device(padded[:, 1]),
+        c=_device(padded[:, 2]),
+        swell=_device(np.full(len(padded), swell, np.float32)),
+        leaves=leaves,
+    )
 
 
 def _along_curve(points: np.ndarray) -> np.ndarray:

@@ -42,9 +42,11 @@ def motes_of(shot: Shot, water: WaterBuffers, grid: Grid, moved: float) -> tuple
     start = np.zeros(cells + 1, np.int32)
     start[1:] = np.cumsum(np.bincount(key, minlength=cells))
     motes = Motes(
-        start=_array(start, qd.i32), list=_array(owner[order].astype(np.int32), qd.i32), ball=_array(ball, vec4),
+        start=_array(start, qd.i32),
+        list=_array(owner[order].astype(np.int32), qd.i32),
+        ball=_array(ball, vec4),
         kind=_array(kind, qd.i32),
-    )  # fmt: skip
+    )
     return motes, (np.diff(start) > 0).astype(np.int32)
 
 

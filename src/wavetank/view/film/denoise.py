@@ -55,9 +55,14 @@ def estimate(noise: qd.types.ndarray(), film: Film):
 
 @qd.kernel(fastcache=True)
 def average(
-    color: qd.types.ndarray(), noise: qd.types.ndarray(), before: qd.types.ndarray(), film: Film, step: qd.i32,
-    turn: qd.i32, patience: qd.f32,
-):  # fmt: skip
+    color: qd.types.ndarray(),
+    noise: qd.types.ndarray(),
+    before: qd.types.ndarray(),
+    film: Film,
+    step: qd.i32,
+    turn: qd.i32,
+    patience: qd.f32,
+):
     """Average every pixel with those up to two steps away, as far as they show the same.
 
     `noise` holds two variances for every pixel, which take turns.

@@ -67,10 +67,19 @@ def grid_around(shot: Shot, reach: float) -> Grid:
     size = upper - lower
     step *= max(1.0, (float(np.prod(size / step)) / MOST_NODES) ** (1.0 / 3.0))
     count = [max(4, 2 * round(float(length) / (2.0 * step))) for length in size]
-    return remembered(Grid(
-        lower=vector(*lower), upper=vector(*upper), box=box(lower, upper), step=vector(*(size / count)),
-        nx=count[0], ny=count[1], nz=count[2], spacing=d, walled=int(tank is not None),
-    ))  # fmt: skip
+    return remembered(
+        Grid(
+            lower=vector(*lower),
+            upper=vector(*upper),
+            box=box(lower, upper),
+            step=vector(*(size / count)),
+            nx=count[0],
+            ny=count[1],
+            nz=count[2],
+            spacing=d,
+            walled=int(tank is not None),
+        )
+    )
 
 
 def room_for(grid: Grid) -> FieldRoom:
@@ -110,10 +119,7 @@ def build(room: FieldRoom, water: WaterBuffers, shot: Shot) -> Field:
     add_ellipsoids(room.sums, water.ellipsoids, grid, UNIT / float(grid.step[0]), count)
     # Standard deviation of the whole blur along an axis: the slope of what a plane becomes.
     wide = math.sqrt((REACH * d) ** 2 / 11.0 + SMOOTH * float(np.max(grid.step)) ** 2)
-    join(
-        room.level, room.sums, given, grid, math.sqrt(2.0 * math.pi) * wide, DRAWN * d,
-        float(grid.step[0]) / UNIT,
-    )  # fmt: skip
+    join(room.level, room.sums, given, grid, math.sqrt(2.0 * math.pi) * wide, DRAWN * d, float(grid.step[0]) / UNIT)
     mark(room.skip, room.level, room.near, grid)
     for axis in range(3):
         spread(room.near, room.skip, grid, axis)
@@ -133,9 +139,7 @@ def folded(i, count, walled):
 
 
 @qd.kernel(fastcache=True)
-def add_shares(
-    sums: qd.types.ndarray(), x: qd.types.ndarray(), grid: Grid, reach: qd.f32, unit: qd.f32, count: qd.i32
-):  # fmt: skip
+def add_shares(sums: qd.types.ndarray(), x: qd.types.ndarray(), grid: Grid, reach: qd.f32, unit: qd.f32, count: qd.i32):
     """Add what every particle has to the nodes around it."""
     for a in range(count):
         p = x[a]
@@ -180,7 +184,7 @@ def share_before(q):
 @qd.kernel(fastcache=True)
 def to_shares(
     share: qd.types.ndarray(), sums: qd.types.ndarray(), solids: SolidSet, grid: Grid, reach: qd.f32, per: qd.f32
-):  # fmt: skip
+):
     """Turn sums into shares of full water; what a solid takes away is no air."""
     for n in range(grid.nx * grid.ny * grid.nz):
         s = sums[n] * per
@@ -192,9 +196,7 @@ def to_shares(
 
 
 @qd.kernel(fastcache=True)
-def go_on_in_solids(
-    share: qd.types.ndarray(), before: qd.types.ndarray(), solids: SolidSet, grid: Grid, keep: qd.f32
-):  # fmt: skip
+def go_on_in_solids(share: qd.types.ndarray(), before: qd.types.ndarray(), solids: SolidSet, grid: Grid, keep: qd.f32):
     """Let the water go on in solids, and as near to them as `keep`, as it is at that distance."""
     for n in range(grid.nx * grid.ny * grid.nz):
         x = grid.lower + (vec3(n % grid.nx, n // grid.nx % grid.ny, n // (grid.nx * grid.ny)) + 0.5) * grid.step
@@ -228,9 +230,7 @@ def blur(share: qd.types.ndarray(), before: qd.types.ndarray(), grid: Grid, axis
 
 
 @qd.kernel(fastcache=True)
-def add_ellipsoids(
-    sums: qd.types.ndarray(), ellipsoids: Ellipsoids, grid: Grid, unit: qd.f32, count: qd.i32
-):  # fmt: skip
+def add_ellipsoids(sums: qd.types.ndarray(), ellipsoids: Ellipsoids, grid: Grid, unit: qd.f32, count: qd.i32):
     """Raise every node to its depth in the ellipsoids around it; lone particles are balls of their own."""
     for a in range(count):
         size = ellipsoids.size[a]
@@ -264,9 +264,14 @@ def add_ellipsoids(
 
 @qd.kernel(fastcache=True)
 def join(
-    level: qd.types.ndarray(), union: qd.types.ndarray(), bulk: qd.types.ndarray(), grid: Grid, slope: qd.f32,
-    drawn: qd.f32, unit: qd.f32,
-):  # fmt: skip
+    level: qd.types.ndarray(),
+    union: qd.types.ndarray(),
+    bulk: qd.types.ndarray(),
+    grid: Grid,
+    slope: qd.f32,
+    drawn: qd.f32,
+    unit: qd.f32,
+):
     """Join the two fields; `level` holds the shares of the surface before."""
     for n in range(grid.nx * grid.ny * grid.nz):
         smooth = (level[n] - 0.5) * slope

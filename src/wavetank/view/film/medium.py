@@ -55,9 +55,16 @@ def medium_of(shot: Shot, grid: Grid) -> Medium:
         upload(array, part.astype(np.float32))
     swallow, shine, murk, ember = arrays
     return Medium(
-        absorption=shot.absorption, scattering=shot.scattering, glow=vector(*glow), swallow=swallow, shine=shine,
-        varied=int(varied is not None), murk=murk, ember=ember, murky=int(murky),
-    )  # fmt: skip
+        absorption=shot.absorption,
+        scattering=shot.scattering,
+        glow=vector(*glow),
+        swallow=swallow,
+        shine=shine,
+        varied=int(varied is not None),
+        murk=murk,
+        ember=ember,
+        murky=int(murky),
+    )
 
 
 def _particles(shot: Shot) -> np.ndarray | None:

@@ -70,9 +70,17 @@ class Setting:
 
 @qd.kernel(fastcache=True)
 def trace(
-    film: Film, world: World, photons: Photons, lens: Lens, look: Look, medium: Medium, setting: Setting,
-    first: qd.i32, samples: qd.i32, half: qd.i32,
-):  # fmt: skip
+    film: Film,
+    world: World,
+    photons: Photons,
+    lens: Lens,
+    look: Look,
+    medium: Medium,
+    setting: Setting,
+    first: qd.i32,
+    samples: qd.i32,
+    half: qd.i32,
+):
     """Add `samples` samples to every pixel, which has had `first` of them; `half` is half of all that will be."""
     for row, column in qd.ndrange(film.mean.shape[0], film.mean.shape[1]):
         for sample in range(first, first + samples):
@@ -104,9 +112,17 @@ def trace(
 
 @qd.func
 def follow(
-    world: World, photons: Photons, lens: Lens, look: Look, medium: Medium, setting: Setting, seed, sample, begin,
+    world: World,
+    photons: Photons,
+    lens: Lens,
+    look: Look,
+    medium: Medium,
+    setting: Setting,
+    seed,
+    sample,
+    begin,
     direction,
-):  # fmt: skip
+):
     """Radiance along a ray; the albedo at its first matte surface, what its first surface is, how many it has met."""
     light, value, waits = vec3(0.0, 0.0, 0.0), vec3(1.0, 1.0, 1.0), vec3(0.0, 0.0, 0.0)
     albedo, shape = vec3(0.0, 0.0, 0.0), qd.Vector([0.0, 0.0, 0.0, 0.0])

@@ -26,8 +26,11 @@ def _solids(frame: Frame, by: float) -> SolidSet:
     """Return the solids then: bodies by their velocities, and what has a motion where that says, unless it is held."""
     solids, standing = frame.solids, frame.standing
     poses = {k: _pose(frame, one, by) for k, one in enumerate(standing, solids.tank_count) if k < solids.count}
-    if all(np.array_equal(poses[k][0], one.position) and np.array_equal(poses[k][1], one.rotation)
-           for k, one in enumerate(standing, solids.tank_count) if k in poses):  # fmt: skip
+    if all(
+        np.array_equal(poses[k][0], one.position) and np.array_equal(poses[k][1], one.rotation)
+        for k, one in enumerate(standing, solids.tank_count)
+        if k in poses
+    ):
         return solids
     place, turn = download(solids.position).copy(), download(solids.rotation).copy()
     for k, (position, rotation) in poses.items():

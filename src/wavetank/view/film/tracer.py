@@ -39,9 +39,11 @@ class Tracer:
         self.buffers = buffers
         shape = (buffers.rows, buffers.columns)
         self.film = paths.Film(
-            mean=qd.ndarray(vec3, shape=shape), half=qd.ndarray(vec3, shape=shape),
-            albedo=qd.ndarray(vec3, shape=shape), shape=qd.ndarray(vec4, shape=shape),
-        )  # fmt: skip
+            mean=qd.ndarray(vec3, shape=shape),
+            half=qd.ndarray(vec3, shape=shape),
+            albedo=qd.ndarray(vec3, shape=shape),
+            shape=qd.ndarray(vec4, shape=shape),
+        )
         self._sky: Any = qd.ndarray(vec3, shape=(1, 1))
         self._seen = ""  # digest of what is in it; empty where there is no picture
         self._room: field.FieldRoom | None = None
@@ -61,9 +63,14 @@ class Tracer:
             return watch.tell is None or watch.tell(done, style.samples)
 
         watch.done = self.trace(
-            shot, style.samples, aperture=style.aperture, focus=style.focus, shutter=style.shutter,
-            first=watch.begun, tell=tell,
-        )  # fmt: skip
+            shot,
+            style.samples,
+            aperture=style.aperture,
+            focus=style.focus,
+            shutter=style.shutter,
+            first=watch.begun,
+            tell=tell,
+        )
         watch.whole = watch.done >= style.samples
         if watch.path and not watch.whole:
             store(watch.path, self.film, digest, watch.done)
@@ -84,9 +91,16 @@ class Tracer:
             upload(self._sky, sky)
 
     def trace(
-        self, shot: Shot, samples: int, *, aperture: float = 0.0, focus: float | None = None, shutter: float = 0.0,
-        first: int = 0, tell: Callable[[int], bool] | None = None,
-    ) -> int:  # fmt: skip
+        self,
+        shot: Shot,
+        samples: int,
+        *,
+        aperture: float = 0.0,
+        focus: float | None = None,
+        shutter: float = 0.0,
+        first: int = 0,
+        tell: Callable[[int], bool] | None = None,
+    ) -> int:
         """Take the samples from `first` on and return how many there are: fewer where `tell` says to stop.
 
         `aperture` is the radius of the lens [m], `focus` the depth that is sharp [m], `shutter` for how long it is open
@@ -107,16 +121,7 @@ class Tracer:
             while done < end:
                 count = min(self._at_once(), end - done)
                 paths.trace(
-                    self.film,
-                    world,
-                    photons,
-                    shot.lens,
-                    shot.look,
-                    medium,
-                    around,
-                    done,
-                    count,
-                    max(1, samples // 2),
+                    self.film, world, photons, shot.lens, shot.look, medium, around, done, count, max(1, samples // 2)
                 )
                 synchronize()
                 done += count
@@ -136,10 +141,18 @@ class Tracer:
         edge = 0.5 * max(1.0, pixels / 420.0) * distance / float(lens.focal) if shot.frame.scene.tank else 0.0
         fill = vector(1.0, 1.0, 1.0) if self._seen else filled(shot.look)
         return paths.Setting(
-            fill=fill, middle=vector(extent.middle[0], 0.0, extent.middle[2]), size=extent.radius, tank=shot.walls,
-            edge=float(edge), aperture=float(aperture), focus=max(float(depth), 1e-3), under=0, brightest=BRIGHTEST,
-            sky=self._sky, hung=int(bool(self._seen)),
-        )  # fmt: skip
+            fill=fill,
+            middle=vector(extent.middle[0], 0.0, extent.middle[2]),
+            size=extent.radius,
+            tank=shot.walls,
+            edge=float(edge),
+            aperture=float(aperture),
+            focus=max(float(depth), 1e-3),
+            under=0,
+            brightest=BRIGHTEST,
+            sky=self._sky,
+            hung=int(bool(self._seen)),
+        )
 
     def _world(self, shot: Shot, shutter: float, moved: float) -> World:
         """Return all that rays may meet at an instant."""
@@ -156,9 +169,13 @@ class Tracer:
         finish = qd.ndarray(qd.i32, shape=(max(shot.frame.solids.count, 1),))
         upload(finish, finishes_of(shot))
         return World(
-            field=field.build(self._room, water, shot), motes=motes, solids=shot.frame.solids,
-            window=solids.window(shot), paints=paints, finish=finish,
-        )  # fmt: skip
+            field=field.build(self._room, water, shot),
+            motes=motes,
+            solids=shot.frame.solids,
+            window=solids.window(shot),
+            paints=paints,
+            finish=finish,
+        )
 
     def _lit(self, shot: Shot, world: World, medium: Medium, slice: int, slices: int) -> light.Photons:
         """Return the light that the water of an instant brings."""
@@ -192,10 +209,17 @@ class Tracer:
             floor.fill(0)
             flow.fill(0)
         photons = light.Photons(
-            floor=floor, flow=flow, corner=vector(lower[0] - margin, texel, lower[2] - margin),
-            begin=vector(*begin), right=vector(*(side * wide)), up=vector(*(top * tall)), across=across, rows=rows,
-            power=wide * tall / (across * rows * rounds), has_flow=int(has_flow),
-        )  # fmt: skip
+            floor=floor,
+            flow=flow,
+            corner=vector(lower[0] - margin, texel, lower[2] - margin),
+            begin=vector(*begin),
+            right=vector(*(side * wide)),
+            up=vector(*(top * tall)),
+            across=across,
+            rows=rows,
+            power=wide * tall / (across * rows * rounds),
+            has_flow=int(has_flow),
+        )
         self._photons = photons
         if float(np.max(look.sun)) > 0.0:
             for number in range(rounds):

@@ -256,9 +256,21 @@ def surface_before(sun: Lens, first: qd.template(), walls: Box, p, ahead, far, a
 
 @qd.func
 def through_body(
-    depth: qd.template(), picture: qd.template(), first: qd.template(), lens: Lens, sun: Lens, look: Look,
-    optics: Optics, inside: Inside, at, bent, mirrored, whole, uneven, solid: qd.template(),
-):  # fmt: skip
+    depth: qd.template(),
+    picture: qd.template(),
+    first: qd.template(),
+    lens: Lens,
+    sun: Lens,
+    look: Look,
+    optics: Optics,
+    inside: Inside,
+    at,
+    bent,
+    mirrored,
+    whole,
+    uneven,
+    solid: qd.template(),
+):
     """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, and
     (radiance, share) of the solid that the ray which is `mirrored` there meets, and (column, row, kind) of the place
     of the picture that is all it shows; where rays beside it have the same kind, their places lie between. A kind of 0
@@ -301,9 +313,14 @@ def through_body(
             if qd.static(solid):
                 if past == 0:
                     hit, k, found = solid_ahead(
-                        inside.solids, inside.paints, p, ahead, s, 0.1 * optics.spacing,
+                        inside.solids,
+                        inside.paints,
+                        p,
+                        ahead,
+                        s,
+                        0.1 * optics.spacing,
                         qd.select(piece == 2, 0.0, uneven),
-                    )  # fmt: skip
+                    )
                     cover = found
                     if share > 0.0:
                         cover = qd.select(cover > 0.5, 1.0, 0.0)
@@ -331,9 +348,14 @@ def through_body(
                             deep = about_depth(sun, first, inside.walls, place, optics.spacing)
                             sunny = qd.exp(-0.6 * qd.max(deep, 0.0) * optics.absorption.y)
                         usual = surface_radiance(
-                            look, inside.paints[k], vec3(hit.x, hit.y, hit.z), -ahead, vec2(sunny, 0.8),
-                            0.4 * look.wrap, 0.0,
-                        )  # fmt: skip
+                            look,
+                            inside.paints[k],
+                            vec3(hit.x, hit.y, hit.z),
+                            -ahead,
+                            vec2(sunny, 0.8),
+                            0.4 * look.wrap,
+                            0.0,
+                        )
                 past = 0
             ends = 1
             if cover == 0.0 and piece == 1:

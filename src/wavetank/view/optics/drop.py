@@ -72,9 +72,17 @@ def rough_of(wide):
 
 @qd.func
 def behind_drop(
-    solid: qd.template(), first: qd.template(), picture: qd.template(), lens: Lens, look: Look, start, direction, row,
-    column, z,
-):  # fmt: skip
+    solid: qd.template(),
+    first: qd.template(),
+    picture: qd.template(),
+    lens: Lens,
+    look: Look,
+    start,
+    direction,
+    row,
+    column,
+    z,
+):
     """Radiance along a ray that has left a drop: of the floor or of what stands behind, as far as they are seen.
 
     That is in the `picture`, at the nearer of the depths `solid` and `first`; the drop is at the depth `z` [m].
@@ -96,9 +104,20 @@ def behind_drop(
 
 @qd.func
 def shine(
-    pixels: Pixels, surface: WaterSurface, drops: Drops, cells: Cells, lens: Lens, look: Look, optics: Optics, a, row,
-    column, c, r, rough,
-):  # fmt: skip
+    pixels: Pixels,
+    surface: WaterSurface,
+    drops: Drops,
+    cells: Cells,
+    lens: Lens,
+    look: Look,
+    optics: Optics,
+    a,
+    row,
+    column,
+    c,
+    r,
+    rough,
+):
     """Radiance of the ball of radius `r` at `c` (view coordinates) that a pixel shows.
 
     `rough` is the variance of its normals there, see `glint`.

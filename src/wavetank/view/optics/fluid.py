@@ -36,13 +36,25 @@ class Optics:
 
 def optics_of(shot: Shot, under: int = 0, samples: int = 1, tall: int = 1) -> Optics:
     """Return what the fluid of a picture does to light."""
-    return remembered(Optics(
-        absorption=shot.absorption, scattering=shot.scattering, glow=vector(*(shot.look.glow * shot.tint)),
-        usual=shot.usual, coarse=float(coarseness(shot)), fine=float(fineness(shot)), unit=shot.extent.spacing / UNIT,
-        spacing=shot.extent.spacing, disc=DISC[2] * shot.extent.spacing,
-        slack=2.0 * shot.radius, under=under, samples=samples, tall=tall,
-        apart=APART * GROUP * samples, turn=shot.turn * samples,
-    ))  # fmt: skip
+    return remembered(
+        Optics(
+            absorption=shot.absorption,
+            scattering=shot.scattering,
+            glow=vector(*(shot.look.glow * shot.tint)),
+            usual=shot.usual,
+            coarse=float(coarseness(shot)),
+            fine=float(fineness(shot)),
+            unit=shot.extent.spacing / UNIT,
+            spacing=shot.extent.spacing,
+            disc=DISC[2] * shot.extent.spacing,
+            slack=2.0 * shot.radius,
+            under=under,
+            samples=samples,
+            tall=tall,
+            apart=APART * GROUP * samples,
+            turn=shot.turn * samples,
+        )
+    )
 
 
 def coarseness(shot: Shot) -> int:

@@ -108,9 +108,18 @@ def mixed(thickness: Thickness, look: Look, optics: Optics, pixel, tau, plane: q
 
 @qd.func
 def murky(
-    sunlit: SunlitWater, shade: qd.template(), sun: Lens, look: Look, optics: Optics, color, glow, at, n, seen,
+    sunlit: SunlitWater,
+    shade: qd.template(),
+    sun: Lens,
+    look: Look,
+    optics: Optics,
+    color,
+    glow,
+    at,
+    n,
+    seen,
     plane: qd.template(),
-):  # fmt: skip
+):
     """Radiance of a fluid that one does not see into, at the point `at` of its surface, shaded by itself and by the
     solids that the sun's map of depths `shade` holds.
     """
@@ -123,7 +132,13 @@ def murky(
             # Shadows are the same as elsewhere; both maps show the same, in texels of their own.
             c, fine = to_view(sun, above), qd.cast(shade.shape[0], qd.f32) / sunlit.depth.shape[0]
             share *= sun_share(
-                shade, fine * to_pixel(sun, c), c.z - 0.5 * optics.spacing, vec2(0.0, 0.0), fine * sun.focal,
-                look.sun_size, vec2(1.0, 0.0), 16,
-            )  # fmt: skip
+                shade,
+                fine * to_pixel(sun, c),
+                c.z - 0.5 * optics.spacing,
+                vec2(0.0, 0.0),
+                fine * sun.focal,
+                look.sun_size,
+                vec2(1.0, 0.0),
+                16,
+            )
     return surface_radiance(look, color, n, seen, vec2(share, 1.0), 0.45, 0.0) + glow

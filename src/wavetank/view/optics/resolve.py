@@ -31,9 +31,16 @@ def beside_at(depth: qd.template(), row, column):
 
 @qd.func
 def even_pixel(
-    pixels: Pixels, surface: WaterSurface, lens: Lens, look: Look, optics: Optics, walls: Box, row, column,
+    pixels: Pixels,
+    surface: WaterSurface,
+    lens: Lens,
+    look: Look,
+    optics: Optics,
+    walls: Box,
+    row,
+    column,
     world: qd.template(),
-):  # fmt: skip
+):
     """(kind, depth [m], normal) of the water that all samples of a pixel show, from the one at `row`, `column` on.
 
     The kind is 0 where they differ or show none, 1 where they show the surface, 2 where they show a pane.

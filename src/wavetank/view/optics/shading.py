@@ -32,10 +32,28 @@ def from_within(thickness: qd.template(), lens: Lens, optics: Optics, row, colum
 
 @qd.func
 def shine(
-    pixels: Pixels, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater, lens: Lens, sun: Lens, look: Look,
-    optics: Optics, inside: Inside, place, z, normal, origin, direction, body, above, whole, uneven, rough,
-    world: qd.template(), many: qd.template(),
-):  # fmt: skip
+    pixels: Pixels,
+    thickness: Thickness,
+    backdrop: Backdrop,
+    sunlit: SunlitWater,
+    lens: Lens,
+    sun: Lens,
+    look: Look,
+    optics: Optics,
+    inside: Inside,
+    place,
+    z,
+    normal,
+    origin,
+    direction,
+    body,
+    above,
+    whole,
+    uneven,
+    rough,
+    world: qd.template(),
+    many: qd.template(),
+):
     """Radiance of the water that is seen at depth `z` with this normal, at a place (column, row) of the picture, and
     the share in it of what is behind.
 
@@ -89,7 +107,7 @@ def shine(
             out = 2.0 * bent.dot(ahead) * bent - ahead
             far = behind_drop(
                 pixels.depth, pixels.depth, backdrop.behind, lens, look, at + travel * bent, out, row, column, z
-            )  # fmt: skip
+            )
             shown += ball * (far - shown)
     swallow, tint, cover, hidden = optics.absorption, optics.glow, 0.0, 0.0
     color, glow, behind = optics.glow, vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)

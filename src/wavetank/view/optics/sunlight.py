@@ -75,9 +75,15 @@ def exponential(x):
 
 @qd.func
 def sun_through_together(
-    through: qd.template(), points: qd.template(), sunlit: SunlitWater, thickness: Thickness, sun: Lens,
-    look: Look, optics: Optics, lanes: qd.template(),
-):  # fmt: skip
+    through: qd.template(),
+    points: qd.template(),
+    sunlit: SunlitWater,
+    thickness: Thickness,
+    sun: Lens,
+    look: Look,
+    optics: Optics,
+    lanes: qd.template(),
+):
     """Fill `through` [3, lanes] with the same of `points` [4, lanes]: (column, row, depth [m]) in the sun's view, and
     whether each counts, 1 or 0.
     """
@@ -95,9 +101,15 @@ def sun_through_together(
 
 @qd.func
 def through_clear(
-    through: qd.template(), points: qd.template(), sunlit: SunlitWater, water: qd.template(), sun: Lens, look: Look,
-    optics: Optics, lanes: qd.template(),
-):  # fmt: skip
+    through: qd.template(),
+    points: qd.template(),
+    sunlit: SunlitWater,
+    water: qd.template(),
+    sun: Lens,
+    look: Look,
+    optics: Optics,
+    lanes: qd.template(),
+):
     """Do so in clear water of one kind.
 
     What is read of the maps is put in columns first: else the loops over lanes are no vectors'.
@@ -151,7 +163,7 @@ def through_clear(
                         if inside[0, lane] > 0.0:
                             keys[0, lane] = sunlit.depth[
                                 qd.cast(points[1, lane], qd.i32), qd.cast(points[0, lane], qd.i32)
-                            ]  # fmt: skip
+                            ]
                 for lane in range(lanes):
                     whole, nearest = found[0, lane], qd.bit_cast(keys[0, lane], qd.f32)
                     nearest = qd.select(whole > 0.0, nearest, 1.7e38)

@@ -26,9 +26,15 @@ def prepare(shot: Shot, buffers: Buffers) -> None:
     water, pixels, extent = water_of(buffers, shot), buffers.pixels, shot.extent
     water.backdrop.known.fill(0)
     divide(
-        water.backdrop, pixels, water.light, strips_of(pixels.depth), shot.lens, shot.look,
-        vector(extent.middle[0], 0.0, extent.middle[2]), extent.radius,
-    )  # fmt: skip
+        water.backdrop,
+        pixels,
+        water.light,
+        strips_of(pixels.depth),
+        shot.lens,
+        shot.look,
+        vector(extent.middle[0], 0.0, extent.middle[2]),
+        extent.radius,
+    )
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
@@ -38,10 +44,19 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if frame.dim == 3 and lanes() > 1:
         find_wet(water.sunlit, water.sun_thickness.water)
     paint(
-        water.backdrop, pixels, water.sunlit, water.sun_thickness, strips_of(pixels.depth, samples, samples), shot.lens,
-        shot.water_sun, shot.look, optics_of(shot, 0, samples, samples), shot.box,
-        int(frame.scene.tank is not None), 100 * lanes() + 10 * int(samples > 1) + frame.dim,
-    )  # fmt: skip
+        water.backdrop,
+        pixels,
+        water.sunlit,
+        water.sun_thickness,
+        strips_of(pixels.depth, samples, samples),
+        shot.lens,
+        shot.water_sun,
+        shot.look,
+        optics_of(shot, 0, samples, samples),
+        shot.box,
+        int(frame.scene.tank is not None),
+        100 * lanes() + 10 * int(samples > 1) + frame.dim,
+    )
 
 
 @qd.func
@@ -62,9 +77,8 @@ def light_at(light: Light, depth: qd.template(), row, column, z):
 
 @qd.kernel(fastcache=True)
 def divide(
-    backdrop: Backdrop, pixels: Pixels, light: Light, strips: Strips, lens: Lens, look: Look, middle: vec3,
-    size: qd.f32,
-):  # fmt: skip
+    backdrop: Backdrop, pixels: Pixels, light: Light, strips: Strips, lens: Lens, look: Look, middle: vec3, size: qd.f32
+):
     """Shade every pixel that is not empty, and fill the others with the background, which counts as the sky's."""
     for task in range(strips.count):
         row, first, last = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])
@@ -84,9 +98,14 @@ def divide(
                     gloss, wrap = 0.3 * look.gloss, 0.4 * look.wrap
                     for part in range(2):  # one copy of the code to compile
                         sky = surface_radiance(
-                            look, albedo, n, seen, qd.select(part == 0, vec2(share.x, 0.0), vec2(0.0, share.y)), wrap,
+                            look,
+                            albedo,
+                            n,
+                            seen,
+                            qd.select(part == 0, vec2(share.x, 0.0), vec2(0.0, share.y)),
+                            wrap,
                             gloss,
-                        )  # fmt: skip
+                        )
                         if part == 0:
                             sun = sky
                 else:
@@ -102,9 +121,19 @@ def divide(
 
 @qd.kernel(fastcache=True)
 def paint(
-    backdrop: Backdrop, pixels: Pixels, sunlit: SunlitWater, thickness: Thickness, strips: Strips, lens: Lens,
-    sun: Lens, look: Look, optics: Optics, box: Box, has_tank: qd.i32, world: qd.template(),
-):  # fmt: skip
+    backdrop: Backdrop,
+    pixels: Pixels,
+    sunlit: SunlitWater,
+    thickness: Thickness,
+    strips: Strips,
+    lens: Lens,
+    sun: Lens,
+    look: Look,
+    optics: Optics,
+    box: Box,
+    has_tank: qd.i32,
+    world: qd.template(),
+):
     """Put sun and sky together as far as the water leaves them, and lay the tank over it.
 
     Samples of a pixel that lie within a texel of the sun's view take as much of the sun as its middle does. `world` is
@@ -124,22 +153,62 @@ def paint(
                 dry = is_dry(sunlit.wet, known)
                 if not dry or not holds_dry(known):
                     backdrop.known[band, block] = paint_together(
-                        backdrop, pixels, sunlit, thickness, lens, sun, look, optics, box, has_tank, band,
-                        block * lanes, known, dry, qd.static(world % 100), lanes,
-                    )  # fmt: skip
+                        backdrop,
+                        pixels,
+                        sunlit,
+                        thickness,
+                        lens,
+                        sun,
+                        look,
+                        optics,
+                        box,
+                        has_tank,
+                        band,
+                        block * lanes,
+                        known,
+                        dry,
+                        qd.static(world % 100),
+                        lanes,
+                    )
             begin = end // lanes * lanes
         for pixel in range(begin, end):
             paint_pixel(
-                backdrop, pixels, sunlit, thickness, lens, sun, look, optics, box, has_tank, band * tall,
-                pixel * across, across, tall, qd.static(world % 100),
-            )  # fmt: skip
+                backdrop,
+                pixels,
+                sunlit,
+                thickness,
+                lens,
+                sun,
+                look,
+                optics,
+                box,
+                has_tank,
+                band * tall,
+                pixel * across,
+                across,
+                tall,
+                qd.static(world % 100),
+            )
 
 
 @qd.func
 def paint_pixel(
-    backdrop: Backdrop, pixels: Pixels, sunlit: SunlitWater, thickness: Thickness, lens: Lens, sun: Lens, look: Look,
-    optics: Optics, box: Box, has_tank, top, left, across, tall, world: qd.template(),
-):  # fmt: skip
+    backdrop: Backdrop,
+    pixels: Pixels,
+    sunlit: SunlitWater,
+    thickness: Thickness,
+    lens: Lens,
+    sun: Lens,
+    look: Look,
+    optics: Optics,
+    box: Box,
+    has_tank,
+    top,
+    left,
+    across,
+    tall,
+    world: qd.template(),
+):
     """Do this for all samples of a pixel, the first of which lies at row `top` and column `left`."""
     together, middle, shared = 0, 0.0, vec3(1.0, 1.0, 1.0)
     if qd.static(world == 13):
@@ -174,9 +243,23 @@ def paint_pixel(
 
 @qd.func
 def paint_together(
-    backdrop: Backdrop, pixels: Pixels, sunlit: SunlitWater, thickness: Thickness, lens: Lens, sun: Lens, look: Look,
-    optics: Optics, box: Box, has_tank, band, begin, known, dry, world: qd.template(), lanes: qd.template(),
-):  # fmt: skip
+    backdrop: Backdrop,
+    pixels: Pixels,
+    sunlit: SunlitWater,
+    thickness: Thickness,
+    lens: Lens,
+    sun: Lens,
+    look: Look,
+    optics: Optics,
+    box: Box,
+    has_tank,
+    band,
+    begin,
+    known,
+    dry,
+    world: qd.template(),
+    lanes: qd.template(),
+):
     """Do this for `lanes` pixels of a row from `begin` on, and return what is then known of them.
 
     Where it is known that they are `dry` the sun is all there.
@@ -265,7 +348,7 @@ def paint_together(
             for lane in qd.static(range(lanes)):
                 backdrop.behind[row, (begin + lane) * across + off] = vec3(
                     colors[0, lane], colors[1, lane], colors[2, lane]
-                )  # fmt: skip
+                )
     place = known
     if known == 0:
         place = cells_between(lowest, highest, sunlit.depth.shape[0], sunlit.wet.shape[0])

@@ -36,16 +36,36 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         return
     water, pixels = water_of(buffers, shot), buffers.pixels
     look_up(
-        pixels, water.surface, water.sunlit, water.backdrop, strips_of(pixels.depth), shot.lens, shot.water_sun,
-        shot.look, optics_of(shot), shot.walls, STEPS, HALVINGS,
-    )  # fmt: skip
+        pixels,
+        water.surface,
+        water.sunlit,
+        water.backdrop,
+        strips_of(pixels.depth),
+        shot.lens,
+        shot.water_sun,
+        shot.look,
+        optics_of(shot),
+        shot.walls,
+        STEPS,
+        HALVINGS,
+    )
 
 
 @qd.kernel(fastcache=True)
 def look_up(
-    pixels: Pixels, surface: WaterSurface, sunlit: SunlitWater, backdrop: Backdrop, strips: Strips, lens: Lens,
-    sun: Lens, look: Look, optics: Optics, walls: Box, steps: qd.i32, halvings: qd.i32,
-):  # fmt: skip
+    pixels: Pixels,
+    surface: WaterSurface,
+    sunlit: SunlitWater,
+    backdrop: Backdrop,
+    strips: Strips,
+    lens: Lens,
+    sun: Lens,
+    look: Look,
+    optics: Optics,
+    walls: Box,
+    steps: qd.i32,
+    halvings: qd.i32,
+):
     """Shade every pixel whose ray leaves the water through its surface before it meets anything."""
     for task in range(strips.count):
         row, begin, end = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])

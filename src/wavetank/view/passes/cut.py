@@ -46,16 +46,32 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     ice = ICE if frame.frozen_count else 0
     plane = remembered(Plane(normal=vector(*normal), offset=offset, least=least, ice=ice))
     lay(
-        buffers.pixels, frame.x, frame.v, frame.rho, frame.material, frame.frozen if ice else frame.material, cells,
-        shot.lens, plane, shot.coloring, frame.dim, shot.quantity,
-    )  # fmt: skip
+        buffers.pixels,
+        frame.x,
+        frame.v,
+        frame.rho,
+        frame.material,
+        frame.frozen if ice else frame.material,
+        cells,
+        shot.lens,
+        plane,
+        shot.coloring,
+        frame.dim,
+        shot.quantity,
+    )
 
 
 @qd.func
 def value_at(
-    x: qd.template(), v: qd.template(), rho: qd.template(), material: qd.template(), cells: Cells, at,
-    dim: qd.template(), quantity: qd.template(),
-):  # fmt: skip
+    x: qd.template(),
+    v: qd.template(),
+    rho: qd.template(),
+    material: qd.template(),
+    cells: Cells,
+    at,
+    dim: qd.template(),
+    quantity: qd.template(),
+):
     """(weight, weighted sum of the quantity) at a point."""
     c = whole_place(cells, at, dim)
     weight, total = 0.0, 0.0
@@ -86,10 +102,19 @@ def weight_of_ice(frozen: qd.template(), cells: Cells, at, dim: qd.template()):
 
 @qd.kernel(fastcache=True)
 def lay(
-    pixels: Pixels, x: qd.types.ndarray(), v: qd.types.ndarray(), rho: qd.types.ndarray(),
-    material: qd.types.ndarray(), frozen: qd.types.ndarray(), cells: Cells, lens: Lens, plane: Plane,
-    coloring: Coloring, dim: qd.template(), quantity: qd.template(),
-):  # fmt: skip
+    pixels: Pixels,
+    x: qd.types.ndarray(),
+    v: qd.types.ndarray(),
+    rho: qd.types.ndarray(),
+    material: qd.types.ndarray(),
+    frozen: qd.types.ndarray(),
+    cells: Cells,
+    lens: Lens,
+    plane: Plane,
+    coloring: Coloring,
+    dim: qd.template(),
+    quantity: qd.template(),
+):
     """Colour every pixel whose ray meets the plane within the water."""
     for row, column in qd.ndrange(pixels.depth.shape[0], pixels.depth.shape[1]):
         ray = view_ray(lens, row, column)

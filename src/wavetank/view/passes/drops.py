@@ -35,16 +35,30 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     water = water_of(buffers, shot)
     drops = water.drops(frame)
     lay(
-        buffers.pixels, water.surface, drops, water.cells, shot.lens, shot.look, optics_of(shot),
-        motion_of(shot.shutter, buffers.supersample), frame.count,
-    )  # fmt: skip
+        buffers.pixels,
+        water.surface,
+        drops,
+        water.cells,
+        shot.lens,
+        shot.look,
+        optics_of(shot),
+        motion_of(shot.shutter, buffers.supersample),
+        frame.count,
+    )
 
 
 @qd.kernel(fastcache=True)
 def lay(
-    pixels: Pixels, surface: WaterSurface, drops: Drops, cells: Cells, lens: Lens, look: Look, optics: Optics,
-    motion: vec4, count: qd.i32,
-):  # fmt: skip
+    pixels: Pixels,
+    surface: WaterSurface,
+    drops: Drops,
+    cells: Cells,
+    lens: Lens,
+    look: Look,
+    optics: Optics,
+    motion: vec4,
+    count: qd.i32,
+):
     """Find the nearest drop of each pixel, shade it by the picture without drops, and lay it over that.
 
     `motion` is that of `motion_of`; `pixels.normal` holds the shaded drops meanwhile.
@@ -52,25 +66,63 @@ def lay(
     for a in range(count):
         if drops.lone[a] == 1 and way_of(lens, drops, cells, a, motion[2]).norm() <= motion[3]:
             for k in range(6):
-                walk(pixels, surface, drops, cells, lens, look, optics, a, drop_of(drops, cells, a, k, optics.spacing,
-                     motion[0], motion[1]), 0)  # fmt: skip
+                walk(
+                    pixels,
+                    surface,
+                    drops,
+                    cells,
+                    lens,
+                    look,
+                    optics,
+                    a,
+                    drop_of(drops, cells, a, k, optics.spacing, motion[0], motion[1]),
+                    0,
+                )
     for a in range(count):
         if drops.lone[a] == 1 and way_of(lens, drops, cells, a, motion[2]).norm() <= motion[3]:
             for k in range(6):
-                walk(pixels, surface, drops, cells, lens, look, optics, a, drop_of(drops, cells, a, k, optics.spacing,
-                     motion[0], motion[1]), 1)  # fmt: skip
+                walk(
+                    pixels,
+                    surface,
+                    drops,
+                    cells,
+                    lens,
+                    look,
+                    optics,
+                    a,
+                    drop_of(drops, cells, a, k, optics.spacing, motion[0], motion[1]),
+                    1,
+                )
     for a in range(count):
         if drops.lone[a] == 1 and way_of(lens, drops, cells, a, motion[2]).norm() <= motion[3]:
             for k in range(6):
-                walk(pixels, surface, drops, cells, lens, look, optics, a, drop_of(drops, cells, a, k, optics.spacing,
-                     motion[0], motion[1]), 2)  # fmt: skip
+                walk(
+                    pixels,
+                    surface,
+                    drops,
+                    cells,
+                    lens,
+                    look,
+                    optics,
+                    a,
+                    drop_of(drops, cells, a, k, optics.spacing, motion[0], motion[1]),
+                    2,
+                )
 
 
 @qd.func
 def walk(
-    pixels: Pixels, surface: WaterSurface, drops: Drops, cells: Cells, lens: Lens, look: Look, optics: Optics, a, drop,
+    pixels: Pixels,
+    surface: WaterSurface,
+    drops: Drops,
+    cells: Cells,
+    lens: Lens,
+    look: Look,
+    optics: Optics,
+    a,
+    drop,
     part: qd.template(),
-):  # fmt: skip
+):
     """Go over the pixels of a drop: 0 to find whose they are, 1 to shade the own ones, 2 to lay them over the picture.
 
     What is a pixel wide or less is as faint as it is small.

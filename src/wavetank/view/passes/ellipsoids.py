@@ -65,10 +65,19 @@ def draw(shot: Shot, buffers: Buffers) -> None:
 
 def shape(dim: int, d: float) -> Shape:
     """Return the sizes of the ellipsoids of particles with the spacing `d` [m]."""
-    return remembered(Shape(
-        spacing=d, reach=REACH * d, least=LEAST * d, growth=(WIDEST[dim] - LEAST) * d, ball=BALL * d,
-        beyond=BEYOND * d, mirrored=MIRRORED * d, depth_2d=DEPTH_2D * d, full=FULL[dim],
-    ))  # fmt: skip
+    return remembered(
+        Shape(
+            spacing=d,
+            reach=REACH * d,
+            least=LEAST * d,
+            growth=(WIDEST[dim] - LEAST) * d,
+            ball=BALL * d,
+            beyond=BEYOND * d,
+            mirrored=MIRRORED * d,
+            depth_2d=DEPTH_2D * d,
+            full=FULL[dim],
+        )
+    )
 
 
 @qd.kernel(fastcache=True)
@@ -241,14 +250,6 @@ def squared(diagonal, side):
     """Square of a symmetric matrix: its diagonal, and its xy, xz, yz."""
     d, s = diagonal, side
     return (
-        vec3(
-            d.x * d.x + s.x * s.x + s.y * s.y,
-            d.y * d.y + s.x * s.x + s.z * s.z,
-            d.z * d.z + s.y * s.y + s.z * s.z,
-        ),
-        vec3(
-            s.x * (d.x + d.y) + s.y * s.z,
-            s.y * (d.x + d.z) + s.x * s.z,
-            s.z * (d.y + d.z) + s.x * s.y,
-        ),
-    )  # fmt: skip
+        vec3(d.x * d.x + s.x * s.x + s.y * s.y, d.y * d.y + s.x * s.x + s.z * s.z, d.z * d.z + s.y * s.y + s.z * s.z),
+        vec3(s.x * (d.x + d.y) + s.y * s.z, s.y * (d.x + d.z) + s.x * s.z, s.z * (d.y + d.z) + s.x * s.y),
+    )

@@ -72,9 +72,7 @@ def even(depth: Any, spare: Any, lens: Lens, walls: Box, sigma: float, d: float)
 
 
 @qd.kernel(fastcache=True)
-def straighten(
-    depth: qd.types.ndarray(), strips: Strips, lens: Lens, walls: Box, margin: qd.f32, lanes: qd.template()
-):  # fmt: skip
+def straighten(depth: qd.types.ndarray(), strips: Strips, lens: Lens, walls: Box, margin: qd.f32, lanes: qd.template()):
     """Put q in the place of depth; 0 (or far below any other) where there is no water.
 
     The last three bits say how far the surface lies before the tank: 0 up to `margin` / 2 [m], 7 from 3/2 of it on.
@@ -166,9 +164,17 @@ def alike(bend, apart, grain, window: Window):
 
 @qd.kernel(fastcache=True)
 def blur(
-    result: qd.types.ndarray(), depth: qd.types.ndarray(), strips: Strips, lens: Lens, window: Window,
-    down: qd.i32, across: qd.i32, clean: qd.i32, final: qd.i32, lanes: qd.template(),
-):  # fmt: skip
+    result: qd.types.ndarray(),
+    depth: qd.types.ndarray(),
+    strips: Strips,
+    lens: Lens,
+    window: Window,
+    down: qd.i32,
+    across: qd.i32,
+    clean: qd.i32,
+    final: qd.i32,
+    lanes: qd.template(),
+):
     """Blur q along rows or columns; the `final` round puts depth in its place.
 
     Pixels of a row come `lanes` at a time as vectors where all of them take the same steps, none of which leaves the
@@ -184,7 +190,7 @@ def blur(
                 if begin + lanes <= columns:
                     together = blur_together(
                         result, depth, lens, window, row, begin, left_end, right_end, down, across, clean, final, lanes
-                    )  # fmt: skip
+                    )
             if together == 0:
                 for column in range(left_end, right_end):
                     key = depth[row, column]
@@ -216,9 +222,20 @@ def blur(
 
 @qd.func
 def blur_together(
-    result: qd.template(), depth: qd.template(), lens: Lens, window: Window, row, begin, first, end,
-    down, across, clean, final, lanes: qd.template(),
-):  # fmt: skip
+    result: qd.template(),
+    depth: qd.template(),
+    lens: Lens,
+    window: Window,
+    row,
+    begin,
+    first,
+    end,
+    down,
+    across,
+    clean,
+    final,
+    lanes: qd.template(),
+):
     """Blur the pixels of a row from `begin` on, `lanes` of them, and return 1; 0 where they do not go together.
 
     Those from `first` to `end` are written: what others are in a strip, or in none, does not change them.

@@ -112,9 +112,18 @@ def lay(shot: Shot, buffers: Buffers, depth: Any, sunk: float, shutter: float) -
     maps.sums.fill(0)
     maps.relief.fill(0)
     splat(
-        maps, frame.diffuse, depth, pixels.depth, buffers.sun_depth, shot.lens, shot.sun, shot.walls, froth,
-        frame.dim, frame.foam_count,
-    )  # fmt: skip
+        maps,
+        frame.diffuse,
+        depth,
+        pixels.depth,
+        buffers.sun_depth,
+        shot.lens,
+        shot.sun,
+        shot.walls,
+        froth,
+        frame.dim,
+        frame.foam_count,
+    )
     shape(maps, shot.lens, shot.look, rows, columns, frame.dim)
     blend(pixels, maps, depth, strips_of(maps.sums), froth)
 
@@ -124,14 +133,28 @@ def froth_of(shot: Shot, buffers: Buffers, sunk: float, shutter: float) -> Froth
     frame, look, d, flat = shot.frame, shot.look, shot.extent.spacing, shot.frame.dim == 2
     height = buffers.rows / buffers.supersample
     in_sun, in_sky = vector(*(ALBEDO * look.sun)), vector(*(ALBEDO * look.sky))
-    return remembered(Froth(
-        size=SIZE[frame.dim] * d, deepest=IN_FRONT if flat else DEEPEST * d, sunk=sunk, fine=max(FINE * height, 0.8),
-        largest=max(LARGEST * height, 1.0), shutter=OPEN * shutter or SHUTTER * frame.scene.frame_time,
-        least=SOFT if shutter else SHARP, in_sun=in_sun, in_sky=in_sky,
-        in_air=PALE, swallow=vector(*(0.5 * d * shot.absorption * (not flat))),
-        line_strength=look.line_strength if frame.scene.tank else 0.0, slack=slack(shot), samples=buffers.supersample,
-        grain=grain_of(shot, buffers.supersample), parts=PARTS, most_parts=MOST_PARTS, flat=int(flat),
-    ))  # fmt: skip
+    return remembered(
+        Froth(
+            size=SIZE[frame.dim] * d,
+            deepest=IN_FRONT if flat else DEEPEST * d,
+            sunk=sunk,
+            fine=max(FINE * height, 0.8),
+            largest=max(LARGEST * height, 1.0),
+            shutter=OPEN * shutter or SHUTTER * frame.scene.frame_time,
+            least=SOFT if shutter else SHARP,
+            in_sun=in_sun,
+            in_sky=in_sky,
+            in_air=PALE,
+            swallow=vector(*(0.5 * d * shot.absorption * (not flat))),
+            line_strength=look.line_strength if frame.scene.tank else 0.0,
+            slack=slack(shot),
+            samples=buffers.supersample,
+            grain=grain_of(shot, buffers.supersample),
+            parts=PARTS,
+            most_parts=MOST_PARTS,
+            flat=int(flat),
+        )
+    )
 
 
 @qd.func
@@ -148,9 +171,7 @@ def size_and_strength(kind, share, number):
 
 
 @qd.kernel(fastcache=True)
-def take(
-    sunlit: SunlitWater, diffuse: Diffuse, sun: Lens, size: qd.f32, caustic: qd.f32, count: qd.i32
-):  # fmt: skip
+def take(sunlit: SunlitWater, diffuse: Diffuse, sun: Lens, size: qd.f32, caustic: qd.f32, count: qd.i32):
     """Spread every particle's optical depth over the texels of the sun's view around it, as smooth as a spline, and
     take from the light that gathers there, as it is shown with the strength `caustic`, what so much froth keeps.
 
@@ -221,8 +242,9 @@ def share_seen(behind, deepest):
 
 
 @qd.func
-def add_disc(maps: FoamMaps, c, middle, wide, strength, light, depth: qd.template(), solid_depth: qd.template(),
-             froth: Froth):  # fmt: skip
+def add_disc(
+    maps: FoamMaps, c, middle, wide, strength, light, depth: qd.template(), solid_depth: qd.template(), froth: Froth
+):
     """Add a disc to the pixels it covers, and return what a pixel in its middle would get of it, in 1/4096."""
     rows, columns, samples = maps.sums.shape[0], maps.sums.shape[1], froth.samples
     low_row = qd.max(qd.cast(qd.ceil(qd.max(middle.y - wide - 0.5, -1.0)), qd.i32), 0)
@@ -253,10 +275,18 @@ def add_disc(maps: FoamMaps, c, middle, wide, strength, light, depth: qd.templat
 
 @qd.kernel(fastcache=True)
 def splat(
-    maps: FoamMaps, diffuse: Diffuse, depth: qd.types.ndarray(), solid_depth: qd.types.ndarray(),
-    sun_depth: qd.types.ndarray(), lens: Lens, sun: Lens, walls: Box, froth: Froth, dim: qd.template(),
+    maps: FoamMaps,
+    diffuse: Diffuse,
+    depth: qd.types.ndarray(),
+    solid_depth: qd.types.ndarray(),
+    sun_depth: qd.types.ndarray(),
+    lens: Lens,
+    sun: Lens,
+    walls: Box,
+    froth: Froth,
+    dim: qd.template(),
     count: qd.i32,
-):  # fmt: skip
+):
     """Add the optical depth of every particle to the pixels it covers, and to the relief."""
     d, samples, grain = froth.size, froth.samples, froth.grain
     for i in range(count):
@@ -267,9 +297,11 @@ def splat(
             scale = d * pixels_per_metre(lens, c.z) / samples  # px of a spacing
             middle, reach = to_pixel(lens, c) / samples, 1.5 * scale + 2.0
             if (
-                middle.x > -reach and middle.y > -reach
-                and middle.x < maps.sums.shape[1] + reach and middle.y < maps.sums.shape[0] + reach
-            ):  # fmt: skip
+                middle.x > -reach
+                and middle.y > -reach
+                and middle.x < maps.sums.shape[1] + reach
+                and middle.y < maps.sums.shape[0] + reach
+            ):
                 # As many discs as keep each of them small; all together cover what one of that radius would.
                 parts = qd.min(qd.max((radius * scale / froth.fine) ** 2, froth.parts), froth.most_parts)
                 each = radius * scale * qd.sqrt(1.0 / parts)
@@ -298,9 +330,11 @@ def splat(
                         down, across = row + n // 2, column + n % 2
                         share = (1.0 - qd.abs(texel.y - down)) * (1.0 - qd.abs(texel.x - across))
                         if (
-                            down >= 0 and across >= 0 and down * grain < maps.sums.shape[0]
+                            down >= 0
+                            and across >= 0
+                            and down * grain < maps.sums.shape[0]
                             and across * grain < maps.sums.shape[1]
-                        ):  # fmt: skip
+                        ):
                             qd.atomic_add(maps.relief[down, across], qd.cast(qd.min(share * per, 1e6) + 0.5, qd.i32))
 
 
@@ -327,8 +361,9 @@ def shape(maps: FoamMaps, lens: Lens, look: Look, rows: qd.i32, columns: qd.i32,
                 height_at(maps, row, column + 1, rows, columns),
             )
             above, below = (
-                height_at(maps, row - 1, column, rows, columns), height_at(maps, row + 1, column, rows, columns)
-            )  # fmt: skip
+                height_at(maps, row - 1, column, rows, columns),
+                height_at(maps, row + 1, column, rows, columns),
+            )
             # Foam lies on water: its plain faces up as much as the eye.
             n = from_view(lens, vec3(left - right, below - above, -0.35)) + vec3(0.0, 0.35, 0.0)
             n = n.normalized(1e-6)

@@ -35,16 +35,21 @@ def fill(shot: Shot, buffers: Buffers, light: Light) -> None:
     """Fill the second component of `light`."""
     reach = max(5.0 * shot.radius, 0.05 * shot.extent.radius)
     look_around(
-        light, buffers.pixels, strips_of(light.share), shot.lens, shot.box, reach, shot.look.shade_depth,
-        buffers.probes,
-    )  # fmt: skip
+        light, buffers.pixels, strips_of(light.share), shot.lens, shot.box, reach, shot.look.shade_depth, buffers.probes
+    )
 
 
 @qd.kernel(fastcache=True)
 def look_around(
-    light: Light, pixels: Pixels, strips: Strips, lens: Lens, world: Box, reach: qd.f32, strength: qd.f32,
+    light: Light,
+    pixels: Pixels,
+    strips: Strips,
+    lens: Lens,
+    world: Box,
+    reach: qd.f32,
+    strength: qd.f32,
     probes: qd.template(),
-):  # fmt: skip
+):
     """Sum up what stands in the way of the sky around every visible point."""
     rows, columns = pixels.depth.shape[0], pixels.depth.shape[1]
     for task in range(strips.count):

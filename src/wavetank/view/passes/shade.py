@@ -19,9 +19,13 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     """Turn `color` into radiance."""
     middle = shot.extent.middle
     shade(
-        buffers.pixels, buffers.with_light(), shot.lens, shot.look, vector(middle[0], 0.0, middle[2]),
+        buffers.pixels,
+        buffers.with_light(),
+        shot.lens,
+        shot.look,
+        vector(middle[0], 0.0, middle[2]),
         shot.extent.radius,
-    )  # fmt: skip
+    )
 
 
 @qd.kernel(fastcache=True)

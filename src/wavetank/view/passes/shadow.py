@@ -36,9 +36,17 @@ def fill(shot: Shot, buffers: Buffers, light: Light) -> None:
     else:
         look = shot.look
         receive(
-            light, buffers.pixels, buffers.sun_depth, strips_of(light.share), shot.lens, shot.sun, look.to_sun,
-            look.sun_size, 0.3 * shot.radius, buffers.probes,
-        )  # fmt: skip
+            light,
+            buffers.pixels,
+            buffers.sun_depth,
+            strips_of(light.share),
+            shot.lens,
+            shot.sun,
+            look.to_sun,
+            look.sun_size,
+            0.3 * shot.radius,
+            buffers.probes,
+        )
 
 
 @qd.kernel(fastcache=True)
@@ -50,9 +58,17 @@ def shine(light: Light):
 
 @qd.kernel(fastcache=True)
 def receive(
-    light: Light, pixels: Pixels, sun_depth: qd.types.ndarray(), strips: Strips, lens: Lens, sun: Lens, to_sun: vec3,
-    sun_size: qd.f32, lift: qd.f32, probes: qd.template(),
-):  # fmt: skip
+    light: Light,
+    pixels: Pixels,
+    sun_depth: qd.types.ndarray(),
+    strips: Strips,
+    lens: Lens,
+    sun: Lens,
+    to_sun: vec3,
+    sun_size: qd.f32,
+    lift: qd.f32,
+    probes: qd.template(),
+):
     """Compare visible points with the sun's depth map: those that `light` is kept of."""
     texels = sun_depth.shape[0]
     for task in range(strips.count):

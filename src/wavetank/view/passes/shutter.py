@@ -66,11 +66,20 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     water, motion = water_of(buffers, shot), buffers.motion
     surface = water.surface
     grain, samples = max(4, grain_of(shot, buffers.supersample)), buffers.supersample
-    shutter = remembered(Shutter(
-        open=float(open_for), visible=VISIBLE * shot.extent.spacing, longest=LONGEST * buffers.rows / samples,
-        least=LEAST, grain=grain, samples=samples, cuts=CUTS, unit=UNIT, white=WHITE,
-        slack=slack(shot),
-    ))  # fmt: skip
+    shutter = remembered(
+        Shutter(
+            open=float(open_for),
+            visible=VISIBLE * shot.extent.spacing,
+            longest=LONGEST * buffers.rows / samples,
+            least=LEAST,
+            grain=grain,
+            samples=samples,
+            cuts=CUTS,
+            unit=UNIT,
+            white=WHITE,
+            slack=slack(shot),
+        )
+    )
     rows, columns = (size // samples // grain + 2 for size in (buffers.rows, buffers.columns))
     begin(motion, rows, columns)
     gather(motion, surface.nearest, water.drops(frame), water.cells, shot.lens, shutter, frame.count)
@@ -88,9 +97,8 @@ def begin(motion: Motion, rows: qd.i32, columns: qd.i32):
 
 @qd.kernel(fastcache=True)
 def gather(
-    motion: Motion, nearest: qd.types.ndarray(), drops: Drops, cells: Cells, lens: Lens, shutter: Shutter,
-    count: qd.i32,
-):  # fmt: skip
+    motion: Motion, nearest: qd.types.ndarray(), drops: Drops, cells: Cells, lens: Lens, shutter: Shutter, count: qd.i32
+):
     """Add up the ways of all particles that the eye sees, but for drops, which have their own."""
     for a in range(count):
         c = to_view(lens, cells.x[a])
@@ -152,9 +160,17 @@ def moves(way: qd.template(), row, column, rows, columns, least):
 
 @qd.kernel(fastcache=True)
 def smear(
-    pixels: Pixels, surface: WaterSurface, motion: Motion, lens: Lens, look: Look, walls: Box, shutter: Shutter,
-    rows: qd.i32, columns: qd.i32, samples: qd.template(),
-):  # fmt: skip
+    pixels: Pixels,
+    surface: WaterSurface,
+    motion: Motion,
+    lens: Lens,
+    look: Look,
+    walls: Box,
+    shutter: Shutter,
+    rows: qd.i32,
+    columns: qd.i32,
+    samples: qd.template(),
+):
     """Average along the ways; `pixels.normal` and `surface.rim` hold what is new meanwhile."""
     grain = shutter.grain
     high, wide = pixels.depth.shape[0] // samples, pixels.depth.shape[1] // samples

@@ -28,9 +28,16 @@ def even(shot: Shot, buffers: Buffers, light: Light) -> None:
 
 @qd.kernel(fastcache=True)
 def average(
-    result: qd.types.ndarray(), light: qd.types.ndarray(), pixels: Pixels, strips: Strips, lens: Lens, radius: qd.f32,
-    down: qd.i32, across: qd.i32, step: qd.i32,
-):  # fmt: skip
+    result: qd.types.ndarray(),
+    light: qd.types.ndarray(),
+    pixels: Pixels,
+    strips: Strips,
+    lens: Lens,
+    radius: qd.f32,
+    down: qd.i32,
+    across: qd.i32,
+    step: qd.i32,
+):
     """Average over four pixels in one direction, those that lie on the same surface."""
     rows, columns = light.shape[0], light.shape[1]
     for task in range(strips.count):

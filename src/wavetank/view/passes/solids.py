@@ -59,10 +59,16 @@ def draw_glass(shot: Shot, buffers: Buffers) -> None:
     if shot.frame.dim == 3 and is_glass.any():
         paints = np.where(is_glass[:, None], traced_colors(shot), np.float32(-1.0))
         lay_glass(
-            buffers.pixels, water_of(buffers, shot).surface.nearest, buffers.solid_box,
-            strips_of(buffers.pixels.depth), shot.frame.solids, window(shot), shot.lens, shot.look,
+            buffers.pixels,
+            water_of(buffers, shot).surface.nearest,
+            buffers.solid_box,
+            strips_of(buffers.pixels.depth),
+            shot.frame.solids,
+            window(shot),
+            shot.lens,
+            shot.look,
             buffers.glass_paints.of(paints),
-        )  # fmt: skip
+        )
 
 
 def lower_depth(shot: Shot, buffers: Buffers, lens: Lens, depth: Any, is_seen: int) -> None:
@@ -70,9 +76,7 @@ def lower_depth(shot: Shot, buffers: Buffers, lens: Lens, depth: Any, is_seen: i
     solids = shot.frame.solids
     if solids.count > solids.tank_count:
         paints = buffers.paints.of(colors_of(shot))
-        trace(
-            depth, buffers.pixels, buffers.solid_box, strips_of(depth), solids, window(shot), lens, paints, is_seen,
-        )  # fmt: skip
+        trace(depth, buffers.pixels, buffers.solid_box, strips_of(depth), solids, window(shot), lens, paints, is_seen)
 
 
 def window(shot: Shot) -> Window:
@@ -200,9 +204,16 @@ def find_box(box: qd.template(), solids: SolidSet, lens: Lens, rows, columns):
 
 @qd.kernel(fastcache=True)
 def trace(
-    depth: qd.types.ndarray(), pixels: Pixels, box: qd.types.ndarray(), strips: Strips, solids: SolidSet,
-    window: Window, lens: Lens, paints: qd.types.ndarray(), is_seen: qd.i32,
-):  # fmt: skip
+    depth: qd.types.ndarray(),
+    pixels: Pixels,
+    box: qd.types.ndarray(),
+    strips: Strips,
+    solids: SolidSet,
+    window: Window,
+    lens: Lens,
+    paints: qd.types.ndarray(),
+    is_seen: qd.i32,
+):
     """Lower `depth` to that of the nearest solid; with `is_seen` it is that of `pixels`, where the solid is drawn.
 
     One kernel for eye and sun, because tracing takes long to compile.
@@ -224,9 +235,16 @@ def trace(
 
 @qd.kernel(fastcache=True)
 def lay_glass(
-    pixels: Pixels, nearest: qd.types.ndarray(), box: qd.types.ndarray(), strips: Strips, solids: SolidSet,
-    window: Window, lens: Lens, look: Look, paints: qd.types.ndarray(),
-):  # fmt: skip
+    pixels: Pixels,
+    nearest: qd.types.ndarray(),
+    box: qd.types.ndarray(),
+    strips: Strips,
+    solids: SolidSet,
+    window: Window,
+    lens: Lens,
+    look: Look,
+    paints: qd.types.ndarray(),
+):
     """Lay what has no negative paint over the picture, where nothing stands before it.
 
     What is seen passes two faces of the wall, is coloured more where it passes aslant, and both faces mirror.

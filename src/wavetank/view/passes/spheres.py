@@ -71,9 +71,13 @@ def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
 
 @qd.kernel(fastcache=True)
 def show_ice(
-    seen: qd.types.ndarray(), x: qd.types.ndarray(), frozen: qd.types.ndarray(), lens: Lens, dim: qd.template(),
+    seen: qd.types.ndarray(),
+    x: qd.types.ndarray(),
+    frozen: qd.types.ndarray(),
+    lens: Lens,
+    dim: qd.template(),
     count: qd.i32,
-):  # fmt: skip
+):
     """Write the places of ice, and one that no eye sees for all else."""
     for i in range(count):
         for k in qd.static(range(dim)):
@@ -122,9 +126,16 @@ def claim(pixels: Pixels, x: qd.types.ndarray(), lens: Lens, radius: qd.f32, lar
 
 @qd.kernel(fastcache=True)
 def paint(
-    pixels: Pixels, x: qd.types.ndarray(), v: qd.types.ndarray(), rho: qd.types.ndarray(),
-    material: qd.types.ndarray(), dye: qd.types.ndarray(), lens: Lens, coloring: Coloring, quantity: qd.template(),
-):  # fmt: skip
+    pixels: Pixels,
+    x: qd.types.ndarray(),
+    v: qd.types.ndarray(),
+    rho: qd.types.ndarray(),
+    material: qd.types.ndarray(),
+    dye: qd.types.ndarray(),
+    lens: Lens,
+    coloring: Coloring,
+    quantity: qd.template(),
+):
     """Give every pixel of a particle its normal and the colour of its quantity."""
     for row, column in qd.ndrange(pixels.depth.shape[0], pixels.depth.shape[1]):
         i = pixels.surface[row, column]

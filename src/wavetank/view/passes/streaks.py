@@ -42,9 +42,19 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     motion = motion_of(shot.shutter, buffers.supersample)
     bound(seen, sums, drops, water.cells, shot.lens, optics, motion, frame.count)
     lay(
-        buffers.pixels, sums, water.surface, seen, strips_of(sums.sums), drops, water.cells, shot.lens, shot.look,
-        optics, motion, frame.count,
-    )  # fmt: skip
+        buffers.pixels,
+        sums,
+        water.surface,
+        seen,
+        strips_of(sums.sums),
+        drops,
+        water.cells,
+        shot.lens,
+        shot.look,
+        optics,
+        motion,
+        frame.count,
+    )
 
 
 @qd.func
@@ -62,9 +72,15 @@ def share_before(x):
 
 @qd.kernel(fastcache=True)
 def bound(
-    seen: qd.types.ndarray(), sums: FoamMaps, drops: Drops, cells: Cells, lens: Lens, optics: Optics, motion: vec4,
+    seen: qd.types.ndarray(),
+    sums: FoamMaps,
+    drops: Drops,
+    cells: Cells,
+    lens: Lens,
+    optics: Optics,
+    motion: vec4,
     count: qd.i32,
-):  # fmt: skip
+):
     """Find the box of the picture outside of which there is no streak; `motion` is that of `motion_of`."""
     samples, rows, columns = optics.samples, sums.sums.shape[0], sums.sums.shape[1]
     for k in range(4):
@@ -102,9 +118,19 @@ def strip_seen(strips: Strips, task, seen: qd.template(), rows, columns):
 
 @qd.kernel(fastcache=True)
 def lay(
-    pixels: Pixels, sums: FoamMaps, surface: WaterSurface, seen: qd.types.ndarray(), strips: Strips, drops: Drops,
-    cells: Cells, lens: Lens, look: Look, optics: Optics, motion: vec4, count: qd.i32,
-):  # fmt: skip
+    pixels: Pixels,
+    sums: FoamMaps,
+    surface: WaterSurface,
+    seen: qd.types.ndarray(),
+    strips: Strips,
+    drops: Drops,
+    cells: Cells,
+    lens: Lens,
+    look: Look,
+    optics: Optics,
+    motion: vec4,
+    count: qd.i32,
+):
     """Add up the streaks of every pixel, and lay their sum over it; `motion` is that of `motion_of`."""
     samples, rows, columns = optics.samples, sums.sums.shape[0], sums.sums.shape[1]
     for task in range(strips.count):
@@ -151,9 +177,17 @@ def between(row, samples, middle, along, wide, left, right):
 
 @qd.func
 def lines(
-    pixels: Pixels, surface: WaterSurface, drops: Drops, cells: Cells, lens: Lens, look: Look, optics: Optics, a, drop,
+    pixels: Pixels,
+    surface: WaterSurface,
+    drops: Drops,
+    cells: Cells,
+    lens: Lens,
+    look: Look,
+    optics: Optics,
+    a,
+    drop,
     way,
-):  # fmt: skip
+):
     """Mean radiance of a drop along three lines that go its way: at its left, through its middle, at its right.
 
     What a long streak shows changes across it alone.
@@ -178,9 +212,21 @@ def lines(
 
 @qd.func
 def add(
-    pixels: Pixels, sums: FoamMaps, surface: WaterSurface, drops: Drops, cells: Cells, lens: Lens, look: Look,
-    optics: Optics, a, drop, way, low, mid, high,
-):  # fmt: skip
+    pixels: Pixels,
+    sums: FoamMaps,
+    surface: WaterSurface,
+    drops: Drops,
+    cells: Cells,
+    lens: Lens,
+    look: Look,
+    optics: Optics,
+    a,
+    drop,
+    way,
+    low,
+    mid,
+    high,
+):
     """Add a drop to the pixels of the picture that it passes; `low`, `mid` and `high` are what `lines` found."""
     c, r, samples = to_view(lens, vec3(drop[0], drop[1], drop[2])), drop[3], optics.samples
     if c.z > lens.near + 2.0 * r:
@@ -218,9 +264,20 @@ def add(
                         moved = 0.5 * (qd.max(u - half, -long) + qd.min(u + half, long)) / scale
                         there = vec3(c.x + moved * along.x, c.y - moved * along.y, c.z)
                         seen = shine(
-                            pixels, surface, drops, cells, lens, look, optics, a, place.y - 0.5, place.x - 0.5, there,
-                            wide / scale, rough + (qd.min(half, long) / wide) ** 2 / 3.0,
-                        )  # fmt: skip
+                            pixels,
+                            surface,
+                            drops,
+                            cells,
+                            lens,
+                            look,
+                            optics,
+                            a,
+                            place.y - 0.5,
+                            place.x - 0.5,
+                            there,
+                            wide / scale,
+                            rough + (qd.min(half, long) / wide) ** 2 / 3.0,
+                        )
                     cover *= 1.0 - look.line_strength * line_cover(pixels.lines[down, across], c.z, optics.slack)
                     tau = 4096.0 * cover * (6.0 - cover) / (6.0 - 4.0 * cover)
                     qd.atomic_add(surface.rim[row * samples, column * samples], qd.cast(tau + 0.5, qd.i32))

@@ -64,20 +64,38 @@ def see(shot: Shot, ellipsoids: Ellipsoids, lens: Lens, depth: Any, rim: Any, lo
     Without `lone` particles these are left to the drops.
     """
     count, turns = shot.frame.count, max(threads(), 1)
-    limits = remembered(Limits(
-        largest=max(LARGEST * depth.shape[0], 2.0), away=AWAY, lone=int(lone), gap=GAP * shot.extent.spacing,
-    ))  # fmt: skip
+    limits = remembered(
+        Limits(largest=max(LARGEST * depth.shape[0], 2.0), away=AWAY, lone=int(lone), gap=GAP * shot.extent.spacing)
+    )
     splat(
-        depth, depth if rim is None else rim, ellipsoids, strips_of(depth), lens, shot.walls, limits,
-        int(rim is not None), turns, -(-count // turns), count,
-    )  # fmt: skip
+        depth,
+        depth if rim is None else rim,
+        ellipsoids,
+        strips_of(depth),
+        lens,
+        shot.walls,
+        limits,
+        int(rim is not None),
+        turns,
+        -(-count // turns),
+        count,
+    )
 
 
 @qd.kernel(fastcache=True)
 def splat(
-    depth: qd.types.ndarray(), rim: qd.types.ndarray(), ellipsoids: Ellipsoids, strips: Strips, lens: Lens,
-    walls: Box, limits: Limits, soft: qd.template(), turns: qd.i32, run: qd.i32, count: qd.i32,
-):  # fmt: skip
+    depth: qd.types.ndarray(),
+    rim: qd.types.ndarray(),
+    ellipsoids: Ellipsoids,
+    strips: Strips,
+    lens: Lens,
+    walls: Box,
+    limits: Limits,
+    soft: qd.template(),
+    turns: qd.i32,
+    run: qd.i32,
+    count: qd.i32,
+):
     """Lower `depth` to the front of every ellipsoid that may be seen, and of its mirror image.
 
     Threads take turns, so that each begins at the near end: ellipsoids are sorted by place, and what is near hides
@@ -135,9 +153,8 @@ def may_be_seen(ellipsoids: Ellipsoids, i, image, lens: Lens, walls: Box, away):
 
 @qd.func
 def fill_ellipse(
-    depth: qd.template(), rim: qd.template(), ellipsoids: Ellipsoids, i, lens: Lens, limits: Limits,
-    part: qd.template(),
-):  # fmt: skip
+    depth: qd.template(), rim: qd.template(), ellipsoids: Ellipsoids, i, lens: Lens, limits: Limits, part: qd.template()
+):
     """Lower `depth` to that of one ellipsoid, or raise `rim` to the share of a pixel that its outline covers.
 
     Part 0 takes the pixels whose centres lie inside. Part 1 takes those that are covered as a whole, as if the outline

@@ -110,6 +110,12 @@ def blend(pixels: Pixels, lens: Lens, look: Look, box: Box):
     for row, column in qd.ndrange(pixels.depth.shape[0], pixels.depth.shape[1]):
         ray = view_ray(lens, row, column)
         pixels.color[row, column] = with_tank(
-            lens, look, box, ray_origin(lens, ray), ray_direction(lens, ray),
-            qd.bit_cast(pixels.depth[row, column], qd.f32), pixels.lines[row, column], pixels.color[row, column],
-        )  # fmt: skip
+            lens,
+            look,
+            box,
+            ray_origin(lens, ray),
+            ray_direction(lens, ray),
+            qd.bit_cast(pixels.depth[row, column], qd.f32),
+            pixels.lines[row, column],
+            pixels.color[row, column],
+        )

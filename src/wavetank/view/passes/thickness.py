@@ -60,9 +60,15 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         disc = remembered(Disc(radius=WIDE * d, peak=peak(3), coarse=float(fineness(shot)), lone=lone))
         begin(water.thickness.edge, water.surface.depth, shot.lens, shot.walls, fineness(shot))
         part_front(
-            water.thickness, water.cells, water.ellipsoids.lone, shot.frame.material, shot.lens, disc,
-            (1.0 if dim == 3 else 0.0) / (FRONT * d), shot.frame.count,
-        )  # fmt: skip
+            water.thickness,
+            water.cells,
+            water.ellipsoids.lone,
+            shot.frame.material,
+            shot.lens,
+            disc,
+            (1.0 if dim == 3 else 0.0) / (FRONT * d),
+            shot.frame.count,
+        )
 
 
 def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
@@ -81,9 +87,16 @@ def add_up(shot: Shot, water: WaterBuffers, thickness: Thickness, lens: Lens, co
     rows, columns = thickness.water.shape
     parts = int(thickness.sums.shape[0]) // int(rows * columns)
     add(
-        thickness, cells.x, water.ellipsoids.lone, strips_of(thickness.water), lens, disc, parts, int(threads() > 0),
+        thickness,
+        cells.x,
+        water.ellipsoids.lone,
+        strips_of(thickness.water),
+        lens,
+        disc,
+        parts,
+        int(threads() > 0),
         frame.count,
-    )  # fmt: skip
+    )
     stain(thickness, cells, water.ellipsoids.lone, frame.dye, lens, disc, frame.count)
     if thickness.fluids:
         part(thickness, cells, water.ellipsoids.lone, frame.material, lens, disc, frame.count)
@@ -124,9 +137,16 @@ def thickness_in(at, row, column):
 
 @qd.kernel(fastcache=True)
 def add(
-    thickness: Thickness, x: qd.types.ndarray(), alone: qd.types.ndarray(), strips: Strips, lens: Lens, disc: Disc,
-    parts: qd.i32, shared_out: qd.template(), count: qd.i32,
-):  # fmt: skip
+    thickness: Thickness,
+    x: qd.types.ndarray(),
+    alone: qd.types.ndarray(),
+    strips: Strips,
+    lens: Lens,
+    disc: Disc,
+    parts: qd.i32,
+    shared_out: qd.template(),
+    count: qd.i32,
+):
     """Add up every particle's disc.
 
     Where the particles are `shared_out`, each of their `parts` has sums of its own, and no thread waits for another.
@@ -174,9 +194,14 @@ def add(
 
 @qd.kernel(fastcache=True)
 def stain(
-    thickness: Thickness, cells: Cells, alone: qd.types.ndarray(), dyes: qd.types.ndarray(), lens: Lens, disc: Disc,
+    thickness: Thickness,
+    cells: Cells,
+    alone: qd.types.ndarray(),
+    dyes: qd.types.ndarray(),
+    lens: Lens,
+    disc: Disc,
     count: qd.i32,
-):  # fmt: skip
+):
     """Add up the discs of dyed particles, as strong as their dye, alone and times its colour.
 
     `thickness.stained` tells whether any is; where none is, `thickness.dye` holds nothing of use.
@@ -209,9 +234,14 @@ def stain(
 
 @qd.kernel(fastcache=True)
 def part(
-    thickness: Thickness, cells: Cells, alone: qd.types.ndarray(), materials: qd.types.ndarray(), lens: Lens,
-    disc: Disc, count: qd.i32,
-):  # fmt: skip
+    thickness: Thickness,
+    cells: Cells,
+    alone: qd.types.ndarray(),
+    materials: qd.types.ndarray(),
+    lens: Lens,
+    disc: Disc,
+    count: qd.i32,
+):
     """Add up the discs of each fluid's particles."""
     rows, columns = thickness.shares.shape[0], thickness.shares.shape[1]
     for row, column in qd.ndrange(rows, columns):
@@ -240,9 +270,15 @@ def begin(edge: qd.types.ndarray(), depth: qd.types.ndarray(), lens: Lens, walls
 
 @qd.kernel(fastcache=True)
 def part_front(
-    thickness: Thickness, cells: Cells, alone: qd.types.ndarray(), materials: qd.types.ndarray(), lens: Lens,
-    disc: Disc, per_depth: qd.f32, count: qd.i32,
-):  # fmt: skip
+    thickness: Thickness,
+    cells: Cells,
+    alone: qd.types.ndarray(),
+    materials: qd.types.ndarray(),
+    lens: Lens,
+    disc: Disc,
+    per_depth: qd.f32,
+    count: qd.i32,
+):
     """Add up each fluid's discs in what lies next behind the surface."""
     rows, columns = thickness.front.shape[0], thickness.front.shape[1]
     for row, column in qd.ndrange(rows, columns):

@@ -66,9 +66,13 @@ def neutral(color):
 
 @qd.kernel(fastcache=True)
 def develop(
-    picture: qd.types.ndarray(), color: qd.types.ndarray(), curve: qd.types.ndarray(),
-    samples: qd.template(), mapped: qd.template(), threes: qd.i32,
-):  # fmt: skip
+    picture: qd.types.ndarray(),
+    color: qd.types.ndarray(),
+    curve: qd.types.ndarray(),
+    samples: qd.template(),
+    mapped: qd.template(),
+    threes: qd.i32,
+):
     """Write the picture from `samples`^2 samples a pixel; `curve` encodes linear light as sRGB bytes.
 
     Four pixels of three bytes fill three words, so that the words in memory are the bytes of the picture.

@@ -46,18 +46,36 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     paints = buffers.paints.of(colors_of(shot)) if world == 4 else buffers.paints.device
     inside = water.same(Inside, walls, solids, paints, water.sun_thickness.water, buffers.sun_depth)
     lay(
-        pixels, water.surface, water.thickness, water.backdrop, water.sunlit,
-        strips_of(pixels.depth, GROUP * buffers.supersample, buffers.supersample), shot.lens, shot.water_sun, shot.look,
-        optics_of(shot, under_water(shot, buffers), buffers.supersample, buffers.supersample), inside,
+        pixels,
+        water.surface,
+        water.thickness,
+        water.backdrop,
+        water.sunlit,
+        strips_of(pixels.depth, GROUP * buffers.supersample, buffers.supersample),
+        shot.lens,
+        shot.water_sun,
+        shot.look,
+        optics_of(shot, under_water(shot, buffers), buffers.supersample, buffers.supersample),
+        inside,
         100 * int(buffers.supersample > 1) + 10 * int(water.thickness.fluids > 0) + world,
-    )  # fmt: skip
+    )
 
 
 @qd.kernel(fastcache=True)
 def lay(
-    pixels: Pixels, surface: WaterSurface, thickness: Thickness, backdrop: Backdrop, sunlit: SunlitWater,
-    strips: Strips, lens: Lens, sun: Lens, look: Look, optics: Optics, inside: Inside, world: qd.template(),
-):  # fmt: skip
+    pixels: Pixels,
+    surface: WaterSurface,
+    thickness: Thickness,
+    backdrop: Backdrop,
+    sunlit: SunlitWater,
+    strips: Strips,
+    lens: Lens,
+    sun: Lens,
+    look: Look,
+    optics: Optics,
+    inside: Inside,
+    world: qd.template(),
+):
     """Shade every pixel that shows water, and copy the backdrop to the others; `surface.nearest` is filled with the
     nearer of its depth and the backdrop's.
 
@@ -103,7 +121,7 @@ def lay(
                 if part == 0 and dry + optics.under == 0 and column >= 0 and column < pixels.depth.shape[1]:
                     even, even_z, even_normal = even_pixel(
                         pixels, surface, lens, look, optics, inside.walls, row, column, qd.static(world % 10)
-                    )  # fmt: skip
+                    )
             if dry == 0 and column >= 0 and column < pixels.depth.shape[1] and (part == 0 or even == 0):
                 middle = vec2(column + 0.5, row + 0.5)
                 result = backdrop.behind[row, column]
@@ -132,10 +150,7 @@ def lay(
                             if at_pane and z < ends[0] - optics.spacing:
                                 wet = 1.0
                             elif (at_pane and z < ends[0] + optics.spacing) or z > ends[1] - optics.spacing:
-                                rise, risen = (
-                                    rise_at(row, column, z, 3.0 * optics.spacing, surface.depth),
-                                    True,
-                                )
+                                rise, risen = (rise_at(row, column, z, 3.0 * optics.spacing, surface.depth), True)
                                 if at_pane and z < ends[0] + optics.spacing:
                                     wet = 1.0 - share_behind(z, ends[0], rise, vec2(turns.x, turns.y))
                                 if z > ends[1] - optics.spacing:
@@ -243,20 +258,25 @@ def lay(
                                     if fresh:
                                         kept_whole = found.x + calm(uneven) * (found.y - found.x)
                                         kept, kept_above, lead = through_body(
-                                            pixels.depth, backdrop.behind, sunlit.depth, lens, sun, look, optics,
-                                            inside, point, bent,
-                                            qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0), kept_whole, uneven,
+                                            pixels.depth,
+                                            backdrop.behind,
+                                            sunlit.depth,
+                                            lens,
+                                            sun,
+                                            look,
+                                            optics,
+                                            inside,
+                                            point,
+                                            bent,
+                                            qd.select(cosi < 0.6, ahead + 2.0 * cosi * n, 0.0),
+                                            kept_whole,
+                                            uneven,
                                             qd.static(world % 10 == 4),
-                                        )  # fmt: skip
+                                        )
                                         kept_z, kept_layer, kept_pixel = at, layer, pixel
                                         if at_end and share > 0.5:
                                             is_end = True
-                                            end, end_above, end_layer, end_pixel = (
-                                                kept,
-                                                kept_above,
-                                                layer,
-                                                pixel,
-                                            )
+                                            end, end_above, end_layer, end_pixel = (kept, kept_above, layer, pixel)
                                             new, new_of = lead, vec4(at, kept_whole, uneven, middle.x)
                                     if lies:
                                         body = seen_between(backdrop.behind, between, before, old, end, new)
@@ -267,10 +287,28 @@ def lay(
                                 if not between_all:
                                     rough = qd.select(shiny, uneven * uneven, 0.0)
                                     shone, passed = shine(
-                                        pixels, thickness, backdrop, sunlit, lens, sun, look, optics, inside,
-                                        middle, at, n, origin, direction, body, above, whole, uneven, rough,
-                                        qd.static(world % 10), qd.static(world % 100 >= 10),
-                                    )  # fmt: skip
+                                        pixels,
+                                        thickness,
+                                        backdrop,
+                                        sunlit,
+                                        lens,
+                                        sun,
+                                        look,
+                                        optics,
+                                        inside,
+                                        middle,
+                                        at,
+                                        n,
+                                        origin,
+                                        direction,
+                                        body,
+                                        above,
+                                        whole,
+                                        uneven,
+                                        rough,
+                                        qd.static(world % 10),
+                                        qd.static(world % 100 >= 10),
+                                    )
                                     result += share * shone
                                     if is_end and whole > 0.999 and not shiny:
                                         new_share, new_added = (
@@ -301,7 +339,7 @@ def lay(
 @qd.func
 def copied_dry(
     pixels: Pixels, surface: WaterSurface, behind: qd.template(), optics: Optics, band, first, wide, begin, last
-):  # fmt: skip
+):
     """Copy the backdrop to the pixels from the column `first` on, `wide` of them, if no water is seen there, and say
     whether that is so; those from `begin` to `last` are written.
     """

@@ -70,19 +70,27 @@ def compare_peers(
     return {
         "machine": machine("cpu", threads),
         "settings": {
-            "peer": PACKAGE, "particles": [pbf_count, dfsph_count], "seconds": seconds, "repeats": repeats,
+            "peer": PACKAGE,
+            "particles": [pbf_count, dfsph_count],
+            "seconds": seconds,
+            "repeats": repeats,
             "load_before": busy,
         },
         "peers": {"splishsplash_pbf": pbf, "splishsplash_dfsph": dfsph},
-    }  # fmt: skip
+    }
 
 
 def against_pbf(dam: Dam, their: Callable[..., Run], seconds: float, repeats: int, say: Say) -> dict[str, Any]:
     """Compare particle-iterations per second, whole steps, ours with viscosity and vorticity, theirs without."""
     scene = dam.scene(
-        support=SUPPORT, iterations=ITERATIONS, frame_time=4.0 * TIME_STEP, substeps=4, courant=100.0,
-        wave_courant=100.0, vorticity=0.01,
-    )  # fmt: skip
+        support=SUPPORT,
+        iterations=ITERATIONS,
+        frame_time=4.0 * TIME_STEP,
+        substeps=4,
+        courant=100.0,
+        wave_courant=100.0,
+        vorticity=0.01,
+    )
     pairs = []
     for turn in range(repeats):
         say(f"PBF, equal iterations: turn {turn + 1} of {repeats}")
@@ -118,9 +126,13 @@ def fastest_of_ours(dam: Dam, target: float, seconds: float, say: Say) -> Settin
             def setting(wave: float, iterations: int = iterations, grid: float = grid) -> Setting:
                 # A fast particle is followed as a fast wave is; waves are no matter where a grid carries the pressure.
                 return {
-                    "iterations": iterations, "substeps": 1, "wave_courant": wave, "grid_pressure": grid,
-                    "courant": min(3.0 if grid else 2.25, max(0.3, 0.9 / 0.35 * wave)), "largest_substeps": 1000,
-                }  # fmt: skip
+                    "iterations": iterations,
+                    "substeps": 1,
+                    "wave_courant": wave,
+                    "grid_pressure": grid,
+                    "courant": min(3.0 if grid else 2.25, max(0.3, 0.9 / 0.35 * wave)),
+                    "largest_substeps": 1000,
+                }
 
             wave = _meet(target, wave, (0.02, 3.0), setting, lambda s: ours(dam.scene(**s), seconds), found, say)
     return _fastest(found, target, "ours")
@@ -134,9 +146,14 @@ def fastest_of_theirs(their: Callable[..., Run], target: float, seconds: float, 
 
         def setting(courant: float, bound: float = 100.0 * share * target) -> Setting:
             return {
-                "method": "dfsph", "seconds": seconds, "dt": 0.001, "cfl_factor": courant, "largest_dt": 0.02,
-                "max_error": bound, "max_error_v": max(0.1, 10.0 * bound),
-            }  # fmt: skip
+                "method": "dfsph",
+                "seconds": seconds,
+                "dt": 0.001,
+                "cfl_factor": courant,
+                "largest_dt": 0.02,
+                "max_error": bound,
+                "max_error_v": max(0.1, 10.0 * bound),
+            }
 
         def run(order: Setting) -> Run:
             if not found:
@@ -148,9 +165,14 @@ def fastest_of_theirs(their: Callable[..., Run], target: float, seconds: float, 
 
 
 def _meet(
-    target: float, step: float, limits: tuple[float, float], setting: Callable[[float], Setting],
-    run: Callable[[Setting], Run], found: list[tuple[float, Setting]], say: Say,
-) -> float:  # fmt: skip
+    target: float,
+    step: float,
+    limits: tuple[float, float],
+    setting: Callable[[float], Setting],
+    run: Callable[[Setting], Run],
+    found: list[tuple[float, Setting]],
+    say: Say,
+) -> float:
     """Look for the time step, in its own unit, whose error is just below `target`; add what keeps it to `found`."""
     before = 0
     for _ in range(TRIES):
@@ -187,7 +209,9 @@ def _short(setting: Setting) -> str:
 def _verdict(pairs: list[tuple[Run, Run]], figure: Callable[[Run], float], name: str) -> dict[str, Any]:
     ratios = [figure(a) / figure(b) for a, b in pairs]
     return {
-        "ratio": statistics.median(ratios), "low": min(ratios), "high": max(ratios),
+        "ratio": statistics.median(ratios),
+        "low": min(ratios),
+        "high": max(ratios),
         "ours": {name: statistics.median(figure(a) for a, _ in pairs), **pairs[0][0]},
         "theirs": {name: statistics.median(figure(b) for _, b in pairs), **pairs[0][1]},
-    }  # fmt: skip
+    }

@@ -34,10 +34,23 @@ def splishsplash_python(say: Callable[[str], None]) -> Path:
     try:
         venv.create(folder, clear=True, with_pip=True)
         subprocess.run(
-            [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary", ":all:",
-             PACKAGE, "numpy"],
-            check=True, capture_output=True, text=True, timeout=900,
-        )  # fmt: skip
+            [
+                str(python),
+                "-m",
+                "pip",
+                "install",
+                "--quiet",
+                "--disable-pip-version-check",
+                "--only-binary",
+                ":all:",
+                PACKAGE,
+                "numpy",
+            ],
+            check=True,
+            capture_output=True,
+            text=True,
+            timeout=900,
+        )
         ready.touch()
     except (OSError, subprocess.SubprocessError) as error:
         lines = (getattr(error, "stderr", "") or str(error)).strip().splitlines() or ["no message"]

@@ -47,9 +47,11 @@ class Dam:
         """Return it as a scene of ours; without foam, which they do not compute."""
         upper = tuple(n * self.spacing for n in self.cells)
         return Scene(
-            spacing=self.spacing, tank=Tank(size=self.tank), fluids=[Block(lower=(0.0, 0.0, 0.0), upper=upper)],
+            spacing=self.spacing,
+            tank=Tank(size=self.tank),
+            fluids=[Block(lower=(0.0, 0.0, 0.0), upper=upper)],
             **{"foam": 0.0, **parameters},
-        )  # fmt: skip
+        )
 
 
 def ours(scene: Scene, seconds: float, *, measure: bool = True) -> Run:
@@ -88,8 +90,10 @@ def ask(python: Path, folder: Path, order: dict[str, Any], threads: int) -> Run:
     """Let SPlisHSPlasH carry out an order; raise `WavetankError` where it fails."""
     result = subprocess.run(
         [str(python), str(SCRIPT), str(folder), json.dumps(order)],
-        capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": str(threads)},
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        env={**os.environ, "OMP_NUM_THREADS": str(threads)},
+    )
     lines = result.stdout.strip().splitlines()
     if result.returncode or not lines or not lines[-1].startswith("{"):
         said = (result.stderr.strip().splitlines() or lines or ["no message"])[-1]

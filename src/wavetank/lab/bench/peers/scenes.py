@@ -31,8 +31,12 @@ from wavetank.simulation.simulation import Simulation
 
 #: A dam, two that meet around a light ball, two fluids, a motor, and one that buckles.
 SCENES = (
-    "DamBreakModel", "DoubleDamBreakWithSphere", "DoubleDamBreakMultiPhase", "MotorScene", "BucklingModel_Weiler2018",
-)  # fmt: skip
+    "DamBreakModel",
+    "DoubleDamBreakWithSphere",
+    "DoubleDamBreakMultiPhase",
+    "MotorScene",
+    "BucklingModel_Weiler2018",
+)
 SECONDS, EVERY = 2.0, 0.05  # s of water, and between two instants
 SHOWN = (0.25, 0.5, 1.0)  # shares of the time at which pictures are made
 SIZE = (480, 400)  # px of a picture
@@ -59,9 +63,13 @@ class Watched:
 
 
 def compare_scenes(
-    names: Sequence[str], pictures: Path, *, seconds: float = SECONDS, threads: int | None = None,
+    names: Sequence[str],
+    pictures: Path,
+    *,
+    seconds: float = SECONDS,
+    threads: int | None = None,
     say: Say = lambda s: None,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Run their scenes with both solvers, write NAME.png for each into `pictures`, and return heights and times.
 
     Raises `WavetankError` where their solver is not here, and for what is no scene of theirs or cannot be imported.
@@ -156,14 +164,13 @@ def figures(name: str, ours: Watched, theirs: Watched) -> dict[str, Any]:
     result: dict[str, Any] = {"scene": name}
     curves: dict[str, dict[str, np.ndarray]] = {}
     for side, run in (("ours", ours), ("theirs", theirs)):
-        curves[side] = {
-            "mean": run.heights(np.mean),
-            "top": run.heights(lambda y: np.percentile(y, TOP)),
-        }
+        curves[side] = {"mean": run.heights(np.mean), "top": run.heights(lambda y: np.percentile(y, TOP))}
         result[side] = {
-            "particles": run.instants[-1].count, "wall": run.wall, "times": run.times.tolist(),
+            "particles": run.instants[-1].count,
+            "wall": run.wall,
+            "times": run.times.tolist(),
             **{what: values.tolist() for what, values in curves[side].items()},
-        }  # fmt: skip
+        }
     floor = min(float(one.positions[:, 1].min()) for run in (ours, theirs) for one in run.instants if one.count)
     start = max(float(curves["ours"]["mean"][0]) - floor, 1e-9)
     apart = {
@@ -209,16 +216,20 @@ def draw(result: dict[str, Any], scene: Scene, ours: Watched, theirs: Watched, p
 def scenes_table(result: dict[str, Any]) -> Table:
     """Return a row for each scene."""
     table = Table(
-        "scene of SPlisHSPlasH", "particles, ours; theirs", "s for the run, ours; theirs",
-        "mean height apart: mean, largest, at the end", "top apart",
-    )  # fmt: skip
+        "scene of SPlisHSPlasH",
+        "particles, ours; theirs",
+        "s for the run, ours; theirs",
+        "mean height apart: mean, largest, at the end",
+        "top apart",
+    )
     for one in result["scenes"]:
         table.add_row(
-            one["scene"], *(
+            one["scene"],
+            *(
                 "; ".join(form.format(one[side][what]) for side in ("ours", "theirs"))
                 for what, form in (("particles", "{:,}"), ("wall", "{:.3g}"))
             ),
             ", ".join(f"{100 * one[what]:.1f} %" for what in ("apart_mean", "apart_largest", "apart_at_the_end")),
             f"{100 * one['top_apart_mean']:.1f} %",
-        )  # fmt: skip
+        )
     return table

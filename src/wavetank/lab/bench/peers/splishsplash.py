@@ -51,10 +51,17 @@ def scene(order: dict[str, Any]) -> dict[str, Any]:
     lower = [(GAP - 1.0) * d] * 3
     upper = [low + (n + 1) * d for low, n in zip(lower, order["cells"], strict=True)]
     wall = {
-        "geometryFile": "box.obj", "translation": [0.5 * edge for edge in tank], "scale": tank, "isDynamic": False,
-        "rotationAxis": [1, 0, 0], "rotationAngle": 0, "isWall": True, "mapInvert": True, "mapThickness": 0.0,
+        "geometryFile": "box.obj",
+        "translation": [0.5 * edge for edge in tank],
+        "scale": tank,
+        "isDynamic": False,
+        "rotationAxis": [1, 0, 0],
+        "rotationAngle": 0,
+        "isWall": True,
+        "mapInvert": True,
+        "mapThickness": 0.0,
         "mapResolution": [max(10, round(edge / (2.5 * d))) for edge in tank],
-    }  # fmt: skip
+    }
     return {
         "Configuration": configuration,
         "Materials": [{"id": "Fluid", "viscosityMethod": 0, "vorticityMethod": 0}],
@@ -97,9 +104,13 @@ def begin(sph: Any, file: Path, folder: Path, seconds: float) -> Any:
     """Return its simulator with a scene file in it."""
     solver = sph.Exec.SimulatorBase()
     solver.init(
-        sceneFile=str(file), outputDir=str(folder / "out"), useGui=False, initialPause=False, useCache=True,
+        sceneFile=str(file),
+        outputDir=str(folder / "out"),
+        useGui=False,
+        initialPause=False,
+        useCache=True,
         stopAt=seconds,
-    )  # fmt: skip
+    )
     solver.initSimulation()
     return solver
 
@@ -205,9 +216,14 @@ def watch(folder: Path, order: dict[str, Any]) -> dict[str, Any]:
         solver.runSimulation()
     names = [water.getFluidModel(k).getId() for k in range(water.numberOfFluidModels())]
     np.savez(
-        folder / "watched.npz", times=kept["times"], counts=kept["counts"], bodies=kept["bodies"], names=names,
-        positions=np.concatenate(kept["positions"]), velocities=np.concatenate(kept["velocities"]),
-    )  # fmt: skip
+        folder / "watched.npz",
+        times=kept["times"],
+        counts=kept["counts"],
+        bodies=kept["bodies"],
+        names=names,
+        positions=np.concatenate(kept["positions"]),
+        velocities=np.concatenate(kept["velocities"]),
+    )
     return {"file": str(file), "wall": wall[0], "steps": steps[0], "seconds_of_water": clock.getTime()}
 
 
