@@ -15,7 +15,10 @@ from wavetank.lab.cases import CASES
 from wavetank.scene.summary import bundled_counts
 
 ROOT = Path(__file__).parent.parent
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "notebook").glob("*.md"))]
+PAGES = sorted(
+    {*DOCUMENTS, *ROOT.glob("*.md"), *(ROOT / "validation").glob("*.md"), *(ROOT / "benchmarks").glob("*.md")}
+)
 COMMANDS = typer.main.get_command(app)
 PLACE = re.compile(r"[A-Z]{3,}(=[A-Z]+)?")
 #: Words in a document that stand for a person's own.
@@ -45,6 +48,46 @@ def test_command_lines_are_understood(path):
             assert word in bundled_counts() or OWN.fullmatch(word) or "/" in word, line
         if name == "validate":
             assert {str(case) for case in given.get("cases") or ()} <= {case.name for case in CASES}, line
+
+
+def anchors_of(path: Path) -> set[str]:
+    """Return the anchors that GitHub gives to the headings of a document."""
+    text = re.sub(r"```.*?```", "", path.read_text("utf-8"), flags=re.DOTALL)
+    titles = [re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", title) for title in re.findall(r"^#+ (.+)$", text, re.MULTILINE)]
+    slugs = [re.sub(r"[^\w\- ]", "", title.strip().lower()).replace(" ", "-") for title in titles]
+    return {slug if (n := slugs[:i].count(slug)) == 0 else f"{slug}-{n}" for i, slug in enumerate(slugs)}
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_links_and_anchors_resolve(path):
+    text = re.sub(r"```.*?```", "", path.read_text("utf-8"), flags=re.DOTALL)
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"[a-z]+:", link):
+            continue
+        name, _, anchor = link.partition("#")
+        target = (path.parent / name) if name else path
+        assert target.exists(), link
+        if anchor and target.suffix == ".md":
+            assert anchor in anchors_of(target), link
+
+
+def test_sections_of_the_notebook_that_code_names_exist():
+    """Comments in the code say `notebook/calm.md, "Tanks that slosh"`."""
+    sources = [path for room in ("src", "tests") for path in (ROOT / room).rglob("*.py")]
+    named = [
+        (path, page, section)
+        for path in sources
+        for page, section in re.findall(
+            r'(?<!front/)\bnotebook/([\w-]+\.md)(?:,[\s#]+"([^"]+)")?', path.read_text("utf-8")
+        )
+    ]
+    for path, page, section in named:
+        assert (ROOT / "notebook" / page).exists(), path
+        if section:
+            title = re.sub(r"\s*\n\s*#?\s*", " ", section)
+            headings = re.findall(r"^#+ (.+)$", (ROOT / "notebook" / page).read_text("utf-8"), re.MULTILINE)
+            assert title in headings, (path, section)
+    assert len(named) > 10
 
 
 def test_there_are_command_lines():

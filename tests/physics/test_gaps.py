@@ -60,7 +60,7 @@ def fastest_after(sim: Simulation, seconds: float) -> float:
 @pytest.mark.parametrize("quality", ["draft", "standard", "high"])
 @pytest.mark.parametrize("size", [(21, 20, 10), (42, 42.9, 11), (42, 24, 12)], ids=str)
 def test_water_rests_in_tanks_that_do_not_match_its_lattice(size, quality):
-    """Hydrostatics: nothing acts on it (docs/notebook/calm.md, "Tanks of another size").
+    """Hydrostatics: nothing acts on it (notebook/calm.md, "Tanks of another size").
 
     Width, height and depth in spacings make cells of 7/4 spacings, where water went on at 0.02 to 0.2 m/s for ever.
     """
@@ -89,7 +89,7 @@ def energy_gained(*frames: int) -> np.ndarray:
 
 
 def test_a_block_that_runs_into_a_pool_does_not_gain_height(monkeypatch):
-    """Conservation of energy; docs/notebook/grid-pressure.md, "Rows that are drawn apart"."""
+    """Conservation of energy; notebook/grid-pressure.md, "Rows that are drawn apart"."""
     early, late = energy_gained(24, 36)
     assert early < 0.03
     assert late < 0.0

@@ -227,7 +227,7 @@ def test_layers_of_different_density_rest():
 def test_full_cells_draw_nothing_in(monkeypatch, spread, drawn):
     """Conservation of volume: water that reads too little where no room is left has nowhere to take more from.
 
-    Drawn in, it pushed rows that slid off each other on (docs/notebook/calm.md, "Slow slips").
+    Drawn in, it pushed rows that slid off each other on (notebook/calm.md, "Slow slips").
     """
     d, error = 0.025, -0.01
     places = np.stack(np.meshgrid(*[(np.arange(40) + 0.5) * d] * 2), -1).reshape(-1, 2) * np.array([spread, 1.0])
@@ -367,7 +367,7 @@ def test_the_room_that_solids_leave_follows_them():
 
 @pytest.mark.parametrize("layers", [9, 11])
 def test_the_lattice_holds_however_the_surface_lies_in_the_cells(layers):
-    """The density of the top layer says nothing (docs/notebook/calm.md, "What the top layer reads").
+    """The density of the top layer says nothing (notebook/calm.md, "What the top layer reads").
 
     With these depths some of it counted, the layer was let down, and slid 0.33 and 0.5 spacings within 3 s.
     """

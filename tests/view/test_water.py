@@ -268,7 +268,7 @@ def test_the_filter_fades_before_a_pane():
 def test_a_still_tank_does_not_flicker():
     """From frame to frame of resting water next to nothing changes: only outlines that cross a pixel do.
 
-    It rests from 3 s on (docs/notebook/calm.md, "The contract"); half a second before three pixels change by 16.
+    It rests from 3 s on (notebook/calm.md, "The contract"); half a second before three pixels change by 16.
     """
     sim = Simulation(Scene.load("still-tank").changed(spacing=0.05))
     sim.advance(3.0)

@@ -129,7 +129,7 @@ def threads() -> int:
 def lanes() -> int:
     """Return how many particles or nodes are computed together: as vectors on a processor, each by a thread on others.
 
-    More than eight are no faster, where vectors are twice as long (docs/notebook/performance.md).
+    More than eight are no faster, where vectors are twice as long (notebook/performance.md).
     """
     return LANES if _current == "cpu" else 1
 

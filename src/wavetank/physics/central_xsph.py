@@ -2,7 +2,7 @@
 
 Without a tank water flies, turns and collides freely, and its angular momentum should stay. Two things changed it, and
 each pair of neighbours makes up for both here, so that a drop keeps it to some 0.1 % where it lost 0.5 to 1.5 %
-(`validate momentum`; docs/notebook/solver.md has the figures, and why tanks keep Eq. 11 as it is):
+(`validate momentum`; notebook/solver.md has the figures, and why tanks keep Eq. 11 as it is):
 
 - Eq. 11 draws velocities together along their difference, which is a torque where water turns. Here they are drawn
   together along the line between the particles, as artificial viscosity does (Monaghan 1992,

@@ -16,7 +16,7 @@ from wavetank.physics.smoothing import KERNELS, NAMES, SLOPES, kernel_shape, res
 LEAST_MIXING = 1e-6  # of S_0: a particle without neighbours has no gradient to divide by
 EARTH = 9.81  # m/s^2
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
-#: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; docs/notebook/solver.md.
+#: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; notebook/solver.md.
 DISORDER = {2: 0.75, 3: 0.35}
 #: Of sqrt(g d): below which motion past neighbours, and along solids, is slow. A wave that can be seen is faster.
 SLOW, SLOW_AT_SOLIDS = 0.1, 0.2
@@ -44,7 +44,7 @@ def coefficients(
     s_0 = rest.squared_gradients / h**2
     w_dq = float(kernel_shape(NAMES[params.kernel][0], np.array(params.tensile_distance))[0])
     tensile = params.tensile_strength / s_0 / (parts or iterations) / w_dq**params.tensile_exponent
-    # Packings need it that gravity presses; without gravity it would blow them up (docs/notebook/calm.md). It is the
+    # Packings need it that gravity presses; without gravity it would blow them up (notebook/calm.md). It is the
     # same force in steps of any length.
     tensile *= (dt / params.frame_time) ** 2 * min(1.0, math.hypot(*params.gravity) / EARTH)
     viscosity = min(1.0, params.viscosity * REFERENCE_RATE * dt)

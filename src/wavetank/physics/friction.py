@@ -16,7 +16,7 @@ Iterations answer what presses a layer or two together with more than all of it,
 Where water lies between a body and another solid, that takes none where water is squeezed out: by a body that is on
 its way, and where one lies above the other. A layer that cannot leave would bear it. Beside upright sides of bodies
 that rest solids do as elsewhere, the tank's walls as other solids do, and so do two bodies: without that, water there
-was thrown to and fro without end, crept up and down walls and went up and down between bodies (docs/notebook/calm.md,
+was thrown to and fro without end, crept up and down walls and went up and down between bodies (notebook/calm.md,
 "Upright slits", "Between two bodies"). A body beside what is none takes nothing, or small ones turn back and forth.
 
     code     symbol    meaning                                           unit

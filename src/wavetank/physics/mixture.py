@@ -12,7 +12,7 @@ volumes it is. Only ratios of masses matter: where all fluids are equally dense 
 
 Where we differ: the multipliers are those of mass-weighted position-based dynamics,
 lambda_i = -C_i / sum_k w_k |grad_k C_i|^2, and not an equation of state. The Jacobi matrix of the constraint keeps its
-spectrum nearly whatever the masses are; what they add is in docs/notebook/viscosity.md and in `stiffening`.
+spectrum nearly whatever the masses are; what they add is in notebook/viscosity.md and in `stiffening`.
 """
 
 import dataclasses
@@ -25,7 +25,7 @@ from wavetank.device.state import Fluids, Particles, Scratch
 from wavetank.foundation.materials import Material, Properties
 from wavetank.foundation.params import Parameters
 
-#: Largest eigenvalue that a factor of ten between the densities adds to the Jacobi matrix; docs/notebook/viscosity.md.
+#: Largest eigenvalue that a factor of ten between the densities adds to the Jacobi matrix; notebook/viscosity.md.
 PER_DECADE = 0.2
 
 

@@ -13,11 +13,11 @@ The distance to a solid is that to the nearest of its surfaces, and its gradient
 the nearest. A particle between two strands of a knot was held by one of them alone, crept to the middle under what
 pressed it, and was kicked by the whole of that in the step in which the other strand took over. What pushes is the
 density that a solid adds, and that has a kernel's width: so where a solid may have crevices n is the mean slope around
-the particle, which falls to 0 in the middle of one (docs/notebook/calm.md, "Crevices").
+the particle, which falls to 0 in the middle of one (notebook/calm.md, "Crevices").
 
 A film thinner than a layer of particles bears less of a body, below 0.8 spacings nothing. What is caught between two
 solids reads the density of water at rest where it is half as much, as each of them counts as water up to the particle.
-It held a box that was a tenth heavier than water 0.6 d above the floor, for ever (docs/notebook/bodies.md).
+It held a box that was a tenth heavier than water 0.6 d above the floor, for ever (notebook/bodies.md).
 
     code     symbol     meaning                                                             unit
     seen     p_0        where distances were asked for                                      m

@@ -10,7 +10,7 @@ Such a group has one list, of all who are within h of any of the eight, itself i
 three times as long as the list of one, so that lists of all take two fifths of the room.
 
 Building a list tests the candidates of a row without a branch, a block of them against eight places into the bits of
-one word, and then walks over the bits that are set. Measured: docs/notebook/performance.md.
+one word, and then walks over the bits that are set. Measured: notebook/performance.md.
 """
 
 import dataclasses

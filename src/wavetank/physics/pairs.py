@@ -3,7 +3,7 @@
 A pass over pairs runs over teams (`teams.py`): particles that follow each other in sorted order and share a neighbour
 list (`neighbors.py`), eight on a processor and one on a graphics card. Each neighbour is read once for the team, and
 the loop over lanes becomes vector instructions: nobody is collected one by one. A team's list holds three times what
-one particle needs, and is walked in half the time (docs/notebook/performance.md). A pass looks like this:
+one particle needs, and is walked in half the time (notebook/performance.md). A pass looks like this:
 
     for turn in range(turns(grid, count)):
         for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):

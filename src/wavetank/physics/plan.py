@@ -20,7 +20,7 @@ from wavetank.physics.tension import substeps_for
 from wavetank.physics.time_step import pool_depth, steps_needed
 from wavetank.physics.world import World
 
-SOLIDS_IN_THICK = 3.0  # the constraint alone makes way for them, a few spacings far; docs/notebook/viscosity.md
+SOLIDS_IN_THICK = 3.0  # the constraint alone makes way for them, a few spacings far; notebook/viscosity.md
 STIRRED = 0.02  # d: way of a solid in a step from which on
 FARTHER = 4.0  # times as many iterations make way
 

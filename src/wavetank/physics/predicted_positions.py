@@ -2,7 +2,7 @@
 
 Their components have arrays of their own, unlike those of other vectors: every pass over pairs reads them, and a
 processor that computes eight neighbours at a time reads plain numbers faster than vectors
-(docs/notebook/performance.md).
+(notebook/performance.md).
 """
 
 from wavetank.device.compiler import qd

@@ -210,7 +210,7 @@ def half_space(name: str, dim: int, ratio: float, s: np.ndarray) -> np.ndarray:
     In the bulk a pair pushes with both multipliers, at a wall there is only the particle's own. Layers that kept their
     place in the wall would push with half the force, and particles would settle on the wall. Layers that mirrored the
     particle would balance it, and are too stiff for the solver. These move half as far: WALL_STIFFENING is measured
-    (docs/notebook/walls.md).
+    (notebook/walls.md).
     """
     layers = np.arange(int(ratio) + 2)
     depth = (s + WALL_STIFFENING / ratio * _tooth(s * ratio - 0.5))[:, None] + (layers + 0.5) / ratio

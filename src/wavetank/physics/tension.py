@@ -21,7 +21,7 @@ Where we differ, and why:
   sigma is in N/m. Inside, where g is noise,
   it is cut off (`QUIET`), and nothing pulls.
 - Cohesion acts at the surface alone. Attraction inside presses the particles into a crystal that does not flow: a drop
-  made of it keeps its corners. `COHESION` is the smallest share that keeps the skin whole; docs/notebook/viscosity.md.
+  made of it keeps its corners. `COHESION` is the smallest share that keeps the skin whole; notebook/viscosity.md.
 - Solids pull like half a rest lattice of the fluid times `wetting`, from a table of the distance.
 - The tension is limited to what a time step can carry, and `substeps_for` asks for the time steps that the real one
   needs; so nothing explodes where the budget of time steps ends.

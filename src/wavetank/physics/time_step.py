@@ -5,7 +5,7 @@ The first is the usual Courant condition. The second is what keeps deep water st
 went at c = beta d / dt, with beta near 4 for four iterations, whatever the depth. Water of depth H then compresses by
 g H / (2 c^2) on average, as in weakly compressible SPH, and where that is more than a few per cent, columns fall into
 themselves, bounce and boil. With w = sqrt(g H) dt / d the compression is (w / beta)^2 / 2: w is all there is to bound
-(docs/notebook/time-steps.md). `largest_substeps` is a budget for fast scenes only, because a jet that is followed in
+(notebook/time-steps.md). `largest_substeps` is a budget for fast scenes only, because a jet that is followed in
 too long steps is merely crude.
 
     code     symbol    meaning                                                   unit

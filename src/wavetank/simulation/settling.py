@@ -2,7 +2,7 @@
 
 Water begins as a lattice, with gaps beside solids and everywhere some thousandths less dense than it will stand. The
 first step would close that at once and take the way for a velocity: a jolt, on which a body of water's density glides
-for seconds (docs/notebook/bodies.md). So before the first step the water takes some in which solids and bodies stand
+for seconds (notebook/bodies.md). So before the first step the water takes some in which solids and bodies stand
 and no velocity stays, but the pressure that the grid carries on from step to step: what stands is as dense as its
 weight makes it, and is borne. No particle moves by more than `FARTHEST` in each. What falls freely stays where it is
 meanwhile. Where the water still moves after all steps, what moves does not stand: it begins where it was, so that the

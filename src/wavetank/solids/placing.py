@@ -1,7 +1,7 @@
 """Where solids are, written to the device in every time step.
 
 Where the host shares its memory each array is written as it is. Elsewhere a copy costs a tenth of a millisecond however
-little it is, so that all go as one table, which a kernel deals out: docs/notebook/performance.md.
+little it is, so that all go as one table, which a kernel deals out: notebook/performance.md.
 """
 
 import numpy as np

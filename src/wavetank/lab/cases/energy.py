@@ -3,7 +3,7 @@
 Reference: conservation of energy; viscosity, impact and the solver take energy away, nothing may bring any. Kinetic
 plus potential energy, the latter zero on the floor; the rise is that above the least value so far. The dam is the
 bundled scene `obstacle-tank`. The block draws its own rows and those of the pool apart, which is what lattices are
-worst at (docs/notebook/grid-pressure.md, "Rows that are drawn apart").
+worst at (notebook/grid-pressure.md, "Rows that are drawn apart").
 """
 
 from typing import Any

@@ -2,7 +2,7 @@
 
 A lattice at the start is a crystal. Drawn out, its rows stay rows, and rows that are near in one direction and far in
 the other read more density than the same number of particles in disorder, because a pointed kernel counts near
-neighbours most: the water swells (docs/notebook/packings.md). Rows that are a little uneven break up. Cases that draw
+neighbours most: the water swells (notebook/packings.md). Rows that are a little uneven break up. Cases that draw
 all of their water out start from this packing instead, as is usual in SPH: Colagrossi et al. 2012,
 "Particle packing algorithm for SPH schemes" (10.1016/j.cpc.2012.02.032).
 """

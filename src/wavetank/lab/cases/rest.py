@@ -24,7 +24,7 @@ SECONDS, QUICK_SECONDS = 120.0, 20.0
 QUICK = ("still-tank", "still-tank-2d", "double-dam-2d", "dam-break-2d")
 SETTLED = 60.0  # s after which a splash is over, see `SPLASHES`
 MOST = 6_000  # particles: scenes of more are coarsened
-#: Not at rest by then, each for a reason of its own; their figures have no bounds (docs/notebook/calm.md).
+#: Not at rest by then, each for a reason of its own; their figures have no bounds (notebook/calm.md).
 RESTLESS = {
     "weightless-drop": "a drop under tension shivers",
     "weightless-drop-2d": "a drop under tension shivers",

@@ -21,7 +21,7 @@ Where we differ, and why:
   pole, and B makes its second moment on the rest lattice exact, averaged over directions.
 - Conjugate gradients (`conjugate_gradients.py`) start at what viscosity did in the last step, which is not far off:
   half of the iterations that they take from rest, a quarter of Chebyshev's, where the fluid is thick
-  (docs/notebook/viscosity.md). Momentum is still exact; what is so stiff that it is turned (`rigid_guess.py`) keeps it
+  (notebook/viscosity.md). Momentum is still exact; what is so stiff that it is turned (`rigid_guess.py`) keeps it
   to 1 %.
 - Solids hold the fluid back along their surface (no-slip) as half a rest lattice would that continues the
   velocity linearly to its value at the wall (Takeda et al. 1994, 10.1143/ptp/92.5.939; Morris et al. 1997,
@@ -36,7 +36,7 @@ Where we differ, and why:
   made honey flow a fifth too fast at any affordable step. A thick fluid therefore begins a step with the share w of
   what pressed it in the last one, and only the change comes afterwards: the incremental projection of Goda 1979
   (10.1016/0021-9991(79)90088-3; Guermond et al. 2006, 10.1016/j.cma.2005.10.010). w = `CARRIED` k / (`HALF` + k) of the
-  `thickness` k: thin water carries nothing here, it would keep its noise. docs/notebook/viscosity.md has the figures.
+  `thickness` k: thin water carries nothing here, it would keep its noise. notebook/viscosity.md has the figures.
 - Bodies feel the opposite of their part of the drag. Where there are any, the grid carries thick fluids as it carries
   thin ones, in steps of a `thickness` of `WITH_BODIES` at most: between particles alone, in steps so short, a ball of
   three spacings does not sink through fluid of two thirds of its density, not even through water (docs/bodies.md).

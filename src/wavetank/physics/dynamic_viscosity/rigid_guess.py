@@ -3,7 +3,7 @@
 What holds a spinning drop together points inwards; pointing where it did a step ago it has a torque. That a drop turns
 as a whole is the last thing that iterations come to where it is stiff, so the torques of all steps added up: a drop of
 10^6 Pa s had 3 to 5 times its energy after two radians. Turned, it has what iterations from rest leave it, within 4 %
-(docs/notebook/viscosity.md).
+(notebook/viscosity.md).
 
     code      symbol                       meaning                                                     unit
     dv        v_i - v_j                    difference of the velocities that it has moved with since   m/s

@@ -12,7 +12,7 @@ lambda <= 0, because water pushes and does not pull.
 Pressure from a grid, details from the particles: Zhu and Bridson 2005 (10.1145/1073204.1073298) in FLIP, Cornelis et
 al. 2014 (10.1111/cgf.12324) for SPH. Where we differ: the right side is the error of the particles' own densities, so
 that volume does not drift, and it is the positions that are moved. The sums are of whole numbers, so that runs repeat
-bit for bit. What was tried, and what it gives: docs/notebook/grid-pressure.md.
+bit for bit. What was tried, and what it gives: notebook/grid-pressure.md.
 
 In time. A correction at the end of a step is implicit Euler, which damps waves by half of omega^2 dt. Each particle
 therefore carries what the grid accelerated it by, `a`, and a share w of it acts in the next prediction;
@@ -30,7 +30,7 @@ close, and an error is less by `GAP_SHARE` times what is missing there.
 
 Slips. The other way round, a row that slides off the one below reads less than the room that it takes. Where a cell is
 full, water that is drawn in for that pushes the row on: it slid ever faster, 0.014 m/s in a tank that had been at rest
-for a minute (docs/notebook/calm.md, "Slow slips"). So a cell draws in no more where it is full, but in worlds
+for a minute (notebook/calm.md, "Slow slips"). So a cell draws in no more where it is full, but in worlds
 with bodies, see `DRAWN`.
 """
 
@@ -78,9 +78,9 @@ LARGEST_SUM = float(1 << 29)  # of errors, in whole numbers
 INNER = (0.7, 0.85)  # from where to where `fill` lets a particle count: near a surface its density says nothing
 BELOW = (0.4, 0.65)  # supports: and its depth, so that the top layer never counts, however it lies in the cells
 FILM = (0.75, 1.25)  # cells of water: from where to where the grid takes part in a film
-DAMPING = 0.1  # of a frame: the length of a step that damps as much, docs/notebook/calm.md
+DAMPING = 0.1  # of a frame: the length of a step that damps as much, notebook/calm.md
 LARGEST_CARRIED = 1.2  # of gravity
-MISSING = 1.0 / 3.0  # of a wall's answer, over what it gives: all of what lacks, docs/notebook/grid-pressure.md
+MISSING = 1.0 / 3.0  # of a wall's answer, over what it gives: all of what lacks, notebook/grid-pressure.md
 FULL = 0.98  # fill that cells without gaps have at least, also where few rows of particles do not match them
 SLIT = 0.7  # fill of a cell that touches a solid, as far as its tents can tell
 CLOSING = 0.5  # of what lacks, in a step

@@ -2,7 +2,7 @@
 
 Nothing flows into solids, and a face of a coarser level is open as much as those that it stands for. Coupled by the
 room of their cells alone, coarser nodes on both sides of a wall were one: the water in a box and that around it started
-from one pressure, and a few sweeps did not part them again (docs/notebook/calm.md, "Seams and sealed water").
+from one pressure, and a few sweeps did not part them again (notebook/calm.md, "Seams and sealed water").
 
     code    symbol     meaning                                                      unit
     fill    f          water in the tent of a node, over the room that it has       1
@@ -18,7 +18,7 @@ from wavetank.physics.grid_pressure.coarse_grid import coordinates, nearest, ram
 from wavetank.physics.grid_pressure.thin_walls import is_shut
 from wavetank.solids.distance import vec3
 
-LEAST_THETA = 0.01  # what is less slants the pressure along a surface that lies at nodes: docs/notebook/calm.md
+LEAST_THETA = 0.01  # what is less slants the pressure along a surface that lies at nodes: notebook/calm.md
 
 
 @qd.func

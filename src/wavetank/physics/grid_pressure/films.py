@@ -3,7 +3,7 @@
 In a film one cell lies between floor and air. Grid and iterations both see the whole of what it is too dense by, and
 each answers it in full. What removes an error more than 4/3 times in a step makes it grow with its sign changed, and
 more than 1.2 times where a share of the pressure is carried on: layers on floors jumped up and down by 0.02 spacings
-from step to step, for ever, and now and then a particle was thrown (docs/notebook/calm.md). Iterations alone reach
+from step to step, for ever, and now and then a particle was thrown (notebook/calm.md). Iterations alone reach
 through a film.
 """
 

@@ -8,7 +8,7 @@ Single cells say little. One of four or eight particles is never quite even, and
 number of spacings a lattice has a pattern in it, an alias: tents of r spacings add up to 1 + 2 sinc^2(r) cos(phase),
 3.3 % more and less at r = 7/4. Below a level surface there is only the way down to ask, and where a column was less
 full than others all the way down, the top row was told that it has gaps: tanks of 21, 35 or 42 spacings never came to
-rest (docs/notebook/calm.md, "Tanks of another size"). So three cells count, each with those beside it: a mean of three
+rest (notebook/calm.md, "Tanks of another size"). So three cells count, each with those beside it: a mean of three
 leaves (1 + 2 cos(2 pi r)) / 3 of the pattern, a third at 7/4 and an eighth at 1.7.
 
     code         meaning                                                                 unit

@@ -2,7 +2,7 @@
 
 The grid's push is the gradient of a smooth pressure over the mean density there: it accelerates all particles alike,
 and where weight goes by faces (`weight.py`) it bears a drop of brine in water as it bears the water. Such drops hung
-where they were: after a heavy fluid had fallen through a light one, a tenth of it stayed above (docs/notebook/calm.md).
+where they were: after a heavy fluid had fallen through a light one, a tenth of it stayed above (notebook/calm.md).
 
 A particle that is foreign where it is therefore has the push that it would have as a sphere: at rest on top of what
 bears the fluid around, the buoyancy (rho_e - rho_i) g over the inertia rho_i + rho_e / 2 of the sphere and of the fluid

@@ -4,7 +4,7 @@ A particle that counts at nodes as a point, with the tents of linear interpolati
 more or less as it passes a node. Cells whose edges are no whole number of spacings then read up to 1 % too much and
 too little, and by how far a surface rises was told wrong by -7 %, or +47 % while a row passed a node. The top layer,
 which is carried by its depth, followed with a delay: waves grew from nothing in some tanks, by a factor e in 20 s, and
-in others they were damped eight times too much (docs/notebook/calm.md, "Tanks that slosh").
+in others they were damped eight times too much (notebook/calm.md, "Tanks that slosh").
 
 Boxes of the spacing fill the room of a lattice without a gap, wherever it lies. What a node has of one is the mean of
 its tent over the box: the generalized interpolation of Bardenhagen and Kober 2004 (10.3970/cmes.2004.005.477), who

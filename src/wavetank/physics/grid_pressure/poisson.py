@@ -1,10 +1,10 @@
 """The Poisson equation laplace lambda = rhs on the grids of a tank, with lambda <= 0.
 
 At the free surface lambda is 0 (the ghost fluid method, Gibou et al. 2002, 10.1006/jcph.2001.6977): as far from a node
-in the water as the water of its cell and of the next one reaches (`surface.py`; docs/notebook/calm.md). Nothing flows
+in the water as the water of its cell and of the next one reaches (`surface.py`; notebook/calm.md). Nothing flows
 into solids. The solution on a grid starts from that of the next coarser one, linearly between its nodes, so that a few
 sweeps of projected over-relaxation are enough on each. It does not start from the time step before: pressures that are
-carried over make water pulse (docs/notebook/solver.md). What nodes are coupled with: `couplings.py`.
+carried over make water pulse (notebook/solver.md). What nodes are coupled with: `couplings.py`.
 """
 
 import itertools

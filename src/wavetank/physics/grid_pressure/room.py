@@ -4,7 +4,7 @@ Where there are bodies, the slits between them and what they lie on have none. T
 lone row of particles in less than half a cell, and all that its densities are off had to leave through the length of
 the slit at once: a hundredth gave a fifth of the pressure below a box of fifteen spacings, which trembled for ever. The
 pressure there is continued from around instead (`buoyancy.py`), and what such a film is pressed by is the iterations'
-(docs/notebook/bodies.md, "A box a tenth heavier than water").
+(notebook/bodies.md, "A box a tenth heavier than water").
 """
 
 from wavetank.device.compiler import qd

@@ -7,7 +7,7 @@ are.
 
 A roof faces down. Where any solid that takes room above counted as one, so did the side of a body that leans by a few
 degrees: a cell at the waterline beside it was air in one frame and full in the next, water was drawn in and thrown, and
-what it pushed was the body (docs/notebook/calm.md, "Roofs and sides"). What is open is told by degrees: nodes crossed a
+what it pushed was the body (notebook/calm.md, "Roofs and sides"). What is open is told by degrees: nodes crossed a
 bound because a body had moved by a hundredth of a spacing.
 
     code      meaning                                                                         unit

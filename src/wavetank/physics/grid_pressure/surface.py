@@ -3,7 +3,7 @@
 The grid's push is the gradient of a smooth pressure. It knows no bump that is shorter than two cells, and carried all
 particles of the top layer alike: without weight, a bump stayed where it was, and as particles of a bump that is lifted
 move apart, the fill below it even fell and the push there rose. Bumps of the wave length of two cells grew by a tenth
-of a spacing in three seconds, an egg carton, until single particles were thrown (docs/notebook/calm.md).
+of a spacing in three seconds, an egg carton, until single particles were thrown (notebook/calm.md).
 
 Particles above the place of the top layer at rest, half a spacing below the surface, therefore lose the grid's push, by
 a share that grows with their height: what sticks out has weight, rests on its neighbours, and sinks back. Nobody has

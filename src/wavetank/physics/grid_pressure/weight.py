@@ -4,7 +4,7 @@ What gravity moves particles by in a step, less what is carried on, is the same 
 beside solids that cut cells they tell it wrong, by a part of the whole weight, which drove water round for ever. So it
 goes to the right side of the equation as the faces of the cells count it, and densities are read where particles were
 before (`boundary.fall`). The slope of water at rest then fulfils the equation whatever the solids are: a well-balanced
-scheme, as Greenberg and Leroux 1996 (10.1137/0733001) have it for shallow water (docs/notebook/calm.md). What particles
+scheme, as Greenberg and Leroux 1996 (10.1137/0733001) have it for shallow water (notebook/calm.md). What particles
 weigh among those of another fluid: `own_weight.py`.
 
     code     meaning                                                                      unit
