@@ -27,7 +27,7 @@ class Pixels:
     surface: qd.types.ndarray()  # i32: place of the particle in device order, or NOTHING, SOLID, FLOOR
     normal: qd.types.ndarray()  # vec3, unit, in the world
     color: qd.types.ndarray()  # vec3, linear RGB: albedo until the shade pass, radiance from then on
-    lines: qd.types.ndarray()  # i32: marks of the edges of the tank, see `optics/marks.py`; or 0
+    lines: qd.types.ndarray()  # i32: marks of the edges of the tank, see `optics/edge_coverage.py`; or 0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -23,8 +23,8 @@ from wavetank.view.glare import add_glare, excess_of
 from wavetank.view.images import Images
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
 from wavetank.view.look import fluid_optics, usual_depth
-from wavetank.view.optics.between import GROUP
 from wavetank.view.optics.dyes import ICE, lay_ice
+from wavetank.view.optics.ray_interpolation import GROUP
 from wavetank.view.passes import tonemap
 from wavetank.view.quantities import QUANTITIES, Coloring, usual
 from wavetank.view.rounding import Rounding

@@ -47,7 +47,7 @@ class WaterSurface:
     """The surface of the water as the eye sees it, [rows, columns], on the device."""
 
     depth: qd.types.ndarray()  # i32: bits of the depth [m], FARTHEST where there is none
-    rim: qd.types.ndarray()  # i32: marks of its outlines, see `optics/marks.py`; or 0
+    rim: qd.types.ndarray()  # i32: marks of its outlines, see `optics/edge_coverage.py`; or 0
     nearest: qd.types.ndarray()  # i32: bits of the depth [m] of what is seen, water or not; scratch before
 
 
@@ -59,7 +59,7 @@ class SunlitWater:
     spare: qd.types.ndarray()  # i32: the same while it is being smoothed; then optical depth of foam in 1 / 4096
     wet: (
         qd.types.ndarray()
-    )  # i32 [CELLS, CELLS]: 1 where water or caustics are in or beside a cell, see `optics/wet.py`
+    )  # i32 [CELLS, CELLS]: 1 where water or caustics are in or beside a cell, see `optics/dry_mask.py`
     caustic: qd.types.ndarray()  # i32: light that refraction brings or takes, and foam keeps, in 1 / 4096 of the sun's
 
 
@@ -86,7 +86,7 @@ class Backdrop:
     in_sun: qd.types.ndarray()  # what comes from the sun
     in_sky: qd.types.ndarray()  # and what comes from elsewhere, both without any water
     behind: qd.types.ndarray()  # both as far as the water lets them through
-    known: qd.types.ndarray()  # i32 [rows, columns] of what comes together: what `optics/wet.py` knows of it, or 0
+    known: qd.types.ndarray()  # i32 [rows, columns] of what comes together: what `optics/dry_mask.py` knows of it, or 0
 
 
 @dataclasses.dataclass(eq=False)

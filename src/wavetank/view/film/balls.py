@@ -107,7 +107,7 @@ def _froth(shot: Shot, moved: float) -> np.ndarray:
 
 
 def _number(owner: np.ndarray, purpose: int) -> np.ndarray:
-    """Return numbers from 0 to 1 that belong to whom they are asked for (the mixer of `optics/chance.py`)."""
+    """Return numbers from 0 to 1 that belong to whom they are asked for (the mixer of `optics/hash_noise.py`)."""
     x = (owner * np.uint64(1024) + np.uint64(purpose) + np.uint64(0x9E3779B9)) & np.uint64(0xFFFFFFFF)
     for factor, shift in ((0x7FEB352D, 16), (0x846CA68B, 15)):
         x ^= x >> np.uint64(shift)

@@ -21,9 +21,9 @@ from wavetank.view.film.murk import albedo_of, any_way, color_of, is_matte, murk
 from wavetank.view.film.sampling import pair, towards
 from wavetank.view.lens import vec3
 from wavetank.view.look import Look
-from wavetank.view.optics.chance import scrambled
+from wavetank.view.optics.bilinear import share_of
+from wavetank.view.optics.hash_noise import scrambled
 from wavetank.view.optics.interface import bent, index_of_water, mirrored, through_drop
-from wavetank.view.optics.maps import share_of
 
 UNIT = 4096.0  # steps of a map in the light of the bare sun
 

@@ -32,7 +32,7 @@ from wavetank.view.film.murk import albedo_of, any_way, color_of, is_matte, murk
 from wavetank.view.film.sampling import around, disc, pair, towards
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, view_ray
 from wavetank.view.look import Look
-from wavetank.view.optics.chance import scrambled
+from wavetank.view.optics.hash_noise import scrambled
 from wavetank.view.optics.interface import bent, index_of_water, mirrored, through_drop
 from wavetank.view.optics.radiance import background, smoothstep, sun_disc
 from wavetank.view.optics.rays import Box

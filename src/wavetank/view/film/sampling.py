@@ -6,7 +6,7 @@ anew for every pair of numbers that a path needs. Nothing depends on threads.
 
 from wavetank.device.compiler import qd
 from wavetank.view.lens import vec2, vec3
-from wavetank.view.optics.chance import scrambled
+from wavetank.view.optics.hash_noise import scrambled
 
 
 @qd.func

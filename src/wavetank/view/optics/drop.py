@@ -17,10 +17,10 @@ from wavetank.view.buffers import Pixels
 from wavetank.view.cells import Cells
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec2, vec3, vec4, view_ray
 from wavetank.view.look import Look
-from wavetank.view.optics.chance import bits_of, share_of_bits
+from wavetank.view.optics.bilinear import margins_inside, picture_at
 from wavetank.view.optics.dyes import dyed, swallowed_by
 from wavetank.view.optics.fluid import Optics, dimmed, refracted
-from wavetank.view.optics.maps import margins_inside, picture_at
+from wavetank.view.optics.hash_noise import bits_of, share_of_bits
 from wavetank.view.optics.mixture import color_of_fluid, swallow_of
 from wavetank.view.optics.radiance import environment, glint, smoothstep, surface_radiance
 from wavetank.view.water_buffers import Drops, WaterSurface

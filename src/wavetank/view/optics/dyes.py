@@ -2,7 +2,7 @@
 
 from wavetank.device.compiler import qd
 from wavetank.view.lens import vec3, vec4
-from wavetank.view.optics.maps import corners, share_of
+from wavetank.view.optics.bilinear import corners, share_of
 
 
 @qd.func

@@ -5,7 +5,7 @@ import dataclasses
 from wavetank.device.compiler import qd
 from wavetank.device.state import remembered
 from wavetank.view.lens import vec3, vector
-from wavetank.view.optics.between import APART, GROUP
+from wavetank.view.optics.ray_interpolation import APART, GROUP
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import UNIT
 

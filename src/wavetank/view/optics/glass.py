@@ -7,7 +7,7 @@ slack              depth by which a line wins against what it touches     m
 from wavetank.device.compiler import qd
 from wavetank.view.lens import Lens
 from wavetank.view.look import Look
-from wavetank.view.optics.marks import line_depth
+from wavetank.view.optics.edge_coverage import line_depth
 from wavetank.view.optics.rays import Box, box_interval
 from wavetank.view.shot import Shot
 

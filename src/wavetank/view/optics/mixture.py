@@ -14,11 +14,11 @@ change from one fluid to the other within half a spacing, along a line that is a
 from wavetank.device.compiler import qd
 from wavetank.view.lens import Lens, to_pixel, to_view, vec2, vec3
 from wavetank.view.look import Look
-from wavetank.view.optics.body import depth_below
+from wavetank.view.optics.bilinear import corners
 from wavetank.view.optics.fluid import Optics
-from wavetank.view.optics.maps import corners
 from wavetank.view.optics.probes import sun_share
 from wavetank.view.optics.radiance import smoothstep, surface_radiance
+from wavetank.view.optics.water_volume import depth_below
 from wavetank.view.water_buffers import SunlitWater, Thickness
 
 

@@ -12,7 +12,7 @@ import math
 
 from wavetank.device.compiler import qd
 from wavetank.view.lens import vec2
-from wavetank.view.optics.maps import gap_at
+from wavetank.view.optics.bilinear import gap_at
 
 
 @qd.func

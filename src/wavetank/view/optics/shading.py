@@ -11,14 +11,14 @@ from wavetank.device.compiler import qd
 from wavetank.view.buffers import Pixels
 from wavetank.view.lens import Lens, ray_direction, to_pixel, to_view, vec2, vec3, view_ray
 from wavetank.view.look import Look
-from wavetank.view.optics.body import Inside
+from wavetank.view.optics.bilinear import picture_at, thickness_at
 from wavetank.view.optics.drop import behind_drop
 from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, refracted
-from wavetank.view.optics.maps import picture_at, thickness_at
 from wavetank.view.optics.mixture import mixed, murky
+from wavetank.view.optics.planar import sheet_at, sheet_normal
 from wavetank.view.optics.radiance import environment, glint, smoothstep
-from wavetank.view.optics.sheet import sheet_at, sheet_normal
+from wavetank.view.optics.water_volume import Inside
 from wavetank.view.water_buffers import Backdrop, SunlitWater, Thickness
 
 

@@ -10,9 +10,9 @@ through             share of the sun that is left, per colour                   
 from wavetank.device.compiler import qd
 from wavetank.view.lens import Lens, to_pixel, to_view, vec2, vec3
 from wavetank.view.look import Look
+from wavetank.view.optics.bilinear import thickness_at
 from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics
-from wavetank.view.optics.maps import thickness_at
 from wavetank.view.optics.mixture import along_sun
 from wavetank.view.water_buffers import SunlitWater, Thickness
 

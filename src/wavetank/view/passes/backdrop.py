@@ -9,13 +9,13 @@ from wavetank.device.compiler import lanes, qd
 from wavetank.view.buffers import Buffers, Light, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_view, vec2, vec3, vector, view_ray
 from wavetank.view.look import Look
+from wavetank.view.optics.bilinear import share_of
+from wavetank.view.optics.dry_mask import cells_between, find_wet, holds_dry, is_dry, noted
 from wavetank.view.optics.fluid import Optics, optics_of
 from wavetank.view.optics.glass import with_tank
-from wavetank.view.optics.maps import share_of
 from wavetank.view.optics.radiance import background, smoothstep, sun_disc, surface_radiance
 from wavetank.view.optics.rays import Box, box_interval
 from wavetank.view.optics.sunlight import sun_through_together, sun_through_water
-from wavetank.view.optics.wet import cells_between, find_wet, holds_dry, is_dry, noted
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import Backdrop, SunlitWater, Thickness, water_of

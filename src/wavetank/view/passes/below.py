@@ -17,11 +17,11 @@ from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, view_ray
 from wavetank.view.look import Look
-from wavetank.view.optics.body import depth_below, normal_above
+from wavetank.view.optics.bilinear import margins_inside, picture_at
 from wavetank.view.optics.fluid import Optics, dimmed, optics_of
-from wavetank.view.optics.maps import margins_inside, picture_at
 from wavetank.view.optics.radiance import environment, glint, smoothstep
 from wavetank.view.optics.rays import Box, box_interval
+from wavetank.view.optics.water_volume import depth_below, normal_above
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import Backdrop, SunlitWater, WaterSurface, water_of

@@ -14,8 +14,8 @@ counts; behind the water light goes on along the sun's rays, which keeps its pla
 from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, from_view, point_at, to_pixel, to_view, vec2, vec3
+from wavetank.view.optics.bilinear import share_of, thickness_at
 from wavetank.view.optics.fluid import above_floor, refracted
-from wavetank.view.optics.maps import share_of, thickness_at
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.radiance import smoothstep
 from wavetank.view.shot import Shot

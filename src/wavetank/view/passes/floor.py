@@ -3,7 +3,7 @@
 from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, view_ray
-from wavetank.view.optics.chance import scrambled, share_of_bits
+from wavetank.view.optics.hash_noise import scrambled, share_of_bits
 from wavetank.view.optics.radiance import smoothstep
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of

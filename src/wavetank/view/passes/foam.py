@@ -34,10 +34,10 @@ from wavetank.view.buffers import Buffers, FoamMaps, Pixels
 from wavetank.view.colormaps import rgb_of, to_linear
 from wavetank.view.lens import Lens, from_view, pixels_per_metre, to_pixel, to_view, vec2, vec3, vector
 from wavetank.view.look import Look
-from wavetank.view.optics.chance import bits_of, scrambled
+from wavetank.view.optics.bilinear import corners, gap_at
 from wavetank.view.optics.fluid import grain_of
 from wavetank.view.optics.glass import line_cover, slack
-from wavetank.view.optics.maps import corners, gap_at
+from wavetank.view.optics.hash_noise import bits_of, scrambled
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of

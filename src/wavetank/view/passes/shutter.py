@@ -26,9 +26,9 @@ from wavetank.view.buffers import Buffers, Motion, Pixels
 from wavetank.view.cells import Cells
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec2, vec3, view_ray
 from wavetank.view.look import Look
+from wavetank.view.optics.bilinear import map_at
 from wavetank.view.optics.fluid import grain_of
 from wavetank.view.optics.glass import line_cover, slack
-from wavetank.view.optics.maps import map_at
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import Drops, WaterSurface, water_of

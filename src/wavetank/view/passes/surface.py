@@ -22,7 +22,7 @@ from wavetank.device.compiler import qd, threads
 from wavetank.device.state import remembered
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, pixels_between, pixels_per_metre, to_view, vec2, vec3
-from wavetank.view.optics.marks import rim_key, rim_mark
+from wavetank.view.optics.edge_coverage import rim_key, rim_mark
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of

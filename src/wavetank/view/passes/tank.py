@@ -14,8 +14,8 @@ from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, view_ray
 from wavetank.view.look import Look
+from wavetank.view.optics.edge_coverage import line_mark
 from wavetank.view.optics.glass import slack, with_tank
-from wavetank.view.optics.marks import line_mark
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 

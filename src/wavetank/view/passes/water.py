@@ -15,16 +15,16 @@ from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, vec4, vector, view_ray
 from wavetank.view.look import Look
-from wavetank.view.optics.between import GROUP, alike, group, seen_between, shaded_alike
-from wavetank.view.optics.body import Inside, calm, through_body, wholeness
+from wavetank.view.optics.adaptive_sampling import even_pixel
+from wavetank.view.optics.edge_coverage import rim_cover, rim_key
 from wavetank.view.optics.fluid import Optics, optics_of, refracted
 from wavetank.view.optics.glass import line_cover
-from wavetank.view.optics.marks import rim_cover, rim_key
 from wavetank.view.optics.normals import normal_beside, normal_of, rise_at, unevenness
 from wavetank.view.optics.panes import share_behind, tank_interval
+from wavetank.view.optics.ray_interpolation import GROUP, alike, group, seen_between, shaded_alike
 from wavetank.view.optics.rays import box
-from wavetank.view.optics.resolve import even_pixel
 from wavetank.view.optics.shading import from_within, shine
+from wavetank.view.optics.water_volume import Inside, calm, through_body, wholeness
 from wavetank.view.paints import colors_of
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
@@ -86,7 +86,7 @@ def lay(
         band, begin, last = strip(strips, task, pixels.depth.shape[0] // optics.tall, pixels.depth.shape[1])
         beside, pair = optics.samples, qd.cast(optics.samples == 1, qd.i32)
         # What is seen through a body of water is found once for all samples of a pixel, or of two pixels of one sample,
-        # and not at all where it lies between the ends of two groups of pixels (`optics/between.py`).
+        # and not at all where it lies between the ends of two groups of pixels (`optics/ray_interpolation.py`).
         kept, kept_z, kept_layer, kept_pixel = vec4(0.0, 0.0, 0.0, -1.0), -1.0, -1, -1
         kept_above, kept_whole, uneven = vec4(0.0, 0.0, 0.0, 0.0), 0.0, 0.0
         before, before_above, before_layer = kept, kept_above, -1

@@ -13,7 +13,7 @@ pixel beside it.
 
 from wavetank.device.compiler import qd
 from wavetank.view.lens import vec2, vec4
-from wavetank.view.optics.maps import picture_at
+from wavetank.view.optics.bilinear import picture_at
 
 
 @qd.func

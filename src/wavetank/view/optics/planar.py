@@ -6,11 +6,11 @@ A wall and a solid leave a share of a particle's disc, by which what the map hol
 from wavetank.device.compiler import qd
 from wavetank.solids.distance import SolidSet, signed_distance
 from wavetank.view.lens import Lens, from_view, point_at, vec2, vec3
-from wavetank.view.optics.body import Inside
+from wavetank.view.optics.bilinear import thickness_at
 from wavetank.view.optics.fluid import Optics
-from wavetank.view.optics.maps import thickness_at
 from wavetank.view.optics.panes import share_before_wall
 from wavetank.view.optics.rays import Box
+from wavetank.view.optics.water_volume import Inside
 
 
 @qd.func

@@ -2,7 +2,7 @@
 
 from wavetank.device.compiler import qd
 from wavetank.view.lens import Lens, to_pixel, to_view, vec3
-from wavetank.view.optics.maps import corners, margins_inside, picture_at, share_of
+from wavetank.view.optics.bilinear import corners, margins_inside, picture_at, share_of
 from wavetank.view.optics.radiance import smoothstep
 
 

@@ -25,15 +25,15 @@ from wavetank.device.compiler import qd
 from wavetank.solids.distance import SolidSet, signed_distance
 from wavetank.view.lens import Lens, to_pixel, to_view, vec2, vec3, vec4
 from wavetank.view.look import Look
+from wavetank.view.optics.bilinear import share_of
 from wavetank.view.optics.fluid import Optics
-from wavetank.view.optics.glimpse import seen_at
 from wavetank.view.optics.interface import bent as crossed
 from wavetank.view.optics.interface import index_of_water
 from wavetank.view.optics.interface import mirrored as reflected
-from wavetank.view.optics.maps import share_of
 from wavetank.view.optics.normals import normal_of, rise_at
 from wavetank.view.optics.radiance import environment, smoothstep, surface_radiance
 from wavetank.view.optics.rays import Box
+from wavetank.view.optics.screen_hit import seen_at
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
