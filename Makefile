@@ -27,8 +27,8 @@ slow: .venv/test-ready
 	$(PYTEST) -m slow
 
 lint: .venv/test-ready
-	$(BIN)/ruff format --check src tests examples
-	$(BIN)/ruff check src tests examples
+	$(BIN)/ruff format --check src tests examples benchmarks
+	$(BIN)/ruff check src tests examples benchmarks
 	$(BIN)/mypy
 
 # The pictures in docs, made anew.

@@ -1,4 +1,4 @@
-"""Pictures of window and page: `xvfb-run -s "-screen 0 1400x900x24" python docs/screens.py [name ...]`, minutes.
+"""Pictures of window and page: `xvfb-run -s "-screen 0 1400x900x24" env PYTHONPATH=. python docs/screens.py [name ...]`, minutes.
 
 A headless Chromium looks at the page; the window opens on whatever display there is.
 """
@@ -14,8 +14,8 @@ from pathlib import Path
 from PIL import Image
 
 import wavetank as wt
+from benchmarks.browser.chromium import Browser
 from wavetank.front.page.server import WebFront
-from wavetank.lab.bench.chromium import Browser
 from wavetank.session import commands as do
 from wavetank.session.session import Session
 

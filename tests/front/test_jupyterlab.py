@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from wavetank.lab.bench.chromium import Browser, executable
+from benchmarks.browser.chromium import Browser, executable
 
 pytest.importorskip("jupyterlab", reason="JupyterLab is large: pip install jupyterlab")
 pytest.importorskip("anywidget", reason="wt.show needs anywidget: pip install 'wavetank[notebook]'")

@@ -9,7 +9,7 @@ import time
 import pytest
 
 import wavetank as wt
-from wavetank.lab.bench.chromium import Browser, executable
+from benchmarks.browser.chromium import Browser, executable
 from wavetank.session import commands as do
 
 BASIN = wt.Scene(

@@ -232,11 +232,7 @@ def test_the_command_prints_json_last(tmp_path, monkeypatch, capsys):
         (("--seconds", "nan"), "--seconds = nan"),
         (("--repeats", "1"), "--repeats = 1"),
         (("--compare", "nothing.json"), "--compare nothing.json"),
-        (("--peers", "--roofline"), "give one of them"),
-        (("--peers", "drop"), "--peers compares one dam break"),
-        (("--peers", "--sizes", "10"), "from 1,000"),
-        (("--scenes",), "goes with --peers"),
-        (("--peers", "--scenes", "--sizes", "1000"), "give no --sizes"),
+        (("--search", "--roofline"), "give one of them"),
         (("--roofline", "drop-2d", "300"), "2-D world"),
     ],
 )

@@ -73,11 +73,6 @@ def bench(
     seconds: Annotated[float | None, typer.Option(help="Seconds of water of each run [0.5].")] = None,
     repeats: Annotated[int, typer.Option(help="Passes that the medians are taken over, 2 or more.")] = 3,
     threads: Annotated[int | None, typer.Option(min=1, max=1024, help="Threads on the CPU; all without it.")] = None,
-    peers: Annotated[bool, typer.Option("--peers", help="Compare with SPlisHSPlasH on the same dam break.")] = False,
-    their_scenes: Annotated[
-        bool, typer.Option("--scenes", help="With --peers: scenes of theirs side by side, in pictures and heights.")
-    ] = False,
-    pictures: Annotated[Path, typer.Option(help="Folder for the pictures of --scenes.")] = Path("out/peers"),
     roofline: Annotated[
         bool, typer.Option("--roofline", help="Compare each kernel with what this machine can do.")
     ] = False,
@@ -85,14 +80,13 @@ def bench(
     bodies: Annotated[
         bool, typer.Option("--bodies", help="Compare a pool with itself when fifty bodies rain into it.")
     ] = False,
-    page: Annotated[bool, typer.Option("--page", help="Measure the page in a headless Chromium.")] = False,
     start_up: Annotated[bool, typer.Option(help="Measure the start of a fresh process too.")] = True,
     out: Annotated[Path | None, typer.Option(help="Write the result to this JSON file.")] = None,
     compare: Annotated[Path | None, typer.Option(metavar="OLD.json", help="Print ratios to an earlier result.")] = None,
     arch: Arch = "cpu",
     as_json: Json = False,
 ) -> None:
-    """Measure milliseconds per stage, rates, start-up; compare with an earlier run, a peer, the machine's ceilings."""
+    """Measure milliseconds per stage, rates, start-up; compare with an earlier run, the machine's ceilings."""
     from wavetank.lab.bench import run as bench_run
 
     order = bench_run.Order(
@@ -101,13 +95,9 @@ def bench(
         seconds=seconds,
         repeats=repeats,
         threads=threads,
-        peers=peers,
-        their_scenes=their_scenes,
-        pictures=pictures,
         roofline=roofline,
         search=search,
         bodies=bodies,
-        page=page,
         start_up=start_up,
         compare=compare,
         arch=arch,

@@ -26,13 +26,9 @@ class Order:
     seconds: float | None
     repeats: int
     threads: int | None
-    peers: bool
-    their_scenes: bool
-    pictures: Path
     roofline: bool
     search: bool
     bodies: bool
-    page: bool
     start_up: bool
     compare: Path | None
     arch: str
@@ -43,18 +39,10 @@ def perform(order: Order, say: Callable[[str], None]) -> tuple[dict[str, Any], l
 
     Raises `WavetankError` for options that do not go together or are out of range.
     """
-    kinds = order.peers + order.roofline + order.search + order.bodies + order.page + (order.compare is not None)
+    kinds = order.roofline + order.search + order.bodies + (order.compare is not None)
     if kinds > 1:
-        raise WavetankError(
-            "--peers, --roofline, --search, --bodies, --page and --compare are six things; give one of them."
-        )
+        raise WavetankError("--roofline, --search, --bodies and --compare are four things; give one of them.")
     names, sizes = split(order.scenes, order.sizes)
-    if order.their_scenes:
-        return _their_scenes(order, names, sizes, say)
-    if order.peers:
-        return _peers(order, names, sizes, say)
-    if order.page:
-        return _page(order, names, sizes, say)
     if order.bodies:
         return _bodies(order, names, sizes, say)
     if order.search:
@@ -111,23 +99,6 @@ def split(words: list[str], sizes: str) -> tuple[list[str], list[int]]:
     return [word for word in words if not word.isdigit()], [int(number) for number in [*numbers, *more]]
 
 
-def _page(
-    order: Order, names: list[str], sizes: list[int], say: Callable[[str], None]
-) -> tuple[dict[str, Any], list[Table]]:
-    from wavetank.lab.bench import page
-
-    if len(names) > 1 or len(sizes) > 1 or order.threads is not None:
-        raise WavetankError("--page measures one scene at one size on all threads; give no more than that.")
-    result = page.measure(
-        names[0] if names else page.SCENE,
-        sizes[0] if sizes else page.SIZE,
-        seconds=page.SECONDS if order.seconds is None else order.seconds,
-        arch=order.arch,
-        say=say,
-    )
-    return result, [page.page_table(result)]
-
-
 def _bodies(
     order: Order, names: list[str], sizes: list[int], say: Callable[[str], None]
 ) -> tuple[dict[str, Any], list[Table]]:
@@ -143,58 +114,3 @@ def _bodies(
         say=say,
     )
     return result, [bodies.bodies_table(result)]
-
-
-def _peers(
-    order: Order, names: list[str], sizes: list[int], say: Callable[[str], None]
-) -> tuple[dict[str, Any], list[Table]]:
-    from wavetank.lab.bench.peers.compare import compare_peers
-
-    if names or len(sizes) > 2 or order.arch != "cpu":
-        raise WavetankError(
-            "--peers compares one dam break on the CPU; give no scene, and at most two --sizes, for PBF and for DFSPH."
-        )
-    result = compare_peers(
-        *(sizes * 2)[:2],
-        seconds=SECONDS if order.seconds is None else order.seconds,
-        repeats=order.repeats,
-        threads=order.threads,
-        say=say,
-    )
-    found, (pbf, dfsph) = result["peers"], result["settings"]["particles"]
-    table = Table(
-        "against SPlisHSPlasH", "ours / theirs", "(low, high)", "ours", "theirs", "density error, ours; theirs"
-    )
-    for title, one, name in (
-        (f"PBF, {pbf:,}: M particle-iterations/s", found["splishsplash_pbf"], "particle_iterations_per_second"),
-        (f"DFSPH at 1 %, {dfsph:,}: s of water per s", found["splishsplash_dfsph"]["at_1pct"], "water_per_second"),
-        (f"DFSPH at 0.1 %, {dfsph:,}: s of water per s", found["splishsplash_dfsph"]["at_0.1pct"], "water_per_second"),
-    ):
-        factor = 1e-6 if name.startswith("particle") else 1.0
-        table.add_row(
-            title,
-            f"{one['ratio']:.2f}",
-            f"[{one['low']:.2f}, {one['high']:.2f}]",
-            *(f"{factor * one[side][name]:.4g}" for side in ("ours", "theirs")),
-            "; ".join(f"{100 * one[side]['density_error_mean']:.3f} %" for side in ("ours", "theirs")),
-        )
-    return result, [table]
-
-
-def _their_scenes(
-    order: Order, names: list[str], sizes: list[int], say: Callable[[str], None]
-) -> tuple[dict[str, Any], list[Table]]:
-    from wavetank.lab.bench.peers import scenes
-
-    if not order.peers or sizes or order.arch != "cpu":
-        raise WavetankError(
-            "--scenes goes with --peers: scenes of theirs on the CPU, each at its own spacing; give no --sizes."
-        )
-    result = scenes.compare_scenes(
-        names or scenes.SCENES,
-        order.pictures,
-        seconds=scenes.SECONDS if order.seconds is None else order.seconds,
-        threads=order.threads,
-        say=say,
-    )
-    return result, [scenes.scenes_table(result)]

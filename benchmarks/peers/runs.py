@@ -97,7 +97,7 @@ def ask(python: Path, folder: Path, order: dict[str, Any], threads: int) -> Run:
     lines = result.stdout.strip().splitlines()
     if result.returncode or not lines or not lines[-1].startswith("{"):
         said = (result.stderr.strip().splitlines() or lines or ["no message"])[-1]
-        raise WavetankError(f"--peers: SPlisHSPlasH stopped with exit code {result.returncode}: {said}")
+        raise WavetankError(f"SPlisHSPlasH stopped with exit code {result.returncode}: {said}")
     run: Run = json.loads(lines[-1])
     return run
 

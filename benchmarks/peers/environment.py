@@ -23,7 +23,7 @@ def splishsplash_python(say: Callable[[str], None]) -> Path:
     if chosen := os.environ.get(VARIABLE):
         python = Path(chosen)
         if not python.is_file():
-            raise WavetankError(f"{VARIABLE} = {chosen!r} is no file; it must be a Python that has pysplishsplash.")
+            raise WavetankError(f"{VARIABLE} = {chosen!r} is not a file; it must be a Python that has pysplishsplash.")
         return python
     folder = cache_folder() / PACKAGE.replace("==", "-")
     python = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
@@ -55,7 +55,7 @@ def splishsplash_python(say: Callable[[str], None]) -> Path:
     except (OSError, subprocess.SubprocessError) as error:
         lines = (getattr(error, "stderr", "") or str(error)).strip().splitlines() or ["no message"]
         raise WavetankError(
-            f"--peers needs {PACKAGE}, which could not be installed here: {lines[-1]}; "
+            f"this comparison needs {PACKAGE}, which could not be installed here: {lines[-1]}; "
             f"set {VARIABLE} to a Python that has it."
         ) from None
     return python

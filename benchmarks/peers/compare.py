@@ -12,11 +12,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from rich.table import Table
+
+from benchmarks.peers.environment import PACKAGE, splishsplash_python
+from benchmarks.peers.runs import Dam, Run, ours, pace, rate, theirs
 from wavetank.device import compiler
 from wavetank.foundation.errors import WavetankError
 from wavetank.lab.bench.machine import cores, load, machine
-from wavetank.lab.bench.peers.environment import PACKAGE, splishsplash_python
-from wavetank.lab.bench.peers.runs import Dam, Run, ours, pace, rate, theirs
 from wavetank.lab.bench.scenes import check
 
 ITERATIONS, TIME_STEP = 5, 0.0025  # of the comparison with PBF
@@ -48,7 +50,7 @@ def compare_peers(
     """
     for count in (pbf_count, dfsph_count):
         if not 1000 <= count <= 10_000_000:
-            raise WavetankError(f"--sizes = {count} is not allowed with --peers; it must be from 1,000 to 10,000,000.")
+            raise WavetankError(f"{count} particles are not allowed; it must be a number from 1,000 to 10,000,000.")
     check(seconds, repeats)
     python, workers = splishsplash_python(say), threads or cores()
     compiler.start("cpu", threads=threads)
@@ -78,6 +80,28 @@ def compare_peers(
         },
         "peers": {"splishsplash_pbf": pbf, "splishsplash_dfsph": dfsph},
     }
+
+
+def peers_table(result: dict[str, Any]) -> Table:
+    """Return the ratios as a table."""
+    found, (pbf, dfsph) = result["peers"], result["settings"]["particles"]
+    table = Table(
+        "against SPlisHSPlasH", "ours / theirs", "(low, high)", "ours", "theirs", "density error, ours; theirs"
+    )
+    for title, one, name in (
+        (f"PBF, {pbf:,}: M particle-iterations/s", found["splishsplash_pbf"], "particle_iterations_per_second"),
+        (f"DFSPH at 1 %, {dfsph:,}: s of water per s", found["splishsplash_dfsph"]["at_1pct"], "water_per_second"),
+        (f"DFSPH at 0.1 %, {dfsph:,}: s of water per s", found["splishsplash_dfsph"]["at_0.1pct"], "water_per_second"),
+    ):
+        factor = 1e-6 if name.startswith("particle") else 1.0
+        table.add_row(
+            title,
+            f"{one['ratio']:.2f}",
+            f"[{one['low']:.2f}, {one['high']:.2f}]",
+            *(f"{factor * one[side][name]:.4g}" for side in ("ours", "theirs")),
+            "; ".join(f"{100 * one[side]['density_error_mean']:.3f} %" for side in ("ours", "theirs")),
+        )
+    return table
 
 
 def against_pbf(dam: Dam, their: Callable[..., Run], seconds: float, repeats: int, say: Say) -> dict[str, Any]:
@@ -197,7 +221,7 @@ def _meet(
 
 def _fastest(found: list[tuple[float, Setting]], target: float, whose: str) -> Setting:
     if not found:
-        raise WavetankError(f"--peers: no setting of {whose} kept the mean density error below {100 * target:g} %.")
+        raise WavetankError(f"no setting of {whose} kept the mean density error below {100 * target:g} %.")
     return max(found, key=lambda pair: pair[0])[1]
 
 

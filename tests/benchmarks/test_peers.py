@@ -3,13 +3,16 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.peers import compare, environment, runs, scenes, splishsplash
+from benchmarks.peers.runs import Dam, ours, pace, rate
 from wavetank import WavetankError
-from wavetank.lab.bench.peers import compare, environment, runs, scenes, splishsplash
-from wavetank.lab.bench.peers.runs import Dam, ours, pace, rate
+
+ROOT = Path(__file__).parents[2]
 
 #: Stands in for the peer: answers like its script, and says what it was told.
 FAKE = """
@@ -99,6 +102,20 @@ def test_ratios_are_ours_over_theirs_at_equal_error(fake, monkeypatch):
     json.dumps(result)
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("dam", "10"), "from 1,000"),
+        (("dam", "--repeats", "1"), "--repeats = 1"),
+        (("scenes", "--seconds", "99"), "--seconds = 99"),
+    ],
+)
+def test_mistakes_are_one_sentence(words, told):
+    done = subprocess.run([sys.executable, "-m", "benchmarks.peers", *words], capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 1
+    assert told in done.stderr.strip() and done.stderr.count("\n") == 1
+
+
 def test_a_setting_that_meets_the_error_is_found():
     tried = []
 
@@ -157,13 +174,13 @@ def test_an_environment_that_cannot_be_made_is_one_sentence(tmp_path, monkeypatc
     with pytest.raises(WavetankError, match=r"could not be installed here: ERROR: no wheel for this system; set WAVE"):
         environment.splishsplash_python(lambda text: None)
     monkeypatch.setenv(environment.VARIABLE, str(tmp_path / "none"))
-    with pytest.raises(WavetankError, match="is no file"):
+    with pytest.raises(WavetankError, match="is not a file"):
         environment.splishsplash_python(lambda text: None)
 
 
 def test_the_script_needs_nothing_of_ours():
     """Another environment's Python runs it: only the standard library at the top."""
-    path = runs.Path(splishsplash.__file__)
+    path = Path(splishsplash.__file__)
     code = "import runpy, sys; sys.modules['wavetank'] = None; sys.modules['numpy'] = None; runpy.run_path(sys.argv[1])"
     subprocess.run([sys.executable, "-c", code, str(path)], check=True)
 

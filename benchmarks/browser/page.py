@@ -1,6 +1,6 @@
-"""`wavetank bench --page`: what a person at the page gets, measured in a real browser.
+"""What a viewer of the page gets, measured in a real browser.
 
-A server as `wavetank play --web` starts it, a headless Chromium beside it on the same processor, a mouse. Pictures are
+A server as `wavetank play --web` starts it, a headless Chromium on the same processor, a mouse. Pictures are
 counted by the page when they are drawn; a delay is from the browser's own time of the press to the first picture drawn
 after it, which nothing but that press can have caused because time stands still and the sharp picture is long there.
 """
@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from benchmarks.browser.chromium import Browser
 from wavetank.foundation.errors import WavetankError
-from wavetank.lab.bench.chromium import Browser
 from wavetank.lab.bench.machine import machine
 
 STAGE = (960, 540)  # px, of the picture's place on the page
@@ -111,7 +111,7 @@ def _served(scene: str, size: int, arch: str) -> Iterator[str]:
             assert server.stdout is not None
             line = next((line for line in server.stdout if "http://" in line), "")
             if not line:
-                raise WavetankError(f"bench --page: `{' '.join(command[1:])}` served no page; see above why.")
+                raise WavetankError(f"`{' '.join(command[1:])}` served no page; see above why.")
             yield next(word for word in line.split() if word.startswith("http://")).rstrip(";")
         finally:
             server.terminate()

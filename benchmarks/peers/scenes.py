@@ -16,13 +16,13 @@ import numpy as np
 from rich.table import Table
 
 import wavetank
+from benchmarks.peers.environment import PACKAGE, splishsplash_python
+from benchmarks.peers.runs import ask
 from wavetank.device import compiler
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.replacing import replacing
 from wavetank.foundation.rotations import inverse, product, turned
 from wavetank.lab.bench.machine import cores, load, machine
-from wavetank.lab.bench.peers.environment import PACKAGE, splishsplash_python
-from wavetank.lab.bench.peers.runs import ask
 from wavetank.lab.plots import BLUE, RED, pyplot, tidy
 from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import Instant, Standing
@@ -72,10 +72,10 @@ def compare_scenes(
 ) -> dict[str, Any]:
     """Run their scenes with both solvers, write NAME.png for each into `pictures`, and return heights and times.
 
-    Raises `WavetankError` where their solver is not here, and for what is no scene of theirs or cannot be imported.
+    Raises `WavetankError` where their solver is not here, and for what is not a scene of theirs or cannot be imported.
     """
     if not EVERY <= seconds <= 60.0:
-        raise WavetankError(f"--seconds = {seconds} is not allowed with --scenes; it must be from {EVERY} to 60.")
+        raise WavetankError(f"--seconds = {seconds} is not allowed; it must be from {EVERY} to 60.")
     pyplot()
     python, workers, busy = splishsplash_python(say), threads or cores(), load()
     compiler.start("cpu", threads=threads)
