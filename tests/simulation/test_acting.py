@@ -100,7 +100,7 @@ def test_what_clings_to_a_body_pulls_it():
     box, mass = sim.bodies["box"], 1000 * 0.002**3
     for _ in range(24):
         sim.step()
-        momentum = box.mass * box.velocity + box.owed[:3]
+        momentum = box.mass * box.velocity + box.pending_impulse[:3]
         largest = max(largest, float(np.linalg.norm(momentum)))
     total = mass * sim.velocities.astype(float).sum(axis=0) + momentum
     assert box.position[0] < 0.0205, "it is drawn near"

@@ -128,7 +128,7 @@ def test_momentum_goes_from_water_to_body():
 
     def sums():
         x, v = sim.positions.astype(float), sim.velocities.astype(float)
-        owed = body.owed  # which the body has got, and shows in the next step
+        owed = body.pending_impulse  # which the body has got, and shows in the next step
         turn = np.array([turned(body.rotation, axis) for axis in np.eye(3)]).T
         momentum = body.mass * body.velocity + owed[:3]
         angular = np.cross(body.center, momentum) + turn @ body.dry.tensor @ turn.T @ body.angular_velocity + owed[3:]
@@ -233,7 +233,7 @@ def test_a_body_that_was_held_owes_nothing_when_it_is_let_go():
     sim.step()
     assert sim.time_steps == 1
     body = sim.bodies["box"]
-    got = body.mass * body.velocity + body.owed[:2]
+    got = body.mass * body.velocity + body.pending_impulse[:2]
     given = (body.force + body.mass * np.array(sim.gravity)) * sim.scene.frame_time
     assert got == pytest.approx(given, abs=1e-6)
 

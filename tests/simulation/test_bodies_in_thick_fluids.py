@@ -59,7 +59,7 @@ def test_the_fluid_takes_the_momentum_that_its_drag_takes_from_a_body(viscosity)
     body, mass = sim.bodies["b"], 1400 * 0.03**3
 
     def momentum():
-        return mass * sim.velocities.astype(float).sum(axis=0) + body.mass * body.velocity + body.owed[:3]
+        return mass * sim.velocities.astype(float).sum(axis=0) + body.mass * body.velocity + body.pending_impulse[:3]
 
     begin = momentum()
     sim.advance(0.3)
@@ -102,4 +102,4 @@ def test_it_goes_on_from_a_saved_state_to_the_last_bit(tmp_path):
     for one in (sim, other):
         one.advance(0.1)
     assert sim.digest() == other.digest()
-    assert sim.bodies["b"].coupling.rubbed[0, 0] > 0.0
+    assert sim.bodies["b"].coupling.viscous_mass[0, 0] > 0.0

@@ -10,7 +10,6 @@ import pytest
 import wavetank as wt
 from wavetank.front.hud import Hud, three
 from wavetank.session import commands as do
-from wavetank.simulation.loads import figures, powers
 
 pytest.importorskip("rapier3d")
 
@@ -44,13 +43,13 @@ def test_a_motor_that_lifts_takes_the_weight_times_its_speed():
         weight = 2 * 9.81 * 0.2 * math.cos(angle)
         assert row["joints.hip.power"] == pytest.approx(weight * row["joints.hip.velocity"], rel=0.02)
         assert row["joints.hip.power"] == pytest.approx(row["joints.hip.effort"] * row["joints.hip.velocity"])
-        assert powers(sim.bodies) == {"hip": pytest.approx(row["joints.hip.power"])}
+        assert sim.joints.powers == {"hip": pytest.approx(row["joints.hip.power"])}
 
 
 def test_a_hinge_without_a_motor_has_no_power_to_be_shown():
     sim = wt.Simulation(arm())
     sim.advance(0.1)
-    assert powers(sim.bodies) == {} and abs(sim.stats()["joints.hip.effort"]) < 0.1
+    assert sim.joints.powers == {} and abs(sim.stats()["joints.hip.effort"]) < 0.1
 
 
 def test_between_two_fluids_each_has_its_share(tmp_path):
@@ -77,7 +76,7 @@ def test_force_is_buoyancy_and_drag():
     assert crate.buoyancy.tolist() == pytest.approx([0, weight, 0], abs=0.02 * weight)
     assert np.linalg.norm(crate.drag) < 0.1 * weight
     assert (crate.buoyancy + crate.drag).tolist() == pytest.approx(crate.force.tolist())
-    row = figures(sim.bodies)
+    row = sim.bodies.figures()
     assert row["bodies.crate.force_y"] == pytest.approx(crate.force[1])
     assert {name.rsplit(".", 1)[1] for name in row} == {
         "force_x",

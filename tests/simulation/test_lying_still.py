@@ -21,10 +21,10 @@ def late(pushes) -> np.ndarray:
     coupling = lone()
     for push in pushes:
         coupling.impulse = np.zeros((1, 6))
-        coupling.expect()
+        coupling.add_late_impulse()
         coupling.impulse = np.full((1, 6), float(push))
-        coupling.end()
-    return coupling.later
+        coupling.record_late_impulse()
+    return coupling.late_impulse
 
 
 def test_what_alternates_is_not_expected_to_go_on():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank.simulation.added_mass import added_mass
+from wavetank.simulation.mass_properties import added_mass
 from wavetank.solids.mass import Ruler, inertia_of
 
 

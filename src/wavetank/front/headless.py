@@ -26,7 +26,6 @@ from wavetank.front.signals import Asked, asked_to_end
 from wavetank.scene.scene import Scene
 from wavetank.simulation.cost import check_time
 from wavetank.simulation.frame import Frame
-from wavetank.simulation.loads import driven
 from wavetank.simulation.simulation import Simulation
 from wavetank.view.camera import Camera
 from wavetank.view.extent import extent_of
@@ -398,7 +397,7 @@ class _Summary:
             sums["energy_start"] = energy
         for name in WORST:
             sums[f"worst {name}"] = max(sums[f"worst {name}"], row[name])
-        for name in driven(self.sim.bodies):  # joints in a ring have no power of their own
+        for name in self.sim.joints.motors:  # joints in a ring have no power of their own
             sums[f"power {name}"] = sums.get(f"power {name}", 0.0) + row.get(f"joints.{name}.power", 0.0)
         sums["error"] += row["density_error_mean"]
         sums["frames"], sums["energy"], self.last = sums["frames"] + 1, energy, row

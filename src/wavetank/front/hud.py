@@ -12,7 +12,6 @@ from wavetank.session.game import Game
 from wavetank.session.scores import keep_score, key_of, scores
 from wavetank.session.session import Session
 from wavetank.simulation.jets import outlines
-from wavetank.simulation.loads import powers
 
 LONGEST = 0.2  # of the picture's height: the arrow of the heaviest body's weight
 MOST = 2.0  # of that: no arrow is longer
@@ -111,7 +110,7 @@ class Hud:
                 if places and float(np.linalg.norm(mean)) > LEAST * weight:
                     told = f"{three(float(np.linalg.norm(mean)))} N"
                     shown.append({"corners": [], "outline": places, "mark": mark, "label": told})
-        for name, power in powers(sim.bodies).items():
+        for name, power in sim.joints.powers.items():
             if math.isfinite(power):
                 (mean,) = self._mean((name, "power"), np.array([power]))
                 at = sim.joints[name].place

@@ -1,4 +1,4 @@
-"""One body: what is known of it, and its public face."""
+"""One rigid body of a running world, by its name in `sim.bodies`."""
 
 import dataclasses
 from collections.abc import Callable
@@ -21,21 +21,21 @@ class Body:
     name: str  # of the solid
     number: int  # of the solid
     solid: Solid
-    rigid: Callable[[], Any]  # the engine's view of it
+    rigid: Callable[[], Any]  # its handle in the engine
     pose: Callable[[], Pose]
     gravity: Callable[[], np.ndarray]  # m/s^2, [3]
     dim: int
     dry: Inertia
-    wet: Inertia  # of the water that it displaces
+    wet: Inertia  # of the water that it displaces when immersed
     unit: float  # 1/m, see `SolidSet.unit`
     coupling: Coupling  # of all bodies
-    row: int  # of this one there
+    row: int  # of this body in `coupling`
 
     # --- what users see ---
 
     @property
     def mass(self) -> float:
-        """Mass [kg]; in a 2-D world that of a metre's length."""
+        """Mass [kg]; in a 2-D world per metre of depth."""
         return self.dry.mass
 
     @property
@@ -72,34 +72,34 @@ class Body:
 
     @property
     def force(self) -> np.ndarray:
-        """What the water pushed it with in the last step [N], shape [dim]."""
-        return self.coupling.impulse[self.row][: self.dim] / (self.coupling.lasted or 1.0)
+        """Force of the water on it in the last step [N], shape [dim]."""
+        return self.coupling.impulse[self.row][: self.dim] / (self.coupling.last_dt or 1.0)
 
     @property
     def buoyancy(self) -> np.ndarray:
-        """What of `force` fluids at rest would push with [N], shape [dim]: the weight of what it displaces."""
-        lifted: np.ndarray = -self.wet.mass * self.coupling.displaces[self.row] * self.gravity()[: self.dim]
+        """The hydrostatic part of `force` [N], shape [dim]: minus the weight of the fluid that it displaces."""
+        lifted: np.ndarray = -self.wet.mass * self.coupling.displaced[self.row] * self.gravity()[: self.dim]
         return lifted
 
     @property
     def drag(self) -> np.ndarray:
-        """The rest of `force` [N], shape [dim]: what motion gives, drag, lift, slams and the water that goes along."""
+        """The hydrodynamic part of `force` [N], shape [dim]: drag, lift, slamming and added mass."""
         return self.force - self.buoyancy
 
     @property
     def torque(self) -> np.ndarray:
-        """The same about its centre of mass [N m], shape [3]."""
-        return self.coupling.impulse[self.row][3:] / (self.coupling.lasted or 1.0)
+        """Torque of the water about its centre of mass in the last step [N m], shape [3]."""
+        return self.coupling.impulse[self.row][3:] / (self.coupling.last_dt or 1.0)
 
     @property
     def immersed(self) -> float:
-        """Share of its volume that is under water, 0 to 1."""
+        """Immersed share of its volume, 0 to 1."""
         return float(self.coupling.immersed[self.row])
 
     @property
-    def owed(self) -> np.ndarray:
-        """Momentum that it is still to get, and that about its centre, [6], kg m/s and kg m^2/s."""
-        return self.coupling.owed[self.row]
+    def pending_impulse(self) -> np.ndarray:
+        """Impulse that it is still to get, and that about its centre, [6], kg m/s and kg m^2/s."""
+        return self.coupling.pending_impulse[self.row]
 
     @property
     def center(self) -> np.ndarray:

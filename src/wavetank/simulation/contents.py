@@ -9,7 +9,6 @@ from wavetank.physics import measure, population
 from wavetank.physics.measure import neighbor_numbers, update_densities
 from wavetank.physics.world import World
 from wavetank.scene.scene import Scene
-from wavetank.simulation import loads
 from wavetank.simulation.arrays import check_crowd, check_rows, largest_norm, put_by_id
 from wavetank.simulation.bodies import Bodies
 from wavetank.simulation.frame import Frame
@@ -145,7 +144,7 @@ class Contents:
         return tuple(found)
 
     def stats(self) -> dict[str, float]:
-        """Measure this instant; see `physics.measure.statistics` and `simulation.loads` for the keys.
+        """Measure this instant; see `physics.measure.statistics` and `Bodies.figures` for the keys.
 
         Foam is in numbers of particles.
         """
@@ -161,7 +160,7 @@ class Contents:
             **{KINDS[kind]: int(np.sum(frame.foam_kinds == kind)) for kind in (1, 2, 3)},
             "foaming": int(frame.foaming.sum()),
             **(self.sources.figures() if self.sources else {}),
-            **loads.figures(self.bodies),
+            **self.bodies.figures(),
             "substeps": self.time_steps,
             "milliseconds_per_frame": 1e3 * self.seconds_per_frame,
         }

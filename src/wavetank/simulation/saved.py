@@ -21,7 +21,7 @@ from wavetank.foundation.replacing import replacing
 from wavetank.physics.foam.pool import ROWS
 from wavetank.scene.scene import MAX_PARTICLES, Scene
 from wavetank.simulation.arrays import check_crowd
-from wavetank.simulation.coupling import REMEMBERED, with_all_rows
+from wavetank.simulation.coupling import STATE_ROWS, upgraded
 from wavetank.simulation.ledger import Ledger
 from wavetank.simulation.snapshot import ARRAYS, VISCOUS, Numbers, Snapshot
 from wavetank.solids.motion import Pose
@@ -252,8 +252,8 @@ def _checked_arrays(parts: dict[str, np.ndarray], header: Header, scene: Scene, 
     bodies = sum(solid.is_body for solid in scene.solids)
     if bodies or any(name in parts for name in BODIES):
         if BODIES[0] in parts:
-            parts[BODIES[0]] = with_all_rows(parts[BODIES[0]])
-        result[BODIES[0]] = array(BODIES[0], np.float64, bodies, REMEMBERED, 6)
+            parts[BODIES[0]] = upgraded(parts[BODIES[0]])
+        result[BODIES[0]] = array(BODIES[0], np.float64, bodies, STATE_ROWS, 6)
         if not bodies or BODIES[1] not in parts or parts[BODIES[1]].dtype != np.uint8 or parts[BODIES[1]].ndim != 1:
             raise WavetankError(f"{refuse}: its bodies are not those of its scene.")
         result[BODIES[1]] = parts[BODIES[1]]

@@ -167,7 +167,7 @@ class Simulation(States):
     ) -> None:
         """Let bodies, solids and water take a step of `dt` [s] from `start` [s] on, those `shares` of a frame."""
         if self.bodies:
-            self.bodies.push(acting, dt, start)
+            self.bodies.apply_forces(acting, dt, start)
             self.bodies.advance(scene.gravity, dt, shares[1], limit, start + dt + self.scene.start_time)
         self.world.solids_version = self.solids.move_to(*shares)
         if self.count:
@@ -182,7 +182,7 @@ class Simulation(States):
             return False
         dt, limit = duration / whole(self._steps_in(duration)), self._speed_limit(duration)
         fall = np.array(scene.gravity, np.float32) * np.float32(dt) ** 2
-        with self.bodies.standing() if self.bodies else contextlib.nullcontext():
+        with self.bodies.frozen() if self.bodies else contextlib.nullcontext():
             stands = settle(
                 self.world,
                 lambda: self._take_step(scene, (), 0.0, dt, (0.0, 1.0), limit),

@@ -63,7 +63,7 @@ class States(Contents, ABC):
         """Return this instant as host arrays, for `resume`."""
         taken = snapshots.take_snapshot(self.scene, self.world, self.solids, self.ledger)
         sources = self.sources.plain() if self.sources else {}
-        return dataclasses.replace(taken, arrays=taken.arrays | self.bodies.arrays(), sources=sources)
+        return dataclasses.replace(taken, arrays=taken.arrays | self.bodies.state_arrays(), sources=sources)
 
     def resume(self, snapshot: Snapshot) -> None:
         """Go back (or on) to an instant; parameters and forces stay as they are now."""
@@ -76,7 +76,7 @@ class States(Contents, ABC):
         self.ledger.capacity = before.capacity
         self.ledger.next_id = max(self.ledger.next_id, before.next_id)
         snapshots.put_particles(snapshot, self.scene, self.world, self.ledger.capacity)
-        self.bodies.resume(snapshot.arrays)
+        self.bodies.restore(snapshot.arrays)
         self.sources = Sources(self.scene)
         self.sources.read(snapshot.sources)
 
@@ -122,5 +122,5 @@ class States(Contents, ABC):
             check_cost(scene, snapshot.ledger.capacity)
             self = cls(scene, arch)
             self.resume(snapshot)
-            self.bodies.check(snapshot.poses)
+            self.bodies.check_poses(snapshot.poses)
         return self

@@ -1,11 +1,11 @@
-"""Forces of a scene act on bodies: each is accelerated as the water would be whose place it takes, piece by piece.
+"""Body forces of a scene on rigid bodies: each piece of a body is accelerated as the water would be in its place.
 
-A force is a kernel over particles, and may be a user's own. So it is given particles that stand for pieces of the
-bodies, as fast as these are there, and what it makes of their velocities is what the body gets, by mass and lever arm.
+A force is a kernel over particles, and may be a user's own. So it is given particles in place of pieces of the bodies,
+with the velocities of these pieces, and the change of their velocities, by mass and lever arm, is that of the body.
 
     code      meaning                                            unit
     places    of the pieces, in the frame of the solid           m
-    shares    mass of a piece, over that of its body             1
+    shares    mass of a piece over that of its body              1
 """
 
 from collections.abc import Iterable, Sequence
@@ -20,11 +20,11 @@ from wavetank.scene.forces.jet import Jet
 from wavetank.simulation.body import Body
 from wavetank.solids.mass import Ruler
 
-ACROSS = 4  # pieces along the longest way through a body
+ACROSS = 4  # pieces along the largest extent of a body
 
 
-class Acting:
-    """What forces do to bodies."""
+class BodyForces:
+    """Pieces of all bodies, as particles that forces act on."""
 
     def __init__(self, members: Sequence[Body], dim: int, spacing: float) -> None:
         self.members, self.dim = members, dim
@@ -38,9 +38,9 @@ class Acting:
         self.particles = new_particles(dim, int(self.ends[-1]))
 
     def impulses(self, forces: Iterable[Force], dt: float, time: float) -> np.ndarray:
-        """Return the momentum [n, 6] that forces give to bodies in a step of `dt` [s] from `time` [s] on."""
+        """Return the impulses [n, 6] [kg m/s, kg m^2/s] of forces on bodies in a step of `dt` [s] from `time` [s]."""
         result = np.zeros((len(self.members), 6))
-        forces = [force for force in forces if not isinstance(force, Jet)]  # that is the water in a mouth
+        forces = [force for force in forces if not isinstance(force, Jet)]  # it acts on the water in an inlet
         if not forces:
             return result
         x, v = np.zeros((2, int(self.ends[-1]), 3))
