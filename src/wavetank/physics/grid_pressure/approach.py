@@ -4,7 +4,7 @@ A wall's layers answer the way of a particle towards it by a share that falls wi
 presses on it, by a third below a body, where water stands off a little. `MISSING` of `correction.py` makes up for what
 lacks where water rests. What a solid moves by itself in a step is answered in full, whatever the distance: the layer of
 particles at it has to make room for all of that way. Else a body closes the gap first and hits the water three steps
-later (docs/bodies.md, Why heave was slow).
+later (notebook/bodies.md, "A barge that is pushed down").
 
     code      meaning                                                              unit
     driven    way of a particle in this step but for gravity and carried pressure  m

@@ -1,8 +1,8 @@
 """Slits between water and a solid above it, which are no free surface: such cells count as full, and close.
 
 Half a spacing of air between water and the bottom of a body was a free surface to the grid: the pressure there came
-and went from step to step, and pushed a held box with 0.3 to 1.5 times its buoyancy (docs/bodies.md). So a cell below a
-roof counts as full where there is water below it, and one that a solid takes a part of where the open ones beside it
+and went from step to step, and pushed a held box with 0.3 to 1.5 times its buoyancy (notebook/calm.md). So a cell below
+a roof counts as full where there is water below it, and one that a solid takes a part of where the open ones beside it
 are.
 
 A roof faces down. Where any solid that takes room above counted as one, so did the side of a body that leans by a few
