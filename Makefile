@@ -48,7 +48,7 @@ validation: .venv/test-ready
 COUNT ?= 20000
 fuzz: .venv/test-ready
 	$(BIN)/python tests/fuzz/long.py --count $(COUNT)
-	WAVETANK_FUZZ=long $(BIN)/python -m pytest -q tests/fuzz/test_attacks.py tests/front/test_floods.py tests/simulation/test_exact.py
+	WAVETANK_FUZZ=long $(BIN)/python -m pytest -q tests/fuzz/test_attacks.py tests/page/test_floods.py tests/simulation/test_exact.py
 
 # Every bundled scene over FRAMES frames: one thread, two threads, restored, killed and gone on, the same digest after each;
 # and 100 times kill -9. An hour. make promises FRAMES=30 KILLS=5 is shorter.

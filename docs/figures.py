@@ -19,7 +19,7 @@ import numpy as np
 from PIL import Image
 
 import wavetank as wt
-from wavetank.front.still import SHOWN_AT, USUAL_TIME
+from wavetank.run.still import SHOWN_AT, USUAL_TIME
 from wavetank.lab.cases import CASES
 from wavetank.lab.converge import converge
 from wavetank.lab.validate import bounds_text, number_text, validate

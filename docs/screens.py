@@ -15,7 +15,7 @@ from PIL import Image
 
 import wavetank as wt
 from benchmarks.browser.chromium import Browser
-from wavetank.front.page.server import WebFront
+from wavetank.page.server import WebFront
 from wavetank.session import commands as do
 from wavetank.session.session import Session
 
@@ -116,7 +116,7 @@ def forces() -> None:
 
 def window() -> None:
     """The window with its curves."""
-    from wavetank.front.window.window import Window
+    from wavetank.page.window.window import Window
 
     opened = Window(Session(wt.Scene.load("obstacle-tank")), (1360, 860))
     opened.open()

@@ -49,7 +49,7 @@ def python_of_blender() -> str:
 def make_run(out: Path) -> None:
     """Write a run with USD, and what Blender has to find in it."""
     import wavetank as wt
-    from wavetank.front.headless import Order, record
+    from wavetank.run.record import Order, record
 
     sim = wt.Simulation(wt.Scene.from_text(SCENE))
     sim.advance(0.5)

@@ -22,9 +22,9 @@ TESTS = [
     "tests/formats",
     "tests/session",
     "tests/simulation",
-    "tests/front/test_gate.py",
-    "tests/front/test_floods.py",
-    "tests/front/test_checkpoints.py",
+    "tests/page/test_gate.py",
+    "tests/page/test_floods.py",
+    "tests/run/test_checkpoints.py",
     "tests/test_cli.py",
     "tests/fuzz/test_attacks.py",
 ]

@@ -23,7 +23,7 @@ import time
 from pathlib import Path
 
 import wavetank as wt
-from wavetank.front.checkpoints import begun
+from wavetank.run.checkpoints import begun
 from wavetank.scene.scene import bundled_levels, bundled_scenes, with_particles
 
 Digests = dict[int, str]  # by the number of the frame

@@ -290,7 +290,7 @@ def test_a_scene_that_needs_a_missing_package_spoils_nothing():
 import sys
 sys.modules["trimesh"] = None
 from wavetank import cli
-from wavetank.front.about import scenes
+from wavetank.page.about import scenes
 cards = {card["name"]: card for card in scenes()}
 print(len(cards), bool(cards["dam-break"]["shapes"]))
 sys.argv = ["wavetank", "scenes"]

@@ -78,7 +78,7 @@ def test_sections_of_the_notebook_that_code_names_exist():
         (path, page, section)
         for path in sources
         for page, section in re.findall(
-            r'(?<!front/)\bnotebook/([\w-]+\.md)(?:,[\s#]+"([^"]+)")?', path.read_text("utf-8")
+            r'(?<!page/)\bnotebook/([\w-]+\.md)(?:,[\s#]+"([^"]+)")?', path.read_text("utf-8")
         )
     ]
     for path, page, section in named:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from wavetank.formats.dualsphysics import load_dualsphysics
     from wavetank.formats.robots import load_mjcf, load_robot, load_urdf
     from wavetank.formats.splishsplash import load_splishsplash
-    from wavetank.front.notebook.show import show
+    from wavetank.page.notebook.show import show
     from wavetank.session import commands
     from wavetank.session.recording import Recording, replay
     from wavetank.session.session import Session
@@ -107,7 +107,7 @@ LATER = {
     "load_urdf": "wavetank.formats.robots",
     "render": "wavetank.view.renderer",
     "replay": "wavetank.session.recording",
-    "show": "wavetank.front.notebook.show",
+    "show": "wavetank.page.notebook.show",
 }
 
 

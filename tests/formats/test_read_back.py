@@ -8,14 +8,14 @@ import time
 
 import numpy as np
 import pytest
-from instants import FPS, FRAMES, instants, world
 
 import wavetank as wt
+from instants import FPS, FRAMES, instants, world
 from wavetank.formats import hdf5, npz
-from wavetank.formats.outputs import Outputs
 from wavetank.formats.plan import Plan, Shapes, Viewpoint
 from wavetank.formats.surface import surfaces_of
 from wavetank.foundation.rotations import turned
+from wavetank.run.outputs import Outputs
 from wavetank.simulation.instant import FOAM, PARTS, WATER, colors_of
 
 VIEW = Viewpoint((2.0, 1.0, 2.0), (0.6, 0.3, 0.3), 0.6)
@@ -271,7 +271,7 @@ KILLED = """
 import sys, pathlib, time
 sys.path.insert(0, {tests!r})
 from instants import instants, world
-from wavetank.formats.outputs import Outputs
+from wavetank.run.outputs import Outputs
 outputs = Outputs(pathlib.Path({out!r}) / "w", world(), ("usd", "vtkhdf", "h5", "vtp", "npz"), fps=25.0)
 print("ready", flush=True)
 for number in range(100_000):
@@ -285,7 +285,7 @@ def test_a_killed_run_opens(tmp_path, delay):
     import h5py
     from pxr import Usd
 
-    script = KILLED.format(tests=str(__import__("pathlib").Path(__file__).parent), out=str(tmp_path))
+    script = KILLED.format(tests=str(__import__("pathlib").Path(__file__).parents[1]), out=str(tmp_path))
     process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     while process.stdout.readline() not in (b"ready\n", b""):
         pass

@@ -19,7 +19,7 @@ from strategies import WEIRD, mutated, of_type, tables, toml_of, torn
 
 import wavetank as wt
 from wavetank.foundation.door import parse_toml
-from wavetank.front.page.viewers import Viewers, _table
+from wavetank.page.viewers import Viewers, _table
 from wavetank.scene.scene import bundled_levels, bundled_scenes
 from wavetank.session.commands import COMMANDS
 from wavetank.session.recording import Recording, replay
@@ -202,7 +202,7 @@ def try_message(text: str) -> None:
     session = _session()
     ray = {"origin": (0.5, 0.3, 5.0), "direction": (0.0, 0.0, -1.0)}
     viewers = Viewers(session.submit, lambda u, v, tool: ray, dict)
-    from wavetank.front.page.viewers import Viewer
+    from wavetank.page.viewers import Viewer
 
     viewers.driver = viewer = Viewer(None)
     taken_or_refused(lambda: viewers.hear(viewer, _table({"text": text})))

@@ -17,10 +17,10 @@ from strategies import mutated, toml_of, torn
 
 import wavetank as wt
 from wavetank.formats.bgeo import read_bgeo
-from wavetank.formats.run_folder import Run, RunFolder
 from wavetank.formats.splishsplash import load_splishsplash
 from wavetank.foundation.door import parse_toml
-from wavetank.front.checkpoints import Checkpoints, begun
+from wavetank.run.checkpoints import Checkpoints, begun
+from wavetank.run.folder import Run, RunFolder
 
 FOLDER = Path(tempfile.gettempdir()) / "wavetank-fuzz"
 SMALL = """
@@ -50,7 +50,7 @@ def _read(folder: Path) -> Files:
 @functools.cache
 def good_run() -> Files:
     """A run of three frames with figures, both kinds of frames, and a checkpoint."""
-    from wavetank.formats.outputs import Outputs
+    from wavetank.run.outputs import Outputs
 
     folder = fresh("made", {})
     scene = wt.Scene.from_text(SMALL)

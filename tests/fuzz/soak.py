@@ -17,11 +17,11 @@ from pathlib import Path
 
 import wavetank as wt
 from wavetank.formats.npz import write_npz
-from wavetank.front.page.server import WebFront
+from wavetank.page.server import WebFront
 from wavetank.scene.scene import bundled_levels, bundled_scenes
 from wavetank.session.session import Session
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "front"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "page"))
 
 from watcher import Watcher, resident
 

@@ -23,7 +23,7 @@ from attacks import (
 )
 
 import wavetank as wt
-from wavetank.front.page.viewers import Viewer, Viewers, _table
+from wavetank.page.viewers import Viewer, Viewers, _table
 from wavetank.session.recording import Recording, replay
 from wavetank.session.session import Session
 from wavetank.simulation.saved import sealed

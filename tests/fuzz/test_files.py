@@ -11,9 +11,9 @@ from files import ROBOT, fresh, good_run, good_scenes, particle_file
 
 import wavetank as wt
 from wavetank.formats.bgeo import read_bgeo
-from wavetank.formats.run_folder import RunFolder
 from wavetank.formats.splishsplash import load_splishsplash
-from wavetank.front.checkpoints import begun
+from wavetank.run.checkpoints import begun
+from wavetank.run.folder import RunFolder
 
 
 @pytest.fixture(autouse=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank.front.about import scenes
+from wavetank.page.about import scenes
 from wavetank.scene.scene import bundled_levels
 from wavetank.scene.summary import bundled_counts
 from wavetank.simulation.simulation import Simulation

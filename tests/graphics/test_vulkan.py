@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from wavetank.front import backends
+from wavetank.lab import backends
 
 DRIVER = Path("/usr/lib/chromium/vk_swiftshader_icd.json")  # of Debian's package
 

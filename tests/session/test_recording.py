@@ -292,7 +292,7 @@ def test_a_recording_that_is_none(tmp_path):
         assert str(report.value).startswith(str(path))
 
 
-OFTEN = "import wavetank.front.recorder as r; r.EVERY = 0.2; from wavetank.cli import main; main()"
+OFTEN = "import wavetank.page.recorder as r; r.EVERY = 0.2; from wavetank.cli import main; main()"
 
 
 def test_a_killed_session_keeps_its_recording(tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank.front.hud import Hud, three
+from wavetank.page.hud import Hud, three
 from wavetank.session import commands as do
 
 pytest.importorskip("rapier3d")

@@ -25,7 +25,7 @@ def export(
     as_json: Json = False,
 ) -> None:
     """Write the frames of a run's folder, a saved state, a recording or an HDF5 file for other programs."""
-    from wavetank.front.exporting import export as convert
+    from wavetank.run.export import export as convert
 
     figures = convert(source, names_in(to), out=out, only=names_in([only]), every=every, arch=arch, console=console)
     if as_json:

@@ -122,8 +122,8 @@ def doctor(
     if compare is not None:
         _compare_backends(compare, as_json)
         return
-    from wavetank.front.play import why_no_window
     from wavetank.lab.doctor import examine, told
+    from wavetank.page.play import why_no_window
 
     findings = examine(why_no_window())
     if as_json:
@@ -136,7 +136,7 @@ def doctor(
 
 
 def _compare_backends(arch: str, as_json: bool) -> None:
-    from wavetank.front import backends
+    from wavetank.lab import backends
 
     with console.status(f"the same water on cpu and {arch}"):
         result = backends.compare(arch)

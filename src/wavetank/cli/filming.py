@@ -46,13 +46,13 @@ def film(
     as_json: Json = False,
 ) -> None:
     """Film a scene by the camera and the slow motion in its table [film]; one that was stopped goes on."""
-    from wavetank.front.filming import film as make
+    from wavetank.run.film import film_scene
     from wavetank.simulation.cost import large_worlds_allowed
 
     world, path = configured(scene, settings), out or Path(Path(scene).stem + ".mp4")
     changes = {"quality": quality, "samples": samples, "fps": fps, "duration": duration, "speed": speed}
     with large_worlds_allowed(allow_large):
-        figures = make(
+        figures = film_scene(
             world,
             path,
             arch=arch,

@@ -34,8 +34,8 @@ def play(
     arch: Arch = "cpu",
 ) -> None:
     """Play with the water in a window or, without a display, a browser: pour, stir, freeze, carry, rewind."""
-    from wavetank.front.kept import as_scene
-    from wavetank.front.play import play as begin
+    from wavetank.page.play import play as begin
+    from wavetank.run.archived import as_scene
 
     name = _chosen(scene, level)
     world = configured(as_scene(name or "obstacle-tank"), settings)
@@ -66,7 +66,7 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """Do a recorded session again and say whether its particles are the same, bit for bit."""
-    from wavetank.front.headless import replay_session
+    from wavetank.run.record import replay_session
 
     figures = replay_session(session, video=video, fps=fps, size=size_of(size), arch=arch, console=console)
     if as_json:

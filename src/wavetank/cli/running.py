@@ -109,7 +109,7 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Simulate a scene and write video, pictures, particles and figures."""
-    from wavetank.front.headless import Order, record
+    from wavetank.run.record import Order, record
     from wavetank.simulation.cost import large_worlds_allowed
     from wavetank.simulation.simulation import Simulation
 
@@ -143,7 +143,7 @@ def resume(
     as_json: Json = False,
 ) -> None:
     """Go on with a run that ended early, from its last checkpoint, to the same bits."""
-    from wavetank.front.headless import go_on
+    from wavetank.run.record import go_on
     from wavetank.simulation.cost import large_worlds_allowed
 
     with large_worlds_allowed(allow_large):
@@ -198,8 +198,8 @@ def render(
     as_json: Json = False,
 ) -> None:
     """Draw one picture of a scene, a saved state or an instant of a run; or a film of a run that is over."""
-    from wavetank.front.kept import FILMS, is_kept
-    from wavetank.front.still import take
+    from wavetank.run.archived import FILMS, is_kept
+    from wavetank.run.still import take
 
     out = out or picture_name(world, at, view, color_by)
     kept = is_kept(world) or (world.endswith(".toml") and out.suffix.lower() in FILMS)
@@ -264,7 +264,7 @@ def render(
 def _film(
     world: str, out: Path, size: tuple[int, int], at: float | None, kept: bool, as_json: bool, **options: Any
 ) -> None:
-    from wavetank.front.kept import film
+    from wavetank.run.archived import film_archived
 
     if not kept:
         raise WavetankError(
@@ -273,14 +273,14 @@ def _film(
         )
     if at is not None:
         raise WavetankError(f"--at does not go with a film, {out}, which shows all frames; name a .png.")
-    figures = film(world, out, *size, console=console, **options)
+    figures = film_archived(world, out, *size, console=console, **options)
     print(json.dumps(figures) if as_json else f"{figures['frames']:,} frames\n{out}")
     if figures["interrupted"]:
         raise typer.Exit(figures["exit_code"])
 
 
 def _report(figures: dict[str, Any]) -> None:
-    from wavetank.formats.outputs import bytes_of
+    from wavetank.run.outputs import bytes_of
 
     last, worst = figures["last"], figures["worst"]
     print(f"{figures['seconds_of_water']:.2f} s of water, {last['count']:,} particles on {figures['arch']}")

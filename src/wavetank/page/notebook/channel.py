@@ -1,0 +1,122 @@
+"""The widget in a notebook's cell: what goes over the kernel's channel, and who looks at the other end.
+
+Nothing of it is an address: messages and pictures take the way that the notebook has to its kernel, however far it is.
+"""
+
+import functools
+import importlib.resources
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+from typing_extensions import override
+
+from wavetank.foundation.door import guarded
+from wavetank.foundation.errors import WavetankError
+from wavetank.page.theme import COLORS
+from wavetank.page.viewers import Ray, Submit, Viewer, Viewers
+
+PATIENCE = 15.0  # s without an answer to a picture after which nobody is there any more
+Table = dict[str, Any]
+
+
+@functools.cache
+def widget_class() -> type[Any]:
+    """Return the class of the widget; raises `WavetankError` where its package is missing."""
+    try:
+        import anywidget
+    except ModuleNotFoundError as error:
+        raise WavetankError(
+            f"wt.show needs the package {error.name} (pip install 'wavetank[notebook]'); then restart the kernel."
+        ) from None
+    static = importlib.resources.files("wavetank.page.notebook") / "static"
+    colors = " ".join(f"--{name}: {value};" for name, value in COLORS.items())
+    style = f".wavetank-live {{ {colors} }}\n{(static / 'live.css').read_text('utf-8')}"
+    members = {"_esm": (static / "live.js").read_text("utf-8"), "_css": style}
+    kind: type[Any] = type("WavetankLive", (anywidget.AnyWidget,), members)
+    return kind
+
+
+class Seat(Viewer):
+    """All views of the widget together: they show the same, and any of them may answer."""
+
+    def __init__(self, widget: Any) -> None:
+        super().__init__(None)
+        self.widget = widget
+
+    @override
+    def post(self, message: Table | bytes) -> None:
+        if isinstance(message, bytes):
+            self.widget.send({"type": "picture"}, [message])
+        else:
+            self.widget.send(_plain(message))
+
+
+class Channel:
+    """Hears and tells the views of one widget; everything happens in the kernel's own thread."""
+
+    def __init__(self, submit: Submit, ray: Ray, hello: Callable[[], Table]) -> None:
+        self.widget = widget_class()()
+        self.viewers = Viewers(submit, ray, hello)
+        self.seat = self.viewers.driver = Seat(self.widget)
+        self.viewers.all.append(self.seat)
+        self.views: set[str] = set()  # that were opened and did not say goodbye
+        self.hidden = False  # behind another tab of the browser
+        self.heard: Callable[[], None] = lambda: None
+        self._sent_at = 0.0  # s, on the clock of the process
+        self.widget.on_msg(self._hear)
+
+    @property
+    def looks(self) -> bool:
+        """Whether someone does: a view is open, is not behind another tab, and answers."""
+        answers = not self.seat.is_busy or time.monotonic() - self._sent_at < PATIENCE
+        return bool(self.views) and not self.hidden and answers
+
+    def tell(self, message: Table) -> None:
+        """Send a message to all views."""
+        if self.views:
+            self.seat.post(message)
+
+    def show(self, picture: bytes) -> None:
+        """Send a picture as soon as the one before was shown."""
+        if not self.seat.is_busy:
+            self._sent_at = time.monotonic()
+        self.seat.show(picture)
+
+    def close(self) -> None:
+        """Say goodbye and close the widget."""
+        self.tell({"type": "end"})
+        self.widget.close()
+
+    def _hear(self, widget: Any, content: Any, buffers: Any) -> None:
+        try:
+            with guarded("a message", "command"):
+                self._act(content if isinstance(content, dict) else {})
+        except WavetankError as error:
+            self.tell({"type": "note", "text": str(error)[:400]})
+        self.heard()
+
+    def _act(self, table: Table) -> None:
+        do, view = table.get("do"), str(table.get("view", ""))[:80]
+        if do == "open":
+            self.views.add(view)
+            self.seat.is_busy, self.seat.next_picture, self.seat.is_new, self.hidden = False, None, True, False
+            self.tell(self.viewers.hello())
+        elif do == "leave":
+            self.views.discard(view)
+            self.viewers.lift_pointers()
+        elif do == "hidden":
+            self.hidden = table.get("on") is True
+        else:
+            self._sent_at = time.monotonic()  # who says something is there
+            self.viewers.hear(self.seat, table)
+
+
+def _plain(value: Any) -> Any:
+    """Return data without numbers that JSON has no word for."""
+    if isinstance(value, dict):
+        return {key: _plain(member) for key, member in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(member) for member in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

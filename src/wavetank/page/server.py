@@ -1,0 +1,334 @@
+"""A page in a browser: pictures go out over a socket, commands come in.
+
+The server has a thread and an event loop of its own; the simulation, and with it everything on the device, stays in
+the thread that calls `run`.
+"""
+
+import asyncio
+import concurrent.futures
+import importlib.resources
+import math
+import mimetypes
+import os
+import secrets
+import socket
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route, WebSocketRoute
+from typing_extensions import override
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.memory import share_arenas
+from wavetank.page.about import everything
+from wavetank.page.aim import aim
+from wavetank.page.dropped import command_for
+from wavetank.page.fitting import fits
+from wavetank.page.gate import HEADERS, Gate
+from wavetank.page.loop import Loop, News
+from wavetank.page.picture import jpeg, png
+from wavetank.page.theme import style_sheet
+from wavetank.page.viewers import LONGEST_MESSAGE, Viewer, Viewers
+from wavetank.session.pace import share_interpreter
+from wavetank.session.recording import Recording
+from wavetank.session.session import Session
+
+PORT = 8420  # the first one tried where none is asked for
+MOST_CONNECTIONS = 1200  # at once; what comes on top is told to come back later
+MOST_DOWNLOADS = 4  # that wait for the simulation's thread
+REST = 0.3  # s between two of them
+
+
+class Protocol(H11Protocol):
+    """HTTP/1.1 whose every answer has our headers, that to what is no request at all included."""
+
+    @override
+    def send_400_response(self, msg: str) -> None:
+        headers = "".join(f"{name}: {value}\r\n" for name, value in HEADERS.items())
+        head = f"HTTP/1.1 400 Bad Request\r\ncontent-type: text/plain; charset=utf-8\r\n{headers}"
+        body = "This is no request.\n"
+        text = f"{head}content-length: {len(body)}\r\nconnection: close\r\n\r\n{body}"
+        self.transport.write(text.encode("ascii"))
+        self.transport.close()
+
+
+class WebFront:
+    """Serves one session."""
+
+    def __init__(
+        self, session: Session, host: str = "127.0.0.1", port: int | None = None, token: str | None = None
+    ) -> None:
+        self.session, self.start_scene = session, session.scene
+        self.viewers = Viewers(session.submit, self._ray, lambda: {**self._hello, "run": self.run_number})
+        self.viewers.wake, self.viewers.call = session.wake, self._call
+        self.viewers.fit, self.viewers.aim, self.viewers.drop_mesh = self._fit, self._aim, self._drop_mesh
+        self.run_number = secrets.token_hex(8)  # other than that of any run before
+        self.loop = Loop(session, self)
+        self.painter, self.ask = self.loop.painter, self.loop.ask
+        self._socket = _listen(host, port)
+        self.port = self._socket.getsockname()[1]
+        everywhere = host in ("0.0.0.0", "::")
+        shown = socket.gethostname() if everywhere else f"[{host}]" if ":" in host and "[" not in host else host
+        app = Starlette(
+            routes=[
+                Route("/", self._page),
+                Route("/page/{file}", self._file),
+                Route("/recording.toml", self._recording),
+                Route("/scene.toml", self._scene),
+                Route("/picture.png", self._picture),
+                WebSocketRoute("/socket", self.viewers.serve),
+            ]
+        )
+        self.gate = Gate(app, host, self.port, token)
+        self.url = f"http://{shown}:{self.port}/?token={self.gate.token}"
+        self._server = uvicorn.Server(
+            uvicorn.Config(
+                self.gate,
+                log_level="error",
+                access_log=False,
+                lifespan="off",
+                ws="websockets-sansio",
+                ws_max_size=LONGEST_MESSAGE,
+                ws_per_message_deflate=False,
+                timeout_graceful_shutdown=1,
+                http=Protocol,
+                server_header=False,
+                limit_concurrency=MOST_CONNECTIONS,
+            )
+        )
+        self._events: asyncio.AbstractEventLoop | None = None
+        self._thread = threading.Thread(target=self._serve, name="wavetank web", daemon=True)
+        self._packer = concurrent.futures.ThreadPoolExecutor(1, "wavetank jpeg")
+        self._packing: concurrent.futures.Future[None] | None = None
+        self._one_download = asyncio.Lock()
+        self._downloads, self._spared_until = 0, 0.0  # under way; when the next one may be
+        self._told_world: dict[str, Any] = {}
+        self._told: Any = None  # the last status, and who was there
+        self._told_regions: dict[str, Any] = {}
+        self._hello = everything(session)
+
+    # --- the simulation's thread ---
+
+    def start(self) -> None:
+        """Open the doors."""
+        share_interpreter()
+        share_arenas()
+        self._thread.start()
+
+    def run(self) -> None:
+        """Let the water move until `stop`."""
+        try:
+            self.loop.run()
+        finally:
+            self._packer.shutdown()
+
+    def stop(self) -> None:
+        """Close the doors and end `run`."""
+        self.loop.stop()
+        self._server.should_exit = True
+        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+            self._thread.join(5.0)
+
+    # --- for the loop, in the simulation's thread: see `loop.Audience` ---
+
+    @property
+    def looks(self) -> bool:
+        """Whether anyone is there."""
+        return bool(self.viewers.all)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether someone waits for a picture, and none is being packed."""
+        return self.viewers.anyone_ready and (self._packing is None or self._packing.done())
+
+    @property
+    def is_new(self) -> bool:
+        """Whether someone has just come."""
+        return any(viewer.is_new for viewer in self.viewers.all)
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """Of the place for the picture, where the driver sits [px]."""
+        driver = self.viewers.driver
+        return driver.size if driver is not None else None
+
+    @property
+    def detail(self) -> str:
+        """How fine pictures are."""
+        return self.viewers.detail
+
+    def show(self, image: np.ndarray, regions: list[dict[str, Any]]) -> None:
+        """Send a picture to everyone, and the regions where they have changed."""
+        outlines = {"type": "regions", "regions": regions}
+        if self.is_new or outlines != self._told_regions:
+            self._told_regions = outlines
+            self._call(lambda: self.viewers.broadcast(outlines))
+        for viewer in self.viewers.all:
+            viewer.is_new = False
+        self._packing = self._packer.submit(self._pack, image)
+
+    def _pack(self, image: np.ndarray) -> None:
+        picture = jpeg(image)
+        self._call(lambda: self.viewers.show(picture))
+        self.session.wake()
+
+    def tell(self, news: News, notes: list[str]) -> None:
+        """Send how things stand to everyone, if anything has changed."""
+        status = {
+            "type": "status",
+            **news.status,
+            "notes": notes,
+            **news.figures,
+            "game": news.game,
+            "scores": news.scores,
+        }
+        if news.world != self._told_world:
+            self._told_world = news.world
+            self._hello = {**self._hello, **news.world}
+            status["world"] = news.world
+        # JSON has no word for what is no number, such as the time of a frame before there was one.
+        plain = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in status.items()}
+        told = (plain, [*self.viewers.all])
+        if told != self._told:  # what stands still says nothing
+            self._told = told
+            self._call(lambda: self.viewers.broadcast(plain))
+
+    # --- the server's thread ---
+
+    def _serve(self) -> None:
+        async def main() -> None:
+            self._events = asyncio.get_running_loop()
+            await self._server.serve(sockets=[self._socket])
+
+        asyncio.run(main())
+
+    def _call(self, act: Callable[[], None]) -> None:
+        events = self._events
+        if events is not None and not events.is_closed():
+            events.call_soon_threadsafe(act)
+
+    def _ray(self, u: float, v: float, tool: str) -> dict[str, Any]:
+        width, height = self.painter.wanted
+        origin, direction = self.session.camera_of(tool).ray(u * width, v * height, width, height)
+        return {"origin": tuple(map(float, origin)), "direction": tuple(map(float, direction))}
+
+    def _answer(self, viewer: Viewer, job: Callable[[], dict[str, Any]]) -> None:
+        """Post to one viewer what a job in the simulation's thread comes to; what is wrong becomes a note."""
+
+        def done() -> dict[str, Any]:
+            try:
+                return job()
+            except WavetankError as error:
+                return {"type": "note", "text": str(error)[:400]}
+
+        def tell(answer: concurrent.futures.Future[Any]) -> None:
+            if not answer.cancelled() and answer.exception() is None:
+                self._call(lambda: viewer.post(answer.result()))
+
+        self.ask(done).add_done_callback(tell)
+
+    def _fit(self, viewer: Viewer) -> None:
+        self._answer(viewer, lambda: fits(self.session))
+
+    def _aim(self, viewer: Viewer, tool: str, u: float, v: float, reach: float) -> None:
+        size = self.painter.wanted
+        self._answer(viewer, lambda: {"type": "aim", **aim(self.session, tool, u, v, reach, size)})
+
+    def _drop_mesh(self, viewer: Viewer, text: str, file: str) -> None:
+        def job() -> dict[str, Any]:
+            self.session.submit(command_for(self.session, text, file))
+            return {"type": "note", "text": f"{file} is a solid now; carry it with Grab."}
+
+        self._answer(viewer, job)
+
+    async def _page(self, request: Request) -> Response:
+        return _packaged("index.html")
+
+    async def _file(self, request: Request) -> Response:
+        name = request.path_params["file"]
+        if name == "run":
+            return Response(self.run_number, media_type="text/plain")
+        return Response(style_sheet(), media_type="text/css") if name == "theme.css" else _packaged(name)
+
+    async def _recording(self, request: Request) -> Response:
+        return await self._download("session.toml", lambda: Recording.of(self.session, self.start_scene).text())
+
+    async def _scene(self, request: Request) -> Response:
+        return await self._download("scene.toml", lambda: self.session.present_scene().text())
+
+    async def _picture(self, request: Request) -> Response:
+        def made() -> bytes:
+            return png(self.painter.paint(sharp=True))
+
+        return await self._download("wavetank.png", made, "image/png")
+
+    async def _download(self, name: str, make: Callable[[], str | bytes], kind: str = "application/toml") -> Response:
+        """Return what the simulation's thread makes, as a file; not too many at once, which the water feels."""
+        if self._downloads >= MOST_DOWNLOADS:
+            return Response(
+                "too many downloads at once; try again\n",
+                status_code=429,
+                media_type="text/plain",
+                headers={"retry-after": "1"},
+            )
+
+        def made() -> str | bytes:
+            try:
+                return make()
+            except WavetankError as error:
+                self.session.note(str(error))
+                raise
+
+        headers = {"content-disposition": f"attachment; filename={name}"}
+        self._downloads += 1
+        try:
+            async with self._one_download:
+                await asyncio.sleep(max(0.0, self._spared_until - time.monotonic()))
+                text = await asyncio.wrap_future(self.ask(made))
+                self._spared_until = time.monotonic() + REST
+            return Response(text, media_type=kind, headers=headers)
+        except WavetankError as error:
+            return Response(f"{error}\n", status_code=409, media_type="text/plain")
+        finally:
+            self._downloads -= 1
+
+
+def _packaged(name: str) -> Response:
+    """Return a file of the page; only those that are there by name."""
+    folder = importlib.resources.files("wavetank.page.page") / "static"
+    if name not in {entry.name for entry in folder.iterdir() if entry.is_file()}:
+        return Response("not here\n", status_code=404, media_type="text/plain")
+    kind = {"js": "text/javascript", "svg": "image/svg+xml"}.get(name.rpartition(".")[2])
+    return Response(
+        (folder / name).read_bytes(), media_type=kind or mimetypes.guess_type(name)[0] or "application/octet-stream"
+    )
+
+
+def _listen(host: str, port: int | None) -> socket.socket:
+    """Open the first free port from `PORT` on, or the one asked for; raises `WavetankError` where it cannot be had."""
+    ports = [port] if port is not None else [*range(PORT, PORT + 20), 0]
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    for number in ports:
+        listener = socket.socket(family, socket.SOCK_STREAM)
+        if os.name == "posix":  # else the port of a run that has ended is refused for a minute
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((host, number))
+            listener.listen(64)
+            return listener
+        except (OSError, OverflowError) as error:
+            listener.close()
+            if number == ports[-1]:
+                raise WavetankError(
+                    f"--port {number} on --host {host} cannot be opened: {error}; "
+                    "try --port 0 for any free one, and --host 127.0.0.1."
+                ) from None
+    raise AssertionError

@@ -1,0 +1,79 @@
+"""A session in a thread of its own, for a front that must never wait for the water.
+
+Commands go in, pictures and figures come out.
+"""
+
+import dataclasses
+import queue
+import threading
+from typing import Any
+
+import numpy as np
+
+from wavetank.foundation.errors import WavetankError
+from wavetank.page.loop import Loop, News
+from wavetank.session.commands import Command
+from wavetank.session.pace import share_interpreter
+from wavetank.session.session import Session
+
+FIGURES_EVERY = 0.2  # s between two measurements, at least
+
+
+@dataclasses.dataclass(frozen=True)
+class Shown(News):
+    """What a front draws: it never reads the session itself, which another thread is changing."""
+
+    image: np.ndarray | None = None  # uint8 [height, width, 3]
+    number: int = 0  # of the picture
+    regions: list[dict[str, Any]] = dataclasses.field(default_factory=list)  # of the game, in the picture
+
+
+class Engine:
+    """Turns a session and paints it until `stop`. `submit` and `do` may be called from any thread."""
+
+    looks = is_ready = True  # see `loop.Audience`
+    is_new = False
+
+    def __init__(self, session: Session) -> None:
+        self.session, self.loop = session, Loop(session, self, FIGURES_EVERY)
+        self.painter, self.ask = self.loop.painter, self.loop.ask
+        self.shown = Shown(**vars(self.loop.news()))
+        self.notes: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self.failure: BaseException | None = None
+        self.size = self.painter.asked  # px of the place for the picture; the front sets it
+        self.detail = "auto"
+        self._thread = threading.Thread(target=self._run, name="wavetank water", daemon=True)
+
+    def start(self) -> None:
+        """Let the water move."""
+        share_interpreter()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and wait for it, as long as a first frame may take to compile: the world is then ours."""
+        self.loop.stop()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def do(self, kind: type[Command], **fields: Any) -> None:
+        """Submit a command; one that is not allowed becomes a note."""
+        try:
+            self.session.submit(kind.parse(fields))
+        except WavetankError as error:
+            self.notes.put(str(error))
+
+    def show(self, image: np.ndarray, regions: list[dict[str, Any]]) -> None:
+        """Publish a picture."""
+        self.shown = dataclasses.replace(self.shown, image=image, number=self.shown.number + 1, regions=regions)
+
+    def tell(self, news: News, notes: list[str]) -> None:
+        """Publish how things stand."""
+        for sentence in notes:
+            self.notes.put(sentence)
+        self.shown = dataclasses.replace(self.shown, **vars(news))
+
+    def _run(self) -> None:
+        try:
+            self.loop.run()
+        except BaseException as error:  # the front's thread raises it again
+            self.failure = error

@@ -1,0 +1,1 @@
+"""Runs: their folders, checkpoints, exports, films of frames, single pictures, and signals that end them."""

@@ -1,0 +1,140 @@
+"""Pictures and films of what was kept: a run's folder, frames in HDF5, a recording."""
+
+from collections import deque
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import Progress
+
+from wavetank.formats import exporter_for
+from wavetank.foundation.errors import WavetankError
+from wavetank.run.checkpoints import FILE, FOLDER, begun
+from wavetank.run.export import source_of
+from wavetank.run.folder import SCENE, RunFolder
+from wavetank.run.signals import asked_to_end
+from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
+from wavetank.simulation.frame import Frame
+from wavetank.simulation.instant import Instant
+from wavetank.simulation.shown import Shown
+from wavetank.simulation.simulation import Simulation
+from wavetank.view.renderer import Renderer, affordable
+from wavetank.view.style import quality_options
+
+FILMS = (".mp4", ".gif")
+
+
+def is_kept(world: str) -> bool:
+    """Say whether this is a run's folder, or frames in HDF5; the name of a bundled scene is neither."""
+    if world in (*bundled_scenes(), *bundled_levels()):
+        return False
+    return RunFolder.is_one(world) or world.endswith((".h5", ".hdf5"))
+
+
+def as_scene(world: str) -> str:
+    """Return the scene file of a run's folder, and any other name as it is."""
+    return str(Path(world) / SCENE) if is_kept(world) and Path(world).is_dir() else world
+
+
+def frame_at(world: str, at: float | None, arch: str = "") -> Frame:
+    """Return the frame of a run's folder that is nearest to the time `at` [s of water], its last one without.
+
+    A frame that was written is read; else the water goes on from the last checkpoint before, or is computed again.
+    Raises `WavetankError`.
+    """
+    if not Path(world).is_dir():
+        source = source_of(Path(world), arch)
+        last = at is None
+        found = deque(source.frames, 1)[-1] if last else min(source.frames, key=lambda one: abs(one.time - at))
+        return Shown(source.scene, arch or "cpu").frame(found)
+    folder = RunFolder.open(world)
+    run = folder.run
+    done = len(folder.stats()) - 1  # number of the last frame that was finished
+    end = run.start + (done / run.fps if done >= 0 else run.seconds)
+    at = end if at is None else at
+    if not run.start - 1e-9 <= at <= end + 0.5 / run.fps:
+        raise WavetankError(
+            f"--at = {at} is not allowed; the run in {world} is from {run.start:g} to {end:g} s; "
+            "name a time between them."
+        )
+    if folder.has_instants():
+        return Shown(folder.scene, arch or run.arch).frame(folder.instant_at(at))
+    number, sim, done = round((at - run.start) * run.fps), None, -1
+    if (folder.path / FOLDER / FILE).exists():
+        kept = begun(folder.path, arch)
+        if kept.checkpoint.frame <= number:
+            sim, done = kept.sim, kept.checkpoint.frame
+            if done == number:
+                return sim.frame()
+    if sim is None:
+        if run.start > 0.0:
+            raise WavetankError(
+                f"{world}: this run began with a state and kept no frames; run it again with --export h5."
+            )
+        sim = Simulation(folder.scene, arch or run.arch)
+    frame = None
+    for _, frame in sim.numbered_frames(number / run.fps, run.fps, run.start, done):
+        pass
+    assert frame is not None
+    return frame
+
+
+def film_archived(
+    world: str,
+    path: Path,
+    width: int,
+    height: int,
+    *,
+    arch: str = "",
+    quality: str = "draft",
+    console: Console | None = None,
+    **options: Any,
+) -> dict[str, Any]:
+    """Write a film of all frames of a run's folder, a recording or an HDF5 file, and return what it shows.
+
+    Nothing is computed again where frames were written. Raises `WavetankError`.
+    """
+    console = console or Console(stderr=True)
+    supersample, chosen = quality_options(quality)
+    writer = exporter_for(path, "video")
+    source = source_of(Path(world), arch)
+    if source.note:
+        console.print(source.note, markup=False)
+    style, count, time = {**chosen, **options}, 0, 0.0
+    frames = _shown(source.scene, source.frames, arch)
+    first = next(frames, None)
+    if first is None:
+        raise WavetankError(f"{world}: no frame of this run was finished.")
+    renderer = Renderer(width, height, affordable(width, height, supersample))
+    with (
+        asked_to_end(say="asked to end; the film is being completed (once more stops at once)") as asked,
+        writer.write(path, width, height, source.fps) as out,
+        Progress(console=console, transient=True) as bar,
+    ):
+        task = bar.add_task("film", total=source.count)
+        frame: Frame | None = first
+        while frame is not None and not asked:
+            out.write(renderer.render(frame, **style))
+            count, time = count + 1, frame.time
+            bar.update(task, completed=count)
+            frame = next(frames, None)
+    return {
+        "file": str(path),
+        "scene": source.scene.title,
+        "frames": count,
+        "fps": source.fps,
+        "time": time,
+        "interrupted": bool(asked),
+        "exit_code": asked.code,
+    }
+
+
+def _shown(scene: Scene, frames: Any, arch: str) -> Iterator[Frame]:
+    shown: Shown | None = None
+    for one in frames:
+        if isinstance(one, Instant):
+            shown = shown or Shown(scene, arch or "cpu")
+            yield shown.frame(one)
+        else:
+            yield one

@@ -1,0 +1,163 @@
+"""All files of a run's frames: which formats, which parts, and a thread that writes them."""
+
+import glob
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from wavetank.formats import exporter_named
+from wavetank.formats.plan import Plan, Series, Shapes, Viewpoint
+from wavetank.formats.surface import check_surface, with_surfaces
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.patience import Patience
+from wavetank.run.background import Background
+from wavetank.scene.scene import Scene
+from wavetank.simulation.instant import PARTS, Instant
+
+TRIED, WORTH_A_WORD = 10, 1_000_000_000  # frames by which the size of all is judged; bytes of all
+USUAL = ("particles", "foam", "solids")
+
+
+def parts_named(only: Collection[str]) -> frozenset[str]:
+    """Return the parts that `--only` names, all but the surface without any; raises `WavetankError`."""
+    wrong = next((name for name in only if name not in PARTS), None)
+    if wrong is not None:
+        raise WavetankError(f"--only {wrong} is not allowed; a frame has the parts {', '.join(PARTS)}.")
+    return frozenset(only or USUAL)
+
+
+def check_exports(names: Sequence[str], only: Collection[str], scene: Scene) -> list[ModuleType]:
+    """Return the modules of these formats; raises `WavetankError` for what cannot be written of this scene."""
+    modules = [exporter_named(name) for name in names]
+    if "surface" in parts_named(only) and modules:
+        check_surface(scene)
+    for module in modules:
+        if hasattr(module, "check"):
+            module.check(scene)
+        if module.KIND == "particles" and only and not hasattr(module, "write_surface"):
+            if "surface" in only and len(set(only)) == 1:
+                raise WavetankError(f"{module.SUFFIXES[0][1:]} holds no surface; use obj, ply, usd, vtkhdf, vtp or h5.")
+    return modules
+
+
+def bytes_of(files: Sequence[str]) -> int:
+    """Return the size of files, ##### for the number of a frame; of a folder that of all in it."""
+    found = [
+        path
+        for name in map(Path, files)
+        for path in name.parent.glob(glob.escape(name.name).replace("#####", "[0-9]*"))
+    ]
+    inside = [below for path in found if path.is_dir() for below in path.rglob("*")]
+    return sum(path.stat().st_size for path in (*found, *inside) if path.is_file())
+
+
+class Outputs:
+    """Writes frames into files beside the simulation."""
+
+    def __init__(
+        self,
+        base: Path,
+        scene: Scene,
+        names: Sequence[str],
+        *,
+        fps: float,
+        only: Collection[str] = (),
+        view: Viewpoint | None = None,
+        kept: int = 0,
+        frames: int = 0,
+        tell: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        modules = check_exports(names, only, scene)
+        self.parts, self.shapes, self.patience = parts_named(only), Shapes(scene), Patience(tell)
+        plan = Plan(base, scene, fps, self.parts, self.shapes, view, kept, self.patience)
+        self._needs_surface = bool(modules) and "surface" in self.parts
+        self._needs_surface |= any(module.KIND == "surface" for module in modules)
+        self._series: list[Series] = [
+            module.write(plan) if module.KIND == "series" else _EachFrame(module, plan) for module in modules
+        ]
+        self._background = Background() if modules else None
+        self._frames, self._tell = frames, tell
+
+    @property
+    def files(self) -> list[str]:
+        """Names of the files, ##### for the number of a frame."""
+        return [name for series in self._series for name in series.files]
+
+    @property
+    def waited(self) -> float:
+        """Seconds that the simulation waited for the writer [s]."""
+        return self._background.waited if self._background else 0.0
+
+    def write(self, number: int, frame: Any) -> None:
+        """Have a `Frame` or an `Instant` written as number `number`; returns once there is room for it to wait.
+
+        Raises what went wrong with one before.
+        """
+        if self._background is None:
+            return
+        instant = Instant.of(frame)
+        self.shapes.learn(instant.standing)
+        self._background.put(lambda: self._write(number, instant), instant.size)
+        if number + 1 == TRIED < self._frames:
+            self.drain()
+            expected = bytes_of(self.files) / TRIED * self._frames
+            if expected > WORTH_A_WORD:
+                self._tell(f"all frames will take about {expected / 1e9:.1f} GB; --every 2 writes half of them.")
+
+    def _write(self, number: int, instant: Instant) -> None:
+        if self._needs_surface:
+            instant = with_surfaces(instant)
+        instant = instant.only(self.parts)
+        for series in self._series:
+            # What grows is patient itself: a frame is appended once.
+            if series.repeatable:
+                self.patience.do(lambda series=series: series.write(number, instant))  # type: ignore[misc]
+            else:
+                series.write(number, instant)
+
+    def drain(self) -> None:
+        """Wait until all that was given is in the files; raises what went wrong."""
+        if self._background is not None:
+            self._background.drain()
+
+    def close(self, *, hurry: bool = False) -> None:
+        """Write what waits and complete the files; raises what went wrong. In a `hurry` nothing is tried again."""
+        if hurry:
+            self.patience.hurry.set()
+        try:
+            if self._background is not None:
+                self._background.finish()
+        finally:
+            for series in self._series:
+                series.close()
+
+    def __enter__(self) -> "Outputs":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
+        self.close(hurry=kind is not None)
+
+
+class _EachFrame:
+    """A file for each frame."""
+
+    repeatable = True
+
+    def __init__(self, module: ModuleType, plan: Plan) -> None:
+        self.module, self.plan = module, plan
+        suffix, has_surface = module.SUFFIXES[0], "surface" in plan.parts and hasattr(module, "write_surface")
+        self._writers: list[tuple[str, Any]] = []
+        if module.KIND == "surface" or plan.parts != {"surface"}:
+            self._writers.append(("", module.write))
+        if has_surface:
+            self._writers.append(("surface", module.write_surface))
+        self.files = [str(plan.path(f"-#####{suffix}", part)) for part, _ in self._writers]
+
+    def write(self, number: int, instant: Instant) -> None:
+        """Write a frame."""
+        for part, write in self._writers:
+            write(self.plan.path(f"-{number:05d}{self.module.SUFFIXES[0]}", part), instant)
+
+    def close(self) -> None:
+        """Do nothing."""

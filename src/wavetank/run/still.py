@@ -1,0 +1,170 @@
+"""One picture of a scene, of a saved state or of a run."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+
+from wavetank.device.compiler import current_backend
+from wavetank.formats import exporter_for
+from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.replacing import partial_path
+from wavetank.foundation.version import VERSION
+from wavetank.run.archived import frame_at, is_kept
+from wavetank.run.signals import Asked, asked_to_end
+from wavetank.scene.scene import Scene
+from wavetank.simulation.frame import Frame
+from wavetank.simulation.simulation import Simulation
+from wavetank.view.camera import Camera
+from wavetank.view.extent import extent_of_water
+from wavetank.view.film.samples import Watch
+from wavetank.view.renderer import ROOM, Renderer, affordable
+from wavetank.view.style import Style, quality_options
+
+SAMPLES = ".samples.npz"  # what the file of a picture that was stopped ends in
+STOPS = "asked to end; the samples are being kept (once more stops at once)"
+PARTS = ("{task.description}", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+USUAL_TIME = 0.5  # s: when a scene is shown unless told
+#: the same for bundled scenes whose best moment is another one
+SHOWN_AT = {
+    "still-tank": 1.0,
+    "still-tank-2d": 1.0,
+    "drop": 0.42,
+    "drop-2d": 0.35,
+    "obstacle-tank": 0.62,
+    "knot": 0.35,
+    "fountain": 2.0,
+    "fountain-2d": 1.5,
+    "sluice": 2.0,
+    "sluice-2d": 1.5,
+    "wave-machine": 4.0,
+    "wave-machine-2d": 4.0,
+    "ducks": 3.0,
+    "boats": 4.0,
+    "sinking-ship": 4.0,
+    "deer-scarer": 6.3,
+    "robot": 6.6,
+    "logs": 2.0,
+    "paddle-boat": 4.5,
+    "lighthouse": 0.62,
+    "rain": 0.32,
+    "jug": 2.4,
+    "river": 5.0,
+    "honey": 0.4,
+    "mountain-lake": 0.8,
+    "vase": 0.28,
+}
+
+
+def take(
+    world: str,
+    scene: Scene | None,
+    path: Path,
+    width: int,
+    height: int,
+    *,
+    at: float | None = None,
+    arch: str = "",
+    quality: str = "standard",
+    eye: str | None = None,
+    target: str | None = None,
+    timings: bool = False,
+    samples: int | None = None,
+    console: Console | None = None,
+    **options: Any,
+) -> dict[str, Any]:
+    """Write a picture with its scene, time and view as metadata, and return what it cost.
+
+    `world` is the name of `scene`, or without one the file of a saved state, or the folder of a run. With
+    `timings` a second picture is taken, pass by pass, after the kernels are compiled.
+    """
+    writer = exporter_for(path, "picture")
+    partial_path(path)  # what is wrong shows before the work
+    supersample, chosen = quality_options(quality, samples)
+    style = {**chosen, **options}
+    view = Style(**style).kind
+    if scene is None and is_kept(world):
+        frame = frame_at(world, at, arch)
+    else:
+        frame = _open(world, scene, at, arch or "cpu").frame(view.coloured)
+    renderer = Renderer(width, height, affordable(width, height, supersample))
+    camera = _camera_of(frame, eye, target, width / max(height, 1))
+    began = time.perf_counter()
+    with (
+        asked_to_end(say=STOPS if style["traced"] else "") as asked,
+        Progress(*PARTS, console=console or Console(stderr=True), transient=True, disable=not style["traced"]) as bar,
+    ):
+        watch = Watch(path=path.with_name(path.name + SAMPLES) if style["traced"] else None)
+        watch.tell = telling(bar, asked)
+        image = renderer.render(frame, camera, watch=watch, **style)
+    if not watch.whole:
+        return {
+            "file": str(watch.path),
+            "samples": watch.done,
+            "of": style["samples"],
+            "interrupted": True,
+            "exit_code": asked.code,
+        }
+    figures: dict[str, Any] = {
+        "file": str(path),
+        "scene": frame.scene.title,
+        "time": frame.time,
+        "view": view.name,
+        "particles": frame.count,
+        "seconds_to_draw": time.perf_counter() - began,
+        "arch": current_backend(),
+    }
+    if timings:
+        measured: dict[str, float] = {}
+        figures["milliseconds"] = measured
+        renderer.render(frame, camera, timings=measured, **style)
+    about = {"scene": frame.scene.title, "time": f"{frame.time:.4f} s", "view": view.name, "particles": frame.count}
+    if watch.done:
+        figures |= {"samples": watch.done, "samples_kept": watch.begun}
+    writer.write(path, image, about | {"Software": f"wavetank {VERSION}"})
+    return figures
+
+
+def telling(bar: Progress, asked: Asked, name: str = "samples") -> Callable[[int, int], bool]:
+    """Return what shows the samples of a picture in a bar, with the time that is left, and stops where `asked` to."""
+    task = bar.add_task(name, total=None)
+
+    def tell(done: int, of: int) -> bool:
+        bar.update(task, completed=done, total=of)
+        return not asked
+
+    return tell
+
+
+def _open(world: str, scene: Scene | None, at: float | None, arch: str) -> Simulation:
+    """Return the world at the time `at` [s]."""
+    sim = Simulation(scene, arch=arch) if scene is not None else Simulation.restore(world, arch=arch)
+    if at is None:
+        at = SHOWN_AT.get(world, USUAL_TIME) if scene is not None else sim.time
+    if not sim.time - 1e-9 <= at <= 86400.0:
+        raise WavetankError(
+            f"--at = {at} is not allowed; {world} starts at {sim.time:g} s, so it must be a number from there to 86400."
+        )
+    sim.advance(max(0.0, at - sim.time))
+    return sim
+
+
+def _camera_of(frame: Frame, eye: str | None, target: str | None, aspect: float) -> Camera:
+    """Return the camera that two texts of the form ``2,1,3`` ask for; what neither says frames the water."""
+    usual = Camera.framing_extent(extent_of_water(frame), aspect)
+    return Camera(
+        eye=_point("eye", eye) if eye else usual.eye,
+        target=_point("target", target) if target else usual.target,
+        height=usual.height,
+    ).tilted(frame.scene, frame.time, 1.0 if eye else ROOM)
+
+
+def _point(name: str, text: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise WavetankError(f"--{name} = {text!r} is not allowed; write three numbers [m], as in 2,1,3.") from None
+    return x, y, z
