@@ -8,8 +8,8 @@ import pytest
 from wavetank.page import keys, theme
 from wavetank.session.commands import Step, command_of
 
-FRONT = Path(theme.__file__).parent
-FILES = [*(FRONT / "window").glob("*.py"), *(FRONT / "page" / "static").glob("*.js"), FRONT / "page/static/style.css"]
+PAGE = Path(theme.__file__).parent
+FILES = [*(PAGE / "window").glob("*.py"), *(PAGE / "static").glob("*.js"), PAGE / "static/style.css"]
 ACTIONS = {key.action for key in keys.KEYS if key.action}
 
 
@@ -21,7 +21,7 @@ def test_no_colour_of_the_theme_is_said_again(path):
 
 def test_the_page_knows_every_colour_that_it_asks_for():
     text = "\n".join(path.read_text() for path in FILES)
-    sheet = theme.style_sheet() + (FRONT / "page/static/style.css").read_text()
+    sheet = theme.style_sheet() + (PAGE / "static/style.css").read_text()
     asked = {*re.findall(r"var\(--([\w-]+)", text), *re.findall(r'colour\("([\w-]+)"\)', text)}
     assert len(asked) > 20
     assert {name for name in asked if f"--{name}:" not in sheet} == {"share"}, "a slider sets its share itself"
@@ -38,7 +38,7 @@ def test_every_key_does_one_thing():
 
 
 def test_the_page_has_every_action():
-    script = (FRONT / "page/static/main.js").read_text()
+    script = (PAGE / "static/main.js").read_text()
     table = script.partition("const ACTIONS = {")[2].partition("\n};")[0]
     for action in ACTIONS:
         assert re.search(rf"""(^|[\s"]){action}"?: """, table), action
