@@ -40,13 +40,10 @@ SEEN_FROM: dict[str, tuple[tuple[float, ...], ...]] = {
 LARGEST = 80_000  # bytes of a picture there
 VALIDATION_HEAD = """# Validation
 
-What is computed beside measurements and exact solutions: the full runs of `wavetank validate`, default settings, on the
-CPU in single precision. The command of each row is `wavetank validate CASE --json`; `make validation` makes this page
-and its pictures anew. What is known of the figures outside of their bounds is in
-[docs/method.md](../docs/method.md#what-is-still-open).
+Computed values beside measurements and exact solutions: full runs of `wavetank validate`, default settings, on the
+CPU in single precision. Values in bold are outside their bounds ([why](../docs/method.md#what-is-still-open)); all
+digits are in [figures.json](figures.json). `make validation` runs the cases and writes this page.
 
-| case | figure | value | bounds | within | reference | source |
-|---|---|---|---|---|---|---|
 """
 UNDER_WATER = Camera(eye=(0.12, 0.07, 0.78), target=(0.6, 0.36, 0.4), field_of_view=1.65)
 #: name -> scene, time [s], options of the picture
@@ -155,7 +152,7 @@ def gallery(names: list[str]) -> None:
         eye = "".join(f" --{key} {','.join(map(str, point))}" for key, point in seen)
         quality = f"film --samples {TRACED[name]}" if name in TRACED else "high"
         rows.append(
-            f"## {scene.title}\n\n![{scene.title}](gallery/{name}.jpg)\n\n"
+            f"## {scene.title}\n\n![{name}](gallery/{name}.jpg)\n\n"
             f"`wavetank render {name} --at {moment:g} --set spacing={scene.spacing:g}{eye} --quality {quality}`"
             f" ({count:,} particles)\n"
         )
@@ -179,27 +176,59 @@ def validation(names: list[str]) -> None:
 
 
 def validation_page(known: dict[str, Any]) -> None:
-    """Write the table of these results of cases, and their pictures."""
-    cases = [case.name for case in CASES if case.name in known]
-    rows = []
-    for name in cases:
-        for number, figure in enumerate(known[name]["figures"]):
-            verdict = {True: "yes", False: "**no**", None: ""}[figure["pass"]]
-            cells = (
-                f"[{name}](#{name})" if number == 0 else "",
-                figure["name"],
-                number_text(figure["value"], figure["unit"]),
-                bounds_text(figure),
-                verdict,
-                figure["reference"],
-                figure["source"],
+    """Write the figures of these results of cases, and their pictures."""
+    sections = []
+    for name in (case.name for case in CASES if case.name in known):
+        figures = known[name]["figures"]
+        sources = "; ".join(dict.fromkeys(figure["source"] for figure in figures if figure["source"]))
+        picture = f"![{known[name]['title']}]({name}.png)"
+        command = f"`wavetank validate {name} --out out`; compared with: {sources}"
+        tables = "\n\n".join(map("\n".join, tables_of(figures)))
+        sections.append(f"## {name}\n\n{picture}\n\n{command}\n\n{tables}\n")
+    (VALIDATION / "README.md").write_text(VALIDATION_HEAD + "\n".join(sections), "utf-8")
+
+
+def tables_of(figures: list[dict[str, Any]]) -> list[list[str]]:
+    """Return the lines of the tables of a case: figures that many worlds share are columns, a world is a row."""
+    shared: dict[tuple[str, str, str], dict[str, str]] = {}
+    for figure in figures:
+        world, _, what = figure["name"].rpartition(": ")
+        if world:
+            shared.setdefault((what, figure["unit"], bounds_text(figure)), {})[world] = marked(
+                figure, number_text(figure["value"], "")
             )
-            rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    pictures = [
-        f"## {name}\n\n![{known[name]['title']}]({name}.png)\n\n`wavetank validate {name} --out out`\n"
-        for name in cases
+    columns = {key: cells for key, cells in shared.items() if len(cells) >= 3}
+    tables = []
+    for worlds in dict.fromkeys(tuple(cells) for cells in columns.values()):
+        alike = [(key, cells) for key, cells in columns.items() if tuple(cells) == worlds]
+        heads = [
+            " ".join(filter(None, (what, f"[{unit}]" * bool(unit), f"({limits})" * bool(limits))))
+            for (what, unit, limits), _ in alike
+        ]
+        tables.append(table(["", *heads], [[world, *(cells[world] for _, cells in alike)] for world in worlds]))
+    single = [
+        [
+            figure["name"],
+            marked(figure, number_text(figure["value"], figure["unit"])),
+            bounds_text(figure),
+            figure["reference"],
+        ]
+        for figure in figures
+        if (figure["name"].rpartition(": ")[2], figure["unit"], bounds_text(figure)) not in columns
     ]
-    (VALIDATION / "README.md").write_text(VALIDATION_HEAD + "\n".join(rows) + "\n\n" + "\n".join(pictures), "utf-8")
+    return tables + ([table(["figure", "value", "bounds", "reference"], single)] if single else [])
+
+
+def marked(figure: dict[str, Any], text: str) -> str:
+    """Return a value in bold where it is outside its bounds."""
+    return f"**{text}**" if figure["pass"] is False else text
+
+
+def table(heads: list[str], rows: list[list[str]]) -> list[str]:
+    """Return the lines of a table in Markdown, without columns that are empty."""
+    kept = [k for k in range(len(heads)) if any(row[k] for row in rows)]
+    lines = [[heads[k] for k in kept], ["---"] * len(kept), *([row[k] for k in kept] for row in rows)]
+    return ["|" + "|".join(cell.replace("|", "\\|") for cell in line) + "|" for line in lines]
 
 
 def shrink(source: Path, target: Path) -> None:
