@@ -90,6 +90,34 @@ def test_sections_of_the_notebook_that_code_names_exist():
     assert len(named) > 10
 
 
+def test_paths_of_the_package_that_documents_name_exist():
+    """Files and folders in backticks, below `src/wavetank/` or the root; `x.py` stands for one of your own."""
+    for page in (
+        "ARCHITECTURE.md",
+        "CONTRIBUTING.md",
+        "SECURITY.md",
+        "README.md",
+        "docs/performance.md",
+        "docs/look.md",
+    ):
+        for name in re.findall(r"`([\w/.-]+/[\w.-]*|[\w/-]+\.py)`", (ROOT / page).read_text("utf-8")):
+            own = re.search(r"\bx\.", name) or name.startswith(("out", "night"))
+            found = [*(ROOT / "src" / "wavetank").rglob(name), *ROOT.glob(name)]
+            assert own or found, (page, name)
+
+
+def test_answers_of_contributing_are_in_the_files_that_they_name():
+    rows = re.findall(
+        r"^\| [^|]+\? \| ([^|]+) \| ([^|]+) \|$", (ROOT / "CONTRIBUTING.md").read_text("utf-8"), re.MULTILINE
+    )
+    assert len(rows) == 10
+    for files, answer in rows:
+        paths = [ROOT / "src" / "wavetank" / name for name in re.findall(r"`([^`]+)`", files)]
+        text = "".join(path.read_text("utf-8") for path in paths)
+        for word in re.findall(r"`([\w.]+)`", answer):
+            assert word.endswith(".py") or re.search(rf"\b{word.split('.')[-1]}\b", text), word
+
+
 def test_there_are_command_lines():
     assert sum(map(len, map(lines_of, DOCUMENTS))) > 100
 
