@@ -189,10 +189,9 @@ def test_what_nobody_thought_of_pauses_and_is_told(playing, watching, monkeypatc
     def fail(*arguments):
         raise RuntimeError("a pipe\nhas burst")
 
-    from wavetank.session import rules
     from wavetank.session.commands import SetView
 
-    monkeypatch.setitem(rules.RULES, SetView, fail)
+    monkeypatch.setattr(SetView, "apply", fail)
     watcher.socket.send('{"do": "view", "view": "particles"}')
     monkeypatch.setattr(type(world.session), "_fit_frame", fail)
     assert watcher.wait_for_note("The water is paused")

@@ -4,14 +4,11 @@ from typing import Any
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.scene.goal import Aim, Goal
-from wavetank.session import commands as c
 from wavetank.session.measures import counted, measure
 from wavetank.session.tools import TOOL_NAMES
 from wavetank.simulation.frame import Frame
 
-#: What would make a level another one; a reset with other parameters begins a level of one's own.
-CHEATS = (c.SetParameter, c.AddSolid, c.RemoveSolid, c.MoveSolid)
-HARMLESS = ("foam", "foam_lifetime")  # parameters that the water does not feel
+HARMLESS = ("foam", "foam_lifetime")  # parameters that do not act on the water
 
 
 class Game:
@@ -32,26 +29,15 @@ class Game:
         self.values = [0.0] * len(goal.aims)
         self._measure(frame)
 
-    def allow(self, command: c.Command) -> c.Command:
-        """Return the command as it may be done; raises `WavetankError` for what the level does not allow."""
-        if isinstance(command, CHEATS) and getattr(command, "name", "") not in HARMLESS:
-            raise WavetankError(
-                "In a level the water and the solids stay as they are; use the tools, or another scene."
-            )
-        if not isinstance(command, c.ToolBegin):
-            return command
+    def allow_tool(self, name: str) -> dict[str, Any]:
+        """Return the options that the level fixes for a tool; raises `WavetankError` where it does not allow it now."""
         tools = self.goal.tools
-        if tools is not None and command.tool not in tools:
+        if tools is not None and name not in tools:
             known = ", ".join(tools) or "none"
-            raise WavetankError(f"{command.tool!r} is not allowed in this level; its tools are: {known}.")
+            raise WavetankError(f"{name!r} is not allowed in this level; its tools are: {known}.")
         if self.goal.strokes is not None and self.strokes >= self.goal.strokes:
             raise WavetankError(f"All {self.goal.strokes} strokes are used; wait for the water or start again.")
-        fixed = (tools or {}).get(command.tool)
-        return command.model_copy(update={"options": {**command.options, **fixed}}) if fixed else command
-
-    def done(self, command: c.Command) -> None:
-        """Take note of a command that took effect."""
-        self.strokes += isinstance(command, c.ToolBegin)
+        return (tools or {}).get(name) or {}
 
     def watch(self, frame: Frame, duration: float) -> None:
         """Judge the frame at the end of `duration` [s]; once the game is over nothing changes."""

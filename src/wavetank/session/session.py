@@ -12,9 +12,8 @@ from typing import Any
 from wavetank.foundation.door import guarded
 from wavetank.foundation.errors import NotFiniteError, WavetankError
 from wavetank.scene.scene import Scene
-from wavetank.session.commands import AddSolid, Bookmark, Command, FrameLength, LoadScene, RemoveSolid, Reset, Rewind
+from wavetank.session.commands import Command, FrameLength
 from wavetank.session.history import History
-from wavetank.session.rules import RULES
 from wavetank.session.state import SessionState
 from wavetank.simulation.simulation import Simulation
 
@@ -22,9 +21,7 @@ MOST_PARTICLES = 200_000
 SLUGGISH, SWIFT = 0.045, 0.025  # s: a frame that takes longer is made shorter, one that takes less longer again
 MOST_PARTS = 8  # of a frame; shorter time steps would turn density errors into velocity
 WORTH = 1.0  # a frame takes no less than so many times its picture, or pictures would eat the time
-BEGINNINGS = (LoadScene, Reset)
-EXPENSIVE = (*BEGINNINGS, AddSolid, RemoveSolid, Bookmark, Rewind)  # commands that take long
-MOST_EXPENSIVE = 8  # of these in the queue
+MOST_SLOW = 8  # slow commands in the queue
 SPARED, SHORTEST_REST = 2.0, 0.1  # times as long as such a command took, and s at least, none follows it
 LONGEST_NOTE = 400  # characters
 Refused = Callable[[str], None] | None  # is told why a command failed
@@ -77,26 +74,26 @@ class Session(SessionState):
         Of those that take long few wait, and another beginning takes the place of one that was not reached yet.
         """
         with self._lock:
-            slot = command.slot
-            if isinstance(command, BEGINNINGS):
-                kept = [other for other in self._waiting if not isinstance(other[0], BEGINNINGS)]
+            key = command.coalescing_key
+            if command.restarts:
+                kept = [other for other in self._waiting if not other[0].restarts]
                 if len(kept) != len(self._waiting):
                     self._waiting = kept
                     self._latest.clear()
-            elif isinstance(command, EXPENSIVE):
-                if sum(isinstance(other, EXPENSIVE) for other, _ in self._waiting) >= MOST_EXPENSIVE:
+            elif command.is_slow:
+                if sum(other.is_slow for other, _ in self._waiting) >= MOST_SLOW:
                     return False
-            if slot is not None and slot in self._latest:
-                place = self._latest[slot]
+            if key is not None and key in self._latest:
+                place = self._latest[key]
                 self._waiting[place] = command.after(self._waiting[place][0]), refused
             elif len(self._waiting) >= MOST_WAITING:
                 return False
             else:
-                if slot is None:
+                if key is None:
                     # Nothing moves past a command that others may depend on.
                     self._latest.clear()
                 else:
-                    self._latest[slot] = len(self._waiting)
+                    self._latest[key] = len(self._waiting)
                 self._waiting.append((command, refused))
         self._wake.set()
         return True
@@ -111,7 +108,7 @@ class Session(SessionState):
             commands, self._waiting = self._waiting, []
             self._latest.clear()
         for number, (command, refused) in enumerate(commands):
-            if sparing and isinstance(command, EXPENSIVE) and time.perf_counter() < self._spared_until:
+            if sparing and command.is_slow and time.perf_counter() < self._spared_until:
                 with self._lock:
                     self._waiting[:0] = commands[number:]
                     self._latest.clear()  # places have changed; what comes joins those behind it only
@@ -123,23 +120,20 @@ class Session(SessionState):
         """Carry out one command; whatever goes wrong becomes a note to who gave it, and the water goes on."""
         began, self.refused = time.perf_counter(), refused or self.note
         try:
-            with guarded(f"The command {type(command).model_fields['do'].default!r} failed", "command"):
+            with guarded(f"The command {command.kind!r} failed", "command"):
                 self.apply(command)
         except WavetankError as error:
             self.refused(str(error)[:LONGEST_NOTE])
         self.refused = self.note
-        if isinstance(command, EXPENSIVE):
+        if command.is_slow:
             end = time.perf_counter()
             self._spared_until = end + max(SPARED * (end - began), SHORTEST_REST)
 
     def apply(self, command: Command) -> None:
         """Carry out one command now; raises `WavetankError` and changes nothing where it is not allowed."""
-        game = self.game
-        if game is not None:
-            command = game.allow(command)
-        RULES[type(command)](self, command)
-        if game is not None:
-            game.done(command)
+        if self.game is not None:
+            command = command.as_allowed(self.game)
+        command.apply(self)
         self.log.append((self.ticks, command))
         self.changes += 1
 
