@@ -179,7 +179,6 @@ TANGLED: set[str] = {
     "physics/grid_pressure/surface.py:depth_beside",
     "physics/near_solids.py:look",
     "physics/tension.py:attract",
-    "run/film.py:_frames",
     "simulation/saved.py:_checked_arrays",
     "solids/meshes/grid.py:nearest_triangles",
     "solids/meshes/grid.py:part_faces",

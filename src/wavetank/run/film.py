@@ -1,7 +1,7 @@
-"""A film of a scene, with its camera and its slow motion; frames that are there are kept, so that it can be stopped.
+"""Films of a scene, with a camera path and slow motion; finished frames are stored, so that a film can be continued.
 
-While a film is made its frames lie in a folder beside it, named after it, with the state of the water at the last of
-them: a film that was stopped goes on there, to the same bits.
+While a film is made its frames are in a folder next to it, with the state of the water at the last of them. A film that
+was interrupted continues from there and ends with the same bits.
 """
 
 import hashlib
@@ -31,9 +31,16 @@ from wavetank.view.film.samples import Watch
 from wavetank.view.renderer import ROOM, Renderer, affordable
 from wavetank.view.style import quality_options
 
-FRAMES = ".frames"  # what the folder's name ends in
+FRAMES = ".frames"  # suffix of the folder of frames
 STATE, ABOUT = "state.npz", "film.json"
-KEEP_EVERY = 8  # frames between two states of the water
+STORE_EVERY = 8  # frames between two saved states of the water
+COLUMNS = (
+    TextColumn("{task.description}"),
+    BarColumn(),
+    TextColumn("{task.fields[frame]}"),
+    TimeElapsedColumn(),
+    TimeRemainingColumn(elapsed_when_finished=True),
+)
 
 
 def film_scene(
@@ -41,45 +48,51 @@ def film_scene(
 ) -> dict[str, Any]:
     """Simulate `scene`, write its film to `path` and return what it shows.
 
-    `changes` take the place of what the scene's film says, or of its light; None changes nothing. With `keep` the
-    frames stay beside the film. Raises `WavetankError`.
+    `changes` replace what the scene's film or its light says; None changes nothing. With `keep` the folder of frames is
+    not deleted. Raises `WavetankError`.
     """
     writer = exporter_for(path, "video")
     look = {name: changes.pop(name, None) for name in ("environment", "sun", "floor")}
+    order = _film_with(scene, changes)
+    if not path.absolute().parent.is_dir():
+        raise WavetankError(f"{str(path)!r} cannot be written: there is no folder {str(path.parent)!r}.")
+    supersample, style = quality_options(order.quality, order.samples)
+    start(arch)
+    renderer = Renderer(*order.size, affordable(*order.size, supersample))
+    frames = _FrameFolder(path.with_name(path.name + FRAMES), scene, order, look)
+    with asked_to_end(say="interrupted; finished frames are kept (once more stops at once)") as asked:
+        camera_work = _Filming(scene, order, frames, renderer, {**style, **look}, asked)
+        rendered = camera_work.render_missing(arch, console or Console(stderr=True))
+    figures = {
+        "file": str(path),
+        "scene": scene.title,
+        "frames": len(rendered),
+        "of": order.frames,
+        "fps": order.fps,
+        "rendered": sum(rendered),
+        "interrupted": len(rendered) < order.frames,
+        "exit_code": asked.code,
+    }
+    if figures["interrupted"]:
+        return figures | {"file": str(frames.folder)}
+    with writer.write(path, *order.size, order.fps) as out:
+        for number in range(order.frames):
+            out.write(np.asarray(Image.open(frames.picture(number)).convert("RGB")))
+    if not keep:
+        shutil.rmtree(frames.folder)
+    return figures
+
+
+def _film_with(scene: Scene, changes: dict[str, Any]) -> Film:
+    """Return the scene's film with `changes`, of which None changes nothing; raises `WavetankError`."""
     table = (scene.film or Film()).model_dump(exclude_unset=True)
     chosen = {name: value for name, value in changes.items() if value is not None}
     over_time = {name: plain for name, plain in table.pop("over_time", {}).items() if name not in chosen}
     table |= chosen | ({"over_time": over_time} if over_time else {})
     order: Film = Film.parse(table, "film")
     if scene.dim == 2 and (order.eye or order.target):
-        raise WavetankError("film: eye and target are for worlds in space; a 2-D world is seen from the front.")
-    if not path.absolute().parent.is_dir():
-        raise WavetankError(f"{str(path)!r} cannot be written: there is no folder {str(path.parent)!r}.")
-    supersample, style = quality_options(order.quality, order.samples)
-    start(arch)
-    renderer = Renderer(*order.size, affordable(*order.size, supersample))
-    folder = make_folder(path.with_name(path.name + FRAMES))
-    _begin(folder, scene, order, look)
-    with asked_to_end(say="asked to end; what is there is being kept (once more stops at once)") as asked:
-        done = _frames(scene, order, folder, renderer, {**style, **look}, (arch, asked, console))
-    figures = {
-        "file": str(path),
-        "scene": scene.title,
-        "frames": len(done),
-        "of": order.frames,
-        "fps": order.fps,
-        "rendered": sum(done),
-        "interrupted": len(done) < order.frames,
-        "exit_code": asked.code,
-    }
-    if figures["interrupted"]:
-        return figures | {"file": str(folder)}
-    with writer.write(path, *order.size, order.fps) as out:
-        for number in range(order.frames):
-            out.write(np.asarray(Image.open(_name(folder, number)).convert("RGB")))
-    if not keep:
-        shutil.rmtree(folder)
-    return figures
+        raise WavetankError("film: eye and target are for 3-D worlds; a 2-D world is always seen from the front.")
+    return order
 
 
 def camera_at(order: Film, scene: Scene, time: float, water: float) -> Camera:
@@ -97,113 +110,121 @@ def camera_at(order: Film, scene: Scene, time: float, water: float) -> Camera:
     return camera.tilted(scene, water, 1.0 if now.eye else ROOM)
 
 
-def _name(folder: Path, number: int) -> Path:
-    return folder / f"frame-{number:05d}.png"
+class _FrameFolder:
+    """The folder of a film's frames, with the state of the water at one of them; frames of another film are deleted."""
+
+    def __init__(self, folder: Path, scene: Scene, order: Film, look: dict[str, Any]) -> None:
+        self.folder = make_folder(folder)
+        plain = json.dumps([VERSION, scene.text(), order.model_dump(mode="json"), look], sort_keys=True, default=str)
+        key = hashlib.sha256(plain.encode()).hexdigest()
+        if self._about().get("key") == key:
+            return
+        for entry in self.folder.iterdir():
+            if entry.name.startswith("frame-") or entry.name in (STATE, ABOUT):
+                entry.unlink()
+        self._write_about({"wavetank": VERSION, "key": key})
+
+    def picture(self, number: int) -> Path:
+        """Return the file of a frame."""
+        return self.folder / f"frame-{number:05d}.png"
+
+    def samples(self, number: int) -> Path:
+        """Return the file of the samples of a frame whose rendering was interrupted."""
+        return self.folder / f"frame-{number:05d}.samples.npz"
+
+    def store(self, sim: Simulation, number: int) -> None:
+        """Save the water of a frame."""
+        state = self.folder / STATE
+        sim.save(state)
+        digest = hashlib.sha256(state.read_bytes()).hexdigest()
+        self._write_about(self._about() | {"state": number, "sha256": digest})
+
+    def restore(self, scene: Scene, arch: str, wanted: int) -> tuple[Simulation, int]:
+        """Return the water at a stored frame not after `wanted`, and its number; else that of the start, and -1."""
+        state, about = self.folder / STATE, self._about()
+        try:
+            number, good = int(about["state"]), hashlib.sha256(state.read_bytes()).hexdigest() == about["sha256"]
+            if good and 0 <= number <= wanted:
+                return Simulation.restore(state, arch=arch), number
+        except (OSError, ValueError, KeyError, TypeError):
+            pass
+        return Simulation(scene, arch=arch), -1
+
+    def _about(self) -> dict[str, Any]:
+        try:
+            about = json.loads((self.folder / ABOUT).read_text("utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return about if isinstance(about, dict) else {}
+
+    def _write_about(self, about: dict[str, Any]) -> None:
+        with replacing(self.folder / ABOUT) as partial:
+            partial.write_text(json.dumps(about) + "\n", encoding="utf-8")
 
 
-def _begin(folder: Path, scene: Scene, order: Film, look: dict[str, Any]) -> None:
-    """Empty a folder that holds frames of another film."""
-    plain = json.dumps([VERSION, scene.text(), order.model_dump(mode="json"), look], sort_keys=True, default=str)
-    key = hashlib.sha256(plain.encode()).hexdigest()
-    about = folder / ABOUT
-    try:
-        same = json.loads(about.read_text("utf-8"))["key"] == key
-    except (OSError, ValueError, KeyError, TypeError):
-        same = False
-    if same:
-        return
-    for entry in folder.iterdir():
-        if entry.name.startswith("frame-") or entry.name in (STATE, ABOUT):
-            entry.unlink()
-    with replacing(about) as partial:
-        partial.write_text(json.dumps({"wavetank": VERSION, "key": key}) + "\n", encoding="utf-8")
+class _Filming:
+    """Renders the frames of a film that are missing."""
 
+    def __init__(
+        self, scene: Scene, order: Film, frames: _FrameFolder, renderer: Renderer, style: dict[str, Any], asked: Asked
+    ) -> None:
+        self.scene, self.order, self.frames, self.renderer, self.style = scene, order, frames, renderer, style
+        self.asked = asked
+        self.times = order.times()  # s of water at each frame
+        self.samples = style["samples"] if style["traced"] else 1  # of a frame, as the progress bar counts
+        self.made = 0  # samples so far
 
-def _frames(
-    scene: Scene,
-    order: Film,
-    folder: Path,
-    renderer: Renderer,
-    style: dict[str, Any],
-    how: tuple[str, Asked, Console | None],
-) -> list[bool]:
-    """Make the frames that are not there, and say for every one that is there whether it was made now."""
-    arch, asked, console = how
-    times, done = order.times(), []
-    there = [_name(folder, number).exists() for number in range(order.frames)]
-    missing = there.index(False) if False in there else order.frames
-    if missing == order.frames:
-        return [False] * order.frames
-    sim, at = _water(scene, folder, arch, times, missing)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.fields[frame]}"),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(elapsed_when_finished=True),
-    )
-    with Progress(*columns, console=console or Console(stderr=True), transient=True) as bar:
-        each = style["samples"] if style["traced"] else 1
-        task = bar.add_task("film", total=each * (order.frames - sum(there)), frame="")
-        made = 0
-        for number in range(order.frames):
-            if there[number]:
-                done.append(False)
-                continue
-            while at < number:
-                at += 1
-                sim.advance(max(0.0, times[at] - (times[at - 1] if at else 0.0)))
-                if at == number and number % KEEP_EVERY == 0:
-                    _store(sim, folder, number)
-                if asked:
+    def render_missing(self, arch: str, console: Console) -> list[bool]:
+        """Render the missing frames until interrupted; say for every frame there is whether it was rendered now."""
+        there = [self.frames.picture(number).exists() for number in range(self.order.frames)]
+        if all(there):
+            return [False] * len(there)
+        self.sim, self.at = self.frames.restore(self.scene, arch, there.index(False))
+        rendered: list[bool] = []
+        with Progress(*COLUMNS, console=console, transient=True) as self.bar:
+            self.task = self.bar.add_task("film", total=self.samples * there.count(False), frame="")
+            for number in range(len(there)):
+                if there[number]:
+                    rendered.append(False)
+                    continue
+                if not (self._advance_to(number) and self._render(number)):
                     break
-            if asked:
-                _store(sim, folder, at)
-                break
-            now = order.at(number / order.fps)
-            camera = camera_at(order, scene, number / order.fps, sim.time)
-            watch = Watch(path=folder / f"frame-{number:05d}.samples.npz" if style["traced"] else None)
+                rendered.append(True)
+                if self.asked and number + 1 < len(there):
+                    self.frames.store(self.sim, number)
+                    break
+        return rendered
 
-            def tell(samples: int, of: int, before: int = made, number: int = number) -> bool:
-                bar.update(task, completed=before + samples, frame=f"frame {number + 1} of {order.frames}")
-                return not asked
+    def _advance_to(self, number: int) -> bool:
+        """Advance the water to a frame; say whether it got there before an interruption."""
+        while self.at < number and not self.asked:
+            self.at += 1
+            self.sim.advance(max(0.0, self.times[self.at] - (self.times[self.at - 1] if self.at else 0.0)))
+            if self.at == number and number % STORE_EVERY == 0:
+                self.frames.store(self.sim, number)
+        if self.asked:
+            self.frames.store(self.sim, self.at)
+        return not self.asked
 
-            watch.tell = tell
-            options = style | {"shutter": now.shutter * now.speed / order.fps, "edges": order.edges}
-            if style["traced"]:
-                options |= {"aperture": now.aperture, "focus": now.focus or camera.distance}
-            image = renderer.render(sim.frame(), camera, watch=watch, legend=False, **options)
-            if not watch.whole:
-                _store(sim, folder, number)
-                break
-            write_png(_name(folder, number), image)
-            made += each
-            bar.update(task, completed=made, frame=f"frame {number + 1} of {order.frames}")
-            done.append(True)
-            if asked and number + 1 < order.frames:
-                _store(sim, folder, number)
-                break
-    return done
+    def _render(self, number: int) -> bool:
+        """Render and write a frame; say whether it was finished before an interruption."""
+        order, time = self.order, number / self.order.fps
+        now, camera = order.at(time), camera_at(order, self.scene, time, self.sim.time)
+        options = self.style | {"shutter": now.shutter * now.speed / order.fps, "edges": order.edges}
+        watch = Watch(tell=lambda samples, of: self._report(number, samples))
+        if self.style["traced"]:
+            watch.path = self.frames.samples(number)
+            options |= {"aperture": now.aperture, "focus": now.focus or camera.distance}
+        image = self.renderer.render(self.sim.frame(), camera, watch=watch, legend=False, **options)
+        if not watch.whole:
+            self.frames.store(self.sim, number)
+            return False
+        write_png(self.frames.picture(number), image)
+        self._report(number, self.samples)
+        self.made += self.samples
+        return True
 
-
-def _store(sim: Simulation, folder: Path, number: int) -> None:
-    """Keep the water of a frame."""
-    state = folder / STATE
-    sim.save(state)
-    with replacing(folder / ABOUT) as partial:
-        about = json.loads((folder / ABOUT).read_text("utf-8"))
-        size = hashlib.sha256(state.read_bytes()).hexdigest()
-        partial.write_text(json.dumps(about | {"state": number, "sha256": size}) + "\n", encoding="utf-8")
-
-
-def _water(scene: Scene, folder: Path, arch: str, times: list[float], wanted: int) -> tuple[Simulation, int]:
-    """Return the water at a frame not behind `wanted`, and that frame's number; -1 where it has not begun."""
-    state = folder / STATE
-    try:
-        about = json.loads((folder / ABOUT).read_text("utf-8"))
-        number, good = int(about["state"]), hashlib.sha256(state.read_bytes()).hexdigest() == about["sha256"]
-        if good and 0 <= number <= wanted:
-            return Simulation.restore(state, arch=arch), number
-    except (OSError, ValueError, KeyError, TypeError):
-        pass
-    return Simulation(scene, arch=arch), -1
+    def _report(self, number: int, samples: int) -> bool:
+        """Show how many samples of a frame there are; say whether to go on."""
+        self.bar.update(self.task, completed=self.made + samples, frame=f"frame {number + 1} of {self.order.frames}")
+        return not self.asked
