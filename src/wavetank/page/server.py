@@ -303,7 +303,7 @@ class WebFront:
 
 def _packaged(name: str) -> Response:
     """Return a file of the page; only those that are there by name."""
-    folder = importlib.resources.files("wavetank.page.page") / "static"
+    folder = importlib.resources.files("wavetank.page") / "static"
     if name not in {entry.name for entry in folder.iterdir() if entry.is_file()}:
         return Response("not here\n", status_code=404, media_type="text/plain")
     kind = {"js": "text/javascript", "svg": "image/svg+xml"}.get(name.rpartition(".")[2])
