@@ -19,8 +19,8 @@ import wavetank
 from benchmarks.peers.environment import PACKAGE, splishsplash_python
 from benchmarks.peers.runs import ask
 from wavetank.device import compiler
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import replacing
 from wavetank.foundation.rotations import inverse, product, turned
 from wavetank.lab.bench.machine import cores, load, machine
 from wavetank.lab.plots import BLUE, RED, pyplot, tidy
@@ -208,7 +208,7 @@ def draw(result: dict[str, Any], scene: Scene, ours: Watched, theirs: Watched, p
     axis.legend(frameon=False, fontsize=9)
     tidy(axis)
     plot.suptitle(f"{result['scene']}: {result['ours']['particles']:,} particles", fontsize=12)
-    with replacing(path, suffixed=True) as partial:
+    with atomic_write(path, suffixed=True) as partial:
         plot.savefig(partial, dpi=90)
     plt.close(plot)
 

@@ -92,7 +92,7 @@ def test_a_second_interrupt_while_the_index_is_put_first_loses_nothing(tmp_path,
     path = tmp_path / "a.mp4"
 
     def interrupted(parts, target):
-        with mp4.replacing(target):
+        with mp4.atomic_write(target):
             raise KeyboardInterrupt
 
     monkeypatch.setattr(mp4, "join", interrupted)

@@ -71,7 +71,7 @@ SCENES: dict[str, tuple[str, str]] = {
     "deep headers": ("[" + "a." * 100_000 + "a]", "nested"),
     "headers that go on": ("\n".join(f"[{'.'.join('a' * n)}]" for n in range(1, 400)), "nested"),
     "long integer": ("spacing = " + "9" * 5000, "digits"),
-    "long hexadecimal integer": ("spacing = 0x" + "f" * 100_000, "digits"),
+    "long hexadecimal integer": ("spacing = 0x" + "f" * 100_000, "64 bits"),
     "integer beyond 64 bits": ("foam_seed = " + "9" * 40, "64 bits"),
     "deep union": (
         POOL

@@ -1,5 +1,6 @@
-"""The doors of files that runs write and other programs bring: checkpoints, folders of runs, robots, scenes, particles."""
+"""The readers of files that runs write and other programs bring: checkpoints, folders of runs, robots, scenes, particles."""
 
+import atexit
 import functools
 import gzip
 import io
@@ -18,11 +19,13 @@ from strategies import mutated, toml_of, torn
 import wavetank as wt
 from wavetank.formats.bgeo import read_bgeo
 from wavetank.formats.splishsplash import load_splishsplash
-from wavetank.foundation.door import parse_toml
+from wavetank.foundation.input_limits import parse_toml
 from wavetank.run.checkpoints import Checkpoints, begun
 from wavetank.run.folder import Run, RunFolder
 
-FOLDER = Path(tempfile.gettempdir()) / "wavetank-fuzz"
+#: of this process: two that share one write over each other
+FOLDER = Path(tempfile.mkdtemp(prefix="wavetank-fuzz-"))
+atexit.register(shutil.rmtree, FOLDER, ignore_errors=True)
 SMALL = """
 spacing = 0.1
 tank.size = [1.0, 0.6]

@@ -1,7 +1,7 @@
 """Many thousand mutations of everything that comes from outside, in a process of its own with limits.
 
-    python tests/fuzz/long.py --count 20000            all doors, by turns
-    python tests/fuzz/long.py --doors state,mesh --count 500 --seed 7
+    python tests/fuzz/long.py --count 20000            all inputs, by turns
+    python tests/fuzz/long.py --inputs state,mesh --count 500 --seed 7
 
 What fails is written to tests/fuzz/found/, with its door in front of the name; what is worth keeping goes to
 `attacks.py` in its smallest form. Exit code 1 where anything failed. Limits of one input: 1 GB more than before, and
@@ -57,15 +57,15 @@ def keep(name: str, given: object, why: str) -> None:
 
 def batch(name: str, count: int, seed: int) -> int:
     """Try so many inputs in this process; return how many failed."""
-    os.environ["WAVETANK_STRICT_DOOR"] = "1"
+    os.environ["WAVETANK_STRICT_INPUT"] = "1"
     import hypothesis
     from attacks import TooSlowError
-    from doors import DOORS, FOLDER, try_scene
     from files import good_scenes
     from hypothesis import HealthCheck, Phase, given, settings
+    from inputs import FOLDER, INPUTS, try_scene
 
     try_scene("spacing = 0.1\ntank.size = [1, 1]\nfluids = [{lower = [0, 0], upper = [0.5, 0.5]}]")  # kernels
-    inputs, attempt = DOORS[name]
+    inputs, attempt = INPUTS[name]
     if name == "other":  # kernels, of bodies and in space
         for plain, files in good_scenes():
             with contextlib.suppress(AssertionError):
@@ -115,14 +115,14 @@ def batch(name: str, count: int, seed: int) -> int:
 def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--count", type=int, default=20_000)
-    parser.add_argument("--doors", default=",".join(SHARES))
+    parser.add_argument("--inputs", default=",".join(SHARES))
     parser.add_argument("--seed", type=int, default=int(time.time()))
     parser.add_argument("--batch", nargs=3, default=None)
     options = parser.parse_args()
     if options.batch:
         name, count, seed = options.batch
         return min(batch(name, int(count), int(seed)), 100)
-    names = options.doors.split(",")
+    names = options.inputs.split(",")
     total = sum(SHARES[name] for name in names)
     failures = tried = 0
     began, seed = time.monotonic(), options.seed

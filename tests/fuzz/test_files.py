@@ -18,7 +18,7 @@ from wavetank.run.folder import RunFolder
 
 @pytest.fixture(autouse=True)
 def strict(monkeypatch):
-    monkeypatch.setenv("WAVETANK_STRICT_DOOR", "1")
+    monkeypatch.setenv("WAVETANK_STRICT_INPUT", "1")
 
 
 def test_a_run_reads_what_it_wrote():

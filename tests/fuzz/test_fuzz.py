@@ -4,9 +4,9 @@ import contextlib
 import os
 
 import pytest
-from doors import DOORS
 from hypothesis import HealthCheck, given, settings
 from hypothesis.errors import FlakyStrategyDefinition
+from inputs import INPUTS
 
 SHARES = {
     "scene": 40,
@@ -24,10 +24,10 @@ SHARES = {
 TIMES = int(os.environ.get("WAVETANK_FUZZ_TIMES", "1"))
 
 
-@pytest.mark.parametrize("name", DOORS)
+@pytest.mark.parametrize("name", INPUTS)
 def test_only_sentences_of_ours_and_worlds_that_work(name, monkeypatch):
-    monkeypatch.setenv("WAVETANK_STRICT_DOOR", "1")
-    inputs, attempt = DOORS[name]
+    monkeypatch.setenv("WAVETANK_STRICT_INPUT", "1")
+    inputs, attempt = INPUTS[name]
 
     @settings(max_examples=SHARES[name] * TIMES, deadline=None, database=None, suppress_health_check=list(HealthCheck))
     @given(inputs)

@@ -112,7 +112,7 @@ def test_a_refusal_costs_little(name, tmp_path):
         capture_output=True,
         text=True,
         timeout=120,
-        env={**os.environ, "WAVETANK_STRICT_DOOR": "1"},
+        env={**os.environ, "WAVETANK_STRICT_INPUT": "1"},
     )
     assert run.returncode == 0, run.stderr[-600:]
     seconds, megabytes, said = json.loads(run.stdout.splitlines()[-1])

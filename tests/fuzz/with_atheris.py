@@ -12,10 +12,10 @@ import sys
 
 import atheris
 
-os.environ["WAVETANK_STRICT_DOOR"] = "1"
+os.environ["WAVETANK_STRICT_INPUT"] = "1"
 with atheris.instrument_imports(include=["wavetank.foundation", "wavetank.scene", "wavetank.solids.meshes", "tomllib"]):
     import wavetank as wt
-    from wavetank.foundation import door
+    from wavetank.foundation import input_limits
     from wavetank.solids.meshes import counted
 
 
@@ -24,15 +24,15 @@ def scene(data: bytes) -> None:
 
 
 def plain(data: bytes) -> None:
-    door.parse_json(data.decode("utf-8", "replace"), "text")
+    input_limits.parse_json(data.decode("utf-8", "replace"), "text")
 
 
 def array(data: bytes) -> None:
-    door.read_array(io.BytesIO(data), len(data), "file", "array")
+    input_limits.read_array(io.BytesIO(data), len(data), "file", "array")
 
 
 def archive(data: bytes) -> None:
-    door.unpack(io.BytesIO(data), len(data), "file")
+    input_limits.unpack_arrays(io.BytesIO(data), len(data), "file")
 
 
 def mesh(data: bytes) -> None:
@@ -43,11 +43,11 @@ def mesh(data: bytes) -> None:
             continue
 
 
-DOORS = {"scene": scene, "json": plain, "array": array, "archive": archive, "mesh": mesh}
+INPUTS = {"scene": scene, "json": plain, "array": array, "archive": archive, "mesh": mesh}
 
 
 def main() -> None:
-    attempt = DOORS[sys.argv.pop(1)]
+    attempt = INPUTS[sys.argv.pop(1)]
 
     def once(data: bytes) -> None:
         try:

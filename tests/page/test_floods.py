@@ -181,7 +181,7 @@ def test_downloads_do_not_stop_the_water(playing, watching):
 
 
 def test_what_nobody_thought_of_pauses_and_is_told(playing, watching, monkeypatch):
-    monkeypatch.delenv("WAVETANK_STRICT_DOOR", raising=False)
+    monkeypatch.delenv("WAVETANK_STRICT_INPUT", raising=False)
     world = playing(POOL)
     watcher = watching(world.socket)
     watcher.wait_for_pictures()

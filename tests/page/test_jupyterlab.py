@@ -94,7 +94,7 @@ def test_played_saved_and_opened_again_without_a_kernel(lab, tmp_path):
     path = tmp_path / "pool.ipynb"
     empty = {"cell_type": "code", "metadata": {}, "outputs": [], "execution_count": None}
     cells = [{**empty, "source": cell} for cell in CELLS]
-    about = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
+    about = {"kernelspec": {"name": "python3", "printable": "Python 3"}}
     path.write_text(json.dumps({"cells": cells, "metadata": about, "nbformat": 4, "nbformat_minor": 4}))
     browser = Browser(tmp_path / "first", 1280, 1100)
     try:

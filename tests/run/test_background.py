@@ -5,7 +5,7 @@ import time
 import pytest
 
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.patience import Patience
+from wavetank.foundation.retry import Retry
 from wavetank.run import background
 from wavetank.run.background import Background
 
@@ -71,7 +71,7 @@ def test_a_full_disk_is_waited_for_and_told_once():
                 raise WavetankError("'a.npz' cannot be written: No space left on device.") from error
         return "done"
 
-    assert Patience(told.append).do(write) == "done"
+    assert Retry(told.append).call(write) == "done"
     assert len(tries) == 4
     assert told == ["waiting, and trying again for 60 s: 'a.npz' cannot be written: No space left on device."]
 
@@ -84,7 +84,7 @@ def test_what_does_not_pass_is_not_tried_again():
         raise OSError(errno.EACCES, "Permission denied")
 
     with pytest.raises(OSError, match="Permission"):
-        Patience().do(write)
+        Retry().call(write)
     assert len(tries) == 1
     with pytest.raises(OSError, match="space"):
-        Patience(longest=0.0).do(lambda: (_ for _ in ()).throw(OSError(errno.ENOSPC, "no space")))
+        Retry(longest=0.0).call(lambda: (_ for _ in ()).throw(OSError(errno.ENOSPC, "no space")))

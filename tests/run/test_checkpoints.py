@@ -112,7 +112,7 @@ def test_a_damaged_checkpoint_gives_way_to_the_one_before(whole, tmp_path, monke
     assert run.checkpoint.state != last.name and "SHA-256" in run.note
     go_on(tmp_path)
     same(tmp_path, whole)
-    with pytest.raises(wt.WavetankError, match="a run that was completed keeps no checkpoints"):
+    with pytest.raises(wt.WavetankError, match="a completed run keeps no checkpoints"):
         go_on(tmp_path)
 
 
@@ -147,7 +147,7 @@ def test_what_is_no_checkpoint_is_one_sentence(change, words, tmp_path, monkeypa
         record(started(), order(tmp_path))
     place = tmp_path / "states" / "run.json"
     place.write_text(json.dumps(change(json.loads(place.read_text()))))
-    monkeypatch.delenv("WAVETANK_STRICT_DOOR", raising=False)
+    monkeypatch.delenv("WAVETANK_STRICT_INPUT", raising=False)
     with pytest.raises(wt.WavetankError, match=words) as report:
         go_on(tmp_path)
     assert "\n" not in str(report.value)
@@ -225,11 +225,11 @@ def test_a_killed_run_goes_on_and_leaves_nothing_behind(delay, tmp_path):
 
 
 def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path, monkeypatch):
-    from wavetank.foundation import replacing
+    from wavetank.foundation import atomic_write
 
     dead = subprocess.Popen([sys.executable, "-c", "pass"])
     dead.wait()
-    here = replacing._here()
+    here = atomic_write._here()
     names = {
         f".a.mp4.{here}-{dead.pid}.partial": False,
         f".a.mp4.{here}-{dead.pid}-12.partial": False,
@@ -241,7 +241,7 @@ def test_leftovers_of_the_dead_are_swept_and_those_of_the_living_stay(tmp_path, 
     }
     for name in names:
         (tmp_path / name).write_text("half")
-    with replacing.replacing(tmp_path / "b.txt") as partial:
+    with atomic_write.atomic_write(tmp_path / "b.txt") as partial:
         partial.write_text("whole")
     for name, stays in names.items():
         assert (tmp_path / name).exists() is stays, name

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.foundation.door import TIMES, UNPACKED, guarded, named, one_line, opened
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import TIMES, UNPACKED, explain_errors, one_line, open_regular, printable
 from wavetank.foundation.memory import free_memory, in_words
 
 LARGEST = 2_000_000_000  # bytes of points
@@ -24,8 +24,8 @@ def read_bgeo(path: str | Path) -> np.ndarray:
 
     What it says of itself is compared with its size and with free memory before the points are unpacked.
     """
-    origin = named(path)
-    with guarded(origin, "particle file"), opened(path, LARGEST, "particle file") as file:
+    origin = printable(path)
+    with explain_errors(origin, "particle file"), open_regular(path, LARGEST, "particle file") as file:
         size = os.fstat(file.fileno()).st_size
         packed = file.read(2) == b"\x1f\x8b"
         file.seek(0)

@@ -6,9 +6,9 @@ What is new is written behind the end that readers know of. What changes in fron
 
 from pathlib import Path
 
+from wavetank.foundation.atomic_write import partial_path
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.patience import Patience
-from wavetank.foundation.replacing import partial_path
+from wavetank.foundation.retry import Retry
 
 PAGE = 16384  # bytes
 
@@ -16,8 +16,8 @@ PAGE = 16384  # bytes
 class CommittedFile:
     """The file object of such a file, as h5py wants one. It gets its name with the first `commit`."""
 
-    def __init__(self, path: str | Path, patience: Patience) -> None:
-        self.path, self.patience = Path(path), patience
+    def __init__(self, path: str | Path, retry: Retry) -> None:
+        self.path, self.retry = Path(path), retry
         self._partial: Path | None = partial_path(path)
         try:
             self._file = self._partial.open("w+b", buffering=0)
@@ -81,7 +81,7 @@ class CommittedFile:
         """Set the size; what readers know of stays until `commit`."""
         self._size = self._place if size is None else size
         if self._size > self._known:
-            self.patience.do(lambda: self._file.truncate(self._size))
+            self.retry.call(lambda: self._file.truncate(self._size))
         return self._size
 
     def flush(self) -> None:
@@ -133,4 +133,4 @@ class CommittedFile:
                 self._file.seek(at + done)
                 done += self._file.write(view[done:])
 
-        self.patience.do(put)
+        self.retry.call(put)

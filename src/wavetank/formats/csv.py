@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.foundation.replacing import replacing
+from wavetank.foundation.atomic_write import atomic_write
 
 SUFFIXES = (".csv",)
 KIND = "particles"
@@ -22,7 +22,7 @@ def write_csv(path: str | Path, frame: Any) -> None:
     header = ",".join(["id", *axes, *(f"v{axis}" for axis in axes), "density", "kind", "age", "material"])
     water = np.column_stack([frame.positions, frame.velocities, frame.densities])
     foam = np.column_stack([frame.foam_positions, frame.foam_velocities])
-    with replacing(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
+    with atomic_write(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
         file.write(header + "\n")
         file.writelines(
             f"{number},{_numbers(row)},0,0,{material}\n"

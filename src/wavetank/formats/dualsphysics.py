@@ -16,8 +16,8 @@ from wavetank.formats.dualsphysics_drawing import Drawing, Item, numbers_of
 from wavetank.formats.dualsphysics_motion import courses
 from wavetank.formats.dualsphysics_solids import OURS, Placed, placed_solids
 from wavetank.formats.imported import Imported
-from wavetank.foundation.door import guarded, named, one_line, parse_xml, read_text
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors, one_line, parse_xml, printable, read_text
 from wavetank.foundation.materials import Material
 from wavetank.scene.filled import Filled
 from wavetank.scene.fluids import Ball, Block, Fluid
@@ -34,8 +34,8 @@ UNREADABLE = (LookupError, ValueError, TypeError, AttributeError, OverflowError,
 
 def load_dualsphysics(path: str | Path, spacing: float | None = None) -> Imported:
     """Read NAME_Def.xml; `spacing` [m] in place of its own dp. Raises `WavetankError` for what has no counterpart."""
-    origin = named(path)
-    with guarded(origin, "scene"):
+    origin = printable(path)
+    with explain_errors(origin, "scene"):
         text = read_text(path, "case", LARGEST)
         root = parse_xml(text, origin, "a case of DualSPHysics")
         if root.tag != "case" or root.find("casedef/geometry/definition") is None:

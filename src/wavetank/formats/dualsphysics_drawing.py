@@ -15,9 +15,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from wavetank.formats.splishsplash_solids import Solids, arrays_of
-from wavetank.foundation.door import one_line
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.expressions import Expression
+from wavetank.foundation.input_limits import one_line
 from wavetank.foundation.rotations import unit_quaternion
 
 MOST_ITEMS, DEEPEST, MOST_COMMANDS = 2000, 8, 20_000  # shapes; lists that run lists; commands

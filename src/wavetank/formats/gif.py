@@ -6,8 +6,8 @@ from types import TracebackType
 
 import numpy as np
 
+from wavetank.foundation.atomic_write import partial_path
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import partial_path
 
 SUFFIXES = (".gif",)
 KIND = "video"

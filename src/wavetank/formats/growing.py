@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from wavetank.formats.committed import CommittedFile
-from wavetank.foundation import door
+from wavetank.foundation import input_limits
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.memory import in_words
-from wavetank.foundation.patience import Patience
+from wavetank.foundation.retry import Retry
 
 CHUNK = 1 << 17  # bytes of a column that lie together, about
 LARGEST = 2**48  # bytes
@@ -33,10 +33,10 @@ def import_h5py() -> Any:
 class GrowingFile:
     """Columns that grow; what was appended counts from the next `commit` on, which counts frames up."""
 
-    def __init__(self, path: str | Path, group: str, counter: str, patience: Patience | None = None) -> None:
+    def __init__(self, path: str | Path, group: str, counter: str, retry: Retry | None = None) -> None:
         """Open `path`; the attribute `counter` of `group` says how many frames there are."""
         h5py = import_h5py()
-        self.disk = CommittedFile(path, patience or Patience())
+        self.disk = CommittedFile(path, retry or Retry())
         # The oldest layout is read by all, and knows no mark of a file that somebody writes, which outlives a kill.
         self.file = h5py.File(self.disk, "w", libver=("earliest", "v110"), rdcc_nbytes=2 * CHUNK)
         self._columns: dict[str, Any] = {}
@@ -90,7 +90,7 @@ class GrowingFile:
 def opened(path: str | Path) -> Any:
     """Open such a file for reading; raises `WavetankError` for what is none."""
     h5py = import_h5py()
-    door.opened(path, LARGEST, "HDF5 file").close()  # a file, and none that waits
+    input_limits.open_regular(path, LARGEST, "HDF5 file").close()  # a file, and none that waits
     with damaged(path):
         return h5py.File(path, "r")
 
@@ -98,14 +98,14 @@ def opened(path: str | Path) -> Any:
 @contextlib.contextmanager
 def damaged(path: str | Path) -> Iterator[None]:
     """Make one sentence of what a damaged file ends in."""
-    origin = door.named(path)
-    with door.guarded(origin, "HDF5 file"):
+    origin = input_limits.printable(path)
+    with input_limits.explain_errors(origin, "HDF5 file"):
         try:
             yield
         except UNREADABLE as error:
             if isinstance(error, WavetankError):
                 raise
-            raise WavetankError(f"{origin}: this HDF5 file cannot be read: {door.one_line(error)}.") from None
+            raise WavetankError(f"{origin}: this HDF5 file cannot be read: {input_limits.one_line(error)}.") from None
 
 
 Rows = Mapping[str, np.ndarray]
@@ -138,7 +138,7 @@ def table_rows(group: Any, frame: int) -> dict[str, np.ndarray]:
         if not 0 <= first <= first + count <= len(column):
             raise ValueError(f"frame {frame} has rows {first} to {first + count} of {name}, which has {len(column)}")
     needed = sum(count * column.dtype.itemsize * math.prod(column.shape[1:]) for column in columns.values())
-    if needed > max(door.UNPACKED, door.TIMES * Path(group.file.filename).stat().st_size):
+    if needed > max(input_limits.UNPACKED, input_limits.TIMES * Path(group.file.filename).stat().st_size):
         raise ValueError(f"frame {frame} takes {in_words(needed)}, too much for a file of this size")
     return {name: column[first : first + count] for name, column in columns.items()}
 

@@ -52,7 +52,7 @@ class Hdf5Series:
     def __init__(self, plan: Plan) -> None:
         path = plan.path(SUFFIXES[0])
         self.files = [str(path)]
-        file = self.file = GrowingFile(path, "/", COUNTER, plan.patience)
+        file = self.file = GrowingFile(path, "/", COUNTER, plan.retry)
         about = {
             "format": "wavetank",
             "layout": VERSION_OF_LAYOUT,

@@ -30,8 +30,8 @@ from wavetank.formats.robot import (
     weight_of,
     whole,
 )
-from wavetank.foundation.door import named, parse_xml, read_text
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import parse_xml, printable, read_text
 from wavetank.foundation.rotations import turned
 from wavetank.scene.joints import BallJoint, Hinge, Joint, Slider, Weld
 from wavetank.solids.motion import Pose
@@ -331,7 +331,7 @@ def _included(root: ElementTree.Element, folder: Path, depth: int) -> ElementTre
                 path = folder / child.get("file", "")
                 if not path.resolve().is_relative_to(folder.resolve()):
                     raise WavetankError(f"it includes {child.get('file', '')[:60]!r}, which lies in another folder.")
-                other = parse_xml(read_text(path, "included file", LARGEST), named(path), "an MJCF file")
+                other = parse_xml(read_text(path, "included file", LARGEST), printable(path), "an MJCF file")
                 parent.remove(child)
                 for place, row in enumerate(_included(other, folder, depth + 1)):
                     parent.insert(number + place, row)

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.foundation.atomic_write import atomic_write, partial_path
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import partial_path, replacing
 
 SUFFIXES = (".mp4",)
 KIND = "video"
@@ -170,7 +170,7 @@ def join(parts: Sequence[Path], path: Path) -> None:
     import av
 
     options = {"movflags": "+faststart"}
-    with replacing(path) as whole, av.open(str(whole), "w", format="mp4", options=options) as target:
+    with atomic_write(path) as whole, av.open(str(whole), "w", format="mp4", options=options) as target:
         stream, shift = None, 0
         for part in parts:
             with av.open(str(part), format="mp4") as source:

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.foundation.door import guarded, named, one_line, read_arrays
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import replacing
+from wavetank.foundation.input_limits import explain_errors, one_line, printable, read_arrays
 from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import FOAM, WATER, Instant, Standing, solids_by_name
 
@@ -26,7 +26,7 @@ def write_npz(path: str | Path, frame: Any) -> None:
     """
     arrays = {name: getattr(frame, name) for name in (*WATER, *FOAM)}
     poses = [np.concatenate([getattr(one, name) for name, _ in POSES]) for one in frame.standing]
-    with replacing(path) as partial, partial.open("wb") as file:
+    with atomic_write(path) as partial, partial.open("wb") as file:
         np.savez_compressed(
             file,
             **arrays,
@@ -44,8 +44,8 @@ def read_npz(path: str | Path) -> dict[str, np.ndarray]:
 
 def read(path: str | Path, scene: Scene) -> Instant:
     """Return the instant of `scene` that a file holds; raises `WavetankError` for a file that holds none."""
-    origin = named(path)
-    with guarded(origin, "frame of particles"):
+    origin = printable(path)
+    with explain_errors(origin, "frame of particles"):
         arrays = read_npz(path)
         try:
             known, ends = solids_by_name(scene), np.cumsum([width for _, width in POSES])[:-1]

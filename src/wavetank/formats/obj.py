@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.formats.surface import check_surface, surfaces_of
-from wavetank.foundation.replacing import replacing
+from wavetank.foundation.atomic_write import atomic_write
 
 SUFFIXES = (".obj",)
 KIND = "surface"
@@ -29,7 +29,7 @@ def write_obj(path: str | Path, frame: Any) -> None:
         corners = np.repeat(surface.triangles.astype(np.int64) + first, 2, axis=1)
         np.savetxt(text, corners, "f %d//%d %d//%d %d//%d")
         first += len(surface.vertices)
-    with replacing(path) as partial:
+    with atomic_write(path) as partial:
         partial.write_text(text.getvalue(), encoding="ascii", errors="replace")
 
 

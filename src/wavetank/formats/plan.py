@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from wavetank.foundation.patience import Patience
+from wavetank.foundation.retry import Retry
 from wavetank.foundation.rotations import turned
 from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import Instant, Standing
@@ -60,7 +60,7 @@ class Plan:
     shapes: Shapes
     view: Viewpoint | None = None
     kept: int = 0  # frames of the files that are there, which a resumed run goes on with
-    patience: Patience = dataclasses.field(default_factory=Patience)
+    retry: Retry = dataclasses.field(default_factory=Retry)
 
     def path(self, suffix: str, part: str = "") -> Path:
         """Return the file of a part."""

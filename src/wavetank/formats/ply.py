@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from wavetank.formats.surface import surfaces_of
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import replacing
 from wavetank.simulation.instant import colors_of
 
 SUFFIXES = (".ply",)
@@ -44,7 +44,7 @@ def write_ply(path: str | Path, frame: Any) -> None:
         *(_element("foam", foam) if len(foam) else ()),
         "end_header",
     ]
-    with replacing(path) as partial:
+    with atomic_write(path) as partial:
         partial.write_bytes("\n".join(header).encode("ascii") + b"\n" + water.tobytes() + foam.tobytes())
 
 
@@ -71,7 +71,7 @@ def write_surface(path: str | Path, instant: Any) -> None:
         "property list uchar int vertex_indices",
         "end_header",
     ]
-    with replacing(path) as partial:
+    with atomic_write(path) as partial:
         partial.write_bytes("\n".join(header).encode("ascii") + b"\n" + vertices.tobytes() + faces.tobytes())
 
 

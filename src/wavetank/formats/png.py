@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import replacing
 
 SUFFIXES = (".png",)
 KIND = "picture"
@@ -26,7 +26,7 @@ def write_png(path: str | Path, image: np.ndarray, metadata: Mapping[str, object
     texts = PngInfo()
     for name, value in (metadata or {}).items():
         texts.add_itxt(name, str(value))
-    with replacing(path) as partial:
+    with atomic_write(path) as partial:
         Image.fromarray(checked).save(partial, format="PNG", pnginfo=texts, compress_level=4)
 
 

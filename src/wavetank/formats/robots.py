@@ -10,8 +10,8 @@ import numpy as np
 from wavetank.formats.mjcf import read_mjcf
 from wavetank.formats.robot import LARGEST, STANDING, Robot
 from wavetank.formats.urdf import read_urdf
-from wavetank.foundation.door import guarded, named, one_line, parse_xml, read_text
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors, one_line, parse_xml, printable, read_text
 from wavetank.foundation.rotations import product, unit_quaternion
 
 
@@ -27,8 +27,8 @@ def load_robot(
     upright = unit_quaternion([math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0])
     place = np.array(position, float), product(upright, STANDING)
     readers: dict[str, Callable[..., Robot]] = {"robot": read_urdf, "mujoco": read_mjcf}
-    origin = named(path)
-    with guarded(origin, "robot"):
+    origin = printable(path)
+    with explain_errors(origin, "robot"):
         root = parse_xml(read_text(path, "file of a robot", LARGEST), origin, "a file of a robot")
         if root.tag not in readers:
             raise WavetankError(
@@ -45,7 +45,7 @@ def load_robot(
 
 def is_mjcf(path: Path) -> bool:
     """Say whether an XML file is a model of MuJoCo. Raises `WavetankError` for what is no XML."""
-    return parse_xml(read_text(path, "XML file", LARGEST), named(path), "this file").tag == "mujoco"
+    return parse_xml(read_text(path, "XML file", LARGEST), printable(path), "this file").tag == "mujoco"
 
 
 def load_urdf(

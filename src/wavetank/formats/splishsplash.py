@@ -15,8 +15,8 @@ import numpy as np
 from wavetank.formats.bgeo import read_bgeo
 from wavetank.formats.imported import Imported
 from wavetank.formats.splishsplash_solids import Solids, arrays_of, turn_of
-from wavetank.foundation.door import guarded, named, one_line, parse_json, read_text
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors, one_line, parse_json, printable, read_text
 from wavetank.foundation.materials import Material
 from wavetank.foundation.params import PARAMETERS
 from wavetank.foundation.rotations import turned
@@ -47,8 +47,8 @@ JOINTS = ("TargetVelocityMotorHingeJoints", "HingeJoints", "BallJoints")
 
 def load_splishsplash(path: str | Path, spacing: float | None = None) -> Imported:
     """Read a scene file; `spacing` [m] in place of its own. Raises `WavetankError` for one that has no counterpart."""
-    origin = named(path)
-    with guarded(origin, "scene"):
+    origin = printable(path)
+    with explain_errors(origin, "scene"):
         data = parse_json(read_text(path, "scene file", LARGEST_FILE), origin)
         if not isinstance(data, dict) or not isinstance(data.get("Configuration"), dict):
             raise WavetankError(f"{origin}: a scene file of SPlisHSPlasH has a table Configuration; this one has none.")

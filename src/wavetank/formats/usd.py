@@ -16,8 +16,8 @@ import numpy as np
 
 from wavetank.formats.plan import Plan
 from wavetank.formats.usd_static import build_static, names_of
+from wavetank.foundation.atomic_write import atomic_write, make_folder
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import make_folder, replacing
 from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import Instant, colors_of, in_space
 
@@ -96,7 +96,7 @@ class UsdSeries:
                 clip.set(path, "wavetank:angularVelocity", "vector3d", one.angular_velocity.tolist())
 
     def _write_stage(self, last: int) -> None:
-        with replacing(self.path) as partial:
+        with atomic_write(self.path) as partial:
             partial.write_text(
                 _STAGE
                 % {
@@ -159,7 +159,7 @@ class _Clip:
 
     def save(self, path: Path) -> None:
         """Write the layer; a file of that name is replaced in one move."""
-        with replacing(path, suffixed=True) as partial:
+        with atomic_write(path, suffixed=True) as partial:
             try:
                 self.layer.Export(str(partial))
             except Exception as error:

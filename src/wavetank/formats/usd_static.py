@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.formats.plan import Plan, Viewpoint
-from wavetank.foundation.replacing import replacing
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.simulation.instant import Instant
 
 SOLID = (0.694, 0.361, 0.224)  # linear colour of solids
@@ -95,7 +95,7 @@ def build_static(plan: Plan, instant: Instant, solids: dict[str, str], folder: P
         _solids(static, plan, instant, solids)
     _surroundings(static, plan)
     for stage, name in ((manifest, "manifest.usda"), (static, "static.usdc")):
-        with replacing(folder / name, suffixed=True) as partial:
+        with atomic_write(folder / name, suffixed=True) as partial:
             stage.GetRootLayer().Export(str(partial))
 
 

@@ -45,7 +45,7 @@ class VtkHdfSeries:
         if name not in self._parts:
             path = self._path(name)
             self.files.append(str(path))
-            self._parts[name] = _Part(GrowingFile(path, "VTKHDF/Steps", COUNTER, self.plan.patience), piece)
+            self._parts[name] = _Part(GrowingFile(path, "VTKHDF/Steps", COUNTER, self.plan.retry), piece)
         return self._parts[name]
 
     def _path(self, name: str) -> Path:

@@ -8,7 +8,7 @@ import numpy as np
 
 from wavetank.formats.plan import Plan
 from wavetank.formats.polydata import Piece, pieces_of
-from wavetank.foundation.replacing import replacing
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.simulation.instant import PARTS, Instant
 
 SUFFIXES = (".vtp",)
@@ -40,7 +40,7 @@ class VtpSeries:
             entries = self._lists.setdefault(name, {})
             entries[number] = {"name": path.name, "time": instant.time}
             series = self.plan.path(".vtp.series", part)
-            with replacing(series) as partial:
+            with atomic_write(series) as partial:
                 text = json.dumps({"file-series-version": "1.0", "files": [*entries.values()]}, indent=1)
                 partial.write_text(text + "\n", encoding="utf-8")
             if str(series) not in self.files:
@@ -89,7 +89,7 @@ def write_piece(path: str | Path, piece: Piece, time: float) -> None:
         text += [f"<{name}>", array("connectivity", rows.reshape(-1).astype(np.int64)), array("offsets", offsets)]
         text += [f"</{name}>"]
     text += ["</Piece>", "</PolyData>", '<AppendedData encoding="raw">']
-    with replacing(path) as partial, partial.open("wb") as file:
+    with atomic_write(path) as partial, partial.open("wb") as file:
         file.write("\n".join(text).encode() + b"\n_")
         for block in blocks:
             file.write(block)

@@ -14,9 +14,9 @@ from typing import Any
 
 from rich.console import Console
 
+from wavetank.foundation.atomic_write import make_folder
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import PAPER_SPACING
-from wavetank.foundation.replacing import make_folder
 from wavetank.lab.plots import BLUE, RED, pyplot, tidy
 from wavetank.scene.scene import Scene
 from wavetank.simulation.simulation import Simulation

@@ -10,8 +10,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from wavetank.foundation.atomic_write import make_folder
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import make_folder
 from wavetank.lab.cases import CASES
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.cases.known import known

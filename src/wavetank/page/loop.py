@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from wavetank.foundation.door import one_line
+from wavetank.foundation.input_limits import one_line
 from wavetank.page.about import figures, status, world
 from wavetank.page.hud import Hud
 from wavetank.page.jobs import Jobs
@@ -99,7 +99,7 @@ class Loop:
         try:
             self.turn()
         except Exception as error:
-            if os.environ.get("WAVETANK_STRICT_DOOR"):
+            if os.environ.get("WAVETANK_STRICT_INPUT"):
                 raise
             self.session.paused, self.session.steps_left = True, 0
             self.session.note(f"The water is paused: {type(error).__name__}, {one_line(error)}; begin the scene anew.")

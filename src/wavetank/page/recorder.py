@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from wavetank.foundation.atomic_write import partial_path
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import partial_path
 from wavetank.scene.scene import Scene
 from wavetank.session.commands import Command
 from wavetank.session.recording import Recording

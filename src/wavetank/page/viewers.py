@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from wavetank.foundation.door import guarded, one_line, parse_json
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors, one_line, parse_json
 from wavetank.session.commands import Command, ToolBegin, ToolEnd, ToolMove, command_of
 
 RATE, BURST = 500.0, 1000.0  # messages a second, and at once: more than any hand makes
@@ -145,7 +145,7 @@ class Viewers:
                 await asyncio.sleep(0.02)
                 continue
             try:
-                with guarded("a message", "command"):
+                with explain_errors("a message", "command"):
                     self.hear(viewer, _table(message))
             except WavetankError as error:
                 viewer.post({"type": "note", "text": str(error)[:400]})

@@ -20,10 +20,10 @@ import numpy as np
 from pydantic import Field
 
 from wavetank.formats.mp4 import VideoWriter, join
-from wavetank.foundation.door import guarded, named, parse_json, read_text
+from wavetank.foundation.atomic_write import atomic_write, make_folder
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors, parse_json, printable, read_text
 from wavetank.foundation.model import Model
-from wavetank.foundation.replacing import make_folder, replacing
 from wavetank.foundation.version import VERSION
 from wavetank.simulation.simulation import Simulation
 
@@ -77,7 +77,7 @@ class Checkpoints:
         self.kept = [made, *(other for other in self.kept if other.state != made.state)][:2]
         self.next = self.start + self.every * np.floor((sim.time - self.start) / self.every + 1.0 + 1e-9)
         about = Progress(arch=sim.arch or "cpu", start=self.start, order=self.order, checkpoints=self.kept)
-        with replacing(self.folder / FILE, lasting=True) as partial:
+        with atomic_write(self.folder / FILE, lasting=True) as partial:
             partial.write_text(json.dumps(about.model_dump(), indent=1, allow_nan=False), encoding="utf-8")
         for other in self.folder.glob("*.npz"):
             if other.name not in {checkpoint.state for checkpoint in self.kept}:
@@ -107,13 +107,13 @@ class Begun:
 def begun(out: Path, arch: str = "") -> Begun:
     """Return the run whose folder this is, at its last good checkpoint; raises `WavetankError` where there is none."""
     place = out / FOLDER / FILE
-    origin = named(place)
+    origin = printable(place)
     if not place.exists():
         raise WavetankError(
-            f"{named(out)}: there is no run to go on with; name the folder of a `wavetank run --checkpoint-every` that "
-            "ended early; a run that was completed keeps no checkpoints."
+            f"{printable(out)}: there is no run to resume; name the folder of a `wavetank run --checkpoint-every` that "
+            "ended early; a completed run keeps no checkpoints."
         )
-    with guarded(origin, "checkpoint"):
+    with explain_errors(origin, "checkpoint"):
         table = parse_json(read_text(place, "checkpoint", 64_000_000), origin)
         version = table.get("format") if isinstance(table, dict) else None
         if version != FORMAT:
@@ -127,10 +127,10 @@ def begun(out: Path, arch: str = "") -> Begun:
         path = out / FOLDER / checkpoint.state
         try:
             if not path.is_file() or _digest(path) != checkpoint.sha256:
-                raise WavetankError(f"{named(path)}: this state is missing, or damaged: its SHA-256 is another.")
+                raise WavetankError(f"{printable(path)}: this state is missing, or damaged: its SHA-256 is another.")
             missing = next((part for part in checkpoint.parts if not (out / FOLDER / part).is_file()), None)
             if missing is not None:
-                raise WavetankError(f"{named(out / FOLDER / missing)}: this part of the video is missing.")
+                raise WavetankError(f"{printable(out / FOLDER / missing)}: this part of the video is missing.")
             sim = Simulation.restore(path, arch=arch or progress.arch)
         except WavetankError as error:
             problems.append(str(error))

@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 from wavetank.formats import hdf5
+from wavetank.foundation.atomic_write import make_folder
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import make_folder
 from wavetank.run.folder import RunFolder
 from wavetank.run.outputs import Outputs
 from wavetank.run.record import view_of

@@ -19,8 +19,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from wavetank.device.compiler import start
 from wavetank.formats import exporter_for
 from wavetank.formats.png import write_png
+from wavetank.foundation.atomic_write import atomic_write, make_folder
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import make_folder, replacing
 from wavetank.foundation.version import VERSION
 from wavetank.run.signals import Asked, asked_to_end
 from wavetank.scene.film import Film
@@ -158,7 +158,7 @@ class _FrameFolder:
         return about if isinstance(about, dict) else {}
 
     def _write_about(self, about: dict[str, Any]) -> None:
-        with replacing(self.folder / ABOUT) as partial:
+        with atomic_write(self.folder / ABOUT) as partial:
             partial.write_text(json.dumps(about) + "\n", encoding="utf-8")
 
 

@@ -20,10 +20,10 @@ import tomli_w
 from pydantic import Field
 
 from wavetank.formats import hdf5, npz
-from wavetank.foundation.door import guarded, named, parse_toml, read_text
+from wavetank.foundation.atomic_write import atomic_write, make_folder
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors, parse_toml, printable, read_text
 from wavetank.foundation.model import Model
-from wavetank.foundation.replacing import make_folder, replacing
 from wavetank.foundation.version import VERSION
 from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import Instant
@@ -68,7 +68,7 @@ class RunFolder:
         scene.save(folder.path / SCENE)
         for stale in (STATS, SUMMARY, TABLE):
             (folder.path / stale).unlink(missing_ok=True)
-        with replacing(folder.path / FILE) as partial:
+        with atomic_write(folder.path / FILE) as partial:
             partial.write_text(tomli_w.dumps(run.model_dump()), encoding="utf-8")
         return folder
 
@@ -81,8 +81,8 @@ class RunFolder:
     def open(cls, path: str | Path) -> "RunFolder":
         """Open the folder of a run; raises `WavetankError` for what is none."""
         place = Path(path) / FILE
-        origin = named(place)
-        with guarded(origin, "run"):
+        origin = printable(place)
+        with explain_errors(origin, "run"):
             table = parse_toml(read_text(place, "run"), origin, "this run")
             if table.get("format", 1) != 1:
                 made = table.get("wavetank", "a later one")
@@ -115,13 +115,13 @@ class RunFolder:
         if not path.exists():
             return []
         *lines, _ = read_text(path, "figures", LARGEST_STATS).split("\n")  # the last one was not finished, or is empty
-        return [_row(line, f"{named(path)}, line {number}") for number, line in enumerate(lines, 1)]
+        return [_row(line, f"{printable(path)}, line {number}") for number, line in enumerate(lines, 1)]
 
     def write_table(self) -> Path:
         """Write the figures of all frames as a table of text, a column each, and return its path."""
         rows = self.stats()
         names = list(dict.fromkeys(name for row in rows for name in row))
-        with replacing(self.path / TABLE) as partial, partial.open("w", encoding="utf-8", newline="") as file:
+        with atomic_write(self.path / TABLE) as partial, partial.open("w", encoding="utf-8", newline="") as file:
             table = csv.DictWriter(file, names, restval="", lineterminator="\n")
             table.writeheader()
             table.writerows({name: "" if math.isnan(value) else value for name, value in row.items()} for row in rows)
@@ -130,7 +130,7 @@ class RunFolder:
     def keep_stats(self, count: int) -> None:
         """Drop the figures of all but the first `count` frames, before a run goes on from there."""
         rows = self.stats()[:count]
-        with replacing(self.path / STATS) as partial:
+        with atomic_write(self.path / STATS) as partial:
             partial.write_text("".join(map(_line, rows)), encoding="utf-8")
 
     # --- frames ---

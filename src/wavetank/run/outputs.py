@@ -10,7 +10,7 @@ from wavetank.formats import exporter_named
 from wavetank.formats.plan import Plan, Series, Shapes, Viewpoint
 from wavetank.formats.surface import check_surface, with_surfaces
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.patience import Patience
+from wavetank.foundation.retry import Retry
 from wavetank.run.background import Background
 from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import PARTS, Instant
@@ -69,8 +69,8 @@ class Outputs:
         tell: Callable[[str], None] = lambda text: None,
     ) -> None:
         modules = check_exports(names, only, scene)
-        self.parts, self.shapes, self.patience = parts_named(only), Shapes(scene), Patience(tell)
-        plan = Plan(base, scene, fps, self.parts, self.shapes, view, kept, self.patience)
+        self.parts, self.shapes, self.retry = parts_named(only), Shapes(scene), Retry(tell)
+        plan = Plan(base, scene, fps, self.parts, self.shapes, view, kept, self.retry)
         self._needs_surface = bool(modules) and "surface" in self.parts
         self._needs_surface |= any(module.KIND == "surface" for module in modules)
         self._series: list[Series] = [
@@ -112,7 +112,7 @@ class Outputs:
         for series in self._series:
             # What grows is patient itself: a frame is appended once.
             if series.repeatable:
-                self.patience.do(lambda series=series: series.write(number, instant))  # type: ignore[misc]
+                self.retry.call(lambda series=series: series.write(number, instant))  # type: ignore[misc]
             else:
                 series.write(number, instant)
 
@@ -124,7 +124,7 @@ class Outputs:
     def close(self, *, hurry: bool = False) -> None:
         """Write what waits and complete the files; raises what went wrong. In a `hurry` nothing is tried again."""
         if hurry:
-            self.patience.hurry.set()
+            self.retry.stop.set()
         try:
             if self._background is not None:
                 self._background.finish()

@@ -16,9 +16,9 @@ from wavetank.formats.gif import LARGEST_RATE, GifWriter, resized
 from wavetank.formats.mp4 import VideoWriter
 from wavetank.formats.plan import Viewpoint
 from wavetank.formats.png import write_png
-from wavetank.foundation.door import guarded, named
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import NotFiniteError, WavetankError
-from wavetank.foundation.replacing import replacing
+from wavetank.foundation.input_limits import explain_errors, printable
 from wavetank.run.checkpoints import Begun, Checkpoints, FilmInParts, begun
 from wavetank.run.folder import SUMMARY, Run, RunFolder
 from wavetank.run.outputs import Outputs, check_exports, parts_named
@@ -160,7 +160,7 @@ def record(sim: Simulation, order: Order, console: Console | None = None, begun:
         stats = order.out / SUMMARY
         files = [*sinks, *work.outputs.files, str(work.folder.write_table()), str(stats)]
         figures = summary.figures() | {"files": files, "waited_for_files": work.outputs.waited, "exit_code": asked.code}
-        with replacing(stats) as partial:
+        with atomic_write(stats) as partial:
             partial.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
         if work.checkpoints and not asked and summary.broken is None:
             work.checkpoints.finish()
@@ -174,7 +174,7 @@ def go_on(out: Path, arch: str = "", console: Console | None = None) -> dict[str
     run = begun(out, arch)
     if run.note and console is not None:
         console.print(f"the checkpoint before the last one is taken: {run.note}", markup=False)
-    with guarded(named(out), "checkpoint"):
+    with explain_errors(printable(out), "checkpoint"):
         table = dict(run.progress.order)
         for name in ("size", "exports", "only"):
             table[name] = tuple(table[name])

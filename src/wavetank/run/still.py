@@ -10,8 +10,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 
 from wavetank.device.compiler import current_backend
 from wavetank.formats import exporter_for
+from wavetank.foundation.atomic_write import partial_path
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import partial_path
 from wavetank.foundation.version import VERSION
 from wavetank.run.archived import frame_at, is_kept
 from wavetank.run.signals import Asked, asked_to_end

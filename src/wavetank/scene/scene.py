@@ -13,12 +13,12 @@ import numpy as np
 import tomli_w
 from pydantic import BeforeValidator, ValidationError, model_validator
 
-from wavetank.foundation.door import guarded, named, parse_toml, read_text
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors, parse_toml, printable, read_text
 from wavetank.foundation.materials import COLORS, Material, Properties
 from wavetank.foundation.model import Model, is_length, sentence
 from wavetank.foundation.params import PRESETS, QUALITIES, Parameters
-from wavetank.foundation.replacing import replacing
 from wavetank.foundation.tracks import scaled
 from wavetank.scene.bounds import check_bodies, check_numbers, check_periodic, check_scales
 from wavetank.scene.filled import AnyFluid, Filled
@@ -271,13 +271,13 @@ class Scene(Timetable, Parameters):
     @classmethod
     def from_text(cls, text: str, origin: str = "scene", **context: Any) -> "Scene":
         """Read the text of a TOML file; a mistake in it is told with `origin` in front; `context` as in `parse`."""
-        with guarded(origin, "scene"):
+        with explain_errors(origin, "scene"):
             scene: Scene = cls.parse(parse_toml(text, origin), origin, **context)
         return scene
 
     def save(self, path: str | Path) -> None:
         """Write this scene as TOML; a file of that name is replaced in one move."""
-        with replacing(path) as partial:
+        with atomic_write(path) as partial:
             partial.write_text(self.text(), encoding="utf-8")
 
     def text(self) -> str:
@@ -382,11 +382,11 @@ def _read(name: str | Path) -> tuple[str, str, Path]:
     if not _is_there(path):
         near = difflib.get_close_matches(str(name)[:100], [*_names("scenes"), *_names("levels")], 1)
         raise WavetankError(
-            f"there is no file {named(name)!r}, and no bundled scene of that name; "
+            f"there is no file {printable(name)!r}, and no bundled scene of that name; "
             + (f"did you mean {near[0]!r}? B" if near else "b")
             + f"undled are: {', '.join(_names('scenes'))}; levels: {', '.join(_names('levels'))}."
         )
-    return read_text(path, "scene"), named(path), path.parent
+    return read_text(path, "scene"), printable(path), path.parent
 
 
 def _is_there(path: Path) -> bool:

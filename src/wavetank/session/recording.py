@@ -11,10 +11,10 @@ from typing import Annotated, Any, Literal
 import tomli_w
 from pydantic import Field
 
-from wavetank.foundation.door import guarded, named, parse_toml, read_text
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors, parse_toml, printable, read_text
 from wavetank.foundation.model import Model
-from wavetank.foundation.replacing import replacing
 from wavetank.foundation.version import VERSION
 from wavetank.scene.scene import Scene
 from wavetank.session.commands import Command, command_of, table_of
@@ -71,7 +71,7 @@ class Recording(Model):
 
     def save(self, path: str | Path) -> None:
         """Write this as TOML; a file of that name is replaced in one move."""
-        with replacing(path) as partial:
+        with atomic_write(path) as partial:
             partial.write_text(self.text(), encoding="utf-8")
 
     def text(self) -> str:
@@ -81,8 +81,8 @@ class Recording(Model):
     @classmethod
     def load(cls, path: str | Path) -> "Recording":
         """Read a recording; raises `WavetankError` for what is none."""
-        origin = named(path)
-        with guarded(origin, "recording"):
+        origin = printable(path)
+        with explain_errors(origin, "recording"):
             recording: Recording = cls.parse(parse_toml(read_text(path, "recording"), origin, READ), origin)
         return recording
 

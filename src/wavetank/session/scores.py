@@ -4,10 +4,10 @@ import hashlib
 import json
 from typing import Any
 
-from wavetank.foundation.door import parse_json, read_text
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.folders import data_folder
-from wavetank.foundation.replacing import replacing
+from wavetank.foundation.input_limits import parse_json, read_text
 from wavetank.scene.scene import Scene, bundled_levels
 
 FILE = "scores.json"
@@ -40,7 +40,7 @@ def keep_score(level: str, stars: int, mark: float) -> bool:
     table[level] = {"stars": stars, "mark": round(mark, 3)}
     folder = data_folder()
     folder.mkdir(parents=True, exist_ok=True)
-    with replacing(folder / FILE) as partial:
+    with atomic_write(folder / FILE) as partial:
         partial.write_text(json.dumps(table, indent=2, sort_keys=True) + "\n", encoding="utf-8")
     return True
 

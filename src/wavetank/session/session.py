@@ -9,8 +9,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from wavetank.foundation.door import guarded
 from wavetank.foundation.errors import NotFiniteError, WavetankError
+from wavetank.foundation.input_limits import explain_errors
 from wavetank.scene.scene import Scene
 from wavetank.session.commands import Command, FrameLength
 from wavetank.session.history import History
@@ -120,7 +120,7 @@ class Session(SessionState):
         """Carry out one command; whatever goes wrong becomes a note to who gave it, and the water goes on."""
         began, self.refused = time.perf_counter(), refused or self.note
         try:
-            with guarded(f"The command {command.kind!r} failed", "command"):
+            with explain_errors(f"The command {command.kind!r} failed", "command"):
                 self.apply(command)
         except WavetankError as error:
             self.refused(str(error)[:LONGEST_NOTE])

@@ -1,4 +1,4 @@
-"""States on disk: a snapshot and its scene in one .npz file, and the way back through the door for what is foreign.
+"""States on disk: a snapshot and its scene in one .npz file, and back with input limits for foreign files.
 
 A state is an archive of arrays without pickles: `format`, `scene` and `about` (JSON texts), the arrays of the snapshot,
 and `seal`, the SHA-256 of all of them, by which damage is found. What the header and the arrays may be is declared
@@ -14,10 +14,10 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import ConfigDict, Field
 
-from wavetank.foundation.door import guarded, named, one_line, parse_json, read_arrays
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors, one_line, parse_json, printable, read_arrays
 from wavetank.foundation.model import FARTHEST, Model, Number
-from wavetank.foundation.replacing import replacing
 from wavetank.physics.foam.pool import ROWS
 from wavetank.scene.scene import MAX_PARTICLES, Scene
 from wavetank.simulation.arrays import check_crowd
@@ -108,7 +108,7 @@ def write_snapshot(path: str | Path, snapshot: Snapshot, scene: str, *, lasting:
         if rows.dtype.kind == "f" and not np.isfinite(rows).all():
             row = int(np.argmin(np.isfinite(rows.reshape(len(rows), -1)).all(axis=1)))
             raise WavetankError(
-                f"{named(path)}: the state is not written: {name}[{row}] at t = {snapshot.time:.6g} s is not finite."
+                f"{printable(path)}: state not written: {name}[{row}] at t = {snapshot.time:.6g} s is not finite."
             )
     about = {
         "numbers": snapshot.ledger.plain() | dataclasses.asdict(snapshot.numbers),
@@ -120,7 +120,7 @@ def write_snapshot(path: str | Path, snapshot: Snapshot, scene: str, *, lasting:
         "sources": snapshot.sources,
     }
     parts = {"format": FORMAT, "scene": scene, "about": json.dumps(about, allow_nan=False), **snapshot.arrays}
-    with replacing(path, lasting=lasting) as partial, partial.open("wb") as file:
+    with atomic_write(path, lasting=lasting) as partial, partial.open("wb") as file:
         np.savez(file, allow_pickle=False, **sealed(parts))
 
 
@@ -136,8 +136,8 @@ def sealed(parts: dict[str, Any]) -> dict[str, np.ndarray]:
 
 def read_snapshot(path: str | Path) -> tuple[Snapshot, Scene]:
     """Read what `write_snapshot` wrote and check all of it; raises `WavetankError` for anything else."""
-    origin = named(path)
-    with guarded(origin, "state"):
+    origin = printable(path)
+    with explain_errors(origin, "state"):
         parts = read_arrays(path, "state that `Simulation.save` wrote")
         refuse = f"{origin}: this is not a state that `Simulation.save` wrote"
         for name in ("scene", "about"):

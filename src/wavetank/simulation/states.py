@@ -6,7 +6,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any, Self
 
-from wavetank.foundation.door import guarded, named
+from wavetank.foundation.input_limits import explain_errors, printable
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
 from wavetank.scene.schedule import with_gravity
@@ -118,7 +118,7 @@ class States(Contents, ABC):
         Raises `WavetankError` for any other file, one that is damaged, and one that needs too much memory.
         """
         snapshot, scene = read_snapshot(path)
-        with guarded(named(path), "state"):
+        with explain_errors(printable(path), "state"):
             check_cost(scene, snapshot.ledger.capacity)
             self = cls(scene, arch)
             self.resume(snapshot)

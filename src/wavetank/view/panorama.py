@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wavetank.foundation.door import guarded, named, read_bytes
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors, printable, read_bytes
 from wavetank.view.lens import vector
 from wavetank.view.look import SKY, Look, lit_floor, pool
 from wavetank.view.sky import terms
@@ -46,15 +46,15 @@ def panorama(path: str) -> Panorama:
         about = Path(path).stat()
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise WavetankError(f"{named(path)}: the environment cannot be read: {reason}.") from None
+        raise WavetankError(f"{printable(path)}: the environment cannot be read: {reason}.") from None
     return _panorama(path, about.st_mtime_ns, about.st_size)
 
 
 @functools.lru_cache(maxsize=4)
 def _panorama(path: str, _changed: int, _size: int) -> Panorama:
     data = read_bytes(Path(path), LARGEST, "environment")
-    with guarded(named(path), "environment"):
-        return panorama_of(pixels_of(data, named(path)))
+    with explain_errors(printable(path), "environment"):
+        return panorama_of(pixels_of(data, printable(path)))
 
 
 def pixels_of(data: bytes, origin: str) -> np.ndarray:

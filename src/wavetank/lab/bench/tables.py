@@ -7,8 +7,8 @@ from typing import Any
 
 from rich.table import Table
 
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.replacing import replacing
 from wavetank.lab.bench.stages import STAGE_NAMES
 
 Figures = dict[str, Any]
@@ -112,7 +112,7 @@ def _reason(error: Exception) -> str:
 def save_result(result: Figures, path: Path) -> None:
     """Write a result, complete or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as partial:
+    with atomic_write(path) as partial:
         partial.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 
 

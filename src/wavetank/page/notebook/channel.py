@@ -12,8 +12,8 @@ from typing import Any
 
 from typing_extensions import override
 
-from wavetank.foundation.door import guarded
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors
 from wavetank.page.theme import COLORS
 from wavetank.page.viewers import Ray, Submit, Viewer, Viewers
 
@@ -91,7 +91,7 @@ class Channel:
 
     def _hear(self, widget: Any, content: Any, buffers: Any) -> None:
         try:
-            with guarded("a message", "command"):
+            with explain_errors("a message", "command"):
                 self._act(content if isinstance(content, dict) else {})
         except WavetankError as error:
             self.tell({"type": "note", "text": str(error)[:400]})

@@ -8,8 +8,8 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from wavetank.foundation.door import check_plain
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import check_plain
 from wavetank.foundation.model import sentence
 from wavetank.session.commands.command import Command, table_of
 from wavetank.session.commands.picture import Home, Orbit, Pan, SetCamera, SetLight, SetView, Zoom

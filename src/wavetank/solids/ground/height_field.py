@@ -15,8 +15,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, WithJsonSchema, model_validator
 from typing_extensions import override
 
-from wavetank.foundation.door import opened, read_array, unpack_text
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import open_regular, read_array, unpack_text
 from wavetank.foundation.model import Edges, Length, Place
 from wavetank.solids.distance import GRIDS
 from wavetank.solids.ground.outline import measure_outline
@@ -202,7 +202,7 @@ def _read(path: Path) -> np.ndarray:
     if path.suffix.lower() not in (".npy", *PICTURES):
         raise ValueError(f"{path}: heights are read from .npy, {', '.join(PICTURES)} files; convert this one.")
     try:
-        file = opened(path, LARGEST_FILE, "file of heights")
+        file = open_regular(path, LARGEST_FILE, "file of heights")
     except WavetankError as error:
         raise ValueError(str(error)) from None
     try:

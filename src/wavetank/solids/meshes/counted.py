@@ -9,8 +9,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-from wavetank.foundation.door import one_line, opened, parse_json
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import one_line, open_regular, parse_json
 from wavetank.foundation.memory import in_words
 
 MOST_FACES = 3_000_000  # before what is double is dropped
@@ -23,7 +23,7 @@ LARGEST_FILE = 500_000_000  # bytes
 def check_file(path: Path) -> None:
     """Raise `ValueError` for a file that is none, too large, or makes more triangles than may be."""
     try:
-        with opened(path, LARGEST_FILE, "mesh file") as file:
+        with open_regular(path, LARGEST_FILE, "mesh file") as file:
             kind = path.suffix.lower()
             faces, why = _CHECKS[kind](file) if kind in _CHECKS else (0, "")
     except WavetankError as error:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from wavetank.foundation.door import read_arrays
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.folders import cache_folder
-from wavetank.foundation.replacing import replacing
+from wavetank.foundation.input_limits import read_arrays
 from wavetank.solids.meshes.grid import DistanceGrid
 
 FORMAT = 2  # counts up when the same mesh would give other distances
@@ -32,7 +32,7 @@ def grid_of(key: str, make: Callable[[], DistanceGrid]) -> DistanceGrid:
             grid = make()
             with contextlib.suppress(OSError, WavetankError):
                 path.parent.mkdir(parents=True, exist_ok=True)
-                with replacing(path) as partial, partial.open("wb") as file:
+                with atomic_write(path) as partial, partial.open("wb") as file:
                     np.savez(file, distances=grid.distances, cell=grid.cell)
         while len(_grids) >= _KEPT:
             del _grids[next(iter(_grids))]

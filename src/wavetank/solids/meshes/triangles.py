@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.foundation.door import unpack_text
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import unpack_text
 
 MOST_TRIANGLES = 1_000_000
 

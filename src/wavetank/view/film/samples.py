@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import download, upload
-from wavetank.foundation.replacing import replacing
+from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.version import VERSION
 from wavetank.view.film.paths import Film
 from wavetank.view.matter import matter_of
@@ -52,7 +52,7 @@ def digest_of(shot: Any, options: tuple[Any, ...]) -> str:
 
 def store(path: Path, film: Film, digest: str, done: int) -> None:
     """Write the samples to a file, which is complete or not there."""
-    with replacing(path) as partial, partial.open("wb") as out:
+    with atomic_write(path) as partial, partial.open("wb") as out:
         arrays: dict[str, Any] = {name: download(getattr(film, name)) for name in NAMES}
         np.savez(out, digest=digest, done=done, **arrays)
 

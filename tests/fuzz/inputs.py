@@ -1,24 +1,22 @@
-"""Every door with what it may be given: an input goes in, and a sentence of ours or something that works comes out.
+"""Every entrance with what it may be given: an input goes in, and a sentence of ours or something that works comes out.
 
-Each entry of `DOORS` is a strategy of inputs and a function that tries one: `test_fuzz.py` tries some in every test
+Each entry of `INPUTS` is a strategy of inputs and a function that tries one: `test_fuzz.py` tries some in every test
 run, `long.py` many thousands, atheris drives the same functions by what code they reach.
 """
 
 import functools
 import io
 import json
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from attacks import POOL, taken_or_refused
-from files import FILES
+from files import FILES, FOLDER
 from hypothesis import strategies as st
 from strategies import WEIRD, mutated, of_type, tables, toml_of, torn
 
 import wavetank as wt
-from wavetank.foundation.door import parse_toml
+from wavetank.foundation.input_limits import parse_toml
 from wavetank.page.viewers import Viewers, _table
 from wavetank.scene.scene import bundled_levels, bundled_scenes
 from wavetank.session.commands import COMMANDS
@@ -27,7 +25,6 @@ from wavetank.session.session import Session
 from wavetank.simulation.saved import Header, sealed
 
 MOST = 3000  # particles of a world that is tried
-FOLDER = Path(tempfile.gettempdir()) / "wavetank-fuzz"
 RICH = (
     POOL
     + """
@@ -299,7 +296,7 @@ def try_mesh(given: tuple[str, bytes]) -> None:
     taken_or_refused(made)
 
 
-DOORS: dict[str, tuple[st.SearchStrategy[Any], Any]] = {
+INPUTS: dict[str, tuple[st.SearchStrategy[Any], Any]] = {
     "scene": (scenes, try_scene),
     "state": (states(), try_state),
     "message": (messages, try_message),

@@ -1,4 +1,4 @@
-"""Files appear complete or not at all, and what a killed process left behind is swept at the next start."""
+"""Files appear complete or not at all; what a killed process left is removed at the next start."""
 
 import contextlib
 import functools
@@ -18,18 +18,17 @@ _swept: set[Path] = set()
 
 
 def partial_path(path: str | Path) -> Path:
-    """Return a new name beside `path` under which it grows; raises `WavetankError` if its folder does not exist."""
+    """Return a new temporary path next to `path`; raises `WavetankError` if its folder does not exist."""
     target = Path(path)
     if not target.parent.is_dir():
         raise WavetankError(f"{str(target)!r} cannot be written: there is no folder {str(target.parent)!r}.")
     sweep(target.parent)
-    # The process's number tells later whether the writer is still there; with the other number no two writers of one
-    # file share a name, neither in two processes nor in one: a video is made of the file that it grew in.
+    # The process id tells later whether the writer still runs; the counter keeps writers of one process apart.
     return target.with_name(f".{target.name[:200]}.{_here()}-{os.getpid()}-{next(_numbers)}.partial")
 
 
 def sweep(folder: Path) -> None:
-    """Remove what processes of this machine that are no more left in a folder; once for each folder and process."""
+    """Remove what ended processes of this machine left in a folder; once per folder and process."""
     folder = folder.absolute()
     if folder in _swept:
         return
@@ -44,7 +43,7 @@ def sweep(folder: Path) -> None:
 
 @functools.cache
 def _here() -> str:
-    """Return what tells this machine, and this space of process numbers, from others that share a disk with it."""
+    """Identify this machine and its namespace of process ids among those that share a disk."""
     try:
         space = str(Path("/proc/self/ns/pid").readlink())
     except OSError:
@@ -65,7 +64,7 @@ def _lives(process: int) -> bool:
 
 
 def make_folder(path: str | Path) -> Path:
-    """Make a folder, and those that it is in, where there is none; raises `WavetankError` if that is not possible."""
+    """Make a folder and its parents if missing; raises `WavetankError` if that is not possible."""
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -74,11 +73,11 @@ def make_folder(path: str | Path) -> Path:
 
 
 @contextlib.contextmanager
-def replacing(path: str | Path, *, lasting: bool = False, suffixed: bool = False) -> Iterator[Path]:
-    """Give a temporary path to write to; it takes the place of `path` on success and is removed on an error.
+def atomic_write(path: str | Path, *, lasting: bool = False, suffixed: bool = False) -> Iterator[Path]:
+    """Yield a temporary path to write to; it replaces `path` on success and is removed on an error.
 
-    A `lasting` file is on the disk before it gets its name, so that it outlives a power cut too. A `suffixed` one ends
-    as `path` does already, for writers that tell the format by the name.
+    A `lasting` file is flushed to disk before it gets its name, so that it survives a power cut too. The temporary path
+    of a `suffixed` one has the suffix of `path`, for writers that tell the format by the name.
     """
     partial = partial_path(path)
     if suffixed:
@@ -97,7 +96,7 @@ def replacing(path: str | Path, *, lasting: bool = False, suffixed: bool = False
 
 
 def flush(path: Path) -> None:
-    """Have the disk take what was written to a file or a folder; where it cannot be asked, nothing happens."""
+    """Flush a file or folder to disk (fsync); does nothing where that is not possible."""
     with contextlib.suppress(OSError):
         number = os.open(path, os.O_RDONLY)
         try:

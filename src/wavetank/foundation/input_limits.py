@@ -1,11 +1,11 @@
-"""The door for what comes from outside: size, depth, count and finiteness, before it is parsed deeply or allocated.
+"""Read what comes from outside: limits of size, depth, count and finiteness before anything is parsed or allocated.
 
-Scenes, states, checkpoints, recordings, meshes and messages are read by the functions of this file and by no others.
-What they refuse they refuse in one sentence; `guarded` makes one of any error that nobody thought of, and where
-WAVETANK_STRICT_DOOR is set, as fuzzers do, lets it through, because then it is a bug to find.
+Scenes, states, checkpoints, recordings, meshes and messages are read by the functions of this file only. tomllib, json,
+ElementTree and NumPy parse; what is here bounds what they are given and makes one sentence of what they raise.
+`explain_errors` does so for any other error too, and lets it pass where WAVETANK_STRICT_INPUT is set, as fuzzers do,
+because then it is a bug to find.
 """
 
-import ast
 import contextlib
 import functools
 import io
@@ -18,46 +18,46 @@ import tomllib
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from tokenize import TokenError
 from typing import IO, Any
 from xml.etree import ElementTree
 
 import numpy as np
+from numpy.lib import format as npy
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.memory import free_memory, in_words
 
-BLOCK = 1 << 22  # bytes that are read at once
 LARGEST_TEXT = 200_000_000  # bytes of a scene or a recording: a million particles one by one
 DEEPEST = 40  # arrays, tables and dotted keys within each other
 MOST_VALUES = 20_000_000  # numbers, texts, tables of a text
 LARGEST_INTEGER = 2**63  # what TOML promises to keep (TOML 1.0, integers)
-LONGEST_HEADER = 4096  # characters that describe an array in a file (NumPy's own write some hundred)
+LONGEST_HEADER = 4096  # characters that describe an array in a file (NumPy writes about a hundred)
 MOST_ARRAYS = 200  # in an archive
 LARGEST_JSON = 64_000_000  # characters of a header
 UNPACKED = 64_000_000  # bytes that an archive may unpack to whatever its size, and
 TIMES = 20  # as many times its size
 
-# What opens and closes, keys with very many dots, numbers with very many digits: all outside of texts and remarks. No
-# branch goes over a piece twice.
-_STRUCTURE = re.compile(
-    r"""(?P<dots>(?<![\w.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){40})|"""
+# Keys of more than 40 parts, for which tomllib takes time and memory that grow with the square of their number; and the
+# strings and comments in which they do not count. No branch goes over a piece twice.
+_LONG_KEYS = re.compile(
+    r"""(?P<key>(?<![\w.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){40})|"""
     r'''"""(?:[^"\\]|\\.|"(?!""))*+(?:""")?|'''
     r"""'''(?:[^']|'(?!''))*+(?:''')?|"""
-    r"""(?P<digits>(?<![\w.])(?:0[xob])?[0-9a-fA-F_]{600})|"""
-    r""""(?:[^"\\\n]|\\.)*+"?|'[^'\n]*+'?|#[^\n]*+|(?P<opens>[\[{])|(?P<closes>[\]}])""",
+    r""""(?:[^"\\\n]|\\.)*+"?|'[^'\n]*+'?|#[^\n]*+""",
     re.DOTALL,
 )
 
 
-def named(path: Any) -> str:
-    """Return a path as messages tell it: in one line, whatever its name."""
+def printable(path: Any) -> str:
+    """Return a path as messages show it: in one line, whatever its name."""
     text = str(path)
     return text if text.isprintable() and len(text) <= 300 else repr(text[:300])
 
 
 @contextlib.contextmanager
-def guarded(origin: str, what: str) -> Iterator[None]:
-    """Make one sentence of every error within that is none of ours; it begins with `origin` and says `what` is read."""
+def explain_errors(origin: str, what: str) -> Iterator[None]:
+    """Raise every error within as a `WavetankError` of one line, which begins with `origin` and says `what` is read."""
     try:
         yield
     except WavetankError as error:
@@ -68,7 +68,7 @@ def guarded(origin: str, what: str) -> Iterator[None]:
     except MemoryError:
         raise WavetankError(f"{origin}: there is not enough memory for this {what}.") from None
     except Exception as error:
-        if os.environ.get("WAVETANK_STRICT_DOOR"):
+        if os.environ.get("WAVETANK_STRICT_INPUT"):
             raise
         reason = " ".join((str(error) or "no reason given").split())[:200].rstrip(".")
         raise WavetankError(f"{origin}: this {what} cannot be read: {type(error).__name__}, {reason}.") from None
@@ -78,9 +78,9 @@ def guarded(origin: str, what: str) -> Iterator[None]:
         raise WavetankError(f"{origin}: this {what} cannot be read: it is damaged.") from None
 
 
-def opened(path: str | Path, most: int, what: str) -> IO[bytes]:
+def open_regular(path: str | Path, most: int, what: str) -> IO[bytes]:
     """Open a regular file of at most `most` bytes; raises `WavetankError` for all else, and never waits for a pipe."""
-    name = named(path)
+    name = printable(path)
     try:
         file = os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb")
     except (OSError, ValueError) as error:
@@ -104,15 +104,11 @@ def opened(path: str | Path, most: int, what: str) -> IO[bytes]:
 
 def read_bytes(path: str | Path, most: int, what: str) -> bytes:
     """Return what is in a regular file of at most `most` bytes; raises `WavetankError`."""
-    with opened(path, most, what) as file:
+    with open_regular(path, most, what) as file:
         try:
-            blocks, left = [], most
-            while left and (block := file.read(min(left, BLOCK))):  # room for all that is allowed is not taken at once
-                blocks.append(block)
-                left -= len(block)
-            return b"".join(blocks)
+            return file.read()
         except OSError as error:
-            raise WavetankError(f"{named(path)}: the {what} cannot be read: {error.strerror or error}.") from None
+            raise WavetankError(f"{printable(path)}: the {what} cannot be read: {error.strerror or error}.") from None
 
 
 def read_text(path: str | Path, what: str, most: int = LARGEST_TEXT) -> str:
@@ -120,21 +116,24 @@ def read_text(path: str | Path, what: str, most: int = LARGEST_TEXT) -> str:
     try:
         return read_bytes(path, most, what).decode("utf-8")
     except UnicodeDecodeError as error:
-        raise WavetankError(f"{named(path)}: the {what} cannot be read: it is no text in UTF-8: {error}.") from None
+        raise WavetankError(f"{printable(path)}: the {what} cannot be read: it is not UTF-8 text: {error}.") from None
 
 
 def parse_toml(text: str, origin: str, what: str = "this") -> dict[str, Any]:
-    """Return what a TOML text says; raises `WavetankError` for what is none, too deep, too long or too much."""
+    """Parse TOML; raises `WavetankError` for text that is not TOML, too long, too deep or has too many values."""
 
     def load(text: str) -> dict[str, Any]:
-        _check_structure(text, origin)
+        long = next((match for match in _LONG_KEYS.finditer(text) if match["key"]), None)
+        if long:
+            line = text.count("\n", 0, long.start()) + 1
+            raise WavetankError(f"{origin}: line {line} is nested more than {DEEPEST} deep, which is the limit.")
         return tomllib.loads(text)
 
     return _parse(load, text, f"{origin}: this", f"{origin}: {what} is not TOML", LARGEST_TEXT, origin)
 
 
 def parse_json(text: str | bytes, origin: str, most: int = LARGEST_JSON) -> Any:
-    """Return what a JSON text says; raises `WavetankError` for what is none, too deep, or holds NaN."""
+    """Parse JSON; raises `WavetankError` for text that is not JSON, too long, too deep, or holds NaN."""
 
     def refuse(name: str) -> None:
         raise WavetankError(f"{origin} holds {name}; every number must be finite.")
@@ -144,13 +143,13 @@ def parse_json(text: str | bytes, origin: str, most: int = LARGEST_JSON) -> Any:
 
 
 def parse_xml(text: str, origin: str, what: str) -> ElementTree.Element:
-    """Return the top element of XML without a document type, which may name other files and grow without end."""
+    """Parse XML without a document type, which could name other files and expand without limit; return its root."""
     if "<!" in text.replace("<!--", ""):
         raise WavetankError(f"{origin}: a document type is not read; {what} has none.")
     try:
         return ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise WavetankError(f"{origin}: this is no XML: {error}.") from None
+        raise WavetankError(f"{origin}: this is not XML: {error}.") from None
 
 
 def _parse(load: Callable[[Any], Any], text: str | bytes, subject: str, refused: str, most: int, origin: str) -> Any:
@@ -160,34 +159,15 @@ def _parse(load: Callable[[Any], Any], text: str | bytes, subject: str, refused:
     try:
         plain = load(text)
     except RecursionError:
-        raise WavetankError(
-            f"{subject} is nested more than {DEEPEST} deep; at most so many levels are allowed."
-        ) from None
-    except ValueError as error:  # errors of both parsers are
+        raise WavetankError(f"{subject} is nested more than {DEEPEST} deep, which is the limit.") from None
+    except ValueError as error:  # what both parsers raise
         raise WavetankError(f"{refused}: {one_line(error)}.") from None
     check_plain(plain, origin)
     return plain
 
 
-def _check_structure(text: str, origin: str) -> None:
-    """Look over brackets, dots and digits of a TOML text before it is parsed."""
-    depth = 0
-    for match in _STRUCTURE.finditer(text):
-        kind = match.lastgroup
-        if kind is None:
-            continue
-        depth += (kind == "opens") - (kind == "closes")
-        if depth > DEEPEST or kind in ("dots", "digits"):
-            line = text.count("\n", 0, match.start()) + 1
-            if kind == "digits":
-                raise WavetankError(f"{origin}: a number in line {line} has more than 600 digits; none needs so many.")
-            raise WavetankError(
-                f"{origin}: line {line} is nested more than {DEEPEST} deep; so many levels are allowed."
-            )
-
-
 def check_plain(plain: Any, origin: str) -> None:
-    """Check depth, number and integers of plain data without going into its depth; raises `WavetankError`."""
+    """Check depth, number of values and size of integers of plain data, level by level; raises `WavetankError`."""
     level, count = [plain], 0
     for _ in range(DEEPEST + 1):
         below: list[Any] = []
@@ -203,17 +183,17 @@ def check_plain(plain: Any, origin: str) -> None:
                 below.extend(value)
             elif isinstance(value, int):
                 if not -LARGEST_INTEGER <= value < LARGEST_INTEGER:
-                    raise WavetankError(f"{origin} holds a whole number that does not fit into 64 bits.")
+                    raise WavetankError(f"{origin} holds an integer that does not fit into 64 bits.")
             elif isinstance(value, str):
                 _check_word(value, origin)
         if not below:
             return
         level = below
-    raise WavetankError(f"{origin} is nested more than {DEEPEST} deep; at most so many levels are allowed.")
+    raise WavetankError(f"{origin} is nested more than {DEEPEST} deep, which is the limit.")
 
 
 def _check_word(text: Any, origin: str) -> None:
-    """Refuse halves of characters, which no file can hold."""
+    """Refuse lone surrogates, which UTF-8 cannot encode."""
     if isinstance(text, str) and not text.isascii():
         try:
             text.encode()
@@ -231,17 +211,17 @@ def one_line(error: Any, most: int = 300) -> str:
 
 
 def read_arrays(path: str | Path, what: str) -> dict[str, np.ndarray]:
-    """Return the arrays of a .npz file by name; raises `WavetankError` for what is none or costs too much.
+    """Return the arrays of a .npz file by name; raises `WavetankError` for another file or one that is too large.
 
     Sizes are read off the headers and compared with those of the file and of free memory before anything is unpacked.
     """
-    file = opened(path, 2**48, what)
+    file = open_regular(path, 2**48, what)
     with file:
         size = os.fstat(file.fileno()).st_size
-        return unpack(file, size, f"{named(path)}: this is not a {what}")
+        return unpack_arrays(file, size, f"{printable(path)}: this is not a {what}")
 
 
-def unpack(file: IO[bytes], size: int, origin: str) -> dict[str, np.ndarray]:
+def unpack_arrays(file: IO[bytes], size: int, origin: str) -> dict[str, np.ndarray]:
     """Return the arrays of an open archive of `size` bytes; raises `WavetankError` that begins with `origin`."""
     try:
         with zipfile.ZipFile(file) as archive:
@@ -268,46 +248,38 @@ def unpack(file: IO[bytes], size: int, origin: str) -> dict[str, np.ndarray]:
         raise WavetankError(f"{origin}: {one_line(error.strerror or error)}.") from None
     except (zipfile.BadZipFile, EOFError, ValueError, RuntimeError, NotImplementedError, KeyError) as error:
         raise WavetankError(f"{origin}: {one_line(error)}.") from None
-    except Exception as error:  # a damaged archive fails in as many ways as there are ways to pack
+    except Exception as error:  # each compression fails in ways of its own
         raise WavetankError(f"{origin}: {type(error).__name__}, {one_line(error)}.") from None
 
 
 def read_array(member: IO[bytes], size: int, origin: str, name: str) -> np.ndarray:
-    """Return the array of a .npy stream of `size` bytes (NEP 1); no bytes are made that are not there."""
+    """Return the array of a .npy stream of `size` bytes (NEP 1); allocates no more than the stream holds.
+
+    `numpy.load` would allocate what the header says before it reads.
+    """
 
     def refuse(why: str) -> WavetankError:
         return WavetankError(f"{origin}: {one_line(repr(name), 60)} {why}.")
 
-    start = member.read(8)
-    if len(start) < 8 or start[:6] != b"\x93NUMPY" or start[6] not in (1, 2, 3):
-        raise refuse("is no array")
-    width = 2 if start[6] == 1 else 4
-    length = int.from_bytes(member.read(width), "little")
-    if length > LONGEST_HEADER:
-        raise refuse("has a header that is too long")
     try:
-        about = ast.literal_eval(member.read(length).decode("latin-1").strip())
-        shape, kind, turned = about["shape"], np.dtype(about["descr"]), about["fortran_order"]
-        shape = tuple(shape)
-        whole = all(type(n) is int and 0 <= n < 2**48 for n in shape) and len(shape) <= 8
-    except (SyntaxError, ValueError, TypeError, KeyError, RecursionError, MemoryError):
-        raise refuse("has a header that cannot be read") from None
+        version = npy.read_magic(member)
+        read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        shape, fortran, kind = read_header(member, max_header_size=LONGEST_HEADER)
+    except (ValueError, TypeError, SyntaxError, RecursionError, MemoryError, TokenError) as error:
+        raise refuse(f"is not an array: {one_line(error)}") from None
     if kind.hasobject:
         raise refuse("holds objects, not arrays")
-    if not whole or kind.kind not in "fiubU" or kind.subdtype is not None or turned not in (True, False):
-        raise refuse("is no array of numbers")
-    needed = math.prod(shape) * kind.itemsize  # in Python's integers, which know no end
-    if needed != size - 8 - width - length:
+    if kind.kind not in "fiubU" or kind.subdtype is not None or len(shape) > 8 or min(shape, default=0) < 0:
+        raise refuse("is not an array of numbers")
+    needed = math.prod(map(int, shape)) * kind.itemsize
+    if not kind.itemsize:  # empty texts
+        raise refuse("is not an array of numbers")
+    data = member.read(min(needed, size) + 1)  # past the end, where archives compare checksums
+    if len(data) != needed:
         raise refuse("does not have the size that its header says")
-    data = member.read(needed)
-    if len(data) != needed or member.read(1):  # looked beyond the end, archives compare their check sums
-        raise refuse("ends too early or too late")
-    array = np.frombuffer(bytearray(data), kind) if kind.itemsize else np.empty(0, kind)
-    if kind.itemsize == 0:
-        array = np.zeros(shape, kind)
-    return array.reshape(shape[::-1]).T if turned else array.reshape(shape)
+    return np.frombuffer(bytearray(data), kind).reshape(shape, order="F" if fortran else "C")
 
 
 def unpack_text(data: bytes, origin: str) -> dict[str, np.ndarray]:
     """Return the arrays of an archive that a scene holds as text; raises `WavetankError`."""
-    return unpack(io.BytesIO(data), len(data), origin)
+    return unpack_arrays(io.BytesIO(data), len(data), origin)
