@@ -305,6 +305,28 @@ def test_kernels_read_no_constants_of_modules(path):
             assert not constant, f"{node.name} reads {name} = {value}"
 
 
+def untyped(node: ast.AST) -> list[str]:
+    """Name the functions below `node` that lack a type of an argument or of what they return; the device's may."""
+    found = []
+    for part in ast.iter_child_nodes(node):
+        if not isinstance(part, ast.FunctionDef | ast.AsyncFunctionDef):
+            found += untyped(part)
+            continue
+        if {ast.unparse(decorator).split("(")[0] for decorator in part.decorator_list} & {"qd.func", "qd.kernel"}:
+            continue
+        given = part.args
+        arguments = [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]
+        types = [one.annotation for one in arguments if one and one.arg not in ("self", "cls")]
+        found += [part.name] * (None in (*types, part.returns)) + untyped(part)
+    return found
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_functions_of_the_host_have_types(path):
+    """Mypy cannot tell kernels from functions that lack a type."""
+    assert untyped(ast.parse(path.read_text())) == []
+
+
 def test_tests_that_are_called_slow_are_there():
     names = (ROOT / "tests" / "slow.txt").read_text("utf-8").splitlines()
     assert names == sorted(set(names))

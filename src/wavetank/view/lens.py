@@ -11,15 +11,19 @@ always measured along `forward`; a ray is written so that its parameter *is* the
 """
 
 import dataclasses
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import remembered
 
-vec2 = qd.types.vector(2, qd.f32)
-vec3 = qd.types.vector(3, qd.f32)
-vec4 = qd.types.vector(4, qd.f32)
+if TYPE_CHECKING:  # as types, variables mean nothing to mypy
+    vec2: TypeAlias = Any
+    vec3: TypeAlias = Any
+    vec4: TypeAlias = Any
+else:
+    vec2, vec3, vec4 = (qd.types.vector(size, qd.f32) for size in (2, 3, 4))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -62,7 +62,9 @@ STUDIO: dict[str, Any] = {"outdoors": 0, "below": vector(0.5, 0.5, 0.5)} | dict.
 def under_sky(look: Look, turbidity: float = TURBIDITY) -> Look:
     """Return a look in the open, on the ground that its sun and its sky light."""
     parts = (tuple(map(float, part)) for part in (look.to_sun, look.sky, look.horizon))
-    weights = {name: vector(*weight) for name, weight in zip(SKY, fitted(*parts, turbidity), strict=True)}
+    weights: dict[str, Any] = {
+        name: vector(*weight) for name, weight in zip(SKY, fitted(*parts, turbidity), strict=True)
+    }
     return dataclasses.replace(look, outdoors=1, below=lit_floor(look), **weights)
 
 

@@ -12,6 +12,7 @@ import dataclasses
 import functools
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -153,7 +154,8 @@ def panorama_of(radiance: np.ndarray) -> Panorama:
     gain = wanted / max(float(np.mean(power) / np.pi * up + np.mean(white)), 1e-12)
     sun, white, sky = gain * power / np.pi, gain * white, gain * sky
     low, high = (to[..., 1] > 0.0) & (to[..., 1] < 0.1), to[..., 1] > 0.8
-    weights = _fitted(sky[above], to[above], per[above], to_sun)
+    fitted = _fitted(sky[above], to[above], per[above], to_sun)
+    weights: dict[str, Any] = {name: vector(*weight) for name, weight in zip(SKY, fitted, strict=True)}
     look = dataclasses.replace(
         plain,
         to_sun=vector(*to_sun),
@@ -163,7 +165,7 @@ def panorama_of(radiance: np.ndarray) -> Panorama:
         horizon=vector(*np.average(sky[low], axis=0, weights=per[low])),
         zenith=vector(*np.average(sky[high], axis=0, weights=per[high])),
         sun_size=float(np.clip(np.sqrt(area / np.pi), 0.005, 0.12)),
-        **{name: vector(*weight) for name, weight in zip(SKY, weights, strict=True)},
+        **weights,
     )
     look = dataclasses.replace(look, below=lit_floor(look), ground=vector(*(0.45 * np.asarray(lit_floor(look)))))
     return Panorama(sky.astype(np.float32), look)
