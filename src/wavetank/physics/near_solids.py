@@ -87,16 +87,17 @@ def in_crevice(slope):
 def faced(solids: SolidSet, k, p, h):
     """(gradient, distance) of solid `k` at `p`; in the crevices of a hollow one the gradient is a mean around `p`."""
     value = signed_distance(solids, k, p)
-    if may_be_hollow(solids, k) and value.w < h:
-        slope = vec3(0.0, 0.0, 0.0)
-        for side in range(6):
-            way = (smoothed() - 2.0 * smoothed() * (side & 1)) * h
-            at = p
-            at[side >> 1] += way
-            slope[side >> 1] += 0.5 * signed_distance(solids, k, at).w / way
-        own = vec3(value.x, value.y, value.z)
-        own += in_crevice(slope) * (slope - own)
-        value = vec4(own.x, own.y, own.z, value.w)
+    if qd.static(solids.has_grids or solids.has_operations):
+        if may_be_hollow(solids, k) and value.w < h:
+            slope = vec3(0.0, 0.0, 0.0)
+            for side in range(6):
+                way = (smoothed() - 2.0 * smoothed() * (side & 1)) * h
+                at = p
+                at[side >> 1] += way
+                slope[side >> 1] += 0.5 * signed_distance(solids, k, at).w / way
+            own = vec3(value.x, value.y, value.z)
+            own += in_crevice(slope) * (slope - own)
+            value = vec4(own.x, own.y, own.z, value.w)
     return value
 
 

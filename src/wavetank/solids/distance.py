@@ -219,6 +219,8 @@ class SolidSet:
     count: qd.i32
     tank_count: qd.i32  # the first so many are the walls of the tank, all of them half-spaces
     repeats: Final[int]  # bit k is set where the world repeats along axis k
+    has_grids: Final[bool]  # whether any solid has a grid of distances: a mesh, a polygon or a height field
+    has_operations: Final[bool]  # whether any solid is more than one shape
 
 
 @qd.func
@@ -269,8 +271,11 @@ def node_distance(solids: SolidSet, node, p):
     at = rotate(conjugate(turn), p - solids.offset[node])
     op = solids.op[node]
     value = vec4(0.0, 0.0, 0.0, 0.0)
-    if op >= grids():
-        value = grid_distance(solids, op - grids(), at, solids.size[node].x)
+    if qd.static(solids.has_grids):
+        if op >= grids():
+            value = grid_distance(solids, op - grids(), at, solids.size[node].x)
+        else:
+            value = shape_distance(op, at, solids.size[node])
     else:
         value = shape_distance(op, at, solids.size[node])
     n = rotate(turn, vec3(value.x, value.y, value.z))
@@ -278,8 +283,8 @@ def node_distance(solids: SolidSet, node, p):
 
 
 @qd.func
-def local_distance(solids: SolidSet, k, p):
-    """(gradient, distance) of solid `k` at the point `p` in its own frame."""
+def program_distance(solids: SolidSet, k, p):
+    """(gradient, distance) of the program of solid `k` at the point `p` in its own frame."""
     stack = qd.Matrix([[0.0] * 4 for _ in range(deepest())])
     depth = 0
     # The top of the stack stays in registers: most solids are a single shape and never touch the rest.
@@ -303,13 +308,25 @@ def local_distance(solids: SolidSet, k, p):
 
 
 @qd.func
+def local_distance(solids: SolidSet, k, p):
+    """(gradient, distance) of solid `k` at the point `p` in its own frame."""
+    value = vec4(0.0, 0.0, 0.0, 0.0)
+    if qd.static(solids.has_operations):
+        value = program_distance(solids, k, p)
+    else:
+        value = node_distance(solids, solids.first[k], p)
+    return value
+
+
+@qd.func
 def grain(solids: SolidSet, k):
     """Largest cell edge [m] of the grids that solid `k` is made of; 0 where its distances are exact."""
     largest = 0.0
-    for node in range(solids.first[k], solids.first[k + 1]):
-        if solids.op[node] >= grids():
-            cell = solids.samples[solids.grid[solids.op[node] - grids()][0]]
-            largest = qd.max(largest, cell * solids.size[node].x)
+    if qd.static(solids.has_grids):
+        for node in range(solids.first[k], solids.first[k + 1]):
+            if solids.op[node] >= grids():
+                cell = solids.samples[solids.grid[solids.op[node] - grids()][0]]
+                largest = qd.max(largest, cell * solids.size[node].x)
     return largest
 
 

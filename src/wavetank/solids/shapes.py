@@ -296,15 +296,7 @@ def build(
     """
     programs = [solid.program() for solid in solids]
     for solid, program in zip(solids, programs, strict=True):
-        depth = deepest = 0
-        for node in program:
-            depth += 1 if node.op >= 0 else -1
-            deepest = max(deepest, depth)
-        if deepest > STACK:
-            raise WavetankError(
-                f"solid {solid.name or type(solid).__name__!r} nests set operations {deepest} deep; "
-                f"at most {STACK} are allowed: build it from several solids."
-            )
+        _check_depth(solid, program)
     nodes = [node for program in programs for node in program] or [Node(0)]
     codes, grid, samples = put_grids(nodes, spacing)
     count = max(len(solids), 1)
@@ -342,7 +334,22 @@ def build(
         count=len(solids),
         tank_count=tank_count,
         repeats=repeats[0],
+        has_grids=any(node.mesh is not None for node in nodes),
+        has_operations=any(len(program) > 1 for program in programs),
     )
+
+
+def _check_depth(solid: Solid, program: list[Node]) -> None:
+    """Raise `WavetankError` for a solid whose program needs more than the stack on the device holds."""
+    depth = deepest = 0
+    for node in program:
+        depth += 1 if node.op >= 0 else -1
+        deepest = max(deepest, depth)
+    if deepest > STACK:
+        raise WavetankError(
+            f"solid {solid.name or type(solid).__name__!r} nests set operations {deepest} deep; "
+            f"at most {STACK} are allowed: build it from several solids."
+        )
 
 
 def resize(device: SolidSet, solids: Sequence[Solid], scales: Sequence[float]) -> None:
