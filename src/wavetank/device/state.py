@@ -33,7 +33,7 @@ class Particles:
     py: qd.types.ndarray()  # likewise
     pz: qd.types.ndarray()  # likewise; unused in 2-D
     v: qd.types.ndarray()  # vec [capacity], m/s
-    a: qd.types.ndarray()  # vec [capacity], m/s^2: by pressure, see `physics/grid_pressure/correction.py`
+    a: qd.types.ndarray()  # vec [capacity], m/s^2: by pressure, see `physics/pressure/correct.py`
     viscous: qd.types.ndarray()  # vec [capacity], m/s^2: by viscosity in the last step; [1] where nothing is viscous
     id: qd.types.ndarray()  # i32 [capacity]: name of the particle for life; those of removed ones are not used again
     material: qd.types.ndarray()  # i32 [capacity]: number of its material
@@ -88,57 +88,6 @@ class Grid:
     nz: qd.i32
     cells: qd.i32
     periods: Periods
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class CoarseGrid:
-    """A level of the grid of `physics/grid_pressure/correction.py`; nodes are the centres of its cells, x fastest."""
-
-    sums: qd.types.ndarray()  # i32 [parts * nodes]: of shares of particles, then of tents times density errors
-    mass_sums: qd.types.ndarray()  # i32 [parts * nodes]: of these shares times densities, where these differ
-    room: qd.types.ndarray()  # f32 [nodes]: share of the cell that no solid takes, 0 where next to nothing is left
-    facing_x: qd.types.ndarray()  # f32 [nodes]: outward normal of the solid nearest to a node, up where none is near
-    facing_y: qd.types.ndarray()  # likewise
-    facing_z: qd.types.ndarray()  # likewise
-    clear: qd.types.ndarray()  # f32 [nodes]: 1 where no solid is within two cells, -1 where a node may be out of reach
-    # Thin walls, see `grid_pressure/thin_walls.py`: outward normal of the one that a node lies at, 0 where there is
-    # none, its distance [m], below 0 inside, and bits of the faces to the next nodes along x, y and z that one lies in.
-    thin_x: qd.types.ndarray()  # f32 [nodes]
-    thin_y: qd.types.ndarray()  # likewise
-    thin_z: qd.types.ndarray()  # likewise
-    thin_s: qd.types.ndarray()  # f32 [nodes], m
-    shut: qd.types.ndarray()  # f32 [nodes]
-    open_x: qd.types.ndarray()  # f32 [nodes]: share of the face to the next node along x that is open
-    open_y: qd.types.ndarray()  # likewise
-    open_z: qd.types.ndarray()  # likewise
-    basin: qd.types.ndarray()  # i32 [nodes]: first node of the connected room that a node belongs to
-    fill: qd.types.ndarray()  # f32 [nodes]: water over room
-    gaps: qd.types.ndarray()  # f32 [nodes]: share of the room that is free between rows of particles
-    depth: qd.types.ndarray()  # f32 [nodes], m: depth below the surface that the volume of the water has
-    density: qd.types.ndarray()  # f32 [nodes]: mean density over that of the heaviest fluid
-    rhs: qd.types.ndarray()  # f32 [nodes]: mean density error over the stiffness
-    wx: qd.types.ndarray()  # f32 [nodes], 1/m^2: coupling with the next node along x
-    wy: qd.types.ndarray()  # likewise
-    wz: qd.types.ndarray()  # likewise
-    inverse: qd.types.ndarray()  # f32 [nodes], m^2: inverse diagonal, 0 outside of the water
-    lam: qd.types.ndarray()  # f32 [nodes], m^2: multiplier
-    slope_x: qd.types.ndarray()  # f32 [nodes], m: derivative of the multiplier across the face to the next node along x
-    slope_y: qd.types.ndarray()  # likewise
-    slope_z: qd.types.ndarray()  # likewise
-    nx: qd.i32
-    ny: qd.i32
-    nz: qd.i32  # 1 in 2-D
-    pieces: qd.i32  # along x, of `width` nodes
-    dx: qd.f32  # m: edges of a cell
-    dy: qd.f32
-    dz: qd.f32  # 1 in 2-D
-    x0: qd.f32  # m: lower corner
-    y0: qd.f32
-    z0: qd.f32  # 0 in 2-D
-    parts: qd.i32  # of the particles that have sums of their own
-    alone: Final[int]  # 1 where there are several, so that no thread waits for another, else 0
-    width: Final[int]  # nodes of a row that a thread takes at once
-    repeats: Final[int]  # bit k is set where the world repeats along axis k
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -265,7 +214,9 @@ class Coefficients:
     wall_gap: qd.f32  # m
     skin: qd.f32 = 0.0  # m^(dim - 2), see physics/tension.py
     cohesion: qd.f32 = 0.0  # m^(dim - 2), likewise
-    fallen: qd.f32 = 0.0  # s^2: by this times gravity places are told from where all fell alike, see grid_pressure
+    fallen: qd.f32 = (
+        0.0  # s^2: by this times gravity places are told from where all fell alike, see `physics/pressure/`
+    )
 
 
 MOST_REMEMBERED = 512

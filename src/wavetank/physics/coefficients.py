@@ -9,8 +9,8 @@ import numpy as np
 from wavetank.device.state import Coefficients, remembered
 from wavetank.foundation.params import Parameters
 from wavetank.physics.density_constraint import schedule
-from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED
 from wavetank.physics.mixture import stiffening
+from wavetank.physics.pressure.grid import THRESHOLDS
 from wavetank.physics.smoothing import KERNELS, NAMES, SLOPES, kernel_shape, rest_lattice
 
 LEAST_MIXING = 1e-6  # of S_0: a particle without neighbours has no gradient to divide by
@@ -83,7 +83,7 @@ def coefficients(
             calm=CALM * math.sqrt(math.hypot(*params.gravity) / h),
             speed_limit=speed_limit,
             carried=carries,
-            largest_carried=LARGEST_CARRIED * math.hypot(*params.gravity),
+            largest_carried=THRESHOLDS.largest_carried * math.hypot(*params.gravity),
             wall_density=params.wall_density,
             wall_gap=params.wall_gap * params.spacing,
         )

@@ -27,10 +27,10 @@ was thrown to and fro without end, crept up and down walls and went up and down 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles, Scratch, Walls
 from wavetank.physics.boundary import is_near, next_near, wall_share
-from wavetank.physics.grid_pressure.coarse_grid import ramp
 from wavetank.physics.near_solids import facing_at, known, place_of
 from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predicted
+from wavetank.physics.pressure.grid import ramp
 from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.solids.distance import SolidSet, image_near, lift, plane_distance, rotate, to_local, vec3
 

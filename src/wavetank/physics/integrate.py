@@ -48,7 +48,7 @@ def predict(
 ):
     """Accelerate, move freely (Algorithm 1, lines 2-3), mark what is near, stay out of it, and find the cell.
 
-    With gravity acts the share of the grid's pressure that is carried on (`grid_pressure/correction.py`). Where solids
+    With gravity acts the share of the grid's pressure that is carried on (`pressure/correct.py`). Where solids
     are not `searched` there are only the walls of the tank; with 2, bodies feel what they stop. In no time, dt = 0,
     particles stay where they are, wherever that is.
     """

@@ -14,8 +14,8 @@ from wavetank.physics.dynamic_viscosity.implicit_viscosity import (
     steps_with_bodies,
     thick_share,
 )
-from wavetank.physics.grid_pressure.correction import carried
 from wavetank.physics.mixture import Blend, blend
+from wavetank.physics.pressure.correct import warm_start_share
 from wavetank.physics.tension import substeps_for
 from wavetank.physics.time_step import pool_depth, steps_needed
 from wavetank.physics.world import World
@@ -72,10 +72,10 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         iterations=round(params.iterations * (1.0 + (FARTHER - 1.0) * share)) if stirred else params.iterations,
         is_rubbed=world.has_friction or params.calming > 0.0,
         is_smoothed=params.viscosity > 0.0 or params.calming > 0.0,
-        is_central=not (world.levels or kinds.mixed),
+        is_central=not (world.pressure or kinds.mixed),
         on_grid=on_grid,
         # What thick fluids carry on has been shortened to their share already.
-        carried=carried(dt, params.frame_time) if on_grid else float(thick),
+        carried=warm_start_share(dt, params.frame_time) if on_grid else float(thick),
     )
 
 
@@ -94,7 +94,7 @@ def has_grid_pressure(world: World, params: Parameters) -> bool:
 
 def has_grid(world: World, params: Parameters) -> bool:
     """Whether there is a grid to carry pressure, should the fluids need it: in a tank, and without ice."""
-    return bool(params.grid_pressure > 0.0 and world.levels and not world.frozen)
+    return bool(params.grid_pressure > 0.0 and world.pressure and not world.frozen)
 
 
 def carries_on(world: World, kinds: Blend, params: Parameters) -> bool:

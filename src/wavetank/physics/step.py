@@ -16,13 +16,13 @@ from wavetank.physics.coefficients import before_fall, coefficients, in_iteratio
 from wavetank.physics.density_constraint import correct_positions, measure_density, solve_multipliers, start_multipliers
 from wavetank.physics.dynamic_viscosity.implicit_viscosity import carry_on, solve_viscosity
 from wavetank.physics.friction import apply_friction
-from wavetank.physics.grid_pressure.correction import correct_pressure
 from wavetank.physics.integrate import bring_within, predict, update_velocities
 from wavetank.physics.mixture import pack_multipliers
 from wavetank.physics.near_solids import FARTHEST, hand_over_pushes, look_again, look_at_solids
 from wavetank.physics.neighbors import find_neighbors
 from wavetank.physics.plan import Plan, plan_step
 from wavetank.physics.population import hold_frozen, stop_frozen
+from wavetank.physics.pressure.correct import correct_pressure
 from wavetank.physics.sorting import sort_particles
 from wavetank.physics.tension import apply_tension, prepare_fluids
 from wavetank.physics.vorticity import confine_vorticity

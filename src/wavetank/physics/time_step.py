@@ -1,7 +1,7 @@
 """How long a time step may be: the fastest particle and the fastest wave go a share of a spacing.
 
 The first is the usual Courant condition. The second is what keeps deep water stiff where no grid carries the pressure
-(`grid_pressure/correction.py`). A few iterations carry pressure a few spacings far: water answers a load as if sound
+(`pressure/correct.py`). A few iterations carry pressure a few spacings far: water answers a load as if sound
 went at c = beta d / dt, with beta near 4 for four iterations, whatever the depth. Water of depth H then compresses by
 g H / (2 c^2) on average, as in weakly compressible SPH, and where that is more than a few per cent, columns fall into
 themselves, bounce and boil. With w = sqrt(g H) dt / d the compression is (w / beta)^2 / 2: w is all there is to bound

@@ -7,14 +7,12 @@ import numpy as np
 
 from wavetank.device.compiler import upload
 from wavetank.device.state import (
-    CoarseGrid,
     Fluids,
     Grid,
     Particles,
     Scratch,
     Walls,
     exchanged,
-    integers,
     with_solids,
     with_viscosity,
     without_viscosity,
@@ -23,6 +21,7 @@ from wavetank.foundation.materials import Material
 from wavetank.physics.bodies import Pieces
 from wavetank.physics.foam.pool import Pool
 from wavetank.physics.near_solids import PLACES
+from wavetank.physics.pressure.grid import PressureGrid
 from wavetank.solids.distance import SolidSet
 
 
@@ -40,16 +39,9 @@ class World:
     materials: dict[int, Material]  # in use, by their numbers
     count: int
     has_friction: bool
-    levels: list[CoarseGrid]  # of the tank, the finest first; none without a tank
+    pressure: PressureGrid | None  # of the tank, if there is one
     frozen: int = 0  # particles that are ice
     solids_version: int = 0  # changes with each motion of the solids
-    room_version: int = -1  # of the solids when the grid was last told which room they leave
-    room_gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m/s^2: at that time, which says what lies above what
-    # i32 [3]: nodes of the grid at thin walls, basins (`grid_pressure/sealed.py`), nodes with room
-    room_found: Any = dataclasses.field(default_factory=lambda: integers(3))
-    has_thin_walls: bool = False
-    basins: int = 1
-    open_nodes: int = 0
     solid_speed: float = 0.0  # m/s: the fastest that any solid moves in this frame
     known: dict[tuple[Any, ...], Any] = dataclasses.field(default_factory=dict)  # see `exchanged`
     pieces: Pieces | None = None  # of the bodies, where there are any
@@ -59,6 +51,11 @@ class World:
     def has_solids(self) -> bool:
         """Whether there is anything solid besides the walls of the tank, which are planes and need no search."""
         return bool(self.solids.count > self.solids.tank_count)
+
+    @property
+    def may_have_thin_walls(self) -> bool:
+        """Whether some solid may be thinner than two cells of the pressure grid."""
+        return self.has_solids
 
     @property
     def searched(self) -> int:

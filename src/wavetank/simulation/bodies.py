@@ -18,8 +18,9 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import quaternion_of
 from wavetank.physics.bodies import Pieces, new_pieces
 from wavetank.physics.dynamic_viscosity.implicit_viscosity import hold_on_bodies
-from wavetank.physics.grid_pressure.correction import LARGEST_CARRIED, carried
 from wavetank.physics.mixture import blend
+from wavetank.physics.pressure.correct import warm_start_share
+from wavetank.physics.pressure.grid import THRESHOLDS
 from wavetank.physics.reactions import DISPLACING, IMMERSION, OF_GRID, RUBBING
 from wavetank.physics.retry import Retry
 from wavetank.physics.step import step as take_step
@@ -285,7 +286,9 @@ class Bodies(Mapping[str, Body]):
             if tries == MOST_TRIES or not self._iterate(dt, part[1]):
                 return False
             # The open volume of the grid stays as it was: the correction is small.
-            world.solids_version = world.room_version = self._solids.move_to(*part)
+            world.solids_version = self._solids.move_to(*part)
+            if world.pressure:
+                world.pressure.solids_version = world.solids_version
             if self.coupling.is_hit:
                 tries += 1
                 return None
@@ -307,12 +310,12 @@ class Bodies(Mapping[str, Body]):
         particle = blend(world.materials, self._scene).largest_density * self._scene.spacing**self._dim
         rows, coupling, wet = sums / self._units[:, None], self.coupling, self._displaced_masses
         scale = self._levers * (particle / dt)
-        cell = world.levels[0].dy if world.levels else 1.0
+        cell = world.pressure.finest.dy if world.pressure else 1.0
         coupling.immersed = np.minimum(1.0, rows[:, IMMERSION] * particle / (wet * cell))
         coupling.displaced = np.minimum(1.0, rows[:, DISPLACING] * particle / (wet * cell))
-        keeps = (carried(dt, self._scene.frame_time) * coupling.warm_start_share)[:, None]
+        keeps = (warm_start_share(dt, self._scene.frame_time) * coupling.warm_start_share)[:, None]
         force = keeps * coupling.warm_started_force + rows[:, OF_GRID : OF_GRID + 6] * scale / dt
-        most = LARGEST_CARRIED * float(np.linalg.norm(self._gravity)) * wet
+        most = THRESHOLDS.largest_carried * float(np.linalg.norm(self._gravity)) * wet
         share = np.minimum(1.0, most / np.maximum(norms(force[:, :3]), 1e-30))
         coupling.grid_force = force * share[:, None]
         coupling.impulse = rows[:, :6] * scale + force * dt

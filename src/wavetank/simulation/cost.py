@@ -12,11 +12,10 @@ import os
 from collections.abc import Iterator
 
 from wavetank.device import compiler
-from wavetank.device.state import CoarseGrid
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.memory import free_memory, in_words, time_in_words
-from wavetank.physics.grid_pressure.coarse_grid import OPEN_CELLS, nodes_of
 from wavetank.physics.neighbors import MAX_ENTRIES, list_room
+from wavetank.physics.pressure.grid import OPEN_CELLS, bytes_per_node, count_nodes
 from wavetank.scene.scene import Scene
 
 SCRATCH = 12  # numbers of `Scratch` for each particle
@@ -62,9 +61,8 @@ def cost_of(scene: Scene, capacity: int | None = None) -> Cost:
     cells = 2 * max(4 * particles, 4096)
     host = 6 * dim if capacity is None else 2 * dim  # places in double precision while they are chosen
     h = scene.support * scene.spacing
-    nodes = nodes_of(scene.tank.beyond(OPEN_CELLS * h), h, scene.tank.periods().axes) if scene.tank else 0
-    fields = len(dataclasses.fields(CoarseGrid)) + 2 * 16
-    return Cost(particles, nodes, 4 * (particles * (own + host) + cells + nodes * fields * 8 // 7))
+    nodes = count_nodes(scene.tank.beyond(OPEN_CELLS * h), h, scene.tank.periods().axes) if scene.tank else 0
+    return Cost(particles, nodes, 4 * (particles * (own + host) + cells) + nodes * bytes_per_node())
 
 
 def check_cost(scene: Scene, capacity: int | None = None) -> None:

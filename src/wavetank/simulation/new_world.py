@@ -4,8 +4,8 @@ from wavetank.device import compiler
 from wavetank.device.periods import NONE
 from wavetank.device.state import Fluids, Walls, new_particles, new_scratch, vectors
 from wavetank.physics.bodies import Pieces
-from wavetank.physics.grid_pressure.coarse_grid import OPEN_CELLS, new_levels
 from wavetank.physics.neighbors import list_room, new_grid
+from wavetank.physics.pressure.grid import OPEN_CELLS, new_pressure_grid
 from wavetank.physics.smoothing import half_space_table
 from wavetank.physics.world import World
 from wavetank.scene.scene import Scene
@@ -31,6 +31,6 @@ def new_world(scene: Scene, capacity: int, solids: MovingSolids, pieces: Pieces 
         materials={},
         count=0,
         has_friction=solids.has_friction,
-        levels=new_levels(scene.tank.beyond(OPEN_CELLS * h), h, periods.axes) if scene.tank else [],
+        pressure=new_pressure_grid(scene.tank.beyond(OPEN_CELLS * h), h, periods.axes) if scene.tank else None,
         pieces=pieces,
     )

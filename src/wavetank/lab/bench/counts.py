@@ -80,4 +80,5 @@ def device_bytes(value: Any) -> int:
 def water_bytes(sim: Simulation) -> int:
     """Return the bytes on the device of all that the water needs: particles twice, scratch, cells, lists, pressure."""
     world = sim.world
-    return sum(map(device_bytes, (world.particles, world.spare, world.scratch, world.grid, *world.levels)))
+    pressure = (*world.pressure.levels, world.pressure.workspace) if world.pressure else ()
+    return sum(map(device_bytes, (world.particles, world.spare, world.scratch, world.grid, *pressure)))

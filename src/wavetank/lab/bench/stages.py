@@ -19,7 +19,7 @@ from wavetank.device import compiler
 STAGES: dict[str, tuple[str, ...]] = {
     "contact": ("wavetank.physics.boundary", "wavetank.physics.retry", "wavetank.physics.near_solids"),
     "neighbours": ("wavetank.physics.sorting", "wavetank.physics.neighbors", "wavetank.physics.pairs"),
-    "grid": ("wavetank.physics.grid_pressure",),
+    "grid": ("wavetank.physics.pressure",),
     "constraint": ("wavetank.physics.density_constraint",),
     "velocities": (
         "wavetank.physics.central_xsph",

@@ -6,18 +6,28 @@ on from the water and from the air around, and each small piece of the body is p
 the place of: Archimedes' principle, piece by piece. Pieces are those of a lattice about as fine as the particles.
 
     code      meaning                                                     unit
-    stage     how many nodes it is to where pressure is known             1
+    sweep     of extrapolation: how many nodes it is to open volume       1
     volume    of a piece, over that of a particle                         1
 """
 
 import math
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import CoarseGrid, Coefficients, Particles
+from wavetank.device.state import Coefficients, Particles
 from wavetank.physics.bodies import Pieces
 from wavetank.physics.boundary import fall, flattened
-from wavetank.physics.grid_pressure.coarse_grid import beside_on, corners, in_cells, tents
-from wavetank.physics.grid_pressure.surface import nodes_beyond
+from wavetank.physics.pressure.grid import (
+    Level,
+    Workspace,
+    corners,
+    directions,
+    edge,
+    hat_weights,
+    in_cells,
+    neighbor,
+    nodes_beyond,
+    on_axis,
+)
 from wavetank.physics.reactions import add_to_body, displacing, immersion, of_grid
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, parts, rotate, vec3
@@ -27,79 +37,83 @@ AIR = 1e-3  # weight of what is continued from the air, where there is water to 
 
 
 @qd.kernel(fastcache=True)
-def mark_known(grid: CoarseGrid):
-    """Mark where the pressure is known: where there is room."""
+def mark_known(grid: Level, w: Workspace):
+    """Mark where the pressure is known: where there is open volume."""
     for n in range(grid.nx * grid.ny * grid.nz):
-        grid.slope_z[n] = 0.0 if grid.room[n] > 0.0 else 1e9
+        w.known_after[n] = 0.0 if grid.open_volume[n] > 0.0 else 1e9
+
+
+@qd.func
+def continued_slope(grid: Level, w: Workspace, m, axis, side, at_rest, sweep):
+    """Change of the multiplier from node `m` to the one before it on that `side` of an axis: on straight at first.
+
+    Farther on it is that `at_rest` [m]: where a body lies on something, what the liquid at the mouth of the slit does
+    by chance would grow from node to node.
+    """
+    slope = -side * edge(grid, axis) * on_axis(at_rest.x, at_rest.y, at_rest.z, axis)
+    if sweep == 1:
+        slope = 0.0
+        if nodes_beyond(grid, m, axis, side) > 0:
+            farther = neighbor(grid, m, axis, side)
+            if w.known_after[farther] < sweep:
+                slope = grid.lam[m] - grid.lam[farther]
+    return slope
 
 
 @qd.kernel(fastcache=True)
-def continue_pressure(
-    grid: CoarseGrid, c: Coefficients, stiffness: qd.f32, turn: qd.i32, air: qd.f32, mixed: qd.template()
+def extrapolate(
+    grid: Level, w: Workspace, c: Coefficients, stiffness: qd.f32, sweep: qd.i32, air: qd.f32, mixed: qd.template()
 ):
-    """Continue multipliers by one node, from those that are known since an earlier `turn`; the `air` counts so much.
+    """Extrapolate multipliers by one node, from those known after an earlier `sweep`; `air` is the weight of air nodes.
 
-    Where fluids are `mixed`, so are their densities. At first they go on straight, farther on as at rest: where a body
-    lies on something, what the water at the mouth of the slit does by chance would grow from node to node.
+    Where fluids are `mixed`, so are their densities.
     """
     for n in range(grid.nx * grid.ny * grid.nz):
         at_rest = fall(c) / -stiffness
-        if grid.slope_z[n] > turn:
-            edges = vec3(grid.dx, grid.dy, grid.dz)
-            lam, weight = 0.0, 0.0
-            mass, filled = 0.0, 0.0
-            for axis in qd.static(range(3)):
-                if grid.nz > 1 or axis < 2:
-                    for side in qd.static((-1, 1)):
-                        nodes = nodes_beyond(grid, n, axis, side)
-                        if nodes > 0:
-                            m = beside_on(grid, n, axis, side)
-                            if grid.slope_z[m] < turn:
-                                slope = -side * edges[axis] * at_rest[axis]
-                                if turn == 1:
-                                    slope = 0.0
-                                    if nodes > 1:
-                                        farther = beside_on(grid, m, axis, side)
-                                        if grid.slope_z[farther] < turn:
-                                            slope = grid.lam[m] - grid.lam[farther]
-                                share = 1.0
-                                if grid.lam[m] == 0.0:  # air, or continued from there
-                                    share, slope = air, 0.0
-                                lam += share * (grid.lam[m] + slope)
-                                weight += share
-                                if qd.static(mixed):
-                                    mass += filled_at(grid, m) * grid.density[m]
-                                    filled += filled_at(grid, m)
+        if w.known_after[n] > sweep:
+            lam, weight, mass, filled = 0.0, 0.0, 0.0, 0.0
+            for direction in range(directions(grid)):
+                axis, side = direction // 2, 2 * (direction % 2) - 1
+                m = neighbor(grid, n, axis, side) if nodes_beyond(grid, n, axis, side) > 0 else n
+                if w.known_after[m] < sweep:
+                    share, slope = 1.0, continued_slope(grid, w, m, axis, side, at_rest, sweep)
+                    if grid.lam[m] == 0.0:  # air, or continued from there
+                        share, slope = air, 0.0
+                    lam += share * (grid.lam[m] + slope)
+                    weight += share
+                    if qd.static(mixed):
+                        mass += filled_at(grid, w, m) * grid.density[m]
+                        filled += filled_at(grid, w, m)
             if weight > 0.0:
                 grid.lam[n] = lam / weight
                 if qd.static(mixed):
                     grid.density[n] = mass / filled if filled > 0.0 else 1.0
-                grid.slope_z[n] = turn
+                w.known_after[n] = sweep
 
 
 @qd.func
-def filled_at(grid: CoarseGrid, n):
-    """How full of fluid node `n` is; all, where the fluid is continued into a body."""
-    return qd.min(grid.fill[n], 1.0) if grid.slope_z[n] == 0.0 else 1.0
+def filled_at(grid: Level, w: Workspace, n):
+    """Liquid fraction of node `n`, at most 1; 1 where the liquid is continued into a body."""
+    return qd.min(grid.liquid[n], 1.0) if w.known_after[n] == 0.0 else 1.0
 
 
 @qd.func
-def density_at(grid: CoarseGrid, at, x: qd.template()):
+def density_at(grid: Level, w: Workspace, at, x: qd.template()):
     """The density of the fluid around a place in the world, over that of the heaviest."""
     dim = qd.static(x.n)
     s = in_cells(grid, flattened(at, x))
     nodes = corners(grid, qd.floor(s, qd.i32), dim)
-    weights = tents(s - qd.floor(s), dim)
+    weights = hat_weights(s - qd.floor(s), dim)
     mass, filled = 0.0, 0.0
     for c in qd.static(range(2**dim)):
-        share = weights[c] * filled_at(grid, nodes[c])
+        share = weights[c] * filled_at(grid, w, nodes[c])
         mass += share * grid.density[nodes[c]]
         filled += share
     return mass / filled if filled > 0.0 else 1.0
 
 
 @qd.func
-def multiplier_at(grid: CoarseGrid, at, x: qd.template()):
+def multiplier_at(grid: Level, at, x: qd.template()):
     """The multiplier at a place in the world, a plane's beyond the last nodes, and 0 where it would pull.
 
     Above the surface it does, where it is continued into a body. Cut off at the nodes, as it is at those in the air, it
@@ -110,10 +124,10 @@ def multiplier_at(grid: CoarseGrid, at, x: qd.template()):
     last = vec3(grid.nx - 2, grid.ny - 2, grid.nz - 2)
     low = qd.floor(s)
     for axis in qd.static(range(3)):
-        if qd.static(not grid.repeats >> axis & 1):
+        if qd.static(not grid.periodic >> axis & 1):
             low[axis] = qd.max(qd.min(low[axis], last[axis]), 0.0)
     nodes = corners(grid, qd.cast(low, qd.i32), dim)
-    weights = tents(s - low, dim)
+    weights = hat_weights(s - low, dim)
     total = 0.0
     for c in qd.static(range(2**dim)):
         total += weights[c] * grid.lam[nodes[c]]
@@ -121,8 +135,9 @@ def multiplier_at(grid: CoarseGrid, at, x: qd.template()):
 
 
 @qd.kernel(fastcache=True)
-def push_bodies(
-    grid: CoarseGrid,
+def push_pieces(
+    grid: Level,
+    w: Workspace,
     pieces: Pieces,
     solids: SolidSet,
     particles: Particles,
@@ -157,15 +172,19 @@ def push_bodies(
         wet = qd.min(qd.max(2.0 * depth / grid.dy, 0.0), 1.0) * pieces.volume[number] * grid.dy
         qd.atomic_add(solids.reaction[parts() * k + immersion()], qd.cast(qd.round(solids.unit[k] * wet), qd.i32))
         if qd.static(mixed):
-            wet *= density_at(grid, fallen, particles.x[0])
+            wet *= density_at(grid, w, fallen, particles.x[0])
         qd.atomic_add(solids.reaction[parts() * k + displacing()], qd.cast(qd.round(solids.unit[k] * wet), qd.i32))
 
 
-def push_on_grid(world: World, stiffness: float, per_lambda: float, c: Coefficients, *, mixed: int) -> None:
-    """Let the pressure that the finest grid has push the bodies; a body is no deeper than `FARTHEST` nodes."""
-    grid, pieces = world.levels[0], world.pieces
-    assert pieces is not None, "there are no bodies"
-    mark_known(grid)
-    for turn in range(1, min(FARTHEST, math.ceil(pieces.reach / min(grid.dx, grid.dy)) + 1) + 1):
-        continue_pressure(grid, c, stiffness, turn, AIR, mixed)
-    push_bodies(grid, pieces, world.solids, world.particles, stiffness, per_lambda, c, mixed)
+def push_bodies_by_pressure(world: World, stiffness: float, per_lambda: float, c: Coefficients, *, mixed: int) -> None:
+    """Push the bodies by the pressure on the finest grid; a body is no deeper than `FARTHEST` nodes.
+
+    `stiffness` is M of the rest lattice, `per_lambda` [1/m] makes a multiplier the depth of liquid at rest.
+    """
+    pressure, pieces = world.pressure, world.pieces
+    assert pressure is not None and pieces is not None, "there are no bodies in a tank"
+    grid, w = pressure.finest, pressure.workspace
+    mark_known(grid, w)
+    for sweep in range(1, min(FARTHEST, math.ceil(pieces.reach / min(grid.dx, grid.dy)) + 1) + 1):
+        extrapolate(grid, w, c, stiffness, sweep, AIR, mixed)
+    push_pieces(grid, w, pieces, world.solids, world.particles, stiffness, per_lambda, c, mixed)
