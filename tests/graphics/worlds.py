@@ -9,7 +9,7 @@ import numpy as np
 
 import wavetank as wt
 from wavetank.lab.bench.scenes import sized
-from wavetank.physics.grid_pressure import block
+from wavetank.physics.pressure import multigrid
 
 
 def compile_kernels() -> None:
@@ -33,7 +33,7 @@ def note(line: str) -> None:
 
 def move(block_nodes: str) -> None:
     """Print what becomes of a dam when levels of so many nodes are one block's."""
-    block.BLOCK_NODES = int(block_nodes)
+    multigrid.BLOCK_NODES = int(block_nodes)
     sim = wt.Simulation(sized(wt.Scene.load("dam-break"), 4000), arch="vulkan")
     for _ in range(6):
         sim.step()

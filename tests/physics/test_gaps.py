@@ -1,11 +1,13 @@
 """Gaps between rows of particles: rows that are drawn apart have some, water at rest has none, whatever its tank."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import wavetank as wt
 from wavetank.lab.cases.energy import energies
-from wavetank.physics.grid_pressure import correction
+from wavetank.physics.pressure import grid
 from wavetank.scene.fluids import Points
 from wavetank.simulation.simulation import Simulation
 
@@ -16,11 +18,11 @@ def test_water_at_rest_has_no_gaps(height):
     block = wt.Block(lower=(0, 0), upper=(1.03, height))
     sim = Simulation(wt.Scene(spacing=0.025, tank=wt.Tank(size=(1.03, 0.9)), fluids=[block]))
     sim.advance(1.0)
-    level = sim.world.levels[0]
+    level, workspace = sim.world.pressure.finest, sim.world.pressure.workspace
     nodes = level.nx * level.ny
-    gaps, fill = level.gaps.to_numpy()[:nodes], level.fill.to_numpy()[:nodes]
-    assert gaps[fill > 0.85].mean() < 1e-3
-    assert gaps[fill > 0.85].max() < 0.03
+    voids, liquid = workspace.voids.to_numpy()[:nodes], level.liquid.to_numpy()[:nodes]
+    assert voids[liquid > 0.85].mean() < 1e-3
+    assert voids[liquid > 0.85].max() < 0.03
     assert level.lam.to_numpy()[:nodes].any()
 
 
@@ -37,14 +39,14 @@ def test_rows_that_are_drawn_apart_have_gaps():
     )
     sim = Simulation(scene)
     sim.step()
-    level = sim.world.levels[0]
-    gaps = level.gaps.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
-    inner = gaps[3 : level.ny // 2, 2 : level.nx // 2]
-    free = correction.FULL - 1.0 / 1.125
+    level, workspace = sim.world.pressure.finest, sim.world.pressure.workspace
+    voids = workspace.voids.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
+    inner = voids[3 : level.ny // 2, 2 : level.nx // 2]
+    free = grid.THRESHOLDS.full - 1.0 / 1.125
     assert 0.5 * free < inner.mean() < 1.05 * free
-    room = level.room.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
+    room = level.open_volume.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
     assert (room < 1.0).any()
-    assert not gaps[room < 1.0].any()
+    assert not voids[room < 1.0].any()
 
 
 def fastest_after(sim: Simulation, seconds: float) -> float:
@@ -93,5 +95,5 @@ def test_a_block_that_runs_into_a_pool_does_not_gain_height(monkeypatch):
     early, late = energy_gained(24, 36)
     assert early < 0.03
     assert late < 0.0
-    monkeypatch.setattr(correction, "FULL", 0.0)
+    monkeypatch.setattr(grid, "THRESHOLDS", dataclasses.replace(grid.THRESHOLDS, full=0.0))
     assert energy_gained(24)[0] > 0.06

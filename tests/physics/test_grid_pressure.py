@@ -8,55 +8,61 @@ import pytest
 import wavetank as wt
 from wavetank.device import compiler
 from wavetank.device.compiler import qd
-from wavetank.device.state import CoarseGrid
 from wavetank.foundation.materials import Material
 from wavetank.physics import step as step_of_algorithm
 from wavetank.physics.coefficients import coefficients
-from wavetank.physics.grid_pressure import coarse_grid, couplings, poisson
-from wavetank.physics.grid_pressure import correction as coarse_pressure
-from wavetank.physics.grid_pressure.coarse_grid import new_levels
 from wavetank.physics.plan import has_grid_pressure
+from wavetank.physics.pressure import grid as pressure_grid
+from wavetank.physics.pressure import multigrid, solids
+from wavetank.physics.pressure.correct import look_at_solids
+from wavetank.physics.pressure.grid import Level, Workspace, new_pressure_grid
 from wavetank.physics.smoothing import NAMES, kernel_shape, rest_lattice
 from wavetank.scene.fluids import Points
 from wavetank.simulation.simulation import Simulation
 
 
 @qd.kernel(fastcache=True)
-def couple(level: CoarseGrid, least_theta: qd.f32):
-    """Set the couplings of a finest level, as `find_room` and `gather` do."""
+def set_coefficients(level: Level, w: Workspace):
+    """Set the coefficients of a finest level, as `find_open_volume` and `assemble` do."""
     for n in range(level.nx * level.ny * level.nz):
-        couplings.open_faces(level, n)
-    for piece in range(level.pieces * level.ny * level.nz):
-        couplings.couple_nodes(level, piece, least_theta, 0)
+        solids.find_apertures(level, w, n)
+    for segment in range(level.segments * level.ny * level.nz):
+        multigrid.set_coefficients(level, segment, 0)
 
 
-def filled(level, heights) -> None:
+def filled(grid, heights) -> None:
     """Water up to `heights` [cells] in every column of a 2-D level, and no solid."""
+    level = grid.finest
     rows = np.arange(level.ny)[:, None]
     fill = np.clip(np.asarray(heights)[None, :] - rows, 0.0, 1.0)
-    for array, values in ((level.fill, fill), (level.room, np.ones_like(fill)), (level.density, np.ones_like(fill))):
+    for array, values in (
+        (level.liquid, fill),
+        (level.open_volume, np.ones_like(fill)),
+        (level.density, np.ones_like(fill)),
+    ):
         whole = array.to_numpy()
         whole[: values.size] = values.ravel()
         array.from_numpy(whole)
-    couple(level, couplings.LEAST_THETA)
+    set_coefficients(level, grid.workspace)
 
 
-def levels_of(size, h, repeats=0):
-    """Grids of a tank at the origin."""
-    return new_levels((np.zeros(len(size)), np.array(size)), h, repeats)
+def grid_of(size, h, periodic=0):
+    """The grid of a tank at the origin."""
+    return new_pressure_grid((np.zeros(len(size)), np.array(size)), h, periodic)
 
 
 def test_weight_at_the_bottom_becomes_hydrostatic_pressure():
     """laplace lambda = C with C in the lowest cells alone: a straight line from the surface down to C H dy."""
-    level = levels_of((0.8, 1.6), 0.1)[0]
+    grid = grid_of((0.8, 1.6), 0.1)
+    level = grid.finest
     assert (level.nx, level.ny) == (8, 16)
     surface = 12.75  # the filling of the 13th cell is 0.75: its surface is a quarter of a cell above its centre
-    filled(level, np.full(8, surface))
+    filled(grid, np.full(8, surface))
     rhs = np.zeros(level.rhs.shape[0], np.float32)
     rhs[: level.nx] = 1.0
     level.rhs.from_numpy(rhs)
     for _ in range(4):
-        poisson.solve(level, level, poisson.GO_ON, 200, 1.8, 0)
+        multigrid.solve(level, level, int(multigrid.Start.CURRENT), 200, 1.8, 0)
     lam = level.lam.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx)
     # The fill crosses one half a third of the way up, but the volume ends after a quarter.
     depth = level.dy * (12.25 - np.arange(13))
@@ -67,11 +73,11 @@ def test_weight_at_the_bottom_becomes_hydrostatic_pressure():
 @pytest.mark.parametrize("cells", [4.0, 4.9, 5.0, 9.7, 10.0, 13.0, 50.0, 63.0, 217.3])
 def test_levels_of_an_axis_that_repeats_are_even(cells):
     """Two colours alternate across the seam only then; cells are about a support long all the same."""
-    levels = levels_of((cells * 0.1, 1.6), 0.1, repeats=1)
+    levels = grid_of((cells * 0.1, 1.6), 0.1, periodic=1).levels
     assert all(level.nx % 2 == 0 for level in levels)
     assert levels[0].nx / cells == pytest.approx(1.0, abs=0.21)
     assert levels[-1].nx < 16
-    assert levels_of((1.6, 1.6), 0.1)[-1].nx == 8
+    assert grid_of((1.6, 1.6), 0.1).levels[-1].nx == 8
 
 
 @pytest.mark.parametrize("number", [0, 1, 2])
@@ -79,17 +85,17 @@ def test_levels_that_repeat_do_not_know_where_the_seam_is(number):
     """What is moved along the ring by so many nodes gives the same multipliers, moved, on all levels."""
     found = []
     for by in (0, 8):
-        levels = levels_of((3.2, 1.6), 0.1, repeats=1)
-        finest = levels[0]
+        grid = grid_of((3.2, 1.6), 0.1, periodic=1)
+        levels, finest = grid.levels, grid.finest
         assert finest.nx == 32
         heights = np.roll(11.4 + 2.0 * np.sin(2.0 * np.pi * np.arange(32) / 32), by)
-        filled(finest, heights)
+        filled(grid, heights)
         rhs = np.zeros(finest.rhs.shape[0], np.float32)
         errors = np.random.default_rng(number).normal(0.2, 1.0, (finest.ny, finest.nx))
         rhs[: finest.nx * finest.ny] = np.roll(errors, by, axis=1).ravel()
         finest.rhs.from_numpy(rhs)
-        poisson.restrict_rooms(levels)
-        poisson.solve_levels(levels)
+        multigrid.restrict_solids(levels)
+        multigrid.solve_levels(levels)
         lam = finest.lam.to_numpy()[: finest.nx * finest.ny].reshape(finest.ny, finest.nx)
         found.append(np.roll(lam, -by, axis=1))
     assert found[0].min() < 0
@@ -106,7 +112,7 @@ def random_errors(level) -> None:
 def error_of(lam: np.ndarray, finest) -> float:
     """Distance of multipliers from those of many sweeps, relative."""
     for _ in range(20):
-        poisson.solve(finest, finest, poisson.GO_ON, 200, 1.95, 0)
+        multigrid.solve(finest, finest, int(multigrid.Start.CURRENT), 200, 1.95, 0)
     exact = finest.lam.to_numpy()
     return float(np.linalg.norm(lam - exact) / np.linalg.norm(exact))
 
@@ -114,25 +120,25 @@ def error_of(lam: np.ndarray, finest) -> float:
 @pytest.mark.parametrize("size", [(1.6, 3.2), (0.25, 3.2), (6.0, 0.4)], ids=["wide", "narrow", "flat"])
 def test_few_sweeps_on_all_levels_come_close(size):
     """The grids together reach within a twentieth what one grid needs hundreds of sweeps for."""
-    levels = levels_of(size, 0.05)
-    finest = levels[0]
-    filled(finest, 0.65 * finest.ny + 0.06 * finest.ny * np.sin(0.3 * np.arange(finest.nx)))
+    grid = grid_of(size, 0.05)
+    levels, finest = grid.levels, grid.finest
+    filled(grid, 0.65 * finest.ny + 0.06 * finest.ny * np.sin(0.3 * np.arange(finest.nx)))
     random_errors(finest)
-    poisson.restrict_rooms(levels)
-    poisson.solve_levels(levels)
+    multigrid.restrict_solids(levels)
+    multigrid.solve_levels(levels)
     assert error_of(finest.lam.to_numpy(), finest) < 0.05
-    poisson.solve(finest, finest, poisson.ZERO, 8, 1.5, 0)
+    multigrid.solve(finest, finest, int(multigrid.Start.ZERO), 8, 1.5, 0)
     assert error_of(finest.lam.to_numpy(), finest) > (0.02 if size[1] < 1.0 else 0.3), "one level alone does not"
 
 
 def test_few_sweeps_come_close_under_a_rough_surface():
     """A surface that leaps by a cell or two from column to column is another one to each level."""
-    levels = levels_of((1.6, 3.2), 0.05)
-    finest = levels[0]
-    filled(finest, 40.0 + 4.0 * np.sin(np.arange(finest.nx)))
+    grid = grid_of((1.6, 3.2), 0.05)
+    levels, finest = grid.levels, grid.finest
+    filled(grid, 40.0 + 4.0 * np.sin(np.arange(finest.nx)))
     random_errors(finest)
-    poisson.restrict_rooms(levels)
-    poisson.solve_levels(levels)
+    multigrid.restrict_solids(levels)
+    multigrid.solve_levels(levels)
     assert error_of(finest.lam.to_numpy(), finest) < 0.12
 
 
@@ -142,10 +148,10 @@ def test_few_sweeps_come_close_behind_walls(walls, bound):
 
     They did, and left errors of 0.75 in a room below the water and of 0.13 around a box with a hole.
     """
-    levels = levels_of((1.6, 1.6), 0.05)
-    finest = levels[0]
-    filled(finest, np.full(finest.nx, 0.8 * finest.ny))
-    room = finest.room.to_numpy()
+    grid = grid_of((1.6, 1.6), 0.05)
+    levels, finest = grid.levels, grid.finest
+    filled(grid, np.full(finest.nx, 0.8 * finest.ny))
+    room = finest.open_volume.to_numpy()
     cells = room[: finest.nx * finest.ny].reshape(finest.ny, finest.nx)
     if walls == "room":
         cells[2:, finest.nx // 2 - 1] = 0.0
@@ -154,11 +160,11 @@ def test_few_sweeps_come_close_behind_walls(walls, bound):
         cells[5:12, 5:14:8] = 0.0
         cells[5:12:6, 5:14] = 0.0
         cells[5, 9] = 1.0
-    finest.room.from_numpy(room)
-    couple(finest, couplings.LEAST_THETA)
+    finest.open_volume.from_numpy(room)
+    set_coefficients(finest, grid.workspace)
     random_errors(finest)
-    poisson.restrict_rooms(levels)
-    poisson.solve_levels(levels)
+    multigrid.restrict_solids(levels)
+    multigrid.solve_levels(levels)
     assert error_of(finest.lam.to_numpy(), finest) < bound
 
 
@@ -179,8 +185,8 @@ def test_stiffness_is_what_a_field_of_multipliers_moves_by(dim, kernel):
 
 
 def test_cells_divide_the_tank_and_are_halved_together():
-    levels = levels_of((2.1, 1.05, 0.33), 0.0475)
-    finest = levels[0]
+    grid = grid_of((2.1, 1.05, 0.33), 0.0475)
+    levels, finest = grid.levels, grid.finest
     assert finest.nx * finest.dx == pytest.approx(2.1) and finest.nz * finest.dz == pytest.approx(0.33)
     assert max(finest.dx, finest.dy, finest.dz) < 1.35 * 0.0475 and min(finest.dx, finest.dy, finest.dz) > 0.7 * 0.0475
     for fine, coarse in itertools.pairwise(levels):
@@ -239,9 +245,9 @@ def test_full_cells_draw_nothing_in(monkeypatch, spread, drawn):
 
     monkeypatch.setattr(step_of_algorithm, "measure_density", read)
     sim.step()
-    level = sim.world.levels[0]
+    level, voids = sim.world.pressure.finest, sim.world.pressure.workspace.voids
     rhs, gaps, fill = (
-        a.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx) for a in (level.rhs, level.gaps, level.fill)
+        a.to_numpy()[: level.nx * level.ny].reshape(level.ny, level.nx) for a in (level.rhs, voids, level.liquid)
     )
     inner = (slice(3, level.ny // 2), slice(3, -3))
     np.testing.assert_allclose(fill[inner], 1.0 / spread, atol=0.02)
@@ -275,7 +281,7 @@ def test_threads_together_solve_what_one_does(monkeypatch):
     found = []
     for few, sums in ((10**9, 4), (0, 1)):
         monkeypatch.setattr(compiler, "FEW", few)
-        monkeypatch.setattr(coarse_grid, "sums_of", lambda nodes, sums=sums: sums)
+        monkeypatch.setattr(pressure_grid, "_parts_of", lambda nodes, sums=sums: sums)
         sim = Simulation(wt.Scene.load("dam-break-2d").changed(spacing=0.05))
         for _ in range(3):
             sim.step()
@@ -283,10 +289,15 @@ def test_threads_together_solve_what_one_does(monkeypatch):
     np.testing.assert_array_equal(*found)
 
 
-def inner(level, name: str) -> np.ndarray:
+def inner(grid, name: str) -> np.ndarray:
     """A quantity of the nodes of a finest level, [z, y, x]."""
+    level = grid.finest
     nodes = level.nx * level.ny * level.nz
-    return getattr(level, name).to_numpy()[:nodes].reshape(level.nz, level.ny, level.nx)
+    return (
+        getattr(level if hasattr(level, name) else grid.workspace, name)
+        .to_numpy()[:nodes]
+        .reshape(level.nz, level.ny, level.nx)
+    )
 
 
 def test_cells_are_as_open_as_a_box_leaves_them():
@@ -296,15 +307,15 @@ def test_cells_are_as_open_as_a_box_leaves_them():
     water = wt.Block(lower=(0, 0, 0), upper=(0.2, 0.3, 0.6))
     sim = Simulation(wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6, 0.6)), fluids=[water], solids=[box]))
     sim.step()
-    level = sim.world.levels[0]
-    room, edges = inner(level, "room"), np.array([level.dx, level.dy, level.dz])
+    level = sim.world.pressure.finest
+    room, edges = inner(sim.world.pressure, "open_volume"), np.array([level.dx, level.dy, level.dz])
     shape = np.array([level.nx, level.ny, level.nz])
     places = np.stack(np.meshgrid(*[(np.arange(n) + 0.5) * e for n, e in zip(shape, edges)], indexing="ij"), -1)
     beyond = np.maximum(low - places, places - high).max(axis=-1).transpose(2, 1, 0)
     assert room[beyond < -0.5 * edges.max()].max() == 0.0
     np.testing.assert_allclose(room[beyond > 1.0 * edges.max()], 1.0, atol=1e-3)
     assert room.sum() * edges.prod() == pytest.approx(0.36 - (high - low).prod(), rel=0.01)
-    near = inner(level, "clear") <= 0.0
+    near = inner(sim.world.pressure, "far_from_solids") == 0.0
     assert near[beyond < edges.min()].all() and not near.all()
 
 
@@ -315,8 +326,8 @@ def test_water_beside_a_solid_fills_its_cells():
     water = wt.Block(lower=(0, 0, 0), upper=(1.2, 0.6, 0.8))
     sim = Simulation(wt.Scene(spacing=d, tank=wt.Tank(size=(1.2, 0.8, 0.8)), fluids=[water], solids=[box]))
     sim.step()
-    level = sim.world.levels[0]
-    fill, room = inner(level, "fill"), inner(level, "room")
+    level = sim.world.pressure.finest
+    fill, room = inner(sim.world.pressure, "liquid"), inner(sim.world.pressure, "open_volume")
     inside = (slice(None), slice(0, int(0.45 / level.dy)), slice(None))
     assert fill[inside][room[inside] == 1.0].min() > 0.95
     assert fill[room == 0.0].max() == 0.0 and (room == 0.0).any()
@@ -333,19 +344,17 @@ def test_the_room_that_solids_leave_follows_them():
     def room() -> np.ndarray:
         with compiler.watched(lambda module, name, launch: (names.append(name), launch())[1]):
             sim.step()
-        level = sim.world.levels[0]
-        kept = level.room.to_numpy()
-        args = coarse_pressure.LEAST_OPEN, coarse_pressure.UNIT, sim.scene.spacing, int(sim.world.has_solids), 3, 1
-        c = coefficients(sim.scene, 1.0 / 60.0)
-        coarse_pressure.find_room(level, sim.world.room_found, sim.world.solids, c, *args)
-        np.testing.assert_array_equal(level.room.to_numpy(), kept)
+        level = sim.world.pressure.finest
+        kept = level.open_volume.to_numpy()
+        look_at_solids(sim.world, sim.world.pressure, sim.scene, coefficients(sim.scene, 1.0 / 60.0))
+        np.testing.assert_array_equal(level.open_volume.to_numpy(), kept)
         return kept
 
     names: list[str] = []
     first = room()
     names.clear()
     np.testing.assert_array_equal(room(), first)
-    assert "gather" in names and "find_room" not in names
+    assert "assemble" in names and "find_open_volume" not in names
     sim.move("box", (0.5, 0.2, 0.3))
     assert (room() != first).any()
     sim.move("box", (0.3, 0.2, 0.3))
@@ -389,12 +398,10 @@ def test_solids_together_leave_the_room_that_their_union_does(count):
     def room(solids) -> tuple[np.ndarray, ...]:
         scene = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6, 0.6)), fluids=[water], solids=solids)
         sim = Simulation(scene)
-        level = sim.world.levels[0]
-        args = coarse_pressure.LEAST_OPEN, coarse_pressure.UNIT, sim.scene.spacing, int(sim.world.has_solids), 3, 1
-        c = coefficients(sim.scene, 1.0 / 60.0)
-        coarse_pressure.find_room(level, sim.world.room_found, sim.world.solids, c, *args)
+        level, workspace = sim.world.pressure.finest, sim.world.pressure.workspace
+        look_at_solids(sim.world, sim.world.pressure, sim.scene, coefficients(sim.scene, 1.0 / 60.0))
         nodes = level.nx * level.ny * level.nz
-        return level.room.to_numpy()[:nodes], level.thin_s.to_numpy()[:nodes]
+        return level.open_volume.to_numpy()[:nodes], workspace.thin_distance.to_numpy()[:nodes]
 
     apart, together = room(balls), room([wt.Union(parts=balls)])
     assert apart[0].min() < 0.95

@@ -7,56 +7,58 @@ from scipy.optimize import least_squares
 import wavetank as wt
 from wavetank.device import compiler
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import CoarseGrid, Particles, Scratch, new_particles, new_scratch
-from wavetank.physics.grid_pressure.coarse_grid import new_levels
-from wavetank.physics.grid_pressure.parcels import add_parcels
+from wavetank.device.state import Particles, Scratch, new_particles, new_scratch
+from wavetank.physics.pressure.grid import Level, Variant, Workspace, new_pressure_grid
+from wavetank.physics.pressure.liquid import add_footprints
 
 UNIT = float(1 << 24)
 
 
 @qd.kernel
 def add(
-    grid: CoarseGrid,
+    grid: Level,
+    w: Workspace,
     particles: Particles,
     scratch: Scratch,
     spacing: qd.f32,
     count: qd.i32,
     lanes: qd.template(),
-    searched: qd.template(),
+    has: Variant,
 ):
     """Add what nodes have of these particles to the sums."""
     qd.loop_config(serialize=True)
     for team in range((count + lanes - 1) // lanes):
-        add_parcels(grid, particles, scratch, spacing, UNIT, team, 0, count, lanes, searched, False)
+        add_footprints(grid, w, particles, scratch, spacing, UNIT, team, 0, count, lanes, has)
 
 
-def shares_of(level, places, spacing, searched=0):
+def shares_of(grid, places, spacing, solids=0, thin=0):
     """What each node has of boxes of that size at `places` [n, 3], [nz, ny, nx]."""
     particles, scratch = new_particles(3, len(places)), new_scratch(len(places))
     for component, values in zip((particles.px, particles.py, particles.pz), places.T, strict=True):
         upload(component, np.pad(values, (0, component.shape[0] - len(values))).astype(np.float32))
-    level.sums.fill(0)
-    add(level, particles, scratch, spacing, len(places), compiler.lanes(), searched)
+    level, workspace = grid.finest, grid.workspace
+    workspace.sums.fill(0)
+    has = Variant(solids=solids, thin_walls=thin, bodies=0, mixed=0, few_nodes=1)
+    add(level, workspace, particles, scratch, spacing, len(places), compiler.lanes(), has)
     nodes = level.nx * level.ny * level.nz
-    return level.sums.to_numpy()[:nodes].reshape(level.nz, level.ny, level.nx) / UNIT
+    return workspace.sums.to_numpy()[:nodes].reshape(level.nz, level.ny, level.nx) / UNIT
 
 
 @pytest.fixture(scope="module")
-def level():
+def grid():
     compiler.start("cpu")
-    found = new_levels((np.zeros(3), np.array([1.0, 1.2, 0.8])), 0.1)[0]
-    found.room.fill(1.0)
-    found.clear.fill(1.0)
+    found = new_pressure_grid((np.zeros(3), np.array([1.0, 1.2, 0.8])), 0.1)
+    found.finest.open_volume.fill(1.0)
     return found
 
 
-def test_shares_are_the_mean_of_a_tent_over_the_box(level):
+def test_shares_are_the_mean_of_a_tent_over_the_box(grid):
     """Bardenhagen and Kober 2004, with tents: here the mean over 20 points along each axis."""
-    rng, d = np.random.default_rng(2), 0.055
+    level, rng, d = grid.finest, np.random.default_rng(2), 0.055
     edges, sizes = np.array([level.dx, level.dy, level.dz]), (level.nx, level.ny, level.nz)
     parts = ((np.arange(20) + 0.5) / 20 - 0.5) * d
     for place in rng.uniform(0.2, 0.6, (20, 3)):
-        shares = shares_of(level, place[None], d)
+        shares = shares_of(grid, place[None], d)
         means = [
             np.maximum(1.0 - np.abs((place[k] + parts) / edges[k] - 0.5 - np.arange(sizes[k])[:, None]), 0.0).mean(1)
             for k in range(3)
@@ -67,14 +69,14 @@ def test_shares_are_the_mean_of_a_tent_over_the_box(level):
         assert np.array(first) == pytest.approx(place / edges - 0.5, abs=1e-4)  # the first moment is kept
 
 
-def test_a_lattice_fills_its_room_wherever_it_lies(level):
+def test_a_lattice_fills_its_room_wherever_it_lies(grid):
     """Boxes of the spacing leave no gap; as points, its particles fill nodes by 0.97 to 1.03 with these cells."""
-    d = 0.057
+    level, d = grid.finest, 0.057
     rows = np.arange(24) * d
     for shift in (0.0, 0.013, 0.03, 0.049):
         places = np.stack(np.meshgrid(rows, rows, rows, indexing="ij"), -1).reshape(-1, 3) - 0.2 + shift
         inside = ((places > 0.0) & (places < (1.0, 1.2, 0.8))).all(axis=1)
-        fill = shares_of(level, places[inside], d) * d**3 / (level.dx * level.dy * level.dz)
+        fill = shares_of(grid, places[inside], d) * d**3 / (level.dx * level.dy * level.dz)
         assert fill[2:6, 2:8, 2:7] == pytest.approx(1.0, abs=1e-4)
 
 
@@ -82,10 +84,9 @@ def test_a_lattice_fills_its_room_wherever_it_lies(level):
 def test_what_is_beyond_a_narrow_tank_counts_at_its_walls(width):
     """A tank one, two or three cells wide: each particle counts once, those near a wall at the node beside it."""
     compiler.start("cpu")
-    narrow = new_levels((np.zeros(3), np.array([width, 0.8, 0.8])), 0.1)[0]
-    narrow.room.fill(1.0)
-    narrow.clear.fill(1.0)
-    assert narrow.nx == round(width / 0.1)
+    narrow = new_pressure_grid((np.zeros(3), np.array([width, 0.8, 0.8])), 0.1)
+    narrow.finest.open_volume.fill(1.0)
+    assert narrow.finest.nx == round(width / 0.1)
     places = np.random.default_rng(0).uniform(0.01, 0.99, (40, 3)) * np.array([width, 0.8, 0.8])
     shares = shares_of(narrow, places, 0.05)
     assert shares.sum() == pytest.approx(40.0, abs=1e-4)
@@ -93,19 +94,20 @@ def test_what_is_beyond_a_narrow_tank_counts_at_its_walls(width):
     assert one[:, :, 0].sum() == pytest.approx(1.0, abs=1e-5)
 
 
-def test_nodes_without_room_leave_their_share_to_others(level):
+def test_nodes_without_room_leave_their_share_to_others(grid):
     """A particle beside a solid counts in full at the nodes that are open to it."""
+    level = grid.finest
     nodes = level.nx * level.ny * level.nz
-    room = np.ones(level.room.shape[0], np.float32)
+    room = np.ones(level.open_volume.shape[0], np.float32)
     room[:nodes].reshape(level.nz, level.ny, level.nx)[:, :5] = 0.0
-    level.room.from_numpy(room)
-    level.clear.fill(-1.0)
+    level.open_volume.from_numpy(room)
+    grid.workspace.near_closed.fill(1.0)
     for place, whole in (((0.4, 0.52, 0.4), 1.0), ((0.43, 0.5, 0.38), 1.0), ((0.41, 0.2, 0.37), 0.0)):
-        shares = shares_of(level, np.array([place]), 0.055, searched=1)
+        shares = shares_of(grid, np.array([place]), 0.055, solids=1)
         assert shares.sum() == pytest.approx(whole, abs=1e-5)  # the last has none around it
         assert not shares[:, :5].any()
-    level.room.fill(1.0)
-    level.clear.fill(1.0)
+    level.open_volume.fill(1.0)
+    grid.workspace.near_closed.fill(0.0)
 
 
 def growth(sim, depth: float, seconds: float) -> tuple[float, float]:
@@ -144,16 +146,17 @@ def test_only_particles_that_may_be_cut_off_ask_which_nodes_are_open(turn):
     water = wt.Block(lower=(0.0, 0.0, 0.0), upper=(1.0, 0.4, 0.9))
     tank = wt.Tank(size=(1.0, 0.8, 0.9))
     sim = wt.Simulation(wt.Scene(spacing=0.05, tank=tank, fluids=[water], solids=[plate, ball, block]))
-    level, rng = sim.world.levels[0], np.random.default_rng(4)
+    grid, rng = sim.world.pressure, np.random.default_rng(4)
+    level, near_closed = grid.finest, grid.workspace.near_closed
     places = rng.uniform(0.0, tank.size, (20_000, 3))
-    marks = level.clear.to_numpy()
-    assert 0.1 < (marks[: level.nx * level.ny * level.nz] < 0.0).mean() < 0.6
-    found = shares_of(level, places, 0.05, searched=2)
-    level.clear.fill(-1.0)
-    asked = shares_of(level, places, 0.05, searched=2)
+    marks = near_closed.to_numpy()
+    assert 0.1 < (marks[: level.nx * level.ny * level.nz] > 0.0).mean() < 0.6
+    found = shares_of(grid, places, 0.05, solids=1, thin=1)
+    near_closed.fill(1.0)
+    asked = shares_of(grid, places, 0.05, solids=1, thin=1)
     assert np.abs(found - asked).max() < 1e-3
-    level.clear.fill(0.0)
-    assert np.abs(shares_of(level, places, 0.05, searched=2) - asked).max() > 0.3
+    near_closed.fill(0.0)
+    assert np.abs(shares_of(grid, places, 0.05, solids=1, thin=1) - asked).max() > 0.3
 
 
 @pytest.mark.parametrize("size", [(40, 50, 20), (40, 59, 20), (40, 60, 20), (24, 29, 16), (31, 29, 14)], ids=str)

@@ -43,7 +43,7 @@ def fastest(sim, before, frames):
 def test_water_inside_and_around_a_box_of_boards_is_at_rest(thick):
     """Hydrostatics: seams are no room, and both waters have a pressure of their own. It was at 0.25 and 2 m/s."""
     sim = wt.Simulation(under_water(boards((0.6, 0.4), (0.4, 0.3), thick)))
-    assert sim.world.basins == 2
+    assert sim.world.pressure.regions == 2
     assert fastest(sim, 60, 90) < 0.05
 
 
@@ -58,7 +58,7 @@ def test_a_box_in_one_piece_keeps_two_waters_apart():
     """Parts of a union have seams as well. A lone particle in an inner corner hops at 0.06 m/s, as it did before."""
     shell = wt.Union(center=(0.6, 0.4), parts=boards((0.0, 0.0), (0.4, 0.3), 0.1))
     sim = wt.Simulation(under_water([shell]))
-    assert sim.world.basins == 2
+    assert sim.world.pressure.regions == 2
     for _ in range(120):
         sim.step()
     assert np.sqrt(np.mean(np.sum(sim.velocities**2, axis=1))) < 0.005

@@ -1,4 +1,4 @@
-"""What faces sideways is no roof, below which what lacks would be a slit and not air (`grid_pressure/slits.py`)."""
+"""What faces sideways is no roof, below which what lacks would be a slit and not air (`pressure/liquid.py`)."""
 
 import numpy as np
 import pytest
@@ -15,15 +15,20 @@ def cells_beside(center: tuple[float, float], angle: float, *names: str) -> list
     block = wt.Block(lower=(0, 0), upper=(0.8, DEPTH))
     sim = wt.Simulation(wt.Scene(spacing=SPACING, tank=wt.Tank(size=(0.8, 0.6)), fluids=[block], solids=[box]))
     sim.step()
-    level = sim.world.levels[0]
-    return [download(getattr(level, name))[: level.nx * level.ny].reshape(level.ny, level.nx) for name in names]
+    level, workspace = sim.world.pressure.finest, sim.world.pressure.workspace
+    return [
+        download(getattr(workspace if name == "depth" else level, name))[: level.nx * level.ny].reshape(
+            level.ny, level.nx
+        )
+        for name in names
+    ]
 
 
 @pytest.mark.parametrize("angle", [0.1, -0.1])
 def test_the_side_of_a_body_that_leans_is_no_roof(angle):
     """Open cells at the waterline beside it are as full as those far from it, wherever it stands in them."""
     for shift in np.arange(0.0, 2.0 * SPACING, 0.2 * SPACING):
-        fill, room = cells_beside((0.4 + shift, 0.25), angle, "fill", "room")
+        fill, room = cells_beside((0.4 + shift, 0.25), angle, "liquid", "open_volume")
         line = int(DEPTH / (2.0 * SPACING))  # the row of cells that begins at the surface
         is_open = room[line] >= 0.97
         assert fill[line, is_open].max() < fill[line, 0] + 0.25
@@ -32,7 +37,7 @@ def test_the_side_of_a_body_that_leans_is_no_roof(angle):
 def test_nodes_that_a_body_takes_are_as_deep_as_those_beside_them():
     """Hydrostatics: the water is level; or what is at the waterline is carried or falls as the body takes a node."""
     for shift in np.arange(0.0, 2.0 * SPACING, 0.2 * SPACING):
-        fields = cells_beside((0.4 + shift, 0.25), 0.0, "room", "depth")
+        fields = cells_beside((0.4 + shift, 0.25), 0.0, "open_volume", "depth")
         row = int(DEPTH / (2.0 * SPACING)) - 1  # the highest that is full of water
         room, depth = (field[row] for field in fields)
         is_taken = np.flatnonzero(room == 0.0)

@@ -279,16 +279,9 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     grid = world.pressure
     assert grid is not None, "there is no tank"
     finest, w, gravity = grid.finest, grid.workspace, (c.gravity_x, c.gravity_y, c.gravity_z)
-    has = Variant(
-        solids=int(world.has_solids),
-        thin_walls=int(world.may_have_thin_walls),
-        bodies=int(world.pieces is not None),
-        mixed=int(kinds.mixed),
-        few_nodes=int(not is_shared(finest)),
-    )
     if grid.solids_version != world.solids_version or (world.pieces and grid.gravity != gravity):
-        look_at_solids(world, grid, params, c, remembered(has))
-    has = remembered(dataclasses.replace(has, thin_walls=int(grid.has_thin_walls)))
+        look_at_solids(world, grid, params, c)
+    has = variant_of(world, mixed=kinds.mixed, thin_walls=grid.has_thin_walls)
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     source = source_of(finest, params, stiffness, bodies=world.pieces is not None)
     assemble(
@@ -313,8 +306,22 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         push_bodies_by_pressure(world, stiffness, per_lambda, c, mixed=kinds.mixed)
 
 
-def look_at_solids(world: World, grid: PressureGrid, params: Parameters, c: Coefficients, has: Variant) -> None:
+def variant_of(world: World, *, mixed: int = 0, thin_walls: bool) -> Variant:
+    """Return what kernels of the grid are compiled for; some walls may be `thin_walls`."""
+    return remembered(
+        Variant(
+            solids=int(world.has_solids),
+            thin_walls=int(thin_walls),
+            bodies=int(world.pieces is not None),
+            mixed=int(mixed),
+            few_nodes=int(world.pressure is not None and not is_shared(world.pressure.finest)),
+        )
+    )
+
+
+def look_at_solids(world: World, grid: PressureGrid, params: Parameters, c: Coefficients) -> None:
     """Find what solids leave open of the cells, once they have moved."""
+    has = variant_of(world, thin_walls=world.may_have_thin_walls)
     grid.found.fill(0)
     find_open_volume(grid.finest, grid.workspace, grid.found, world.solids, c, UNIT, params.spacing, params.dim, has)
     find_regions(grid.finest, grid.workspace, grid.found)
