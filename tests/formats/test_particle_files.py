@@ -2,10 +2,33 @@ import numpy as np
 import pytest
 
 from wavetank.formats import EXPORTERS, exporter_for, exporter_named, suffixes
-from wavetank.formats.csv import read_csv, write_csv
+from wavetank.formats.csv import write_csv
 from wavetank.formats.npz import read_npz, write_npz
-from wavetank.formats.ply import COLUMNS, FOAM_COLUMNS, read_foam, read_ply, write_ply
+from wavetank.formats.ply import COLUMNS, FOAM_COLUMNS, write_ply
 from wavetank.foundation.errors import WavetankError
+
+
+def read_csv(path):
+    """Columns by name, float64 [count]."""
+    names, *lines = path.read_text("utf-8").splitlines()
+    rows = [line.split(",") for line in lines if not line.startswith("#")]
+    return dict(zip(names.split(","), np.array(rows, float).reshape(-1, names.count(",") + 1).T, strict=True))
+
+
+def read_ply(path):
+    """Elements by name, structured arrays [count]."""
+    header, _, body = path.read_bytes().partition(b"end_header\n")
+    kinds, elements, at = {"float": "<f4", "int": "<i4", "uchar": "u1"}, {}, 0
+    for words in map(str.split, header.decode("ascii").splitlines()):
+        if words[0] == "element":
+            elements[words[1]] = (int(words[2]), [])
+        elif words[0] == "property":
+            [*elements.values()][-1][1].append((words[2], kinds[words[1]]))
+    for name, (count, columns) in elements.items():
+        elements[name] = np.frombuffer(body, columns, count, at)
+        at += elements[name].nbytes
+    assert at == len(body)
+    return elements
 
 
 def test_npz_brings_everything_back(tmp_path, frame):
@@ -52,7 +75,8 @@ def test_csv_brings_every_bit_back(tmp_path, frame):
 
 def test_ply_brings_every_bit_back(tmp_path, frame):
     write_ply(tmp_path / "a.ply", frame)
-    back = read_ply(tmp_path / "a.ply")
+    parts = read_ply(tmp_path / "a.ply")
+    back, foam = parts["vertex"], parts["foam"]
     assert len(back) == frame.count
     for k in range(3):
         for name, values in (("xyz"[k], frame.positions), ("v" + "xyz"[k], frame.velocities)):
@@ -64,7 +88,6 @@ def test_ply_brings_every_bit_back(tmp_path, frame):
     palette = np.array([(0x2F, 0x7F, 0xD0), (0xE0, 0xA5, 0x26), (0xE0, 0xA5, 0x26)])[frame.materials]
     colors = np.where(dyed[:, None], (1 - half) * palette + half * np.array((0xC0, 0x10, 0x30)), palette)
     assert (np.stack([back[name] for name in ("red", "green", "blue")], 1) == np.round(colors)).all()
-    foam = read_foam(tmp_path / "a.ply")
     for k in range(3):
         for name, values in (("xyz"[k], frame.foam_positions), ("v" + "xyz"[k], frame.foam_velocities)):
             assert (foam[name] == (values[:, k] if k < frame.dim else 0.0)).all()
@@ -89,7 +112,7 @@ def test_ply_has_the_header_that_readers_expect(tmp_path, frame):
 def test_no_particles_are_a_file_too(tmp_path, nothing, suffix):
     path = tmp_path / f"empty{suffix}"
     exporter_for(path).write(path, nothing)
-    readers = {".npz": read_npz, ".csv": read_csv, ".ply": read_ply}
+    readers = {".npz": read_npz, ".csv": read_csv, ".ply": lambda path: read_ply(path)["vertex"]}
     back = readers[suffix](path)
     assert len(back["x"] if suffix != ".npz" else back["positions"]) == 0
 

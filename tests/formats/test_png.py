@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from wavetank.formats.png import read_metadata, write_png
+from wavetank.formats.png import write_png
 from wavetank.foundation.errors import WavetankError
 
 
@@ -13,7 +13,7 @@ def test_pixels_and_texts_come_back(tmp_path):
     with Image.open(tmp_path / "a.png") as back:
         assert back.mode == "RGB"
         assert (np.asarray(back) == image).all()
-    assert read_metadata(tmp_path / "a.png") == {"scene": texts["scene"], "time": "0.5"}
+        assert back.text == {"scene": texts["scene"], "time": "0.5"}
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.png"]
 
 

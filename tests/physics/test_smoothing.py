@@ -6,7 +6,7 @@ import wavetank as wt
 from wavetank.device.compiler import qd
 from wavetank.physics import smoothing
 from wavetank.physics.coefficients import coefficients, relaxations
-from wavetank.physics.smoothing import KERNELS, NAMES, SLOPES, kernel_shape, lattice_density, rest_lattice, sigma
+from wavetank.physics.smoothing import KERNELS, NAMES, SLOPES, kernel_shape, rest_lattice, sigma
 
 SINGLE = [name for name, (a, b) in NAMES.items() if a == b]
 
@@ -63,11 +63,16 @@ def test_nothing_beyond_the_support(number):
     assert np.all(on_device(list(NAMES)[number], np.array([1.0, 1.5, 40.0])) == 0.0)
 
 
+def density(name: str, dim: int, ratio: float) -> float:
+    """Density of the rest lattice in units of m / d^dim, 1 for a perfect kernel: sigma (h = d) times the sum of w."""
+    return sigma(name, dim) / ratio**dim / rest_lattice(name, dim, ratio).density_scale
+
+
 def test_lattice_densities():
     """Poly6 over the unit lattice at h / d = 2, in units of m / d^dim."""
-    assert lattice_density("poly6", 3, 2.0) == pytest.approx(1.00978, abs=1e-5)
-    assert lattice_density("poly6", 2, 2.0) == pytest.approx(1.01461, abs=1e-5)
-    assert lattice_density("spiky", 3, 2.0) == pytest.approx(1.2359, abs=1e-4)
+    assert density("poly6", 3, 2.0) == pytest.approx(1.00978, abs=1e-5)
+    assert density("poly6", 2, 2.0) == pytest.approx(1.01461, abs=1e-5)
+    assert density("spiky", 3, 2.0) == pytest.approx(1.2359, abs=1e-4)
 
 
 def test_the_reports_units():
@@ -75,7 +80,7 @@ def test_the_reports_units():
     from wavetank.foundation.params import PAPER_S0, PAPER_SPACING, PRESETS
 
     ratio = 1.1 / PAPER_SPACING
-    assert lattice_density("poly6", 3, ratio) / PAPER_SPACING**3 == pytest.approx(3.0, abs=1e-4)
+    assert density("poly6", 3, ratio) / PAPER_SPACING**3 == pytest.approx(3.0, abs=1e-4)
     s_0 = rest_lattice("poly6-spiky", 3, ratio).squared_gradients / 1.1**2
     assert s_0 == pytest.approx(PAPER_S0, rel=1e-5)
     assert PRESETS["paper"]["force_mixing"] * s_0 == pytest.approx(100.0, rel=1e-5)

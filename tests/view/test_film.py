@@ -11,7 +11,7 @@ import pytest
 
 import wavetank as wt
 from wavetank.device.compiler import download, qd, upload
-from wavetank.view.film import denoise, field, light, paths
+from wavetank.view.film import denoise, light, paths
 from wavetank.view.film.medium import Medium, medium_of
 from wavetank.view.film.samples import Watch
 from wavetank.view.film.tracer import Tracer
@@ -314,7 +314,8 @@ def test_the_surface_does_not_show_its_particles():
     renderer, shot = shot_of(frame)
     tracer = Tracer(renderer.buffers)
     world = tracer._world(shot, 0.0, 0.0)
-    level, grid = field.host_level(world.field), world.field.grid
+    grid = world.field.grid
+    level = download(world.field.level).reshape(grid.nz, grid.ny, grid.nx)
     above = (level[:, :-1] > 0.0) & (level[:, 1:] <= 0.0)
     assert np.all(above.sum(axis=1) == 1)  # one surface, without holes, and nothing above it
     j = above.argmax(axis=1)[:, None]

@@ -42,13 +42,4 @@ def _numbers(row: np.ndarray) -> str:
     return ",".join(f"{value:.9g}" for value in row)
 
 
-def read_csv(path: str | Path) -> dict[str, np.ndarray]:
-    """Return the columns of a file by name, float64 [count]."""
-    with Path(path).open(encoding="utf-8") as file:
-        names = file.readline().strip().split(",")
-        lines = [line for line in file if not line.startswith("#")]
-    rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.empty((0, len(names)))
-    return dict(zip(names, rows.T, strict=True))
-
-
 write = write_csv

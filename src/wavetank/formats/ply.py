@@ -10,7 +10,6 @@ import numpy as np
 
 from wavetank.formats.surface import surfaces_of
 from wavetank.foundation.atomic_write import atomic_write
-from wavetank.foundation.errors import WavetankError
 from wavetank.simulation.instant import colors_of
 
 SUFFIXES = (".ply",)
@@ -97,26 +96,6 @@ def _element(name: str, records: np.ndarray) -> list[str]:
     kinds = {"f": "float", "i": "int", "u": "uchar"}
     properties = [f"property {kinds[records.dtype[column].kind]} {column}" for column in records.dtype.names]
     return [f"element {name} {len(records)}", *properties]
-
-
-def read_ply(path: str | Path) -> np.ndarray:
-    """Return the water of a file that `write_ply` wrote, a structured array [count] with fields `COLUMNS`."""
-    return _parts(path)[0]
-
-
-def read_foam(path: str | Path) -> np.ndarray:
-    """Return its spray, foam and bubbles, a structured array with fields `FOAM_COLUMNS`."""
-    return _parts(path)[1]
-
-
-def _parts(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
-    header, _, body = Path(path).read_bytes().partition(b"end_header\n")
-    lines = header.decode("ascii", "replace").splitlines()
-    if "format binary_little_endian 1.0" not in lines:
-        raise WavetankError(f"{str(path)!r} is not a binary little endian PLY file.")
-    counts = {line.split()[1]: int(line.split()[2]) for line in lines if line.startswith("element ")}
-    water = np.frombuffer(body, _RECORD, counts["vertex"])
-    return water, np.frombuffer(body, _FOAM_RECORD, counts.get("foam", 0), offset=water.nbytes)
 
 
 write = write_ply

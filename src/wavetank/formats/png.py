@@ -30,13 +30,4 @@ def write_png(path: str | Path, image: np.ndarray, metadata: Mapping[str, object
         Image.fromarray(checked).save(partial, format="PNG", pnginfo=texts, compress_level=4)
 
 
-def read_metadata(path: str | Path) -> dict[str, str]:
-    """Return the texts that `write_png` put into a file."""
-    from PIL import Image
-
-    with Image.open(path) as image:
-        image.load()
-        return {name: str(value) for name, value in image.text.items()}  # type: ignore[attr-defined]
-
-
 write = write_png

@@ -145,11 +145,6 @@ def rest_points(dim: int, ratio: float) -> np.ndarray:
     return _lattice(dim, ratio) * ratio
 
 
-def lattice_density(name: str, dim: int, ratio: float) -> float:
-    """Return the density of the rest lattice in units of m / d^dim (1 for a perfect kernel)."""
-    return sigma(name, dim) / ratio**dim * _lattice_sum(name, dim, ratio)
-
-
 def _lattice_sum(name: str, dim: int, ratio: float) -> float:
     w, _ = kernel_shape(name, np.linalg.norm(_lattice(dim, ratio), axis=1))
     return float(kernel_shape(name, np.zeros(1))[0][0] + w.sum())

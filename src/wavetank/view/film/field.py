@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.device.compiler import download, qd
+from wavetank.device.compiler import qd
 from wavetank.device.state import remembered
 from wavetank.solids.distance import SolidSet, around, signed_distance
 from wavetank.view.film.grid import Field, Grid, node_at, value_at
@@ -312,8 +312,3 @@ def spread(skip: qd.types.ndarray(), before: qd.types.ndarray(), grid: Grid, axi
             if there >= 0 and there < count:
                 best = qd.min(best, qd.max(qd.abs(off), before[c + off * by]))
         skip[c] = best
-
-
-def host_level(field: Field) -> np.ndarray:
-    """Return the field on the host [m], float32 [nz, ny, nx]."""
-    return download(field.level).reshape(field.grid.nz, field.grid.ny, field.grid.nx)
