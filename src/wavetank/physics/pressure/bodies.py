@@ -72,9 +72,11 @@ def extrapolate(
         at_rest = fall(c) / -stiffness
         if w.known_after[n] > sweep:
             lam, weight, mass, filled = 0.0, 0.0, 0.0, 0.0
-            for direction in range(directions(grid)):
-                axis, side = direction // 2, 2 * (direction % 2) - 1
-                m = neighbor(grid, n, axis, side) if nodes_beyond(grid, n, axis, side) > 0 else n
+            for direction in qd.static(range(6)):  # unrolled: sums of a loop round differently
+                axis, side = qd.static(direction // 2, 2 * (direction % 2) - 1)
+                m = n
+                if direction < directions(grid) and nodes_beyond(grid, n, axis, side) > 0:
+                    m = neighbor(grid, n, axis, side)
                 if w.known_after[m] < sweep:
                     share, slope = 1.0, continued_slope(grid, w, m, axis, side, at_rest, sweep)
                     if grid.lam[m] == 0.0:  # air, or continued from there

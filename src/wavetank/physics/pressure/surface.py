@@ -110,14 +110,16 @@ def depth_along_axes(grid: Level, w: Workspace, n, gravity):
     `gravity` is a vector of any length.
     """
     deepest = 3.0 * grid.dy
-    closeness, depth = 0.0, -1.0  # sum of inverse squares of the ways [1/m^2]; cells
+    depth, ways = -1.0, qd.Vector.zero(qd.f32, 6)  # cells; m
     for direction in range(directions(grid)):
         axis, side = direction // 2, 2 * (direction % 2) - 1
         if grid.liquid[n] >= 0.5:
-            way = cells_to_air(grid, w, n, axis, side, gravity) * edge(grid, axis)
-            closeness += 1.0 / (way * way) if way > 0.0 else 0.0
+            ways[direction] = cells_to_air(grid, w, n, axis, side, gravity) * edge(grid, axis)
         else:
             depth = qd.max(depth, depth_in_air(grid, w, n, axis, side))
+    closeness = 0.0  # 1/m^2: sum of inverse squares of the ways; unrolled, as sums of a loop round differently
+    for direction in qd.static(range(6)):
+        closeness += 1.0 / (ways[direction] * ways[direction]) if ways[direction] > 0.0 else 0.0
     below = qd.min(deepest, 1.0 / qd.sqrt(closeness)) if closeness > 0.0 else deepest
     found = below if grid.liquid[n] >= 0.5 else depth * grid.dy
     return found if grid.open_volume[n] > 0.0 else deepest  # inside of a solid nothing sticks out
