@@ -49,11 +49,12 @@ def python_of_blender() -> str:
 def make_run(out: Path) -> None:
     """Write a run with USD, and what Blender has to find in it."""
     import wavetank as wt
-    from wavetank.run.record import Order, record
+    from wavetank.run.options import RunOptions
+    from wavetank.run.record import record
 
     sim = wt.Simulation(wt.Scene.from_text(SCENE))
     sim.advance(0.5)
-    record(sim, Order(out, (FRAMES - 1) / 10.0, 10.0, SIZE, exports=("usd", "npz")))
+    record(sim, RunOptions(out, (FRAMES - 1) / 10.0, 10.0, SIZE, exports=("usd", "npz")))
     import numpy as np
 
     expected = []

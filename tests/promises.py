@@ -23,7 +23,7 @@ import time
 from pathlib import Path
 
 import wavetank as wt
-from wavetank.run.checkpoints import begun
+from wavetank.run.checkpoints import load_run
 from wavetank.scene.scene import bundled_levels, bundled_scenes, with_particles
 
 Digests = dict[int, str]  # by the number of the frame
@@ -137,7 +137,7 @@ def problems_in(out: Path, exact: Digests) -> list[str]:
 
     found = []
     if (out / "states" / "run.json").exists():
-        kept = begun(out)
+        kept = load_run(out)
         if kept.note:
             found.append(kept.note)
         if kept.sim.digest() != exact[kept.checkpoint.frame]:

@@ -20,7 +20,7 @@ import wavetank as wt
 from wavetank.formats.bgeo import read_bgeo
 from wavetank.formats.splishsplash import load_splishsplash
 from wavetank.foundation.input_limits import parse_toml
-from wavetank.run.checkpoints import Checkpoints, begun
+from wavetank.run.checkpoints import Checkpoints, load_run
 from wavetank.run.folder import Run, RunFolder
 
 #: of this process: two that share one write over each other
@@ -66,7 +66,7 @@ def good_run() -> Files:
             run.add_stats(sim.stats())
             sim.step()
         outputs.drain()
-        kept.keep(sim, 2, {"frames": 3}, [])
+        kept.write(sim, 2, {"frames": 3}, [])
     return _read(folder)
 
 
@@ -118,7 +118,7 @@ def tables_of(draw: Any, content: bytes) -> bytes:
 
 def try_checkpoint(files: Files) -> None:
     folder = fresh("checkpoint", files)
-    kept = taken_or_refused(lambda: begun(folder))
+    kept = taken_or_refused(lambda: load_run(folder))
     if kept is not None:
         taken_or_refused(kept.sim.step)
         assert np.isfinite(kept.sim.positions).all()

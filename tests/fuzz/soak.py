@@ -79,7 +79,7 @@ def main() -> int:
             time.sleep(0.1)
         for other in others:
             other.close()
-        write = front.ask(lambda: write_npz(folder / "now.npz", session.sim.frame()))
+        write = front.call(lambda: write_npz(folder / "now.npz", session.sim.frame()))
         write.result(60)
         urllib.request.urlopen(f"http://127.0.0.1:{front.port}/scene.toml?token={front.gate.token}", timeout=60).read()
         session.log.clear()  # what a session remembers of itself grows by design

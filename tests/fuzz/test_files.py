@@ -12,7 +12,7 @@ from files import ROBOT, fresh, good_run, good_scenes, particle_file
 import wavetank as wt
 from wavetank.formats.bgeo import read_bgeo
 from wavetank.formats.splishsplash import load_splishsplash
-from wavetank.run.checkpoints import begun
+from wavetank.run.checkpoints import load_run
 from wavetank.run.folder import RunFolder
 
 
@@ -110,7 +110,7 @@ def test_tables_that_say_something_else(change):
 
 def test_checkpoints():
     pytest.importorskip("h5py")
-    assert begun(fresh("checkpoint", good_run())).checkpoint.frame == 2
+    assert load_run(fresh("checkpoint", good_run())).checkpoint.frame == 2
     for content, words in (
         (b"{", "JSON"),
         (b"[]", "format"),
@@ -118,7 +118,7 @@ def test_checkpoints():
         (b'{"format": 3}', "format"),
     ):
         folder = fresh("checkpoint", good_run() | {"states/run.json": content})
-        refused(lambda folder=folder: begun(folder), words)
+        refused(lambda folder=folder: load_run(folder), words)
 
 
 # --- of other programs ---

@@ -5,7 +5,7 @@ import pytest
 import wavetank as wt
 from wavetank.foundation.errors import WavetankError
 from wavetank.page.dropped import command_for
-from wavetank.page.fitting import expected_pace, fits, fitting
+from wavetank.page.fitting import expected_pace, fits, real_time_particles
 from wavetank.page.play import _checked_token
 from wavetank.page.units import digits, units
 from wavetank.session.session import Session
@@ -16,10 +16,10 @@ def test_fewer_particles_are_faster_and_what_fits_runs_in_real_time():
     paces = [expected_pace(scene, count, 1.2e-6) for count in (1_000, 5_000, 20_000, 80_000)]
     assert paces == sorted(paces, reverse=True)
     assert paces[-1] < 0.2
-    fit = fitting(scene, 1.2e-6)
+    fit = real_time_particles(scene, 1.2e-6)
     assert expected_pace(scene, fit, 1.2e-6) == pytest.approx(1.0, abs=0.05)
     assert expected_pace(scene, 1.5 * fit, 1.2e-6) < 0.95
-    assert fitting(scene, 0.5e-6) > fit, "a faster machine has room for more"
+    assert real_time_particles(scene, 0.5e-6) > fit, "a faster machine has room for more"
 
 
 def test_a_level_and_points_have_no_slider():

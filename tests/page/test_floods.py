@@ -123,7 +123,7 @@ def answer(port: int, request: bytes) -> bytes:
 
 
 def test_headers_are_on_every_answer(playing):
-    """Good pages, refusals, what is not there, what is no request, a socket that is refused."""
+    """Good pages, refusals, what is not there, a malformed request, a socket that is refused."""
     world = playing(POOL)
     port, token = world.front.port, world.front.gate.token
     host = f"Host: 127.0.0.1:{port}\r\nConnection: close\r\n"

@@ -202,7 +202,7 @@ def test_one_drives_the_others_watch(playing):
         second.send('{"do": "point-begin", "x": 0.5, "y": 0.5, "tool": "push"}')
         wait_until(lambda: world.session.hands)
         second.close()
-        # Who leaves lifts the hand, and another takes the helm.
+        # Who leaves lifts the hand, and another takes control.
         wait_until(lambda: not world.session.hands)
         first.send('{"do": "set", "name": "viscosity", "value": 0.2}')
         wait_until(lambda: world.session.sim.viscosity == 0.2)

@@ -121,7 +121,7 @@ def test_played_saved_and_opened_again_without_a_kernel(lab, tmp_path):
         browser.wait_for("document.querySelector('.wavetank-live .fine output')?.textContent.includes('expected')", 20)
         undo = "document.querySelector('.wavetank-live button[aria-label=Undo]')"
         assert browser.run(f"{undo}.hidden")
-        browser.click(".wavetank-live button[aria-label='Start again']")
+        browser.click(".wavetank-live button[aria-label=Restart]")
         browser.wait_for(f"!{undo}.hidden", 20)
         browser.wait_for(f"{count} < {before + 1}", 20)
         if folder := os.environ.get("WAVETANK_PICTURES"):  # to look at

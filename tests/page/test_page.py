@@ -88,7 +88,7 @@ def test_a_person_plays(open_page, browser):
     browser.run("document.querySelector('[data-tool=dye]').click()")
     water = browser.center("#picture", 0.35, 0.6)
     browser.drag(water, browser.center("#picture", 0.42, 0.6))
-    until(lambda: world.front.ask(lambda: (session.sim.frame().dyes != 0).any()).result(60))
+    until(lambda: world.front.call(lambda: (session.sim.frame().dyes != 0).any()).result(60))
 
     # One that needs time: the hand pushes the water.
     browser.key(" ")
@@ -112,9 +112,9 @@ def test_a_person_plays(open_page, browser):
     browser.click("[data-tab=look]")
     browser.run("[...document.querySelectorAll('#look button')].find((b) => b.textContent === 'Evening').click()")
     until(lambda: session.light == {"environment": "evening"})
-    browser.wait_for("document.querySelector(\"[aria-label='Sun, around'][type=range]\")?.value > 0.6")  # 235 of 360
+    browser.wait_for("document.querySelector(\"[aria-label='Sun azimuth'][type=range]\")?.value > 0.6")  # 235 of 360
     browser.run(
-        "(() => { const s = document.querySelector(\"[aria-label='Sun, around'][type=range]\");"
+        "(() => { const s = document.querySelector(\"[aria-label='Sun azimuth'][type=range]\");"
         "s.value = 0.25; s.oninput() })()"
     )
     until(lambda: session.light.get("sun") == "90,9")

@@ -43,7 +43,7 @@ def test_keys_alone(open_page, browser, tmp_path, monkeypatch):  # noqa: F811
     session = world.session
     browser.wait_for("!document.querySelector('#hud').hidden")
     time.sleep(0.5)
-    assert session.waits
+    assert session.awaits_touch
     assert session.sim.time == 0.0, "nothing moves before the first touch"
     tab_to(browser, "tab-water")
     press(browser, "ArrowRight")
@@ -58,7 +58,7 @@ def test_keys_alone(open_page, browser, tmp_path, monkeypatch):  # noqa: F811
     press(browser, "Enter")
     browser.wait_for("!document.querySelector('#cross').hidden")
     press(browser, "Enter")
-    until(lambda: session.hands and not session.waits)
+    until(lambda: session.hands and not session.awaits_touch)
     press(browser, "ArrowRight", hold=1.2)
     until(lambda: session.game.outcome == "won", 90)
     press(browser, "Enter")
@@ -77,7 +77,7 @@ def test_keys_alone(open_page, browser, tmp_path, monkeypatch):  # noqa: F811
     path.write_text(text)
     recording = Recording.load(path)
     # In the simulation's thread, the only one that may compute.
-    assert world.front.ask(lambda: list(replay(recording))[-1].sim.digest()).result(240) == recording.digest
+    assert world.front.call(lambda: list(replay(recording))[-1].sim.digest()).result(240) == recording.digest
     assert browser.complaints() == []
 
 
@@ -92,13 +92,13 @@ def test_keys_alone_from_the_start_to_a_saved_recording(open_page, browser, tmp_
     browser.wait_for("document.querySelector('#tab-scenes').ariaSelected === 'true'")
     tab_to(browser, "spill")
     press(browser, "Enter")
-    until(lambda: session.game is not None and session.waits)
+    until(lambda: session.game is not None and session.awaits_touch)
     browser.wait_for("!document.querySelector('#hud').hidden && document.activeElement.id === 'picture'")
     browser.wait_for("document.querySelector('[data-tool=tilt]').getAttribute('aria-pressed') === 'true'")
     press(browser, "Enter")
     browser.wait_for("!document.querySelector('#cross').hidden")
     press(browser, "Enter")
-    until(lambda: session.hands and not session.waits)
+    until(lambda: session.hands and not session.awaits_touch)
     press(browser, "ArrowRight", hold=1.0)
     until(lambda: session.game.outcome, 150)
     assert session.game.outcome == "won"
@@ -117,7 +117,7 @@ def test_keys_alone_from_the_start_to_a_saved_recording(open_page, browser, tmp_
     until(path.is_file, 60)
     until(lambda: path.stat().st_size > 0, 10)
     recording = Recording.load(path)
-    assert world.front.ask(lambda: list(replay(recording))[-1].sim.digest()).result(240) == recording.digest
+    assert world.front.call(lambda: list(replay(recording))[-1].sim.digest()).result(240) == recording.digest
     assert browser.complaints() == []
 
 
@@ -231,7 +231,7 @@ def test_a_phone_by_touch_alone(open_page, browser, tmp_path, monkeypatch, sides
         time.sleep(0.4)
         look(browser, f"won-{sides[0]}")
         finger.tap("#retry")
-        until(lambda: session.waits)
+        until(lambda: session.awaits_touch)
         finger.tap("#panel-toggle")
         finger.tap("#tab-scenes")
         browser.wait_for("document.querySelectorAll('#scenes button[data-scene]').length > 20")
@@ -273,14 +273,14 @@ def test_what_was_left_comes_back(open_page, browser):  # noqa: F811
     browser.wait_for("document.querySelector('[data-scene=obstacle-tank] small').textContent.includes(' of ')")
     browser.key(" ")
     until(lambda: session.paused)
-    digest = world.front.ask(session.sim.digest).result(60)
+    digest = world.front.call(session.sim.digest).result(60)
     browser.run("document.querySelector('[data-scene=obstacle-tank]').click()")
     until(lambda: session.sim.scene.title != "Basin")
     assert 200 <= session.sim.count < 20_000, "of 21,952"
     until(lambda: not session.paused)
     browser.key("z")
     until(lambda: session.sim.scene.title == "Basin")
-    assert world.front.ask(session.sim.digest).result(60) == digest
+    assert world.front.call(session.sim.digest).result(60) == digest
     # The dial is filled in the other scene, and in this one again.
     assert "straight down" in browser.run("document.querySelector('.dial svg').getAttribute('aria-valuetext')")
 
@@ -291,7 +291,7 @@ def test_the_aim_lies_on_the_water_and_lights_what_would_be_taken(open_page, bro
     width, height = world.front.painter.wanted
     until(lambda: session.sim.time > 0.1)
     browser.run("document.querySelector('[data-tool=stir]').click(); document.querySelector('.fold').click()")
-    middle = session.sight.project([[0.3, 0.3, 0.2]], width, height)[0]
+    middle = session.tilted_camera.project([[0.3, 0.3, 0.2]], width, height)[0]
     browser.mouse("mouseMoved", *browser.center("#picture", middle[0] / width, middle[1] / height))
     browser.wait_for("document.querySelectorAll('#aim polyline[points*=\" \"]').length === 4")
     ring = browser.run(
@@ -299,11 +299,11 @@ def test_the_aim_lies_on_the_water_and_lights_what_would_be_taken(open_page, bro
     )
     assert ring[0] * width > 1.5 * ring[1] * height, "a circle that lies is seen flat"
     browser.run("document.querySelector('[data-tool=grab]').click()")
-    top = session.sight.project([[0.9, 0.199, 0.2]], width, height)[0]
+    top = session.tilted_camera.project([[0.9, 0.199, 0.2]], width, height)[0]
     browser.mouse("mouseMoved", *browser.center("#picture", top[0] / width, top[1] / height))
-    until(lambda: session.lit == "pillar")
+    until(lambda: session.highlighted == "pillar")
     browser.mouse("mouseMoved", *browser.center("#title"))
-    until(lambda: session.lit == "")
+    until(lambda: session.highlighted == "")
 
 
 CUBE = """v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
@@ -353,7 +353,7 @@ def test_a_colour_switches_the_view_and_has_a_legend_and_a_slice_moves(open_page
     until(lambda: session.view == "particles")
     browser.wait_for("document.querySelector('#legend').textContent.includes('Speed [m/s]')")
     browser.run(pill.format("Slice"))
-    place = "document.querySelector('#look input[type=range][aria-label=\\'Where along it\\']')"
+    place = "document.querySelector('#look input[type=range][aria-label=\\'Position\\']')"
     browser.wait_for(f"{place} !== null")
     first = browser.run("document.querySelector('#picture').toDataURL()")
     browser.run(f"(() => {{ const e = {place}; e.value = 0.9; e.oninput() }})()")
@@ -373,7 +373,7 @@ def test_a_page_of_another_run_says_so_and_stops_asking(open_page, browser):  # 
     other = WebFront(Session(BASIN), port=port)  # at once: the port of a run that has ended is free
     other.start()
     try:
-        browser.wait_for("document.querySelector('#veil-text').textContent.includes('started anew')", 30)
+        browser.wait_for("document.querySelector('#veil-text').textContent.includes('restarted')", 30)
         time.sleep(1.0)
         sockets = sum(event["method"] == "Network.webSocketCreated" for event in browser.events)
         time.sleep(3.0)

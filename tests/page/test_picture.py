@@ -3,7 +3,7 @@ import pytest
 
 import wavetank as wt
 from wavetank.page import picture
-from wavetank.session.pace import MADE_GOOD, Pace
+from wavetank.session.pace import CATCH_UP, Pace
 from wavetank.session.session import Session
 
 
@@ -87,7 +87,7 @@ def test_only_a_picture_of_lateness_is_made_good():
     pace.passed(0.0, 1 / 60, 1 / 60)
     pace.passed(5.0, 1 / 60, 1 / 60)
     assert pace.wait(5.0) == 0.0
-    assert pace.due == pytest.approx(5.0 - MADE_GOOD)
+    assert pace.due == pytest.approx(5.0 - CATCH_UP)
 
 
 def test_a_single_hitch_does_not_spoil_the_pace_but_slowness_does():
@@ -126,6 +126,6 @@ def test_the_size_of_pictures_settles(session, monkeypatch, seconds_per_pixel):
     assert len(set(sizes[20:])) == 1
     costs = {share: 0.006 + seconds_per_pixel * 960 * 540 * share**2 for share in picture.SHARES}
     settled = min(picture.SHARES, key=lambda share: abs(share - sizes[-1]))
-    assert costs[settled] <= picture.CLEARLY * picture.AFFORD or settled == picture.SHARES[0]
+    assert costs[settled] <= picture.HYSTERESIS * picture.PICTURE_TIME or settled == picture.SHARES[0]
     larger = [share for share in picture.SHARES if share > settled]
-    assert not larger or picture.CLEARLY**2 * costs[larger[0]] > picture.AFFORD
+    assert not larger or picture.HYSTERESIS**2 * costs[larger[0]] > picture.PICTURE_TIME

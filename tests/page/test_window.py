@@ -214,7 +214,7 @@ def test_the_aim_lies_on_the_water_and_lights_what_would_be_taken(person):
     session, stage = person.session, person.window.stage
     width, height = stage.box[2:]
     person.desk.tool = "stir"
-    middle = session.sight.project([[0.3, 0.35, 0.2]], width, height)[0]
+    middle = session.tilted_camera.project([[0.3, 0.35, 0.2]], width, height)[0]
     person.move(*person.water(middle[0] / width, middle[1] / height))
     person.until(lambda: stage._aim.get("drop"))
     ring, drop = np.array(stage._aim["ring"]) * (width, height), np.array(stage._aim["drop"]) * (width, height)
@@ -230,12 +230,12 @@ def test_the_aim_lies_on_the_water_and_lights_what_would_be_taken(person):
     around = screen[y + v - 3 : y + v + 4, x + u - 3 : x + u + 4]
     assert np.ptp(around.max(axis=2)) > 60, "a bright line with a dark rim"
     person.desk.tool = "grab"
-    top = session.sight.project([[0.9, 0.199, 0.2]], width, height)[0]
+    top = session.tilted_camera.project([[0.9, 0.199, 0.2]], width, height)[0]
     person.move(*person.water(top[0] / width, top[1] / height))
-    person.until(lambda: session.lit == "pillar")
+    person.until(lambda: session.highlighted == "pillar")
     person.desk.tool = "push"
     person.move(stage.box[0] + 0.5 * width, 12.0)
-    person.until(lambda: session.lit == "")
+    person.until(lambda: session.highlighted == "")
 
 
 def test_buttons_wheel_and_keys_move_the_camera(person):
@@ -265,7 +265,7 @@ def test_buttons_wheel_and_keys_move_the_camera(person):
 def test_a_key_shows_what_the_water_does_to_bodies(person):
     pytest.importorskip("rapier3d")
     crate = wt.Box(name="crate", center=(0.3, 0.4, 0.2), size=(0.2, 0.2, 0.2), density=500)
-    person.window.engine.ask(lambda: person.session.sim.add_solid(crate)).result(LONGEST)
+    person.window.engine.call(lambda: person.session.sim.add_solid(crate)).result(LONGEST)
     assert "force.buoyancy" not in person.desk.places
     person.key("n")
     person.until(lambda: "force.buoyancy" in person.desk.places and "force.drag" in person.desk.places)
@@ -273,7 +273,7 @@ def test_a_key_shows_what_the_water_does_to_bodies(person):
     assert right > left + 10 and bottom > top + 5, "a number in a box"
     person.key("n")
     person.until(lambda: not person.session.shows_forces)
-    person.window.engine.ask(lambda: person.session.sim.remove_solid("crate")).result(LONGEST)
+    person.window.engine.call(lambda: person.session.sim.remove_solid("crate")).result(LONGEST)
 
 
 def test_the_sun_is_turned_by_a_slider_and_by_keys(person):
@@ -348,11 +348,11 @@ LEVEL = wt.Scene(
 
 def time_is_over(person) -> None:
     def wait() -> None:
-        assert person.session.waits, "for the first touch"
-        person.session.paused = person.session.waits = False
+        assert person.session.awaits_touch, "for the first touch"
+        person.session.paused = person.session.awaits_touch = False
         person.session.game.elapsed = person.session.game.goal.seconds
 
-    person.window.engine.ask(wait).result()
+    person.window.engine.call(wait).result()
     person.until(lambda: person.desk.game["outcome"] == "lost" and "retry" in person.desk.places)
 
 
@@ -429,7 +429,7 @@ def without_display() -> dict[str, str]:
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere there is always a display")
 def test_without_a_display_play_serves_the_page_and_says_why():
     said = play_out([], without_display(), "plays at")
-    assert "no window: there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); here is the page" in said
+    assert "no window: there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); serving the page" in said
     assert "token=" in said and "Traceback" not in said
     said = play_out(["--window"], without_display(), "no such word")
     assert said.count("\n") == 1 and said.startswith("wavetank: --window: there is no display")

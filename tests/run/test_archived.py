@@ -10,9 +10,10 @@ from PIL import Image
 import wavetank as wt
 from wavetank.formats import npz
 from wavetank.run import archived
-from wavetank.run.archived import as_scene, film_archived, frame_at
-from wavetank.run.record import Order, record
-from wavetank.run.still import take
+from wavetank.run.archived import film_archived, frame_at, scene_path
+from wavetank.run.options import RunOptions
+from wavetank.run.record import record
+from wavetank.run.still import render_still
 from wavetank.simulation.instant import FOAM, WATER
 from wavetank.simulation.shown import Shown
 from wavetank.view.renderer import Renderer
@@ -31,7 +32,7 @@ FPS, SECONDS = 10.0, 0.8
 def run(request, tmp_path_factory):
     out = tmp_path_factory.mktemp("run")
     exports = (request.param,) if request.param else ()
-    record(wt.Simulation(wt.Scene.from_text(SCENE)), Order(out, SECONDS, FPS, (96, 64), exports=exports))
+    record(wt.Simulation(wt.Scene.from_text(SCENE)), RunOptions(out, SECONDS, FPS, (96, 64), exports=exports))
     return out, request.param
 
 
@@ -94,8 +95,8 @@ def test_the_command_line_opens_a_run(wavetank, run, tmp_path, monkeypatch):
         assert result.returncode == 0 and "9 frames" in result.stdout
         for words, arguments in {
             "from 0 to 0.8 s": (str(out), "--at", "0.9"),
-            "--set does not go with": (str(out), "--set", "viscosity=1"),
-            "does not go with a film": (str(out), "--at", "0.1", "--out", str(tmp_path / "b.mp4")),
+            "--set cannot be used with": (str(out), "--set", "viscosity=1"),
+            "cannot be used with a film": (str(out), "--at", "0.1", "--out", str(tmp_path / "b.mp4")),
             "wavetank run drop-2d --video": ("drop-2d", "--out", str(tmp_path / "b.mp4")),
         }.items():
             refused = wavetank("render", *arguments)
@@ -104,9 +105,9 @@ def test_the_command_line_opens_a_run(wavetank, run, tmp_path, monkeypatch):
 
 def test_a_run_is_played_from_its_scene(run):
     out, _ = run
-    scene = wt.Scene.load(as_scene(str(out)))
+    scene = wt.Scene.load(scene_path(str(out)))
     assert scene.spacing == 0.06 and [solid.name for solid in scene.solids] == ["paddle"]
-    assert as_scene("drop-2d") == "drop-2d"
+    assert scene_path("drop-2d") == "drop-2d"
 
 
 def test_a_run_without_frames_goes_on_from_its_checkpoint(tmp_path, frames, monkeypatch):
@@ -122,7 +123,9 @@ def test_a_run_without_frames_goes_on_from_its_checkpoint(tmp_path, frames, monk
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr(Simulation, "_advance_frame", ending)
-        record(wt.Simulation(wt.Scene.from_text(SCENE)), Order(tmp_path, SECONDS, FPS, (96, 64), checkpoint_every=0.4))
+        record(
+            wt.Simulation(wt.Scene.from_text(SCENE)), RunOptions(tmp_path, SECONDS, FPS, (96, 64), checkpoint_every=0.4)
+        )
     with monkeypatch.context() as patch:
         patch.setattr(archived, "Simulation", None)  # not from the start
         np.testing.assert_array_equal(frame_at(str(tmp_path), 0.6).positions, frames[6][0]["positions"])
@@ -143,5 +146,5 @@ def test_a_state_shown_is_not_the_water_it_came_from(frames):
 
 def test_the_picture_of_a_run_is_written(run, tmp_path):
     out, _ = run
-    figures = take(str(out), None, tmp_path / "x.png", 64, 48, at=0.5, quality="draft")
+    figures = render_still(str(out), None, tmp_path / "x.png", 64, 48, at=0.5, quality="draft")
     assert figures["time"] == pytest.approx(0.5) and (tmp_path / "x.png").is_file()

@@ -7,12 +7,12 @@ import pytest
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.retry import Retry
 from wavetank.run import background
-from wavetank.run.background import Background
+from wavetank.run.background import BackgroundWriter
 
 
 def test_all_is_done_in_order_and_memory_is_bounded(monkeypatch):
     monkeypatch.setattr(background, "MOST_BYTES", 100)
-    writer, done, gate, held = Background(), [], threading.Event(), []
+    writer, done, gate, held = BackgroundWriter(), [], threading.Event(), []
 
     def job(number):
         gate.wait(10)
@@ -37,7 +37,7 @@ def test_all_is_done_in_order_and_memory_is_bounded(monkeypatch):
 
 def test_one_frame_may_be_larger_than_the_room(monkeypatch):
     monkeypatch.setattr(background, "MOST_BYTES", 100)
-    writer, done = Background(), []
+    writer, done = BackgroundWriter(), []
     for number in range(3):
         writer.put(lambda number=number: done.append(number), 1000)
     writer.drain()
@@ -46,7 +46,7 @@ def test_one_frame_may_be_larger_than_the_room(monkeypatch):
 
 
 def test_what_goes_wrong_reaches_who_writes():
-    writer = Background()
+    writer = BackgroundWriter()
 
     def fail():
         raise WavetankError("the disk is gone.")

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank.run.checkpoints import begun
+from wavetank.run.checkpoints import load_run
 from wavetank.run.folder import RunFolder
-from wavetank.run.record import Order, go_on, record
-from wavetank.run.signals import asked_to_end
+from wavetank.run.options import RunOptions
+from wavetank.run.record import record, resume_run
+from wavetank.run.signals import stop_on_signal
 
 SCENE = """
 spacing = 0.05
@@ -32,8 +33,8 @@ frequency = 1.0
 """
 
 
-def order(out: Path, **more) -> Order:
-    return Order(out, 1.0, 20.0, (64, 48), exports=("npz",), checkpoint_every=0.1, **more)
+def order(out: Path, **more) -> RunOptions:
+    return RunOptions(out, 1.0, 20.0, (64, 48), exports=("npz",), checkpoint_every=0.1, **more)
 
 
 def started() -> wt.Simulation:
@@ -95,7 +96,7 @@ def test_a_run_goes_on_to_the_same_bits(whole, tmp_path, monkeypatch, frame):
         record(started(), order(tmp_path, video=True))
     states = sorted(path.name for path in (tmp_path / "states").glob("*.npz"))
     assert len(states) == min(2, (frame - 1) // 2)
-    go_on(tmp_path)
+    resume_run(tmp_path)
     same(tmp_path, whole)
     assert films(tmp_path / "run.mp4") == films(whole / "run.mp4") == 21
 
@@ -108,12 +109,12 @@ def test_a_damaged_checkpoint_gives_way_to_the_one_before(whole, tmp_path, monke
     content = bytearray(last.read_bytes())
     content[len(content) // 2] ^= 1
     last.write_bytes(content)
-    run = begun(tmp_path)
+    run = load_run(tmp_path)
     assert run.checkpoint.state != last.name and "SHA-256" in run.note
-    go_on(tmp_path)
+    resume_run(tmp_path)
     same(tmp_path, whole)
-    with pytest.raises(wt.WavetankError, match="a completed run keeps no checkpoints"):
-        go_on(tmp_path)
+    with pytest.raises(wt.WavetankError, match="a completed run has no checkpoints"):
+        resume_run(tmp_path)
 
 
 def test_a_run_goes_on_where_another_one_has_been(whole, tmp_path, monkeypatch):
@@ -121,8 +122,8 @@ def test_a_run_goes_on_where_another_one_has_been(whole, tmp_path, monkeypatch):
     with monkeypatch.context() as patch, pytest.raises(Crash):
         crash_at(patch, 12)
         record(started(), order(tmp_path, video=True))
-    record(wt.Simulation(wt.Scene.load("drop-2d")), Order(tmp_path, 0.1, 30.0, (64, 48), name="other"))
-    figures = go_on(tmp_path)
+    record(wt.Simulation(wt.Scene.load("drop-2d")), RunOptions(tmp_path, 0.1, 30.0, (64, 48), name="other"))
+    figures = resume_run(tmp_path)
     assert figures["digest"] == json.loads((whole / "stats.json").read_text())["digest"]
     folder = RunFolder.open(tmp_path)
     assert folder.run.name == "run" and folder.run.fps == 20.0 and folder.scene.tank.size == (1.2, 0.8)
@@ -149,7 +150,7 @@ def test_what_is_no_checkpoint_is_one_sentence(change, words, tmp_path, monkeypa
     place.write_text(json.dumps(change(json.loads(place.read_text()))))
     monkeypatch.delenv("WAVETANK_STRICT_INPUT", raising=False)
     with pytest.raises(wt.WavetankError, match=words) as report:
-        go_on(tmp_path)
+        resume_run(tmp_path)
     assert "\n" not in str(report.value)
 
 
@@ -257,9 +258,9 @@ def test_a_second_signal_in_a_finalizer_comes_again_after_it():
             ended.append(True)
 
     ended: list[bool] = []
-    with pytest.raises(KeyboardInterrupt), asked_to_end() as asked:
+    with pytest.raises(KeyboardInterrupt), stop_on_signal() as stop:
         os.kill(os.getpid(), signal.SIGTERM)
-        assert asked.code == 143
+        assert stop.code == 143
         slow = Slow()
         del slow
         assert ended == [True], "the finalizer ends"

@@ -87,7 +87,7 @@ def test_a_state_and_a_recording_are_exported(tmp_path, monkeypatch, capsys):
         ("nothing", "there is no file or folder"),
         (".", "the run cannot be read"),
         ("a.xyz", "this is none"),
-        ("frame.npz", "without the scene that they are of"),
+        ("frame.npz", "without their scene"),
         ("a.h5", "cannot be read"),
     ],
 )

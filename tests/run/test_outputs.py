@@ -10,7 +10,7 @@ from wavetank.run.outputs import Outputs, bytes_of
 @pytest.fixture
 def spoken(tmp_path, monkeypatch):
     """What is told of a run of so many frames, of which ten are written."""
-    monkeypatch.setattr(outputs, "WORTH_A_WORD", 100_000_000)
+    monkeypatch.setattr(outputs, "LARGE", 100_000_000)
 
     def spoken_(frames: int) -> list[str]:
         told: list[str] = []

@@ -9,7 +9,7 @@ from wavetank.session.recording import Recording, replay
 from wavetank.session.session import Session
 from wavetank.session.tools import TOOL_NAMES
 from wavetank.session.tools.grab import STRETCH
-from wavetank.session.tools.press import place_of, unit_of_force
+from wavetank.session.tools.solids import force_unit, to_world_frame
 
 pytest.importorskip("rapier3d")
 
@@ -71,7 +71,7 @@ def test_shove_presses_where_it_is_dragged(dim):
     for _ in range(5):
         session.tick()
     body = session.sim.bodies["box"]
-    force = strength * unit_of_force(session.sim, 1.2)
+    force = strength * force_unit(session.sim, 1.2)
     assert body.velocity[0] * body.mass == pytest.approx(force * 5 / 60, rel=0.05)
     assert body.angular_velocity[2] < 0.0
 
@@ -91,9 +91,9 @@ def test_a_body_hangs_on_the_hand_by_its_weight(dim):
     for _ in range(150):
         session.tick()
     body = session.sim.bodies["box"]
-    stiffness = unit_of_force(session.sim, 1.2) / (STRETCH * 1.2)
+    stiffness = force_unit(session.sim, 1.2) / (STRETCH * 1.2)
     tool, hand = session.hands[0]
-    stretch = hand.point - place_of(body, tool._point)
+    stretch = hand.point - to_world_frame(body, tool._point)
     assert stretch == pytest.approx([0.0, 9.81 * body.mass / stiffness, 0.0], abs=2e-3)
     heavy = pond(dim, box(dim, center=(0.6, 0.12, 0.3)[:dim], density=8000.0))
     heavy.apply(c.ToolBegin(tool="grab", options={"strength": 0.5}, **ray(0.6, 0.12)))

@@ -200,7 +200,7 @@ def test_a_late_session_fills_its_frames_and_a_replay_does_as_well(monkeypatch):
     session.smooth = True
     monkeypatch.setattr(session.pace, "is_late", lambda wanted: session.sim.time > 0.2)
     monkeypatch.setattr(session.pace, "wait", lambda now: 0.0)
-    monkeypatch.setattr("wavetank.session.session.SLUGGISH", 1e9)  # s: however slow this machine is, frames stay whole
+    monkeypatch.setattr("wavetank.session.session.SLOW_FRAME", 1e9)  # s: frames are never divided
     while session.sim.time < 0.8:
         session.turn()
     assert [command for _, command in session.log] == [c.FrameLength(parts=1, filled=True)]
@@ -243,7 +243,7 @@ def test_the_past_fits_into_its_memory():
     history = History(memory=5 * size)
     for k in range(20):
         snapshot.ledger.time = 0.1 * k
-        history.keep(snapshot)
+        history.record(snapshot)
     assert 4 <= len(history.times) <= 5
     assert history.times[-1] == pytest.approx(1.9)
     unpacked = Packed(snapshot).unpack()
@@ -394,7 +394,7 @@ def test_forces_of_a_script_cannot_be_recorded_and_that_is_said():
         add(session.sim)
         session.tick()
         with pytest.raises(
-            wt.WavetankError, match=r"a script changed its forces \(Lift\); a recording has those of"
+            wt.WavetankError, match=r"a script changed its forces \(Lift\); a recording holds the scene"
         ) as e:
             Recording.of(session, pool())
         assert "\n" not in str(e.value)

@@ -175,7 +175,7 @@ def test_what_is_there_is_a_scene():
     for k in range(30):
         session.apply(c.MoveSolid(name="ball", position=(0.7, 0.3), rotation=0.01 * k))
         session.tick()
-    scene = wt.Scene.from_text(session.present_scene().text())
+    scene = wt.Scene.from_text(session.current_scene().text())
     assert [solid.name for solid in scene.solids] == ["ball", "solid 1"]
     again = Session(scene)
     np.testing.assert_array_equal(again.sim.positions, session.sim.positions)

@@ -64,8 +64,8 @@ def test_a_scene_of_so_many_particles():
 
 def test_a_level_waits_for_the_first_touch_where_there_are_people():
     session = wt.Session(wt.Scene.load("over-the-wall"))
-    session.patient = True
-    session.wait_for_hand()
+    session.starts_on_touch = True
+    session.wait_for_touch()
     assert not session.turn()
     session.apply(do.ToolBegin(tool="push", origin=(0.5, 0.2, 5), direction=(0, 0, -1)))
     assert session.turn()
@@ -100,13 +100,13 @@ def test_a_tilted_tank_is_seen_tilted_and_gravity_points_down_in_the_picture():
     session.apply(do.ToolMove(**ray(session, 0.6, 0.5)))
     gravity = np.array(session.sim.gravity)
     assert gravity[0] != 0.0
-    eye, axes = session.sight, session.sight._axes
-    assert session.sight != session.camera
+    eye, axes = session.tilted_camera, session.tilted_camera._axes
+    assert session.tilted_camera != session.camera
     level, upright = axes @ gravity, session.camera._axes @ [0.0, -9.81, 0.0]
     assert level == pytest.approx(upright, abs=1e-4)
     assert eye.distance == pytest.approx(session.camera.distance)
     session.apply(do.ToolEnd())
-    assert session.sight == session.camera
+    assert session.tilted_camera == session.camera
 
 
 def test_who_asks_for_a_colour_sees_it():

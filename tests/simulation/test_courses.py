@@ -105,7 +105,7 @@ def test_grabbing_lets_go_to_the_motion():
         session.tick()
     expected = 0.05 + 0.08 * math.sin(4 * session.sim.time)
     assert session.sim.solids.poses[number][0][0] == pytest.approx(expected, abs=1e-9)
-    scene = session.present_scene()
+    scene = session.current_scene()
     assert scene.start_time == session.sim.time
     then = wt.Simulation(scene)
     assert then.solids.poses[number][0][0] == pytest.approx(expected, abs=1e-9)

@@ -13,18 +13,20 @@ from wavetank.foundation.errors import WavetankError
 
 @app.command()
 def export(
-    source: Annotated[Path, typer.Argument(metavar="RUN|STATE.npz|RECORDING.toml|FRAMES.h5", help="What was kept.")],
+    source: Annotated[Path, typer.Argument(metavar="RUN|STATE.npz|RECORDING.toml|FRAMES.h5", help="What to export.")],
     to: Annotated[
         list[str],
         typer.Option(metavar="FORMATS", help="Formats: usd, vtkhdf, vtp, h5, npz, csv, ply, obj; several as a,b."),
     ],
-    out: Annotated[Path | None, typer.Option(help="Folder for the files; where the source is unless told.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the files; by default that of the source.")] = None,
     only: Only = "",
-    every: Annotated[int, typer.Option(help="Write only each so manyth frame.")] = 1,
-    arch: Annotated[str, typer.Option(help="Back end, where something is computed; that of the source.")] = "",
+    every: Annotated[int, typer.Option(help="Write every Nth frame only.")] = 1,
+    arch: Annotated[
+        str, typer.Option(help="Back end, where frames are computed again; by default that of the source.")
+    ] = "",
     as_json: Json = False,
 ) -> None:
-    """Write the frames of a run's folder, a saved state, a recording or an HDF5 file for other programs."""
+    """Export the frames of a run's folder, a saved state, a recording or an HDF5 file to other programs."""
     from wavetank.run.export import export as convert
 
     figures = convert(source, names_in(to), out=out, only=names_in([only]), every=every, arch=arch, console=console)
@@ -45,13 +47,13 @@ def import_scene(
             help="SCENE.json of SPlisHSPlasH, CASE_Def.xml of DualSPHysics, ROBOT.urdf or ROBOT.xml (MJCF).",
         ),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="The scene file to be written, TOML.")],
-    spacing: Annotated[float | None, typer.Option(help="Distance of particles [m] in place of its own.")] = None,
-    into: Annotated[str, typer.Option(help="Scene that a robot comes into.")] = "still-tank",
-    at: Annotated[str, typer.Option(help="Where a robot stands [m], as 0.2,0,0.3.")] = "",
+    out: Annotated[Path, typer.Option("--out", "-o", help="The TOML scene file to write.")],
+    spacing: Annotated[float | None, typer.Option(help="Particle spacing [m] instead of its own.")] = None,
+    into: Annotated[str, typer.Option(help="Scene to place a robot in.")] = "still-tank",
+    at: Annotated[str, typer.Option(help="Position of a robot [m], as in 0.2,0,0.3.")] = "",
     as_json: Json = False,
 ) -> None:
-    """Read a scene of SPlisHSPlasH or DualSPHysics, or a robot; write a scene, and say what has no counterpart."""
+    """Convert a scene of SPlisHSPlasH or DualSPHysics, or a robot, to a scene; list what was not converted."""
     from wavetank.formats.robots import is_mjcf, load_robot
 
     if file.suffix.lower() == ".urdf" or (file.suffix.lower() in (".xml", ".mjcf") and is_mjcf(file)):
@@ -79,5 +81,5 @@ def _place(text: str) -> tuple[float, ...]:
     except ValueError:
         place = ()
     if len(place) != 3 or not all(math.isfinite(part) for part in place):
-        raise WavetankError(f"--at = {text!r} is not allowed; write three numbers [m], as 0.2,0,0.3.")
+        raise WavetankError(f"--at = {text!r} is not allowed; write three numbers [m], as in 0.2,0,0.3.")
     return place

@@ -26,7 +26,7 @@ def converge(
     scene: SceneName = "obstacle-tank",
     out: Annotated[Path, typer.Option(help="Folder for the plots and tables.")] = Path("out"),
     seconds: Annotated[float, typer.Option(help="Seconds of water of each run.")] = 2.0,
-    iterations: Annotated[int, typer.Option(help="Iterations shown within a step.")] = 20,
+    iterations: Annotated[int, typer.Option(help="Iterations to show within a step.")] = 20,
     arch: Arch = "cpu",
     as_json: Json = False,
 ) -> None:
@@ -69,12 +69,12 @@ def bench(
     scenes: Annotated[
         list[str], typer.Argument(metavar="[SCENE]... [SIZE]...", help="Scenes, and further sizes.")
     ] = [],  # noqa: B006
-    sizes: Annotated[str, typer.Option(help="Numbers of particles, as 10000,100000.")] = "",
+    sizes: Annotated[str, typer.Option(help="Numbers of particles, as in 10000,100000.")] = "",
     seconds: Annotated[float | None, typer.Option(help="Seconds of water of each run [0.5].")] = None,
-    repeats: Annotated[int, typer.Option(help="Passes that the medians are taken over, 2 or more.")] = 3,
-    threads: Annotated[int | None, typer.Option(min=1, max=1024, help="Threads on the CPU; all without it.")] = None,
+    repeats: Annotated[int, typer.Option(help="Passes over which medians are taken, 2 or more.")] = 3,
+    threads: Annotated[int | None, typer.Option(min=1, max=1024, help="Threads on the CPU; by default all.")] = None,
     roofline: Annotated[
-        bool, typer.Option("--roofline", help="Compare each kernel with what this machine can do.")
+        bool, typer.Option("--roofline", help="Compare each kernel with the limits of this machine.")
     ] = False,
     search: Annotated[bool, typer.Option("--search", help="Compare the neighbour search with a k-d tree.")] = False,
     bodies: Annotated[
@@ -114,11 +114,12 @@ def bench(
 @app.command()
 def doctor(
     compare: Annotated[
-        str | None, typer.Option(metavar="ARCH", help="Compute and draw the same on the CPU and on this back end.")
+        str | None,
+        typer.Option(metavar="ARCH", help="Compare water and pictures of the CPU with those of this back end."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Say what is installed, which back ends work, and how to get what is missing."""
+    """Report what is installed, which back ends work, and how to get what is missing."""
     if compare is not None:
         _compare_backends(compare, as_json)
         return

@@ -26,17 +26,17 @@ from wavetank.cli.options import (
 def film(
     scene: SceneName,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="The film, MP4 or GIF; named after the scene unless told.")
+        Path | None, typer.Option("--out", "-o", help="The film, MP4 or GIF; by default named after the scene.")
     ] = None,
     quality: Annotated[
-        str | None, typer.Option(help="draft, standard, high or film; that of the scene's film unless told.")
+        str | None, typer.Option(help="draft, standard, high or film; by default that of the scene's film.")
     ] = None,
-    samples: Annotated[int | None, typer.Option(help="Samples a pixel, of high and film.")] = None,
-    size: Annotated[str | None, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of a picture.")] = None,
+    samples: Annotated[int | None, typer.Option(help="Samples per pixel, of high and film.")] = None,
+    size: Annotated[str | None, typer.Option(metavar="WIDTHxHEIGHT", help="Size of a picture [px].")] = None,
     fps: Annotated[float | None, typer.Option(help="Frames per second of film.")] = None,
     duration: Annotated[float | None, typer.Option(help="Seconds of film.")] = None,
     speed: Annotated[float | None, typer.Option(help="Seconds of water in a second of film.")] = None,
-    keep: Annotated[bool, typer.Option("--keep", help="Leave the frames beside the film.")] = False,
+    keep: Annotated[bool, typer.Option("--keep", help="Do not delete the frames.")] = False,
     environment: Environment = None,
     sun: Sun = None,
     floor: Floor = None,
@@ -45,7 +45,7 @@ def film(
     arch: Arch = "cpu",
     as_json: Json = False,
 ) -> None:
-    """Film a scene by the camera and the slow motion in its table [film]; one that was stopped goes on."""
+    """Film a scene with the camera and slow motion of its table [film]; an interrupted film is continued."""
     from wavetank.run.film import film_scene
     from wavetank.simulation.cost import large_worlds_allowed
 
@@ -67,8 +67,8 @@ def film(
     if as_json:
         print(json.dumps(figures))
     elif figures["interrupted"]:
-        print(f"{figures['frames']:,} of {figures['of']:,} frames are kept; the same command goes on.")
+        print(f"{figures['frames']:,} of {figures['of']:,} frames are done; the same command continues.")
     else:
-        print(f"{figures['frames']:,} frames, {figures['rendered']:,} of them made now\n{path}")
+        print(f"{figures['frames']:,} frames, {figures['rendered']:,} of them rendered now\n{path}")
     if figures["interrupted"]:
         raise typer.Exit(figures["exit_code"])

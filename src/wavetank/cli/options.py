@@ -1,4 +1,4 @@
-"""What several commands share: the application, options that they have in common, and how texts become values."""
+"""What several commands share: the application, common options, and how texts become values."""
 
 import tomllib
 from pathlib import Path
@@ -16,9 +16,11 @@ PYTHONS = "<list[str]>"
 
 SceneName = Annotated[str, typer.Argument(help="A bundled scene or the path of a TOML file.")]
 Settings = Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="Set a key of the scene.")]
-Arch = Annotated[str, typer.Option(help="Back end: cpu, gpu (the best there is), cuda, vulkan, metal, amdgpu.")]
-Size = Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of a picture.")]
-View = Annotated[str | None, typer.Option(help="water, particles, slice or foam; water unless particles are coloured.")]
+Arch = Annotated[str, typer.Option(help="Back end: cpu, gpu (the best available), cuda, vulkan, metal, amdgpu.")]
+Size = Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Size of a picture [px].")]
+View = Annotated[
+    str | None, typer.Option(help="water, particles, slice or foam; by default water, or particles with --color-by.")
+]
 Quality = Annotated[
     str,
     typer.Option(help="draft, standard (2 x 2 samples a pixel), high (64 pictures averaged) or film (paths of light)."),
@@ -27,28 +29,32 @@ ColorBy = Annotated[str | None, typer.Option(help="speed, density, material, foa
 Environment = Annotated[
     str | None,
     typer.Option(
-        help="studio, pool, paper, sky, evening, overcast or a picture (.hdr); the scene's or the view's unless told."
+        help="studio, pool, paper, sky, evening, overcast or a picture (.hdr); by default the scene's or the view's."
     ),
 ]
-Sun = Annotated[str | None, typer.Option(help="Where the sun stands [deg]: azimuth,elevation, as 40,25.")]
+Sun = Annotated[str | None, typer.Option(help="Direction of the sun [deg]: azimuth,elevation, as in 40,25.")]
 Floor = Annotated[str | None, typer.Option(help="plain, tiles, stone, sand or table.")]
-Cut = Annotated[str | None, typer.Option(help="Where a slice lies: z=0.35 for example.")]
+Cut = Annotated[str | None, typer.Option(help="Position of a slice [m], as in z=0.35.")]
 Exports = Annotated[
     list[str],
     typer.Option(
-        metavar="FORMATS", help="Write each frame: usd, vtkhdf, vtp, h5, npz, csv, ply, obj; several as usd,npz."
+        metavar="FORMATS", help="Write each frame: usd, vtkhdf, vtp, h5, npz, csv, ply, obj; several as in usd,npz."
     ),
 ]
-Only = Annotated[str, typer.Option(help="Parts of it: particles, foam, solids, surface; all but the surface.")]
-AllowLarge = Annotated[bool, typer.Option("--allow-large", help="Begin what needs more memory than is free, or hours.")]
+Only = Annotated[
+    str, typer.Option(help="Parts to write: particles, foam, solids, surface; by default all but the surface.")
+]
+AllowLarge = Annotated[
+    bool, typer.Option("--allow-large", help="Start even if it needs more memory than is free, or hours.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object as the last line.")]
 
 
 class Plain(TyperCommand):
-    """A command whose help says of its arguments what a person types, and not what Python makes of it."""
+    """A command whose help does not show Python's types of its arguments."""
 
     def get_help(self, ctx: Any) -> str:
-        """Return the help, with its columns where they were."""
+        """Return the help, with its columns aligned."""
         return super().get_help(ctx).replace(PYTHONS, " " * len(PYTHONS))
 
 
@@ -61,7 +67,7 @@ def _root(version: Annotated[bool, typer.Option("--version", help="Print the ver
 
 
 def configured(name: str, settings: list[str]) -> Scene:
-    """Return a scene with what `--set` says."""
+    """Return a scene with the changes of `--set`."""
     scene = Scene.load(name)
     changes: dict[str, Any] = {}
     for setting in settings:
@@ -73,7 +79,7 @@ def configured(name: str, settings: list[str]) -> Scene:
 
 
 def value_of(text: str) -> Any:
-    """Read a value as TOML does; what is not TOML is a string."""
+    """Parse a value as TOML; anything else is a string."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
@@ -81,19 +87,19 @@ def value_of(text: str) -> Any:
 
 
 def names_in(texts: list[str]) -> tuple[str, ...]:
-    """Return the names in texts such as "usd,npz", each once."""
+    """Return the names in texts such as "usd,npz", without repeats."""
     return tuple(dict.fromkeys(name.strip() for text in texts for name in text.split(",") if name.strip()))
 
 
 def picture_name(world: str, at: float | None, view: str | None, color_by: str | None) -> Path:
-    """Return the name of a picture that says what is on it, so that two commands leave two files."""
+    """Return a file name for a picture from its scene, time, view and colouring."""
     seconds = None if at is None else f"{at:g}s"
     parts = [Path(world).resolve().stem, seconds, view, color_by.lstrip("#") if color_by else None]
     return Path("-".join(part for part in parts if part) + ".png")
 
 
 def size_of(text: str) -> tuple[int, int]:
-    """Read width and height [px]; raises `WavetankError`."""
+    """Parse width and height [px]; raises `WavetankError`."""
     from wavetank.view.renderer import LARGEST_SIDE as LARGEST
 
     width, _, height = text.lower().partition("x")

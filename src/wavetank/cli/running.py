@@ -41,7 +41,7 @@ def scenes(
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema of a scene file.")] = False,
     as_json: Json = False,
 ) -> None:
-    """List the bundled scenes, and the levels with the best that was reached."""
+    """List the bundled scenes, and the levels with their best scores."""
     if schema:
         print(scene_schema())
         return
@@ -81,16 +81,16 @@ def scenes(
 def run(
     scene: SceneName,
     seconds: Annotated[float, typer.Option(help="Seconds of water.")] = 4.0,
-    out: Annotated[Path, typer.Option(help="Folder for what is written.")] = Path("out"),
+    out: Annotated[Path, typer.Option(help="Folder for the files.")] = Path("out"),
     video: Annotated[bool, typer.Option("--video", help="Write an MP4.")] = False,
     gif: Annotated[bool, typer.Option("--gif", help="Write an animated GIF.")] = False,
     frames: Annotated[bool, typer.Option("--frames", help="Write a PNG for each frame.")] = False,
     export: Exports = [],  # noqa: B006
     only: Only = "",
-    every: Annotated[int, typer.Option(help="Export only each so manyth frame.")] = 1,
+    every: Annotated[int, typer.Option(help="Export every Nth frame only.")] = 1,
     fps: Annotated[float, typer.Option(help="Frames per second of water in video and files.")] = 30.0,
     size: Annotated[
-        str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of a picture; 1280x720 unless told, of a GIF 640x360.")
+        str, typer.Option(metavar="WIDTHxHEIGHT", help="Size of a picture [px]; by default 1280x720, of a GIF 640x360.")
     ] = "",
     view: View = None,
     color_by: ColorBy = None,
@@ -99,9 +99,10 @@ def run(
     sun: Sun = None,
     floor: Floor = None,
     quality: Quality = "draft",
-    name: Annotated[str, typer.Option(help="Front part of the files' names.")] = "",
+    name: Annotated[str, typer.Option(help="Prefix of file names.")] = "",
     checkpoint_every: Annotated[
-        float, typer.Option(metavar="SECONDS", help="Keep a state of every so many seconds of water: see resume.")
+        float,
+        typer.Option(metavar="SECONDS", help="Write a checkpoint after every so many seconds of water: see resume."),
     ] = 0.0,
     allow_large: AllowLarge = False,
     settings: Settings = [],  # noqa: B006
@@ -109,12 +110,13 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Simulate a scene and write video, pictures, particles and figures."""
-    from wavetank.run.record import Order, record
+    from wavetank.run.options import RunOptions
+    from wavetank.run.record import record
     from wavetank.simulation.cost import large_worlds_allowed
     from wavetank.simulation.simulation import Simulation
 
     world = configured(scene, settings)
-    order = Order(
+    order = RunOptions(
         out,
         seconds,
         fps,
@@ -137,17 +139,17 @@ def run(
 
 @app.command()
 def resume(
-    folder: Annotated[Path, typer.Argument(help="The folder that run --checkpoint-every wrote to.")],
-    arch: Annotated[str, typer.Option(help="Back end; that of the run unless given.")] = "",
+    folder: Annotated[Path, typer.Argument(help="The folder of a run --checkpoint-every.")],
+    arch: Annotated[str, typer.Option(help="Back end; by default that of the run.")] = "",
     allow_large: AllowLarge = False,
     as_json: Json = False,
 ) -> None:
-    """Go on with a run that ended early, from its last checkpoint, to the same bits."""
-    from wavetank.run.record import go_on
+    """Resume a run that ended early, from its last checkpoint, to the same bits."""
+    from wavetank.run.record import resume_run
     from wavetank.simulation.cost import large_worlds_allowed
 
     with large_worlds_allowed(allow_large):
-        _finish(go_on(folder, arch, console), as_json)
+        _finish(resume_run(folder, arch, console), as_json)
 
 
 def _finish(figures: dict[str, Any], as_json: bool) -> None:
@@ -163,20 +165,20 @@ def _finish(figures: dict[str, Any], as_json: bool) -> None:
 def render(
     world: Annotated[
         str,
-        typer.Argument(metavar="SCENE|RUN|STATE.npz|FRAMES.h5", help="What is drawn: a run is named by its folder."),
+        typer.Argument(
+            metavar="SCENE|RUN|STATE.npz|FRAMES.h5", help="What to draw: a scene, a run's folder, a state or frames."
+        ),
     ],
     at: Annotated[
         float | None,
-        typer.Option(
-            "--at", "--time", help="Time [s]: a scene's best moment, a state's own, a run's last unless told."
-        ),
+        typer.Option("--at", "--time", help="Time [s]; by default a scene's best moment, a state's own, a run's last."),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="The picture, PNG, named after what is on it unless told; of a run, MP4 or GIF for a film."),
+        typer.Option(help="The picture, PNG, by default named after its contents; of a run also a film, MP4 or GIF."),
     ] = None,
     size: Size = "1280x720",
-    width: Annotated[int | None, typer.Option(hidden=True)] = None,  # both: what --size was called before
+    width: Annotated[int | None, typer.Option(hidden=True)] = None,  # both: older names of --size
     height: Annotated[int | None, typer.Option(hidden=True)] = None,
     view: View = None,
     color_by: ColorBy = None,
@@ -187,25 +189,27 @@ def render(
     quality: Annotated[
         str, typer.Option(help="draft, standard, high or film, as for run; standard for a picture, draft for a film.")
     ] = "",
-    samples: Annotated[int | None, typer.Option(help="Samples a pixel, of high and film; 64 unless told.")] = None,
+    samples: Annotated[int | None, typer.Option(help="Samples per pixel, of high and film; by default 64.")] = None,
     eye: Annotated[
-        str | None, typer.Option(help="Where the camera is [m], as 2,1,3; what it looks at is --target.")
+        str | None, typer.Option(help="Position of the camera [m], as in 2,1,3; it looks at --target.")
     ] = None,
-    target: Annotated[str | None, typer.Option(help="What the camera looks at [m]; the middle unless told.")] = None,
+    target: Annotated[
+        str | None, typer.Option(help="Point that the camera looks at [m]; by default the middle.")
+    ] = None,
     timings: Annotated[bool, typer.Option("--timings", help="Print the milliseconds of every pass.")] = False,
     settings: Settings = [],  # noqa: B006
-    arch: Annotated[str, typer.Option(help="Back end; cpu, or that of the run unless given.")] = "",
+    arch: Annotated[str, typer.Option(help="Back end; by default cpu, or that of the run.")] = "",
     as_json: Json = False,
 ) -> None:
-    """Draw one picture of a scene, a saved state or an instant of a run; or a film of a run that is over."""
-    from wavetank.run.archived import FILMS, is_kept
-    from wavetank.run.still import take
+    """Render a picture of a scene, a saved state or an instant of a run; or a film of a finished run."""
+    from wavetank.run.archived import FILMS, is_archive
+    from wavetank.run.still import render_still
 
     out = out or picture_name(world, at, view, color_by)
-    kept = is_kept(world) or (world.endswith(".toml") and out.suffix.lower() in FILMS)
-    scene = None if kept or world.endswith(".npz") else configured(world, settings)
+    archived = is_archive(world) or (world.endswith(".toml") and out.suffix.lower() in FILMS)
+    scene = None if archived or world.endswith(".npz") else configured(world, settings)
     if scene is None and settings:
-        raise WavetankError("--set does not go with a saved state or a run, which has its scene with it.")
+        raise WavetankError("--set cannot be used with a saved state or a run, which contains its scene.")
     across, down = size_of(size)
     across, down = (across if width is None else width), (down if height is None else height)
     if out.suffix.lower() in FILMS:
@@ -214,7 +218,7 @@ def render(
             out,
             (across, down),
             at,
-            kept,
+            archived,
             as_json,
             arch=arch,
             quality=quality or "draft",
@@ -226,7 +230,7 @@ def render(
             floor=floor,
         )
         return
-    figures = take(
+    figures = render_still(
         world,
         scene,
         out,
@@ -250,7 +254,7 @@ def render(
         print(json.dumps(figures))
     if figures.get("interrupted"):
         if not as_json:
-            print(f"{figures['samples']} of {figures['of']} samples are kept; the same command goes on.")
+            print(f"{figures['samples']} of {figures['of']} samples are done; the same command continues.")
         raise typer.Exit(figures["exit_code"])
     if as_json:
         return
@@ -262,17 +266,17 @@ def render(
 
 
 def _film(
-    world: str, out: Path, size: tuple[int, int], at: float | None, kept: bool, as_json: bool, **options: Any
+    world: str, out: Path, size: tuple[int, int], at: float | None, archived: bool, as_json: bool, **options: Any
 ) -> None:
     from wavetank.run.archived import film_archived
 
-    if not kept:
+    if not archived:
         raise WavetankError(
             f"--out {out}: films are made of a run's folder, a recording or an .h5; wavetank run {world} --video "
             "makes one of a scene."
         )
     if at is not None:
-        raise WavetankError(f"--at does not go with a film, {out}, which shows all frames; name a .png.")
+        raise WavetankError(f"--at cannot be used with a film, {out}, which shows all frames; name a .png.")
     figures = film_archived(world, out, *size, console=console, **options)
     print(json.dumps(figures) if as_json else f"{figures['frames']:,} frames\n{out}")
     if figures["interrupted"]:

@@ -1,4 +1,4 @@
-"""What page and window draw their controls from: taken from the declarations, so that nothing is said twice."""
+"""Descriptions of parameters, tools, scenes and views, from which page, notebook and window make their controls."""
 
 import dataclasses
 import functools
@@ -27,11 +27,11 @@ from wavetank.view.quantities import QUANTITIES
 from wavetank.view.views import VIEWS
 
 SHADES = 48  # colours of a legend
-EVERYDAY = ("gravity", "viscosity", "vorticity", "iterations", "substeps", "spacing")  # shown first
+COMMON = ("gravity", "viscosity", "vorticity", "iterations", "substeps", "spacing")  # shown first
 
 
-def everything(session: Session) -> dict[str, Any]:
-    """Return all that a page draws controls from; sent once to each viewer."""
+def hello_message(session: Session) -> dict[str, Any]:
+    """Return the first message to a viewer: descriptions of all controls."""
     return {
         "type": "hello",
         "parameters": [_parameter(p) for p in PARAMETERS],
@@ -67,18 +67,18 @@ def world(session: Session) -> dict[str, Any]:
         "forces": session.shows_forces,
         "bodies": len(session.sim.bodies),
         "light": dataclasses.asdict(standing(scene, session.view, session.light)),
-        "undo": session.former.scene.title if session.former else None,
+        "undo": session.previous_world.scene.title if session.previous_world else None,
         "game": session.game is not None,
     }
 
 
 def painted(session: Session) -> str:
-    """Return the coloring that is seen, an empty text where particles have none."""
+    """Return the shown colouring, "" where particles have none."""
     return str(options(session.view, session.color_by).get("color_by", ""))
 
 
 def legend(session: Session) -> dict[str, Any] | None:
-    """Return what the colours of the picture mean: a title, colours from the first to the last, round numbers."""
+    """Return the legend of the picture's colours: title, colours from low to high, ticks."""
     color_by, scene = painted(session), session.sim.scene
     if color_by not in QUANTITIES or not VIEWS[session.view or views()[0]].coloured:
         return None
@@ -94,7 +94,7 @@ def legend(session: Session) -> dict[str, Any] | None:
 
 
 def status(session: Session, painter: Painter) -> dict[str, Any]:
-    """Return what changes all the time."""
+    """Return what changes with every frame."""
     pace, times = session.pace, session.history.times
     return {
         "time": session.sim.time,
@@ -102,7 +102,7 @@ def status(session: Session, painter: Painter) -> dict[str, Any]:
         "ticks": session.ticks,
         "count": session.sim.count,
         "paused": session.paused,
-        "waits": session.waits,
+        "waits": session.awaits_touch,
         "speed": session.speed,
         "pace": pace.measured if not session.paused else 0.0,
         "fps": pace.frames_per_second,
@@ -118,7 +118,7 @@ def status(session: Session, painter: Painter) -> dict[str, Any]:
 
 
 def figures(session: Session) -> dict[str, float]:
-    """Measure the water; that costs a search for neighbours."""
+    """Measure the water, which takes a neighbour search."""
     stats = session.sim.stats()
     names = ("density_error_mean", "density_error_max", "kinetic_energy", "potential_energy", "speed_max")
     return {name: float(stats[name]) for name in names}
@@ -137,7 +137,7 @@ def _parameter(p: Any) -> dict[str, Any]:
         "symbol": p.symbol,
         "sentence": p.sentence,
         "live": p.live,
-        "everyday": p.name in EVERYDAY,
+        "everyday": p.name in COMMON,
         "choices": choices,
         "whole": isinstance(p.default, int),
     }
@@ -150,7 +150,7 @@ def scenes() -> list[dict[str, Any]]:
 
 
 def _card(name: str) -> dict[str, Any]:
-    """A scene as a card; one that needs a package that is missing here says so when it is chosen."""
+    """Return a scene's card; one that needs a missing package says so when it is chosen."""
     try:
         return _outline(name, Scene.load(name))
     except WavetankError:
@@ -159,7 +159,7 @@ def _card(name: str) -> dict[str, Any]:
 
 
 def _outline(name: str, scene: Scene) -> dict[str, Any]:
-    """A scene as a few boxes and balls, which the page draws as a thumbnail."""
+    """Return a scene as boxes and balls, for its thumbnail."""
     extent = extent_of(scene)
     shapes: list[dict[str, Any]] = []
     colors = {material.name: material.color for material in scene.palette()[1:]}

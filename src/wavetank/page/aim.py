@@ -1,4 +1,4 @@
-"""Where a hand would act: a ring on the surface that its ray meets, a line to the floor, and what it would take."""
+"""Preview of a tool: a ring where it would act, a line to the floor, and the solid that it would take."""
 
 import math
 from typing import Any
@@ -11,21 +11,21 @@ from wavetank.session.tools import TOOL_NAMES
 from wavetank.session.tools.hand import Hand
 
 CORNERS = 40  # of the ring
-FOOT = 0.35  # of the ring: how large its mark on the floor is
+FOOT = 0.35  # size of the mark on the floor, over that of the ring
 
 Place = list[float]  # u, v: shares of the picture's width and height
 
 
 def aim(session: Session, tool: str, u: float, v: float, reach: float, size: tuple[int, int]) -> dict[str, Any]:
-    """Return ring, line to the floor and its mark there as shares of a picture of `size` [px]; light up what is taken.
+    """Return ring, line to the floor and mark there as shares of a picture of `size` [px]; highlight the solid.
 
     `u` and `v` are the pointer's place in that picture, `reach` the radius as a share of the world, 0 for no ring.
     """
     kind = TOOL_NAMES.get(tool)
     if kind is None:
-        light(session, "")
+        highlight(session, "")
         return {}
-    camera, (width, height) = session.camera_of(tool), size
+    camera, (width, height) = session.camera_for(tool), size
     held = next((hand for other, hand in session.hands.values() if other.name == tool), None)
     if held is None:
         ray = camera.ray(u * width, v * height, width, height)
@@ -33,7 +33,7 @@ def aim(session: Session, tool: str, u: float, v: float, reach: float, size: tup
         takes = held.hit.kind == "solid" and (
             kind.takes == "solid" or (kind.takes == "body" and _is_body(session, held))
         )
-        light(session, held.hit.name if takes else "")
+        highlight(session, held.hit.name if takes else "")
     if not reach:
         return {}
     flat, center, radius = session.sim.scene.dim == 2, held.point, held.radius(reach)
@@ -47,10 +47,10 @@ def aim(session: Session, tool: str, u: float, v: float, reach: float, size: tup
     return result
 
 
-def light(session: Session, name: str) -> None:
-    """Light up the solid of that name, and no other."""
-    if session.lit != name:
-        session.lit = name
+def highlight(session: Session, name: str) -> None:
+    """Highlight the solid of that name; none for ""."""
+    if session.highlighted != name:
+        session.highlighted = name
         session.changes += 1
 
 
@@ -62,5 +62,5 @@ def _is_body(session: Session, hand: Hand) -> bool:
 
 
 def _seen(session: Session, points: np.ndarray, size: tuple[int, int]) -> list[Place]:
-    places = session.sight.project(points, *size)[:, :2] / size
+    places = session.tilted_camera.project(points, *size)[:, :2] / size
     return [[round(float(u), 4), round(float(v), 4)] for u, v in places] if np.isfinite(places).all() else []

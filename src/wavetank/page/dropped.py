@@ -1,4 +1,4 @@
-"""A mesh that someone drops on page or window: the text of an OBJ becomes a solid in the middle of the world."""
+"""Meshes dropped on page or window: the text of an OBJ becomes a solid in the middle of the world."""
 
 import itertools
 from pathlib import PurePath
@@ -12,18 +12,18 @@ from wavetank.session.session import Session
 from wavetank.solids.meshes.mesh import Mesh
 from wavetank.view.extent import extent_of
 
-SHARE = 0.3  # of the world's length: the longest edge of what is dropped
+SHARE = 0.3  # of the world's length: longest edge of a dropped mesh
 MOST_CORNERS = 400_000
 
 
 def command_for(session: Session, text: str, file: str) -> AddSolid:
-    """Return the command that puts the mesh of an OBJ file's `text` on the floor of the world.
+    """Return the command that places the mesh of an OBJ file's `text` on the floor of the world.
 
-    Raises `WavetankError` that names `file` for what is no closed mesh, or has no place in this world.
+    Raises `WavetankError`, with the name `file`, where it is not a closed mesh or the world is 2-D.
     """
     scene, extent = session.sim.scene, extent_of(session.sim.scene)
     if scene.dim == 2:
-        raise WavetankError(f"{file}: a mesh needs a 3-D world, and this one is flat; choose a 3-D scene first.")
+        raise WavetankError(f"{file}: a mesh needs a 3-D world, and this one is 2-D; choose a 3-D scene first.")
     vertices, faces = _triangles(text, file)
     edges = np.ptp(vertices[np.unique(faces)], axis=0)
     if not edges.max() > 0.0:
@@ -43,7 +43,7 @@ def command_for(session: Session, text: str, file: str) -> AddSolid:
 
 
 def _triangles(text: str, file: str) -> tuple[np.ndarray, np.ndarray]:
-    """Read the corners and faces of an OBJ; faces of more than three corners become fans."""
+    """Read the vertices and faces of an OBJ; polygons become triangle fans."""
     corners: list[list[float]] = []
     faces: list[tuple[int, int, int]] = []
     for number, line in enumerate(text.splitlines(), 1):
@@ -57,10 +57,10 @@ def _triangles(text: str, file: str) -> tuple[np.ndarray, np.ndarray]:
                 around = [k - 1 if k > 0 else len(corners) + k for k in around]
                 faces += [(around[0], a, b) for a, b in itertools.pairwise(around[1:])]
         except ValueError:
-            raise WavetankError(f"{file}, line {number}: {line.strip()[:60]!r} is no line of an OBJ file.") from None
+            raise WavetankError(f"{file}, line {number}: {line.strip()[:60]!r} is not valid in an OBJ file.") from None
         if len(corners) > MOST_CORNERS or len(faces) > MOST_CORNERS:
             raise WavetankError(f"{file}: the mesh has more than {MOST_CORNERS:,} corners or faces; simplify it.")
     points, triangles = np.array(corners, float).reshape(-1, 3), np.array(faces, np.int64).reshape(-1, 3)
     if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points) or not np.isfinite(points).all():
-        raise WavetankError(f"{file}: there is no mesh in it: an OBJ has lines 'v x y z' and 'f a b c'.")
+        raise WavetankError(f"{file}: it contains no mesh: an OBJ has lines 'v x y z' and 'f a b c'.")
     return points, triangles

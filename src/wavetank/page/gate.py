@@ -1,7 +1,7 @@
-"""Who may come in: the right token, the right Host, an Origin of our own. All else is refused before it is looked at.
+"""Access to the server: requests need the token, a known Host and an Origin of our own; others are refused at once.
 
-A page of another site can make a browser talk to 127.0.0.1, and a name that is made to point here can make it look
-like our own page. The token keeps both out; Host and Origin say so early.
+A page of another site can make a browser send requests to 127.0.0.1, also under a name that resolves to it (DNS
+rebinding). The token protects against both; Host and Origin are checked first.
 """
 
 import hmac
@@ -11,9 +11,9 @@ import urllib.parse
 from collections.abc import Iterable
 from typing import Any
 
-OPEN_PATHS = ("/page/",)  # style and scripts, the same for everyone
+OPEN_PATHS = ("/page/",)  # style and scripts, without anything secret
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
-#: of every answer: our own page alone may frame, load and read what is here (OWASP's list of secure headers)
+#: of every response: only our own page may frame, load and read it (OWASP's list of secure headers)
 HEADERS = {
     "content-security-policy": "default-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
     "frame-ancestors 'self' http://127.0.0.1:* http://localhost:*; base-uri 'none'; form-action 'none'; "
@@ -35,28 +35,28 @@ class Gate:
         self.app, self.port = app, port
         self.token = token or secrets.token_urlsafe(18)
         self.cookie = f"wavetank_{port}"
-        # Beyond loopback this machine has names that we do not know; there the token alone decides.
+        # Other than on loopback the names of this machine are unknown; there only the token is checked.
         self.hosts = {f"{name}:{port}" for name in (*LOOPBACK, host)} if is_loopback(host) else None
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        """Let a request pass or refuse it (ASGI)."""
+        """Pass a request on or refuse it (ASGI)."""
         if scope["type"] not in ("http", "websocket"):
             return
         headers = {key.decode("latin-1"): value.decode("latin-1") for key, value in scope["headers"]}
-        if not self._is_welcome(scope, headers):
+        if not self._is_allowed(scope, headers):
             await _refuse(scope, receive, send)
             return
         if scope["type"] == "http":
             send = self._with_headers(send, scope)
         await self.app(scope, receive, send)
 
-    def _is_welcome(self, scope: Any, headers: dict[str, str]) -> bool:
+    def _is_allowed(self, scope: Any, headers: dict[str, str]) -> bool:
         host, origin = headers.get("host", ""), headers.get("origin")
         if self.hosts is not None and host.lower() not in self.hosts:
             return False
-        if origin is not None and _place_of(origin) != host.lower():
+        if origin is not None and _host_of(origin) != host.lower():
             return False
-        # Browsers always name the origin of a socket; what does not is no browser and needs the token all the same.
+        # Browsers always send the Origin of a socket; other clients need the token as well.
         if scope["type"] == "http" and scope["path"].startswith(OPEN_PATHS):
             return True
         return any(hmac.compare_digest(given.encode(), self.token.encode()) for given in self._tokens(scope, headers))
@@ -85,8 +85,8 @@ class Gate:
         return wrapped
 
 
-def _place_of(origin: str) -> str | None:
-    """Return the host and the port of an origin; None for what is none."""
+def _host_of(origin: str) -> str | None:
+    """Return host and port of an Origin; None where it is malformed."""
     try:
         return urllib.parse.urlsplit(origin).netloc.lower()
     except ValueError:
@@ -94,7 +94,7 @@ def _place_of(origin: str) -> str | None:
 
 
 def is_loopback(host: str) -> bool:
-    """Say whether only this machine can reach a server that listens on `host`."""
+    """Return whether only this machine can reach a server that listens on `host`."""
     return host in ("localhost", "::1", "[::1]") or host.startswith("127.")
 
 
@@ -106,8 +106,8 @@ async def _refuse(scope: Any, receive: Any, send: Any) -> None:
         if kind not in (scope.get("extensions") or {}):
             await send({"type": "websocket.close", "code": 1008})
             return
-    body = b"wavetank: this page opens with the link that the program printed, token included.\n"
-    # What answers a socket tells the length by itself, and some versions of it a second time.
+    body = b"wavetank: open this page with the link that the program printed, which includes the token.\n"
+    # The web socket library adds the length itself.
     length = [(b"content-length", str(len(body)).encode())] if scope["type"] == "http" else []
     await send(
         {

@@ -1,4 +1,4 @@
-"""What page and window show of a game: the goal and how it stands, its regions in the picture, high scores."""
+"""What page and window show of a game: goal, progress, regions in the picture, high scores; and of forces."""
 
 import itertools
 import math
@@ -13,34 +13,34 @@ from wavetank.session.scores import keep_score, key_of, scores
 from wavetank.session.session import Session
 from wavetank.simulation.jets import outlines
 
-LONGEST = 0.2  # of the picture's height: the arrow of the heaviest body's weight
-MOST = 2.0  # of that: no arrow is longer
-LEAST = 0.02  # of the heaviest body's weight: what is less is not shown
-NEWEST = 0.15  # share of a new frame in the means that are shown
+WEIGHT_ARROW = 0.2  # of the picture's height: length of the arrow of the heaviest body's weight
+LONGEST_ARROW = 2.0  # of that
+SMALLEST_FORCE = 0.02  # of the heaviest body's weight: smaller ones are not shown
+NEWEST = 0.15  # weight of a new frame in moving averages
 Place = list[float]  # u, v: shares of a picture's width and height
 
 
 class Hud:
-    """Follows the game of one session from attempt to attempt."""
+    """Describes the game of one session, and saves its scores."""
 
     def __init__(self, session: Session) -> None:
         self.session = session
         self.scores = scores()
         self._game: Game | None = None
         self._means: dict[tuple[str, str], tuple[int, np.ndarray]] = {}
-        self._level, self._is_best, self._kept = "", False, False
+        self._level, self._is_best, self._saved = "", False, False
 
     def status(self) -> dict[str, Any] | None:
-        """Return the game as plain data, None where there is none; the first time that it is won, keep the score."""
+        """Return the game as plain data, None where there is none; save the score when it is won."""
         game = self.session.game
         if game is not self._game:
-            self._game, self._is_best, self._kept = game, False, False
+            self._game, self._is_best, self._saved = game, False, False
             self._level = key_of(self.session.scene) if game is not None else ""
         if game is None:
             return None
-        if game.outcome == "won" and not self._kept:
-            self._kept = True
-            self._keep_score(game)
+        if game.outcome == "won" and not self._saved:
+            self._saved = True
+            self._save_score(game)
         levels = bundled_levels()
         place = levels.index(self._level) + 1 if self._level in levels else 0
         told = game.describe()
@@ -55,15 +55,15 @@ class Hud:
             "verdict": self._verdict(game),
         }
 
-    def _keep_score(self, game: Game) -> None:
+    def _save_score(self, game: Game) -> None:
         try:
             self._is_best = keep_score(self._level, game.stars, game.mark)
         except (OSError, WavetankError) as error:
-            self.session.note(f"The score cannot be kept: {error}.")
+            self.session.note(f"The score cannot be saved: {error}.")
         self.scores = scores()
 
     def _verdict(self, game: Game) -> str:
-        """Say in a sentence or two how it was won, or how it may be."""
+        """Return a sentence or two on the win, or the level's hint."""
         if game.outcome != "won":
             return game.goal.hint
         said = [] if game.goal.is_endured else [f"In {game.elapsed:.1f} s."]
@@ -79,7 +79,7 @@ class Hud:
     def regions(self, size: tuple[int, int]) -> list[dict[str, Any]]:
         """Return the corners and the outline of each region, as shares of a picture of `size` [px].
 
-        Behind those of the game come the mouths of emitters and drains, which have a `mark` and no corners, and forces.
+        After those of the game follow emitters and drains, with a `mark` and without corners, and forces.
         """
         game = self.session.game
         places = [] if game is None else [self._corners(aim.lower, aim.upper, size) for aim in game.goal.aims]
@@ -91,23 +91,23 @@ class Hud:
         return regions + self._forces(size) if self.session.shows_forces else regions
 
     def _forces(self, size: tuple[int, int]) -> list[dict[str, Any]]:
-        """Return arrows, with a `label`, of what the water does to bodies, and the power of joints that have motors.
+        """Return arrows, with a `label`, of the water's forces on bodies, and the power of joints that have motors.
 
-        The heaviest body's weight is an arrow `LONGEST` of the picture's height long. They are means of some frames:
-        what the water does in a single step jumps.
+        The heaviest body's weight is an arrow `WEIGHT_ARROW` of the picture's height long. They are averages of some
+        frames, as forces of single time steps fluctuate.
         """
         sim, shown = self.session.sim, []
         weight = max((body.mass for body in sim.bodies.values()), default=0.0) * math.hypot(*sim.gravity)
-        longest = LONGEST * self.session.camera.visible_height  # m
+        longest = WEIGHT_ARROW * self.session.camera.visible_height  # m
         scale = longest / (weight or 1.0)  # m/N
         for name, body in sim.bodies.items():
             for mark, force in (("buoyancy", body.buoyancy), ("drag", body.drag)):
                 mean = self._mean((name, mark), force)
                 start, way = body.center, np.zeros(3)
                 way[: len(mean)] = scale * mean
-                way *= min(1.0, MOST * longest / max(float(np.linalg.norm(way)), 1e-30))
+                way *= min(1.0, LONGEST_ARROW * longest / max(float(np.linalg.norm(way)), 1e-30))
                 places = self._in_picture(np.array([start, start + way]), size)
-                if places and float(np.linalg.norm(mean)) > LEAST * weight:
+                if places and float(np.linalg.norm(mean)) > SMALLEST_FORCE * weight:
                     told = f"{three(float(np.linalg.norm(mean)))} N"
                     shown.append({"corners": [], "outline": places, "mark": mark, "label": told})
         for name, power in sim.joints.powers.items():
@@ -121,7 +121,7 @@ class Hud:
         return [row for row in shown if row["outline"]]
 
     def _mean(self, what: tuple[str, str], value: np.ndarray) -> np.ndarray:
-        """Return the mean of a vector over the last frames, the more the newer they are."""
+        """Return the exponential moving average of a vector over frames."""
         ticks, before, mean = self.session.ticks, *self._means.get(what, (-1, value))
         if len(mean) != len(value) or ticks < before:
             mean = value
@@ -138,14 +138,14 @@ class Hud:
         return self._in_picture(corners, size)
 
     def _in_picture(self, points: np.ndarray, size: tuple[int, int]) -> list[Place]:
-        """Return points in space [m] as shares of a picture, none where one of them is behind the eye."""
-        places = self.session.sight.project(points, *size)[:, :2] / size
+        """Project points [m] to shares of a picture; none where one of them is behind the camera."""
+        places = self.session.tilted_camera.project(points, *size)[:, :2] / size
         seen = all(math.isfinite(part) for part in places.reshape(-1))
         return [[round(float(u), 5), round(float(v), 5)] for u, v in places] if seen else []
 
 
 def three(value: float) -> str:
-    """Return a number with three digits that count, and no more: 0.00 where there is next to nothing."""
+    """Format a number with three significant digits; 0.00 below 0.005."""
     if abs(value) < 0.005:
         return "0.00"
     return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}"

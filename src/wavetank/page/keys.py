@@ -1,4 +1,4 @@
-"""The keys of page and window, the paces of time, and the tool that only looks: each said once."""
+"""Keys of page and window, speeds of time, and the tool that only moves the camera."""
 
 import dataclasses
 from typing import Any
@@ -6,49 +6,49 @@ from typing import Any
 
 @dataclasses.dataclass(frozen=True)
 class Key:
-    """What a key does: a command as a plain table, or an action that a front knows by its name."""
+    """A key, with a command as a plain table, or the name of an action of page and window."""
 
-    key: str  # a sign, or a name as browsers tell it
-    label: str = ""  # in the list of keys, with `text`; keys without one are in the row of another
+    key: str  # a character, or a name as in a browser's `KeyboardEvent.key`
+    label: str = ""  # in the list of keys, with `text`; keys without one share the row of another
     text: str = ""
     action: str = ""
     command: dict[str, Any] | None = None
     page_only: bool = False
-    repeats: bool = False  # while it is held: what turns something on and off does not
+    repeats: bool = False  # while held; toggles do not
 
 
 KEYS = (
-    Key(" ", "Space", "Pause, play", "pause"),
+    Key(" ", "Space", "Play, pause", "pause"),
     Key(".", ".", "One frame", command={"do": "step"}, repeats=True),
     Key(",", ",", "One second back", "back", repeats=True),
-    Key("r", "R", "Start again", "again"),
+    Key("r", "R", "Restart the scene", "again"),
     Key("[", "[ ]", "Slower, faster", "slower", repeats=True),
     Key("]", action="faster", repeats=True),
     Key("m", "M", "Bookmark", "bookmark"),
-    Key("h", "H", "See all", command={"do": "home"}),
+    Key("h", "H", "Reset the view", command={"do": "home"}),
     Key("Escape", "Esc", "Stop all tools", command={"do": "tool-stop"}),
     Key("f", "F", "Full screen", "full-screen", page_only=True),
-    Key("c", "C", "Controls: the panel", "panel"),
+    Key("c", "C", "Show or hide the controls", "panel"),
     Key("z", "Z", "Undo a reset or a change of scene", command={"do": "undo"}),
-    Key("Enter", "Enter", "Use the tool by keys: arrows aim, Enter puts it down and lifts it", "aim", page_only=True),
-    Key("+", "+ −", "Closer, farther", command={"do": "zoom", "factor": 0.85}, repeats=True),
+    Key("Enter", "Enter", "Use the tool by keyboard: arrows aim, Enter presses and releases", "aim", page_only=True),
+    Key("+", "+ −", "Zoom in, out", command={"do": "zoom", "factor": 0.85}, repeats=True),
     Key("-", command={"do": "zoom", "factor": 1.18}, repeats=True),
-    Key("ArrowLeft", "Arrows", "Turn", command={"do": "orbit", "azimuth": -0.12}, repeats=True),
+    Key("ArrowLeft", "Arrows", "Turn the view", command={"do": "orbit", "azimuth": -0.12}, repeats=True),
     Key("ArrowRight", command={"do": "orbit", "azimuth": 0.12}, repeats=True),
     Key("ArrowUp", command={"do": "orbit", "elevation": 0.08}, repeats=True),
     Key("ArrowDown", command={"do": "orbit", "elevation": -0.08}, repeats=True),
     Key("n", "N", "Forces on bodies: buoyancy, drag, power", "forces"),
     Key("<", "< >", "Turn the sun", command={"do": "light", "turn": -10}, repeats=True),
     Key(">", command={"do": "light", "turn": 10}, repeats=True),
-    Key("{", "{ }", "Lower, higher sun", command={"do": "light", "rise": -4}, repeats=True),
+    Key("{", "{ }", "Lower, raise the sun", command={"do": "light", "rise": -4}, repeats=True),
     Key("}", command={"do": "light", "rise": 4}, repeats=True),
     Key("?", "?", "This list", "help"),
 )
 
-#: seconds of water in a second that can be chosen, and what they are called
+#: choices of seconds of water in a second, and their labels
 SPEEDS = ((1 / 16, "1/16 ×"), (1 / 8, "1/8 ×"), (1 / 4, "1/4 ×"), (1 / 2, "1/2 ×"), (1.0, "1 ×"), (2.0, "2 ×"))
 
-#: a tool of the fronts alone, which makes no command
+#: the tool that only moves the camera, and makes no command
 LOOK: dict[str, Any] = {
     "name": "look",
     "label": "Look",
@@ -63,5 +63,5 @@ LOOK: dict[str, Any] = {
 
 
 def nearest_speed(factor: float) -> int:
-    """Return the place in `SPEEDS` of the pace that is nearest."""
+    """Return the index of the nearest entry of `SPEEDS`."""
     return min(range(len(SPEEDS)), key=lambda n: abs(SPEEDS[n][0] - factor))

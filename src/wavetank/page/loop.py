@@ -1,11 +1,12 @@
-"""The loop that page and window share: what is asked, a frame of water, a picture where one is due, how it all stands.
+"""The loop that page, notebook and window share: calls from other threads, a frame, a picture, a status report.
 
-It runs in the one thread that may look at the simulation's arrays.
+It runs in the one thread that may read the simulation's arrays.
 """
 
 import concurrent.futures
 import dataclasses
 import os
+import queue
 import threading
 import time
 from collections.abc import Callable
@@ -16,93 +17,104 @@ import numpy as np
 from wavetank.foundation.input_limits import one_line
 from wavetank.page.about import figures, status, world
 from wavetank.page.hud import Hud
-from wavetank.page.jobs import Jobs
 from wavetank.page.picture import Painter
 from wavetank.session.session import Session
 
 STATUS_EVERY = 0.1  # s
-FIGURES_SHARE = 0.03  # of the time goes into measuring
-FIGURES_SELDOM = 2.0  # s between two measurements, at most
-CALM = 0.25  # s without a change after which a sharp picture is worth it
-REST = 0.05  # s, at most, without a look at what is asked
+FIGURES_SHARE = 0.03  # of the time that measuring may take
+FIGURES_EVERY = 2.0  # s between two measurements, at most
+CALM = 0.25  # s without a change after which a sharp picture is made
+REST = 0.05  # s, at most, between two looks at the queue of calls
 
 
 @dataclasses.dataclass(frozen=True)
-class News:
-    """How a session stands, as plain data."""
+class Report:
+    """The status of a session, as plain data."""
 
     status: dict[str, Any] = dataclasses.field(default_factory=dict)
     world: dict[str, Any] = dataclasses.field(default_factory=dict)
     figures: dict[str, float] = dataclasses.field(default_factory=dict)
-    measured: int = 0  # how often figures were taken
+    measured: int = 0  # number of measurements
     game: dict[str, Any] | None = None
     scores: dict[str, dict[str, Any]] = dataclasses.field(default_factory=dict)  # by level
 
 
 class Audience(Protocol):
-    """Who looks at a session."""
+    """The viewers of a session, as the loop sees them."""
 
     @property
-    def looks(self) -> bool:
-        """Whether anyone does; time stands still while nobody is there."""
+    def has_viewers(self) -> bool:
+        """Whether there are any; without one the session is paused."""
 
     @property
-    def is_ready(self) -> bool:
-        """Whether there is use for a picture."""
+    def wants_picture(self) -> bool:
+        """Whether a viewer is ready for the next picture."""
 
     @property
-    def is_new(self) -> bool:
-        """Whether someone has not seen one yet."""
+    def has_new_viewer(self) -> bool:
+        """Whether a viewer has not seen any yet."""
 
     @property
     def size(self) -> tuple[int, int] | None:
-        """Of the place for the picture [px]; None where nobody says."""
+        """Width and height of the picture on the screen [px]; None where unknown."""
 
     @property
     def detail(self) -> str:
-        """How fine pictures are: see `Painter.detail`."""
+        """Resolution of pictures: see `Painter.detail`."""
 
     def show(self, image: np.ndarray, regions: list[dict[str, Any]]) -> None:
         """Show a picture, uint8 [height, width, 3], with the regions of the game in it."""
 
-    def tell(self, news: News, notes: list[str]) -> None:
-        """Show how things stand, and sentences for the person."""
+    def send_report(self, report: Report, notes: list[str]) -> None:
+        """Show the status, and messages."""
 
 
 class Loop:
-    """Turns a session, paints it and tells how it stands, until `stop`."""
+    """Runs a session, makes its pictures and reports its status, until `stop`."""
 
-    def __init__(self, session: Session, audience: Audience, figures_every: float = FIGURES_SELDOM) -> None:
-        session.smooth = session.patient = True
-        session.wait_for_hand()
+    def __init__(self, session: Session, audience: Audience, figures_every: float = FIGURES_EVERY) -> None:
+        session.smooth = session.starts_on_touch = True
+        session.wait_for_touch()
         self.session, self.audience, self.figures_every = session, audience, figures_every
         self.painter, self.hud = Painter(session), Hud(session)
-        self._jobs, self._stopped = Jobs(session.wake), threading.Event()
+        self._calls: queue.SimpleQueue[tuple[Callable[[], Any], concurrent.futures.Future[Any]]] = queue.SimpleQueue()
+        self._stopped = threading.Event()
         self._painted, self._painted_at, self._sharp = -1, 0.0, False
         self._next_status = self._next_figures = 0.0
         self._figures: dict[str, float] = {}
-        self._measured, self._measured_at = 0, (-1, 0)  # how often, and at which frame with how many particles
+        self._measured, self._measured_at = 0, (-1, 0)  # how often; frame and particles of the last one
 
-    def ask(self, job: Callable[[], Any]) -> concurrent.futures.Future[Any]:
-        """Have `job` done between two frames, from any thread."""
-        return self._jobs.ask(job)
+    def call(self, function: Callable[[], Any]) -> concurrent.futures.Future[Any]:
+        """Have `function` called between two frames, from any thread; the future has its result or exception."""
+        future: concurrent.futures.Future[Any] = concurrent.futures.Future()
+        self._calls.put((function, future))
+        self.session.wake()
+        return future
+
+    def _answer_calls(self) -> None:
+        while not self._calls.empty():
+            function, future = self._calls.get()
+            try:
+                future.set_result(function())
+            except Exception as error:
+                future.set_exception(error)
 
     def run(self) -> None:
-        """Let the water move until `stop`."""
+        """Run until `stop`."""
         while not self._stopped.is_set():
             self.turn_or_pause()
-            self.session.rest(REST, asleep=not self.audience.looks)
-        self.session.drain()  # what was done while the last frame was computed belongs to the recording
+            self.session.rest(REST, asleep=not self.audience.has_viewers)
+        self.session.drain()  # commands of the last frame belong to the recording
 
     def turn_or_pause(self) -> None:
-        """Turn; what nobody thought of stops the time, is told, and ends nothing."""
+        """Turn; an unexpected error pauses the session and becomes a note."""
         try:
             self.turn()
         except Exception as error:
             if os.environ.get("WAVETANK_STRICT_INPUT"):
                 raise
             self.session.paused, self.session.steps_left = True, 0
-            self.session.note(f"The water is paused: {type(error).__name__}, {one_line(error)}; begin the scene anew.")
+            self.session.note(f"The water is paused: {type(error).__name__}, {one_line(error)}; restart the scene.")
             self._stopped.wait(REST)
 
     def stop(self) -> None:
@@ -111,30 +123,30 @@ class Loop:
         self.session.wake()
 
     def turn(self) -> None:
-        """Do what is due: jobs, commands, a frame, a picture, a status."""
-        self._jobs.do_all()
+        """Do what is due: calls, commands, a frame, a picture, a report."""
+        self._answer_calls()
         self.painter.detail = self.audience.detail
         size = self.audience.size
         if size is not None and size != self.painter.asked:
             self.painter.want(*size)
-        if self.audience.looks:
+        if self.audience.has_viewers:
             self.session.turn()
-        else:  # who comes later sees the beginning
+        else:  # so that the first viewer sees the start
             self.session.drain()
             self.session.pace.stop()
         now = time.perf_counter()
         self._paint(now)
-        if now >= self._next_status and self.audience.looks:
+        if now >= self._next_status and self.audience.has_viewers:
             self._next_status = now + STATUS_EVERY
             self._measure(now)
-            news = self.news()  # first: a score that cannot be kept is one more note
+            report = self.report()  # first, as it may add a note
             notes, self.session.notes = self.session.notes, []
-            self.audience.tell(news, notes)
+            self.audience.send_report(report, notes)
 
-    def news(self) -> News:
-        """Return how the session stands."""
+    def report(self) -> Report:
+        """Return the status of the session."""
         game = self.hud.status()
-        return News(
+        return Report(
             status(self.session, self.painter),
             world(self.session),
             self._figures,
@@ -144,23 +156,23 @@ class Loop:
         )
 
     def _paint(self, now: float) -> None:
-        """Show a picture where something has changed, or is to be seen sharply, and someone waits for it."""
-        if not self.audience.is_ready:
+        """Show a picture where something has changed, or a sharp one is due, and a viewer is ready."""
+        if not self.audience.wants_picture:
             return
         changed = self.session.changes != self._painted
         calm = not changed and not self._sharp and self.painter.is_reduced and now - self._painted_at > CALM
-        if not (self.audience.is_new or ((changed or calm) and self.painter.is_due(now))):
+        if not (self.audience.has_new_viewer or ((changed or calm) and self.painter.is_due(now))):
             return
         self._painted, self._painted_at, self._sharp = self.session.changes, now, calm
         image = self.painter.paint(sharp=calm)
         self.audience.show(image, self.hud.regions(self.painter.wanted))
 
     def _measure(self, now: float) -> None:
-        """Take the figures anew where the water has moved, and not so often that it is felt."""
+        """Measure the water where it has moved, within `FIGURES_SHARE` of the time."""
         instant = (self.session.ticks, self.session.sim.count)
         if now < self._next_figures or instant == self._measured_at:
             return
         began = time.perf_counter()
         self._figures, self._measured, self._measured_at = figures(self.session), self._measured + 1, instant
         took = time.perf_counter() - began
-        self._next_figures = now + min(FIGURES_SELDOM, max(self.figures_every, took / FIGURES_SHARE))
+        self._next_figures = now + min(FIGURES_EVERY, max(self.figures_every, took / FIGURES_SHARE))

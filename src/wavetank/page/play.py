@@ -1,4 +1,4 @@
-"""`wavetank play`: a session, a front for it, and its recording."""
+"""`wavetank play`: a session in a window or on a page, and its recording."""
 
 import contextlib
 import os
@@ -13,7 +13,7 @@ from typing import Any
 from wavetank.foundation.errors import WavetankError
 from wavetank.page.gate import is_loopback
 from wavetank.page.recorder import check_folder, recorded
-from wavetank.run.signals import asked_to_end
+from wavetank.run.signals import stop_on_signal
 from wavetank.scene.scene import Scene
 from wavetank.session.session import Session
 
@@ -31,12 +31,12 @@ def play(
     most: int = 200_000,
     token: str = "",
 ) -> None:
-    """Open a window where there can be one, else serve the page and say why; `window` insists, `web` never tries.
+    """Open a window where possible, else serve the page and print the reason; `window` or `web` force one of them.
 
-    Who asks for a port or another host asks for the page. Raises `WavetankError` where `window` cannot be had.
+    With a port or another host the page is served. Raises `WavetankError` where `window` is not possible.
     """
     if window and web:
-        raise WavetankError("--window and --web exclude each other; give one of them, or none for what fits.")
+        raise WavetankError("--window and --web exclude each other; give at most one of them.")
     if not web and (window or (host == "127.0.0.1" and port is None and browser)):
         reason = why_no_window()
         if reason is None:
@@ -44,12 +44,12 @@ def play(
             return
         if window:
             raise WavetankError(f"--window: {reason}.")
-        print(f"no window: {reason}; here is the page instead", flush=True)
+        print(f"no window: {reason}; serving the page instead", flush=True)
     play_in_browser(scene, arch, host=host, port=port, browser=browser, record=record, most=most, token=token)
 
 
 def why_no_window() -> str | None:
-    """Return why there can be no window here, and how to get one; None where there can."""
+    """Return why a window is not possible here, and how to get one; None where it is."""
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         return "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)"
     try:
@@ -89,7 +89,7 @@ def play_in_window(scene: Scene, arch: str, *, record: Path | None = None, most:
 
     check_folder(record)
     window = Window(Session(scene, arch, most_particles=most))
-    with _stopped_when_asked(window.stop), recorded(record, window.engine.session, scene, window.engine.loop.ask):
+    with _stopped_by_signal(window.stop), recorded(record, window.engine.session, scene, window.engine.loop.call):
         try:
             window.open()
             window.run()
@@ -108,21 +108,21 @@ def play_in_browser(
     most: int = 200_000,
     token: str = "",
 ) -> None:
-    """Serve a page until Ctrl-C and print one line with its address, token included: `token`, or one made anew."""
+    """Serve the page until Ctrl-C, and print its address with `token`, by default a random one."""
     from wavetank.page.server import PORT, WebFront
 
     check_folder(record)
     session = Session(scene, arch, most_particles=most)
     front = WebFront(session, host, port, _checked_token(token))
-    with _stopped_when_asked(front.stop):
+    with _stopped_by_signal(front.stop):
         front.start()
-        where = "" if is_loopback(host) else " (anyone with this link can steer; it is not encrypted)"
+        where = "" if is_loopback(host) else " (anyone with this link can take control; not encrypted)"
         if port is None and front.port != PORT:
-            print(f"port {PORT} is taken, so this is {front.port}; --port says which one it must be", flush=True)
-        print(f"wavetank plays at {front.url}{where} (Ctrl-C ends it)", flush=True)
+            print(f"port {PORT} is in use; using {front.port} (--port chooses another)", flush=True)
+        print(f"wavetank plays at {front.url}{where} (Ctrl-C stops it)", flush=True)
         if browser:
             threading.Thread(target=webbrowser.open, args=(front.url,), daemon=True).start()
-        with recorded(record, session, scene, front.ask):
+        with recorded(record, session, scene, front.call):
             try:
                 front.run()
             finally:
@@ -132,14 +132,14 @@ def play_in_browser(
 def _checked_token(token: str) -> str | None:
     if token and not re.fullmatch(r"[A-Za-z0-9_-]{12,200}", token):
         raise WavetankError(
-            "--token must be 12 to 200 letters, digits, - or _, as `openssl rand -hex 16` makes them: who knows it can "
-            "steer; leave it out for one that is made anew."
+            "--token must be 12 to 200 letters, digits, - or _, as `openssl rand -hex 16` makes them: anyone who "
+            "knows it can take control; without it a random one is used."
         )
     return token or None
 
 
 @contextlib.contextmanager
-def _stopped_when_asked(stop: Callable[[], None]) -> Iterator[None]:
-    """Call `stop` when the process is asked to end; a second wish ends at once, but for the recording."""
-    with asked_to_end(lambda: threading.Thread(target=stop, daemon=True).start()):
+def _stopped_by_signal(stop: Callable[[], None]) -> Iterator[None]:
+    """Call `stop` at a signal to end; a second one ends at once, except for the recording."""
+    with stop_on_signal(lambda: threading.Thread(target=stop, daemon=True).start()):
         yield

@@ -1,4 +1,4 @@
-"""The recording of a session, written again and again while it is played: a killed one ends with its last seconds."""
+"""Saves the recording of a session every few seconds while it is played, so that a killed one loses little."""
 
 import concurrent.futures
 import contextlib
@@ -15,22 +15,22 @@ from wavetank.session.commands import Command
 from wavetank.session.recording import Recording
 from wavetank.session.session import Session
 
-EVERY = 5.0  # s between two of them, or
-SHARE = 20.0  # times as long as one took, where that is more
+EVERY = 5.0  # s between two saves, or
+SHARE = 20.0  # times the duration of one, where that is longer
 
-Ask = Callable[[Callable[[], Any]], "concurrent.futures.Future[Any]"]
+Call = Callable[[Callable[[], Any]], "concurrent.futures.Future[Any]"]
 
 
 class Recorder:
-    """Writes what was done so far from a thread of its own; each file is whole, and replays to its own digest."""
+    """Saves recordings from a thread of its own; each file is complete and replays to its own digest."""
 
-    def __init__(self, path: Path, session: Session, start: Scene, ask: Ask) -> None:
+    def __init__(self, path: Path, session: Session, start: Scene, call: Call) -> None:
         self.path, self.session, self.start = path, session, start
-        self._ask, self._ended, self._ticks = ask, threading.Event(), 0
-        self._thread = threading.Thread(target=self._write_on, daemon=True)
+        self._call, self._ended, self._ticks = call, threading.Event(), 0
+        self._thread = threading.Thread(target=self._save_repeatedly, daemon=True)
         self._thread.start()
 
-    def _write_on(self) -> None:
+    def _save_repeatedly(self) -> None:
         pause = EVERY
         while not self._ended.wait(pause):
             began = time.monotonic()
@@ -39,8 +39,8 @@ class Recorder:
             pause = max(EVERY, SHARE * (time.monotonic() - began))
 
     def _write(self) -> None:
-        """Take how things stand between two frames, and make a file of it beside the water."""
-        now = self._ask(lambda: _moment(self.session))
+        """Copy the log between two frames, and write it in this thread."""
+        now = self._call(lambda: _moment(self.session))
         while not now.done() and not self._ended.is_set():
             concurrent.futures.wait([now], timeout=0.2)
         if not now.done() or self._ended.is_set():
@@ -51,7 +51,7 @@ class Recorder:
             self._ticks = ticks
 
     def finish(self) -> None:
-        """End the thread, and write all that was done; raises `WavetankError` for what no recording can hold."""
+        """End the thread and save the whole recording; raises `WavetankError` where it cannot be replayed."""
         self._ended.set()
         self._thread.join(60.0)
         Recording.of(self.session, self.start).save(self.path)
@@ -63,9 +63,9 @@ def _moment(session: Session) -> tuple[int, str, list[tuple[int, Command]]]:
 
 
 @contextlib.contextmanager
-def recorded(path: Path | None, session: Session, start: Scene, ask: Ask) -> Iterator[None]:
-    """Record a session that is played within; where there is no path, do nothing."""
-    recorder = Recorder(path, session, start, ask) if path is not None else None
+def recorded(path: Path | None, session: Session, start: Scene, call: Call) -> Iterator[None]:
+    """Record a session within the context; without a path, do nothing."""
+    recorder = Recorder(path, session, start, call) if path is not None else None
     try:
         yield
     finally:
@@ -78,7 +78,7 @@ def check_folder(path: Path | None) -> None:
     if path is None:
         return
     if not path.resolve().parent.is_dir():
-        raise WavetankError(f"--record {path}: the folder {path.resolve().parent} is not there; make it first.")
+        raise WavetankError(f"--record {path}: the folder {path.resolve().parent} does not exist; create it first.")
     if path.is_dir():
         raise WavetankError(f"--record {path}: this is a folder; name a file in it.")
     partial = partial_path(path)

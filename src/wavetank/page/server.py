@@ -1,7 +1,7 @@
-"""A page in a browser: pictures go out over a socket, commands come in.
+"""The page's server: pictures go out over a web socket, commands come in.
 
-The server has a thread and an event loop of its own; the simulation, and with it everything on the device, stays in
-the thread that calls `run`.
+It has a thread and an event loop of its own; the simulation, and all work on the device, stays in the thread that calls
+`run`.
 """
 
 import asyncio
@@ -28,12 +28,12 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.memory import share_arenas
-from wavetank.page.about import everything
+from wavetank.page.about import hello_message
 from wavetank.page.aim import aim
 from wavetank.page.dropped import command_for
 from wavetank.page.fitting import fits
 from wavetank.page.gate import HEADERS, Gate
-from wavetank.page.loop import Loop, News
+from wavetank.page.loop import Loop, Report
 from wavetank.page.picture import jpeg, png
 from wavetank.page.theme import style_sheet
 from wavetank.page.viewers import LONGEST_MESSAGE, Viewer, Viewers
@@ -41,20 +41,20 @@ from wavetank.session.pace import share_interpreter
 from wavetank.session.recording import Recording
 from wavetank.session.session import Session
 
-PORT = 8420  # the first one tried where none is asked for
-MOST_CONNECTIONS = 1200  # at once; what comes on top is told to come back later
+PORT = 8420  # the first one tried by default
+MOST_CONNECTIONS = 1200  # at once; more are refused with 503
 MOST_DOWNLOADS = 4  # that wait for the simulation's thread
-REST = 0.3  # s between two of them
+DOWNLOAD_PAUSE = 0.3  # s between two of them
 
 
 class Protocol(H11Protocol):
-    """HTTP/1.1 whose every answer has our headers, that to what is no request at all included."""
+    """HTTP/1.1 whose every response has our headers, also those to malformed requests."""
 
     @override
     def send_400_response(self, msg: str) -> None:
         headers = "".join(f"{name}: {value}\r\n" for name, value in HEADERS.items())
         head = f"HTTP/1.1 400 Bad Request\r\ncontent-type: text/plain; charset=utf-8\r\n{headers}"
-        body = "This is no request.\n"
+        body = "Bad request\n"
         text = f"{head}content-length: {len(body)}\r\nconnection: close\r\n\r\n{body}"
         self.transport.write(text.encode("ascii"))
         self.transport.close()
@@ -68,11 +68,11 @@ class WebFront:
     ) -> None:
         self.session, self.start_scene = session, session.scene
         self.viewers = Viewers(session.submit, self._ray, lambda: {**self._hello, "run": self.run_number})
-        self.viewers.wake, self.viewers.call = session.wake, self._call
+        self.viewers.wake, self.viewers.in_server = session.wake, self._in_server
         self.viewers.fit, self.viewers.aim, self.viewers.drop_mesh = self._fit, self._aim, self._drop_mesh
-        self.run_number = secrets.token_hex(8)  # other than that of any run before
+        self.run_number = secrets.token_hex(8)  # identifies this run of the server
         self.loop = Loop(session, self)
-        self.painter, self.ask = self.loop.painter, self.loop.ask
+        self.painter, self.call = self.loop.painter, self.loop.call
         self._socket = _listen(host, port)
         self.port = self._socket.getsockname()[1]
         everywhere = host in ("0.0.0.0", "::")
@@ -106,32 +106,32 @@ class WebFront:
         )
         self._events: asyncio.AbstractEventLoop | None = None
         self._thread = threading.Thread(target=self._serve, name="wavetank web", daemon=True)
-        self._packer = concurrent.futures.ThreadPoolExecutor(1, "wavetank jpeg")
-        self._packing: concurrent.futures.Future[None] | None = None
+        self._encoder = concurrent.futures.ThreadPoolExecutor(1, "wavetank jpeg")
+        self._encoding: concurrent.futures.Future[None] | None = None
         self._one_download = asyncio.Lock()
-        self._downloads, self._spared_until = 0, 0.0  # under way; when the next one may be
-        self._told_world: dict[str, Any] = {}
-        self._told: Any = None  # the last status, and who was there
-        self._told_regions: dict[str, Any] = {}
-        self._hello = everything(session)
+        self._downloads, self._next_download = 0, 0.0  # in progress; time of the next one
+        self._sent_world: dict[str, Any] = {}
+        self._sent: Any = None  # the last status, and its viewers
+        self._sent_regions: dict[str, Any] = {}
+        self._hello = hello_message(session)
 
     # --- the simulation's thread ---
 
     def start(self) -> None:
-        """Open the doors."""
+        """Start to serve."""
         share_interpreter()
         share_arenas()
         self._thread.start()
 
     def run(self) -> None:
-        """Let the water move until `stop`."""
+        """Run the session until `stop`."""
         try:
             self.loop.run()
         finally:
-            self._packer.shutdown()
+            self._encoder.shutdown()
 
     def stop(self) -> None:
-        """Close the doors and end `run`."""
+        """Stop to serve and end `run`."""
         self.loop.stop()
         self._server.should_exit = True
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
@@ -140,66 +140,66 @@ class WebFront:
     # --- for the loop, in the simulation's thread: see `loop.Audience` ---
 
     @property
-    def looks(self) -> bool:
-        """Whether anyone is there."""
+    def has_viewers(self) -> bool:
+        """Whether there are viewers."""
         return bool(self.viewers.all)
 
     @property
-    def is_ready(self) -> bool:
-        """Whether someone waits for a picture, and none is being packed."""
-        return self.viewers.anyone_ready and (self._packing is None or self._packing.done())
+    def wants_picture(self) -> bool:
+        """Whether a viewer waits for a picture, and none is being encoded."""
+        return self.viewers.anyone_ready and (self._encoding is None or self._encoding.done())
 
     @property
-    def is_new(self) -> bool:
-        """Whether someone has just come."""
+    def has_new_viewer(self) -> bool:
+        """Whether a viewer has just connected."""
         return any(viewer.is_new for viewer in self.viewers.all)
 
     @property
     def size(self) -> tuple[int, int] | None:
-        """Of the place for the picture, where the driver sits [px]."""
+        """Width and height of the picture on the driver's screen [px]."""
         driver = self.viewers.driver
         return driver.size if driver is not None else None
 
     @property
     def detail(self) -> str:
-        """How fine pictures are."""
+        """Resolution of pictures."""
         return self.viewers.detail
 
     def show(self, image: np.ndarray, regions: list[dict[str, Any]]) -> None:
-        """Send a picture to everyone, and the regions where they have changed."""
+        """Send a picture to all viewers, and the regions where they have changed."""
         outlines = {"type": "regions", "regions": regions}
-        if self.is_new or outlines != self._told_regions:
-            self._told_regions = outlines
-            self._call(lambda: self.viewers.broadcast(outlines))
+        if self.has_new_viewer or outlines != self._sent_regions:
+            self._sent_regions = outlines
+            self._in_server(lambda: self.viewers.broadcast(outlines))
         for viewer in self.viewers.all:
             viewer.is_new = False
-        self._packing = self._packer.submit(self._pack, image)
+        self._encoding = self._encoder.submit(self._encode, image)
 
-    def _pack(self, image: np.ndarray) -> None:
+    def _encode(self, image: np.ndarray) -> None:
         picture = jpeg(image)
-        self._call(lambda: self.viewers.show(picture))
+        self._in_server(lambda: self.viewers.show(picture))
         self.session.wake()
 
-    def tell(self, news: News, notes: list[str]) -> None:
-        """Send how things stand to everyone, if anything has changed."""
+    def send_report(self, report: Report, notes: list[str]) -> None:
+        """Send the status to all viewers, where anything has changed."""
         status = {
             "type": "status",
-            **news.status,
+            **report.status,
             "notes": notes,
-            **news.figures,
-            "game": news.game,
-            "scores": news.scores,
+            **report.figures,
+            "game": report.game,
+            "scores": report.scores,
         }
-        if news.world != self._told_world:
-            self._told_world = news.world
-            self._hello = {**self._hello, **news.world}
-            status["world"] = news.world
-        # JSON has no word for what is no number, such as the time of a frame before there was one.
+        if report.world != self._sent_world:
+            self._sent_world = report.world
+            self._hello = {**self._hello, **report.world}
+            status["world"] = report.world
+        # JSON has no NaN, such as the time of a frame before the first one.
         plain = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in status.items()}
-        told = (plain, [*self.viewers.all])
-        if told != self._told:  # what stands still says nothing
-            self._told = told
-            self._call(lambda: self.viewers.broadcast(plain))
+        message = (plain, [*self.viewers.all])
+        if message != self._sent:  # nothing to send while nothing changes
+            self._sent = message
+            self._in_server(lambda: self.viewers.broadcast(plain))
 
     # --- the server's thread ---
 
@@ -210,18 +210,18 @@ class WebFront:
 
         asyncio.run(main())
 
-    def _call(self, act: Callable[[], None]) -> None:
+    def _in_server(self, act: Callable[[], None]) -> None:
         events = self._events
         if events is not None and not events.is_closed():
             events.call_soon_threadsafe(act)
 
     def _ray(self, u: float, v: float, tool: str) -> dict[str, Any]:
         width, height = self.painter.wanted
-        origin, direction = self.session.camera_of(tool).ray(u * width, v * height, width, height)
+        origin, direction = self.session.camera_for(tool).ray(u * width, v * height, width, height)
         return {"origin": tuple(map(float, origin)), "direction": tuple(map(float, direction))}
 
     def _answer(self, viewer: Viewer, job: Callable[[], dict[str, Any]]) -> None:
-        """Post to one viewer what a job in the simulation's thread comes to; what is wrong becomes a note."""
+        """Send one viewer the result of a call in the simulation's thread; an error becomes a note."""
 
         def done() -> dict[str, Any]:
             try:
@@ -231,9 +231,9 @@ class WebFront:
 
         def tell(answer: concurrent.futures.Future[Any]) -> None:
             if not answer.cancelled() and answer.exception() is None:
-                self._call(lambda: viewer.post(answer.result()))
+                self._in_server(lambda: viewer.post(answer.result()))
 
-        self.ask(done).add_done_callback(tell)
+        self.call(done).add_done_callback(tell)
 
     def _fit(self, viewer: Viewer) -> None:
         self._answer(viewer, lambda: fits(self.session))
@@ -245,7 +245,7 @@ class WebFront:
     def _drop_mesh(self, viewer: Viewer, text: str, file: str) -> None:
         def job() -> dict[str, Any]:
             self.session.submit(command_for(self.session, text, file))
-            return {"type": "note", "text": f"{file} is a solid now; carry it with Grab."}
+            return {"type": "note", "text": f"{file} was added as a solid; move it with Grab."}
 
         self._answer(viewer, job)
 
@@ -262,7 +262,7 @@ class WebFront:
         return await self._download("session.toml", lambda: Recording.of(self.session, self.start_scene).text())
 
     async def _scene(self, request: Request) -> Response:
-        return await self._download("scene.toml", lambda: self.session.present_scene().text())
+        return await self._download("scene.toml", lambda: self.session.current_scene().text())
 
     async def _picture(self, request: Request) -> Response:
         def made() -> bytes:
@@ -271,7 +271,7 @@ class WebFront:
         return await self._download("wavetank.png", made, "image/png")
 
     async def _download(self, name: str, make: Callable[[], str | bytes], kind: str = "application/toml") -> Response:
-        """Return what the simulation's thread makes, as a file; not too many at once, which the water feels."""
+        """Return a file that the simulation's thread makes; few at once, as they delay the water."""
         if self._downloads >= MOST_DOWNLOADS:
             return Response(
                 "too many downloads at once; try again\n",
@@ -291,9 +291,9 @@ class WebFront:
         self._downloads += 1
         try:
             async with self._one_download:
-                await asyncio.sleep(max(0.0, self._spared_until - time.monotonic()))
-                text = await asyncio.wrap_future(self.ask(made))
-                self._spared_until = time.monotonic() + REST
+                await asyncio.sleep(max(0.0, self._next_download - time.monotonic()))
+                text = await asyncio.wrap_future(self.call(made))
+                self._next_download = time.monotonic() + DOWNLOAD_PAUSE
             return Response(text, media_type=kind, headers=headers)
         except WavetankError as error:
             return Response(f"{error}\n", status_code=409, media_type="text/plain")
@@ -302,10 +302,10 @@ class WebFront:
 
 
 def _packaged(name: str) -> Response:
-    """Return a file of the page; only those that are there by name."""
+    """Return a file of `static`, by its exact name only."""
     folder = importlib.resources.files("wavetank.page") / "static"
     if name not in {entry.name for entry in folder.iterdir() if entry.is_file()}:
-        return Response("not here\n", status_code=404, media_type="text/plain")
+        return Response("not found\n", status_code=404, media_type="text/plain")
     kind = {"js": "text/javascript", "svg": "image/svg+xml"}.get(name.rpartition(".")[2])
     return Response(
         (folder / name).read_bytes(), media_type=kind or mimetypes.guess_type(name)[0] or "application/octet-stream"
@@ -313,12 +313,12 @@ def _packaged(name: str) -> Response:
 
 
 def _listen(host: str, port: int | None) -> socket.socket:
-    """Open the first free port from `PORT` on, or the one asked for; raises `WavetankError` where it cannot be had."""
+    """Listen on `port`, by default the first free one from `PORT` on; raises `WavetankError` where that fails."""
     ports = [port] if port is not None else [*range(PORT, PORT + 20), 0]
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for number in ports:
         listener = socket.socket(family, socket.SOCK_STREAM)
-        if os.name == "posix":  # else the port of a run that has ended is refused for a minute
+        if os.name == "posix":  # else a port stays refused for a minute after a run
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listener.bind((host, number))

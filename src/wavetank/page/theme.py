@@ -1,4 +1,4 @@
-"""The colours of page and window, each said once. The page gets them as a style sheet."""
+"""Colours of page, notebook and window; the page gets them as a style sheet."""
 
 GROUND, PANEL, RAISED, HOVER, LINE = "#0c1115", "#131a20", "#1b242c", "#25313b", "#24303a"
 CARD, NOTE, GROOVE, GRIP = "#10171d", "#0d1419", "#2a3742", "#33424e"  # over the picture; of bars and their handles
@@ -12,16 +12,16 @@ WATER_FRONT, WATER_TOP, WATER_SIDE = "#2a92d4", "#6cc7f6", "#1d70a8"  # of the d
 SOLID_FRONT, SOLID_TOP, SOLID_SIDE, EDGE = "#c99a73", "#e6c19f", "#a27852", "#7d93a1"
 DYE = "#2f9fe8"  # offered first where a tool colours water
 
-#: all of these, as the page calls them: accent-ground and so on
+#: all of these by their names in style sheets, as in accent-ground
 COLORS = {name.lower().replace("_", "-"): value for name, value in list(globals().items()) if name.isupper()}
 
 #: colours of forces, by their marks
 FORCES = {"buoyancy": BUOYANCY, "drag": DRAG, "power": POWER}
 
-#: what particles may be coloured besides by a quantity
+#: uniform colours of particles, next to those by a quantity
 PAINTS = (("#3f99da", "Blue"), ("#e8eef2", "Milk"))
 
 
 def style_sheet() -> str:
-    """Return the colours as properties of a page: ``--accent`` and so on."""
+    """Return the colours as CSS properties, as in ``--accent``."""
     return f":root {{ {' '.join(f'--{name}: {value};' for name, value in COLORS.items())} }}\n"

@@ -1,14 +1,14 @@
-"""What the shares of tools are in a world of a given size, in units that a person reads."""
+"""Units of tools' options in a world of a given size."""
 
 import math
 
-from wavetank.session.tools.press import REFERENCE
+from wavetank.session.tools.solids import REFERENCE
 
 EARTH = 9.81  # m/s^2
 
 
 def units(size: float, dim: int) -> dict[str, tuple[float, str]]:
-    """Return what a declared unit is worth in a world as long as `size` [m], and what that is called."""
+    """Return factor and name of each declared unit, in a world of length `size` [m]."""
     length = (100.0 * size, "cm") if size < 1.0 else (size, "m")
     return {
         "L": length,
@@ -21,12 +21,12 @@ def units(size: float, dim: int) -> dict[str, tuple[float, str]]:
 
 
 def readable(unit: str) -> str:
-    """Return a unit with raised powers."""
+    """Return a unit with superscripts."""
     return unit.replace("^2", "²").replace("^3", "³")
 
 
 def digits(value: float) -> str:
-    """Return the printf format of a number that a person reads: three digits, and never a power of ten."""
+    """Return a printf format with three significant digits and without exponent."""
     size = abs(value)
     if size >= 1000.0:
         return "%.0f"

@@ -1,4 +1,4 @@
-"""The people at a page: one drives, the others watch. Runs in the server's event loop."""
+"""Connected viewers: one controls the session, the others watch. Runs in the server's event loop."""
 
 import asyncio
 import json
@@ -11,25 +11,25 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import explain_errors, one_line, parse_json
 from wavetank.session.commands import Command, ToolBegin, ToolEnd, ToolMove, command_of
 
-RATE, BURST = 500.0, 1000.0  # messages a second, and at once: more than any hand makes
+RATE, BURST = 500.0, 1000.0  # messages a second, and at once: more than a pointer makes
 MOST_VIEWERS = 16
 LONGEST_SIDE = 8192  # px
-AGAIN = 1.0  # s, after which the same note is worth saying again
+REPEAT_AFTER = 1.0  # s after which the same note is sent again
 LONGEST_MESSAGE = 2_500_000  # bytes: a dropped scene file
 
 Ray = Callable[[float, float, str], dict[str, Any]]
 Tell = Callable[[str], None] | None
-Submit = Callable[[Command, Tell], bool]  # takes a command, and who is told in another thread why it failed
+Submit = Callable[[Command, Tell], bool]  # takes a command, and what reports a failure in another thread
 
 
-class Bucket:
-    """Lets so many messages a second through."""
+class RateLimit:
+    """Limits messages to `RATE` a second (a token bucket of size `BURST`)."""
 
     def __init__(self) -> None:
         self.left, self.last = BURST, time.monotonic()
 
     def take(self) -> bool:
-        """Say whether one more may pass."""
+        """Return whether one more message may pass."""
         now = time.monotonic()
         self.left, self.last = min(BURST, self.left + RATE * (now - self.last)), now
         if self.left < 1.0:
@@ -39,20 +39,20 @@ class Bucket:
 
 
 class Viewer:
-    """One socket: at most one picture is on its way to it, and the next one may wait here."""
+    """One socket; at most one picture is in flight, and the next one may wait."""
 
     def __init__(self, socket: Any) -> None:
-        self.socket, self.bucket = socket, Bucket()
-        self.is_busy = False  # with a picture that is on its way
+        self.socket, self.rate_limit = socket, RateLimit()
+        self.is_busy = False  # whether a picture is in flight
         self.next_picture: bytes | None = None
-        self.is_new = True  # and has not seen one yet
+        self.is_new = True  # whether it has not seen any picture yet
         self.size = (960, 540)
-        self.noted = "", -math.inf  # the last note to this one alone, and when
+        self.last_note = "", -math.inf  # and its time [s]
         self.outbox: asyncio.Queue[dict[str, Any] | bytes] = asyncio.Queue(maxsize=64)
-        self.status: dict[str, Any] | None = None  # waits in the outbox; a later one joins it there
+        self.status: dict[str, Any] | None = None  # in the outbox, where a later one is merged into it
 
     def post(self, message: dict[str, Any] | bytes) -> None:
-        """Send soon; on a line that is too slow statuses become one, and notes that do not fit are dropped."""
+        """Queue a message; on a slow line statuses are merged, and notes that do not fit are dropped."""
         if isinstance(message, dict) and message["type"] == "status":
             if self.status is not None:
                 self.status.update(message, notes=[*self.status["notes"], *message["notes"]][-20:])
@@ -64,28 +64,30 @@ class Viewer:
             self.status = None
 
     def note(self, text: str) -> None:
-        """Send a sentence; the same one again at once, and what would be in the way of pictures, is dropped."""
+        """Queue a sentence, unless it repeats the last one, or would delay pictures."""
         now = time.monotonic()
-        if (text != self.noted[0] or now - self.noted[1] > AGAIN) and self.outbox.qsize() < self.outbox.maxsize // 2:
-            self.noted = text, now
+        if (
+            text != self.last_note[0] or now - self.last_note[1] > REPEAT_AFTER
+        ) and self.outbox.qsize() < self.outbox.maxsize // 2:
+            self.last_note = text, now
             self.post({"type": "note", "text": text})
 
     def show(self, picture: bytes) -> None:
-        """Send a picture as soon as the one before was shown; a later one takes its place until then."""
+        """Send a picture once the previous one was shown; until then a later one replaces it."""
         if self.is_busy:
             self.next_picture = picture
         else:
             self.is_busy = True
             self.post(picture)
 
-    def shown(self) -> None:
-        """Send the picture that waits: the page has shown the one before."""
+    def acknowledge(self) -> None:
+        """Send the waiting picture, as the page has shown the previous one."""
         picture, self.next_picture, self.is_busy = self.next_picture, None, False
         if picture is not None:
             self.show(picture)
 
     async def send_all(self) -> None:
-        """Send what is posted, for ever."""
+        """Send queued messages indefinitely."""
         while True:
             message = await self.outbox.get()
             if message is self.status:
@@ -97,7 +99,7 @@ class Viewer:
 
 
 class Viewers:
-    """All sockets, in the order in which they came."""
+    """All viewers, in the order in which they connected."""
 
     def __init__(self, submit: Submit, ray: Ray, hello: Callable[[], dict[str, Any]]) -> None:
         self.submit, self.ray, self.hello = submit, ray, hello
@@ -105,20 +107,20 @@ class Viewers:
         self.driver: Viewer | None = None
         self.detail = "auto"
         self.wake: Callable[[], None] = lambda: None
-        self.call: Callable[[Callable[[], None]], None] = lambda job: job()  # does a job in the server's event loop
+        self.in_server: Callable[[Callable[[], None]], None] = lambda job: job()  # in the server's event loop
         self.fit: Callable[[Viewer], None] = lambda viewer: None
         self.aim: Callable[[Viewer, str, float, float, float], None] = lambda *given: None
         self.drop_mesh: Callable[[Viewer, str, str], None] = lambda *given: None
-        self.tool = ""  # that the driver's pointer put down last
+        self.tool = ""  # that the driver used last
         self.down: set[int] = set()  # pointers of the driver that are down
 
     @property
     def anyone_ready(self) -> bool:
-        """Whether someone has use for a picture: one is made while the one before is on its way."""
+        """Whether a viewer has no picture waiting: the next one is made while one is in flight."""
         return any(viewer.next_picture is None for viewer in self.all)
 
     async def serve(self, socket: Any) -> None:
-        """Talk with one page until it leaves."""
+        """Serve one page until it disconnects."""
         await socket.accept()
         if len(self.all) >= MOST_VIEWERS:
             await socket.close(1013, "too many viewers")
@@ -133,15 +135,15 @@ class Viewers:
             await self._listen(viewer)
         finally:
             sender.cancel()
-            self._leave(viewer)
+            self._disconnect(viewer)
 
     async def _listen(self, viewer: Viewer) -> None:
         while True:
             message = await viewer.socket.receive()
             if message["type"] == "websocket.disconnect":
                 return
-            if not viewer.bucket.take():
-                # Reading slowly makes the other side wait; the simulation does not notice.
+            if not viewer.rate_limit.take():
+                # Reading slowly makes the sender wait, and does not affect the simulation.
                 await asyncio.sleep(0.02)
                 continue
             try:
@@ -151,16 +153,16 @@ class Viewers:
                 viewer.post({"type": "note", "text": str(error)[:400]})
 
     def hear(self, viewer: Viewer, table: dict[str, Any]) -> None:
-        """Act on one message; raises `WavetankError` for what is not allowed."""
+        """Act on one message; raises `WavetankError` where it is not allowed."""
         do = table.get("do")
         if do == "ack":
-            viewer.shown()
+            viewer.acknowledge()
             self.wake()
         elif do == "size":
-            viewer.size = (_whole(table, "width", LONGEST_SIDE), _whole(table, "height", LONGEST_SIDE))
+            viewer.size = (_whole_number(table, "width", LONGEST_SIDE), _whole_number(table, "height", LONGEST_SIDE))
             self.wake()
         elif do == "drive":
-            self.lift_pointers()
+            self.end_tools()
             self.driver = viewer
             self._tell_roles()
         elif do == "fit":
@@ -168,7 +170,7 @@ class Viewers:
         elif do == "hover" and viewer is not self.driver:
             viewer.post({"type": "aim"})
         elif viewer is not self.driver:
-            raise WavetankError("You are watching; take the helm to join in.")
+            raise WavetankError("You are watching; take control to use tools.")
         elif do == "detail" and table.get("detail") in ("auto", "full", "half"):
             self.detail = table["detail"]
             self.wake()
@@ -177,24 +179,24 @@ class Viewers:
         elif do == "mesh":
             self.drop_mesh(viewer, str(table.get("text", "")), str(table.get("file", "the mesh"))[:200])
         elif do in ("point-begin", "point-move", "point-end"):
-            self._point(table, self._to(viewer))
-        elif not self.submit(command_of(table), self._to(viewer)):
-            raise WavetankError("Too much at once: a command was dropped.")
+            self._point(table, self._reporter(viewer))
+        elif not self.submit(command_of(table), self._reporter(viewer)):
+            raise WavetankError("Too many commands at once: one was dropped.")
 
-    def _to(self, viewer: Viewer) -> Tell:
-        """Return what tells a viewer, from any thread, and nobody else."""
-        return lambda text: self.call(lambda: viewer.note(text))
+    def _reporter(self, viewer: Viewer) -> Tell:
+        """Return a function that sends notes to one viewer, from any thread."""
+        return lambda text: self.in_server(lambda: viewer.note(text))
 
     def _point(self, table: dict[str, Any], tell: Tell) -> None:
-        """Turn a place in the picture, shares of its width and height, into a ray into the world."""
-        pointer = _whole(table, "pointer", 9, least=0)
+        """Convert a point of the picture, as shares of its width and height, to a ray into the world."""
+        pointer = _whole_number(table, "pointer", 9, least=0)
         if table["do"] == "point-end":
             self.down.discard(pointer)
             self.submit(ToolEnd(pointer=pointer), tell)
             return
         if table["do"] == "point-begin":
             self.tool = str(table.get("tool"))[:80]
-        ray = {"pointer": pointer, **self.ray(*_place(table), self.tool)}
+        ray = {"pointer": pointer, **self.ray(*_picture_point(table), self.tool)}
         if table["do"] == "point-begin":
             self.down.add(pointer)
             self.submit(
@@ -204,24 +206,24 @@ class Viewers:
             self.submit(ToolMove.parse(ray), tell)
 
     def broadcast(self, message: dict[str, Any]) -> None:
-        """Post to everyone."""
+        """Queue a message to all viewers."""
         for viewer in self.all:
             viewer.post(message)
 
     def show(self, picture: bytes) -> None:
-        """Send a picture to everyone, to each at its pace."""
+        """Send a picture to all viewers, to each at its pace."""
         for viewer in self.all:
             viewer.show(picture)
 
-    def _leave(self, viewer: Viewer) -> None:
+    def _disconnect(self, viewer: Viewer) -> None:
         self.all.remove(viewer)
         if viewer is self.driver:
-            self.lift_pointers()
+            self.end_tools()
             self.driver = self.all[0] if self.all else None
         self._tell_roles()
 
-    def lift_pointers(self) -> None:
-        """Lift the tools that the driver holds."""
+    def end_tools(self) -> None:
+        """End the tools that the driver uses."""
         for pointer in self.down:
             self.submit(ToolEnd(pointer=pointer), None)
         self.down.clear()
@@ -241,8 +243,8 @@ def _table(message: dict[str, Any]) -> dict[str, Any]:
     return table
 
 
-def _place(table: dict[str, Any]) -> tuple[float, float]:
-    """Return a place in the picture, as shares of its width and height."""
+def _picture_point(table: dict[str, Any]) -> tuple[float, float]:
+    """Return a point of the picture, as shares of its width and height."""
     u, v = table.get("x"), table.get("y")
     for share in (u, v):
         if isinstance(share, bool) or not isinstance(share, int | float) or not -2.0 <= share <= 3.0:
@@ -251,16 +253,16 @@ def _place(table: dict[str, Any]) -> tuple[float, float]:
 
 
 def _hovered(table: dict[str, Any]) -> tuple[str, float, float, float]:
-    """Return tool, place and reach of a pointer over the picture; no tool where it has left it."""
+    """Return tool, point and radius of a pointer over the picture; no tool where it has left it."""
     if "x" not in table:
         return "", 0.0, 0.0, 0.0
     reach = table.get("reach", 0.0)
     if isinstance(reach, bool) or not isinstance(reach, int | float) or not 0.0 <= reach <= 2.0:
         raise WavetankError("reach must be a share of the world, a number from 0 to 2.")
-    return str(table.get("tool", ""))[:80], *_place(table), float(reach)
+    return str(table.get("tool", ""))[:80], *_picture_point(table), float(reach)
 
 
-def _whole(table: dict[str, Any], key: str, most: int, least: int = 1) -> int:
+def _whole_number(table: dict[str, Any], key: str, most: int, least: int = 1) -> int:
     value = table.get(key, 0)
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         raise WavetankError(f"{key} = {one_line(value, 20)} must be a whole number from {least} to {most}.")

@@ -1,4 +1,4 @@
-"""Pictures and films of what was kept: a run's folder, frames in HDF5, a recording."""
+"""Frames of archived runs (a run's folder, an HDF5 file, a recording), and films of them."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -10,10 +10,10 @@ from rich.progress import Progress
 
 from wavetank.formats import exporter_for
 from wavetank.foundation.errors import WavetankError
-from wavetank.run.checkpoints import FILE, FOLDER, begun
-from wavetank.run.export import source_of
+from wavetank.run.checkpoints import FILE, FOLDER, load_run
+from wavetank.run.export import open_source
 from wavetank.run.folder import SCENE, RunFolder
-from wavetank.run.signals import asked_to_end
+from wavetank.run.signals import stop_on_signal
 from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.instant import Instant
@@ -25,26 +25,26 @@ from wavetank.view.style import quality_options
 FILMS = (".mp4", ".gif")
 
 
-def is_kept(world: str) -> bool:
-    """Say whether this is a run's folder, or frames in HDF5; the name of a bundled scene is neither."""
+def is_archive(world: str) -> bool:
+    """Say whether this is a run's folder or an HDF5 file of frames; names of bundled scenes are not."""
     if world in (*bundled_scenes(), *bundled_levels()):
         return False
     return RunFolder.is_one(world) or world.endswith((".h5", ".hdf5"))
 
 
-def as_scene(world: str) -> str:
-    """Return the scene file of a run's folder, and any other name as it is."""
-    return str(Path(world) / SCENE) if is_kept(world) and Path(world).is_dir() else world
+def scene_path(world: str) -> str:
+    """Return the scene file of a run's folder; any other name unchanged."""
+    return str(Path(world) / SCENE) if is_archive(world) and Path(world).is_dir() else world
 
 
 def frame_at(world: str, at: float | None, arch: str = "") -> Frame:
-    """Return the frame of a run's folder that is nearest to the time `at` [s of water], its last one without.
+    """Return the frame of an archived run nearest to the time `at` [s of water], the last one where it is None.
 
-    A frame that was written is read; else the water goes on from the last checkpoint before, or is computed again.
+    A frame that was written is read; otherwise it is computed, from the last checkpoint before it or from the start.
     Raises `WavetankError`.
     """
     if not Path(world).is_dir():
-        source = source_of(Path(world), arch)
+        source = open_source(Path(world), arch)
         last = at is None
         found = deque(source.frames, 1)[-1] if last else min(source.frames, key=lambda one: abs(one.time - at))
         return Shown(source.scene, arch or "cpu").frame(found)
@@ -62,7 +62,7 @@ def frame_at(world: str, at: float | None, arch: str = "") -> Frame:
         return Shown(folder.scene, arch or run.arch).frame(folder.instant_at(at))
     number, sim, done = round((at - run.start) * run.fps), None, -1
     if (folder.path / FOLDER / FILE).exists():
-        kept = begun(folder.path, arch)
+        kept = load_run(folder.path, arch)
         if kept.checkpoint.frame <= number:
             sim, done = kept.sim, kept.checkpoint.frame
             if done == number:
@@ -70,7 +70,7 @@ def frame_at(world: str, at: float | None, arch: str = "") -> Frame:
     if sim is None:
         if run.start > 0.0:
             raise WavetankError(
-                f"{world}: this run began with a state and kept no frames; run it again with --export h5."
+                f"{world}: this run started from a saved state and wrote no frames; run it again with --export h5."
             )
         sim = Simulation(folder.scene, arch or run.arch)
     frame = None
@@ -98,7 +98,7 @@ def film_archived(
     console = console or Console(stderr=True)
     supersample, chosen = quality_options(quality)
     writer = exporter_for(path, "video")
-    source = source_of(Path(world), arch)
+    source = open_source(Path(world), arch)
     if source.note:
         console.print(source.note, markup=False)
     style, count, time = {**chosen, **options}, 0, 0.0
@@ -108,13 +108,13 @@ def film_archived(
         raise WavetankError(f"{world}: no frame of this run was finished.")
     renderer = Renderer(width, height, affordable(width, height, supersample))
     with (
-        asked_to_end(say="asked to end; the film is being completed (once more stops at once)") as asked,
+        stop_on_signal(say="interrupted; completing the film (once more stops at once)") as stop,
         writer.write(path, width, height, source.fps) as out,
         Progress(console=console, transient=True) as bar,
     ):
         task = bar.add_task("film", total=source.count)
         frame: Frame | None = first
-        while frame is not None and not asked:
+        while frame is not None and not stop:
             out.write(renderer.render(frame, **style))
             count, time = count + 1, frame.time
             bar.update(task, completed=count)
@@ -125,8 +125,8 @@ def film_archived(
         "frames": count,
         "fps": source.fps,
         "time": time,
-        "interrupted": bool(asked),
-        "exit_code": asked.code,
+        "interrupted": bool(stop),
+        "exit_code": stop.code,
     }
 
 

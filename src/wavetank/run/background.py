@@ -1,6 +1,6 @@
-"""A writer beside the simulation: a thread that compresses and writes what waits, in order, and nothing is dropped.
+"""A thread that compresses and writes frames in order, in parallel with the simulation.
 
-Where more waits than there is room for, the simulation waits too. What fails for a while is tried again.
+The queue is bounded: where it is full, the simulation waits. Nothing is dropped.
 """
 
 import queue
@@ -12,15 +12,15 @@ from typing import TypeVar
 Work = TypeVar("Work")
 Job = Callable[[], None]
 MOST_WAITING = 8  # frames
-MOST_BYTES = 256_000_000  # of frames that wait; at least one may
+MOST_BYTES = 256_000_000  # of queued frames; a single larger one is accepted
 
 
-class Background:
-    """Does jobs one after the other in a thread of its own."""
+class BackgroundWriter:
+    """Runs jobs one after the other in a thread of its own."""
 
     def __init__(self) -> None:
-        self.waited = 0.0  # s that who had work waited for room
-        self._bytes = 0  # of what waits or is being written
+        self.waited = 0.0  # s that callers of `put` waited
+        self._bytes = 0  # of queued jobs, with the running one
         self._room = threading.Condition()
         self._jobs: queue.SimpleQueue[tuple[Job, int] | None] = queue.SimpleQueue()
         self._number = 0
@@ -29,7 +29,7 @@ class Background:
         self._thread.start()
 
     def put(self, job: Job, size: int) -> None:
-        """Have `job` done, which holds `size` bytes; waits for room, and raises what went wrong with one before."""
+        """Queue a job that holds `size` bytes; wait while the queue is full, and raise the error of an earlier job."""
         began = time.perf_counter()
         with self._room:
             while self._error is None and self._number and not self._fits(size):
@@ -41,17 +41,17 @@ class Background:
         self._jobs.put((job, size))
 
     def drain(self) -> None:
-        """Wait until nothing waits; raises what went wrong."""
+        """Wait until the queue is empty; raises the error of a job."""
         with self._room:
             while self._number:
                 self._room.wait(0.2)
         self._raise()
 
     def finish(self) -> None:
-        """Wait until all is done; raises what went wrong."""
+        """Wait until all jobs are done, and end the thread; raises the error of a job."""
         self._jobs.put(None)
         while self._thread.is_alive():
-            self._thread.join(0.2)  # so that a second Ctrl-C is heard
+            self._thread.join(0.2)  # short, so that a second Ctrl-C is handled
         self._raise()
 
     def _fits(self, size: int) -> bool:
@@ -68,7 +68,7 @@ class Background:
             try:
                 if self._error is None:
                     job()
-            except BaseException as error:  # belongs to who waits for it
+            except BaseException as error:  # raised by the next call
                 self._error = error
             finally:
                 with self._room:

@@ -1,13 +1,13 @@
-"""Checkpoints of a run: whole states on disk, from which `wavetank resume` goes on to the same bits.
+"""Checkpoints of a run: complete states on disk, from which `wavetank resume` continues to the same bits.
 
-A run's folder has them in `states/`: `NUMBER.npz`, states (`simulation/saved.py`) after that many frames, the last two;
-`film-NUMBER.mp4`, the parts of a video that end there; and `run.json`, which names both states with their SHA-256, what
-was ordered and the figures so far. `run.json` is replaced in one move after the state is on the disk: whenever the
-process ends, it names states that are complete.
+A run's folder has them in `states/`: `NUMBER.npz`, the states (`simulation/saved.py`) after that many frames, the last
+two; `film-NUMBER.mp4`, the segments of a video that end there; and `run.json`, which names both states with their
+SHA-256, the options of the run and the figures so far. `run.json` is replaced atomically after the state is on disk:
+whenever the process ends, it names complete states.
 
-It repeats what `run.toml` (`folder.py`) says was ordered, on purpose: state, order and figures have to
-change in one move, and `run.toml` belongs to whatever ran in this folder last, which may be another run that wrote no
-checkpoint. What goes on is always what `run.json` says.
+It repeats the options that `run.toml` (`folder.py`) has, because state, options and figures have to change atomically,
+and `run.toml` belongs to the last run in this folder, which may have written no checkpoint. A run is always resumed
+from `run.json`.
 """
 
 import dataclasses
@@ -34,11 +34,11 @@ Part = Annotated[str, Field(pattern=r"^film-[0-9]{5,9}\.mp4$")]
 
 
 class Checkpoint(Model):
-    """One of them."""
+    """A saved state, and how far the run's files were then."""
 
     state: Name
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    frame: Annotated[int, Field(ge=0, le=100_000_000)]  # that were written
+    frame: Annotated[int, Field(ge=0, le=100_000_000)]  # number of the last frame that was written
     figures: dict[str, Any]  # of the run so far
     parts: Annotated[list[Part], Field(max_length=1_000_000)] = []  # of the video
 
@@ -55,63 +55,62 @@ class Progress(Model):
 
 
 class Checkpoints:
-    """Keeps those of a run that is under way."""
+    """Writes the checkpoints of a running run."""
 
     def __init__(self, out: Path, every: float, start: float, order: dict[str, Any]) -> None:
         self.folder = make_folder(out / FOLDER)
         self.every, self.start, self.order = every, start, order
-        self.kept: list[Checkpoint] = []
+        self.written: list[Checkpoint] = []
         self.next = start + every  # s of water
 
     def is_due(self, time: float) -> bool:
         """Say whether the next one is due at `time` [s of water]."""
         return time >= self.next - 1e-9
 
-    def keep(self, sim: Simulation, frame: int, figures: dict[str, Any], parts: list[Path]) -> None:
-        """Write one after so many frames; the one before is kept, and earlier ones go."""
+    def write(self, sim: Simulation, frame: int, figures: dict[str, Any], parts: list[Path]) -> None:
+        """Write one after `frame`; the one before stays, earlier ones are deleted."""
         path = self.folder / f"{frame:05d}.npz"
         sim.save(path, lasting=True)
         made = Checkpoint(
             state=path.name, sha256=_digest(path), frame=frame, figures=figures, parts=[part.name for part in parts]
         )
-        self.kept = [made, *(other for other in self.kept if other.state != made.state)][:2]
+        self.written = [made, *(other for other in self.written if other.state != made.state)][:2]
         self.next = self.start + self.every * np.floor((sim.time - self.start) / self.every + 1.0 + 1e-9)
-        about = Progress(arch=sim.arch or "cpu", start=self.start, order=self.order, checkpoints=self.kept)
+        about = Progress(arch=sim.arch or "cpu", start=self.start, order=self.order, checkpoints=self.written)
         with atomic_write(self.folder / FILE, lasting=True) as partial:
             partial.write_text(json.dumps(about.model_dump(), indent=1, allow_nan=False), encoding="utf-8")
         for other in self.folder.glob("*.npz"):
-            if other.name not in {checkpoint.state for checkpoint in self.kept}:
+            if other.name not in {checkpoint.state for checkpoint in self.written}:
                 other.unlink(missing_ok=True)
 
     def finish(self) -> None:
-        """Remove all of them: the run is complete."""
+        """Delete all of them: the run is complete."""
         for pattern in ("*.npz", "film-*.mp4"):
             for path in self.folder.glob(pattern):
                 path.unlink(missing_ok=True)
         (self.folder / FILE).unlink(missing_ok=True)
-        for path in (self.folder,):
-            if not any(path.iterdir()):
-                path.rmdir()
+        if not any(self.folder.iterdir()):
+            self.folder.rmdir()
 
 
 @dataclasses.dataclass(frozen=True)
-class Begun:
-    """A run that goes on."""
+class ResumedRun:
+    """A run to be continued, at a checkpoint."""
 
     sim: Simulation
     progress: Progress
     checkpoint: Checkpoint
-    note: str = ""  # where the last checkpoint could not be taken
+    note: str = ""  # why the last checkpoint could not be used
 
 
-def begun(out: Path, arch: str = "") -> Begun:
-    """Return the run whose folder this is, at its last good checkpoint; raises `WavetankError` where there is none."""
+def load_run(out: Path, arch: str = "") -> ResumedRun:
+    """Load the run of a folder at its last good checkpoint; raises `WavetankError` without one."""
     place = out / FOLDER / FILE
     origin = printable(place)
     if not place.exists():
         raise WavetankError(
             f"{printable(out)}: there is no run to resume; name the folder of a `wavetank run --checkpoint-every` that "
-            "ended early; a completed run keeps no checkpoints."
+            "ended early; a completed run has no checkpoints."
         )
     with explain_errors(origin, "checkpoint"):
         table = parse_json(read_text(place, "checkpoint", 64_000_000), origin)
@@ -127,7 +126,7 @@ def begun(out: Path, arch: str = "") -> Begun:
         path = out / FOLDER / checkpoint.state
         try:
             if not path.is_file() or _digest(path) != checkpoint.sha256:
-                raise WavetankError(f"{printable(path)}: this state is missing, or damaged: its SHA-256 is another.")
+                raise WavetankError(f"{printable(path)}: this state is missing or damaged: its SHA-256 does not match.")
             missing = next((part for part in checkpoint.parts if not (out / FOLDER / part).is_file()), None)
             if missing is not None:
                 raise WavetankError(f"{printable(out / FOLDER / missing)}: this part of the video is missing.")
@@ -135,8 +134,8 @@ def begun(out: Path, arch: str = "") -> Begun:
         except WavetankError as error:
             problems.append(str(error))
             continue
-        return Begun(sim, progress, checkpoint, " ".join(problems))
-    raise WavetankError(f"{origin}: no checkpoint can be taken: {' '.join(problems)}")
+        return ResumedRun(sim, progress, checkpoint, " ".join(problems))
+    raise WavetankError(f"{origin}: no checkpoint can be used: {' '.join(problems)}")
 
 
 def _digest(path: Path) -> str:
@@ -147,8 +146,8 @@ def _digest(path: Path) -> str:
     return whole.hexdigest()
 
 
-class FilmInParts:
-    """A video that is cut at each checkpoint, so that what was drawn before it outlives the process."""
+class SegmentedVideo:
+    """A video in segments that end at checkpoints, so that a killed process leaves what was drawn before."""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: float, folder: Path, parts: list[Path]) -> None:
         self.path, self.size, self.fps, self.folder, self.parts = path, size, fps, folder, [*parts]
@@ -160,8 +159,8 @@ class FilmInParts:
             self._writer = VideoWriter(self.folder / "film-now.mp4", *self.size, self.fps)
         self._writer.write(image)
 
-    def cut(self, frame: int) -> list[Path]:
-        """End a part after so many frames; return all parts."""
+    def end_segment(self, frame: int) -> list[Path]:
+        """End a segment after `frame`; return all segments."""
         if self._writer is not None:
             self._writer.path = self.folder / f"film-{frame:05d}.mp4"
             self._writer.close()
@@ -169,11 +168,11 @@ class FilmInParts:
             self._writer = None
         return self.parts
 
-    def __enter__(self) -> "FilmInParts":
+    def __enter__(self) -> "SegmentedVideo":
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
-        """Make one file of all parts, but where something other than an interrupt went wrong."""
+        """Join all segments, except after an error other than an interrupt."""
         if kind is None or not issubclass(kind, Exception):
             last = self.folder / "film-99999999.mp4"
             if self._writer is not None:

@@ -1,4 +1,4 @@
-"""Turns what was kept of a run into files for other programs."""
+"""Export of runs, states and recordings to files for other programs."""
 
 import dataclasses
 import itertools
@@ -15,7 +15,7 @@ from wavetank.foundation.atomic_write import make_folder
 from wavetank.foundation.errors import WavetankError
 from wavetank.run.folder import RunFolder
 from wavetank.run.outputs import Outputs
-from wavetank.run.record import view_of
+from wavetank.run.record import viewpoint_of
 from wavetank.scene.scene import Scene
 from wavetank.session.recording import Recording, replay
 from wavetank.simulation.instant import Instant
@@ -24,15 +24,15 @@ from wavetank.simulation.simulation import Simulation
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """Frames to be written."""
+    """Frames to export."""
 
     scene: Scene
     frames: Iterable[Any]  # of `Frame` or `Instant`
     fps: float  # frames per second of water
-    name: str  # front part of the files' names
-    folder: Path  # of the files unless told
+    name: str  # prefix of file names
+    folder: Path  # default folder of the files
     count: int | None = None
-    note: str = ""  # what the user should know
+    note: str = ""  # for the user
 
 
 def export(
@@ -45,16 +45,16 @@ def export(
     arch: str = "",
     console: Console | None = None,
 ) -> dict[str, Any]:
-    """Write the frames of a run's folder, a state, a recording or an HDF5 file in these formats; return what it wrote.
+    """Export a run's folder, a saved state, a recording or an HDF5 file; return what was written.
 
-    Raises `WavetankError` for what is none of these.
+    Every `every`-th frame is written in each of the formats `names`. Raises `WavetankError`.
     """
     console = console or Console(stderr=True)
     if not names:
         raise WavetankError("--to is missing; name one or several formats, as in --to usd or --to vtkhdf,ply.")
     if every < 1:
         raise WavetankError(f"--every = {every} is not allowed; it must be a whole number of at least 1.")
-    found = source_of(source, arch)
+    found = open_source(source, arch)
     if found.note:
         console.print(found.note)
     folder, written = make_folder(out or found.folder), 0
@@ -64,7 +64,7 @@ def export(
         names,
         fps=found.fps / every,
         only=only,
-        view=view_of(found.scene),
+        view=viewpoint_of(found.scene),
         frames=(found.count or 0) // every,
         tell=console.print,
     )
@@ -78,55 +78,55 @@ def export(
     return {"frames": written, "files": outputs.files, "fps": found.fps / every}
 
 
-def source_of(path: Path, arch: str = "") -> Source:
-    """Return the frames that a path stands for; raises `WavetankError`."""
+def open_source(path: Path, arch: str = "") -> Source:
+    """Return the frames of a run's folder, a state, a recording or an HDF5 file; raises `WavetankError`."""
     if path.is_dir():
-        return _run(RunFolder.open(path), arch)
+        return _from_run(RunFolder.open(path), arch)
     if not path.is_file():
         raise WavetankError(
             f"there is no file or folder {str(path)!r}; give a run's folder, a state, a recording or an .h5."
         )
     if path.suffix == ".npz":
-        return _state(path, arch)
+        return _from_state(path, arch)
     if path.suffix == ".toml":
-        return _recording(path, arch)
+        return _from_recording(path, arch)
     if path.suffix in hdf5.SUFFIXES:
-        return _tables(path)
+        return _from_hdf5(path)
     raise WavetankError(
         f"{path}: frames are read from a run's folder, a state (.npz), a recording (.toml) or an HDF5 file "
-        "(.h5); this is none."
+        "(.h5); this is none of them."
     )
 
 
-def _run(folder: RunFolder, arch: str) -> Source:
+def _from_run(folder: RunFolder, arch: str) -> Source:
     run = folder.run
     if folder.has_instants():
         return Source(folder.scene, folder.instants(), run.fps / run.every, run.name, folder.path)
     if run.start > 0.0:
         raise WavetankError(
-            f"{folder.path}: this run began with a state and kept no frames; run it again with --export h5."
+            f"{folder.path}: this run started from a saved state and wrote no frames; run it again with --export h5."
         )
     sim = Simulation(folder.scene, arch or run.arch)
     note = (
-        f"{folder.path} holds no frames (run with --export h5 or npz keeps them): the same {run.seconds:g} s of water "
+        f"{folder.path} holds no frames (write them with run --export h5 or npz): the {run.seconds:g} s of water "
         "are computed again."
     )
     frames = sim.frames(run.seconds, run.fps)
     return Source(folder.scene, frames, run.fps, run.name, folder.path, round(run.seconds * run.fps) + 1, note)
 
 
-def _state(path: Path, arch: str) -> Source:
+def _from_state(path: Path, arch: str) -> Source:
     if zipfile.is_zipfile(path):
         with zipfile.ZipFile(path) as file:
             if "positions.npy" in file.namelist() and "about.npy" not in file.namelist():
                 raise WavetankError(
-                    f"{path} holds the particles of a frame, without the scene that they are of; give the run's folder."
+                    f"{path} holds the particles of a frame without their scene; give the run's folder."
                 )
     sim = Simulation.restore(path, arch or "cpu")
     return Source(sim.scene, iter([sim.frame()]), 30.0, path.stem, path.parent, 1)
 
 
-def _recording(path: Path, arch: str) -> Source:
+def _from_recording(path: Path, arch: str) -> Source:
     recording = Recording.load(path)
     sessions = replay(recording, arch or recording.arch, str(path))
     first = next(sessions)
@@ -136,7 +136,7 @@ def _recording(path: Path, arch: str) -> Source:
     )
 
 
-def _tables(path: Path) -> Source:
+def _from_hdf5(path: Path) -> Source:
     instants: Iterator[Instant] = hdf5.read(path)
     first = next(instants, None)
     if first is None:

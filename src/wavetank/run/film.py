@@ -22,7 +22,7 @@ from wavetank.formats.png import write_png
 from wavetank.foundation.atomic_write import atomic_write, make_folder
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.version import VERSION
-from wavetank.run.signals import Asked, asked_to_end
+from wavetank.run.signals import StopRequest, stop_on_signal
 from wavetank.scene.film import Film
 from wavetank.scene.scene import Scene
 from wavetank.simulation.simulation import Simulation
@@ -60,8 +60,8 @@ def film_scene(
     start(arch)
     renderer = Renderer(*order.size, affordable(*order.size, supersample))
     frames = _FrameFolder(path.with_name(path.name + FRAMES), scene, order, look)
-    with asked_to_end(say="interrupted; finished frames are kept (once more stops at once)") as asked:
-        camera_work = _Filming(scene, order, frames, renderer, {**style, **look}, asked)
+    with stop_on_signal(say="interrupted; finished frames are kept (once more stops at once)") as stop:
+        camera_work = _Filming(scene, order, frames, renderer, {**style, **look}, stop)
         rendered = camera_work.render_missing(arch, console or Console(stderr=True))
     figures = {
         "file": str(path),
@@ -71,7 +71,7 @@ def film_scene(
         "fps": order.fps,
         "rendered": sum(rendered),
         "interrupted": len(rendered) < order.frames,
-        "exit_code": asked.code,
+        "exit_code": stop.code,
     }
     if figures["interrupted"]:
         return figures | {"file": str(frames.folder)}
@@ -166,10 +166,16 @@ class _Filming:
     """Renders the frames of a film that are missing."""
 
     def __init__(
-        self, scene: Scene, order: Film, frames: _FrameFolder, renderer: Renderer, style: dict[str, Any], asked: Asked
+        self,
+        scene: Scene,
+        order: Film,
+        frames: _FrameFolder,
+        renderer: Renderer,
+        style: dict[str, Any],
+        stop: StopRequest,
     ) -> None:
         self.scene, self.order, self.frames, self.renderer, self.style = scene, order, frames, renderer, style
-        self.asked = asked
+        self.stop = stop
         self.times = order.times()  # s of water at each frame
         self.samples = style["samples"] if style["traced"] else 1  # of a frame, as the progress bar counts
         self.made = 0  # samples so far
@@ -190,21 +196,21 @@ class _Filming:
                 if not (self._advance_to(number) and self._render(number)):
                     break
                 rendered.append(True)
-                if self.asked and number + 1 < len(there):
+                if self.stop and number + 1 < len(there):
                     self.frames.store(self.sim, number)
                     break
         return rendered
 
     def _advance_to(self, number: int) -> bool:
         """Advance the water to a frame; say whether it got there before an interruption."""
-        while self.at < number and not self.asked:
+        while self.at < number and not self.stop:
             self.at += 1
             self.sim.advance(max(0.0, self.times[self.at] - (self.times[self.at - 1] if self.at else 0.0)))
             if self.at == number and number % STORE_EVERY == 0:
                 self.frames.store(self.sim, number)
-        if self.asked:
+        if self.stop:
             self.frames.store(self.sim, self.at)
-        return not self.asked
+        return not self.stop
 
     def _render(self, number: int) -> bool:
         """Render and write a frame; say whether it was finished before an interruption."""
@@ -227,4 +233,4 @@ class _Filming:
     def _report(self, number: int, samples: int) -> bool:
         """Show how many samples of a frame there are; say whether to go on."""
         self.bar.update(self.task, completed=self.made + samples, frame=f"frame {number + 1} of {self.order.frames}")
-        return not self.asked
+        return not self.stop

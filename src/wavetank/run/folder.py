@@ -1,11 +1,11 @@
-"""The folder of a run: what it was, and what it wrote; docs/formats.md.
+"""The folder of a run: its options and what it wrote; docs/formats.md.
 
-run.toml       what was ordered, and the version of this layout
-scene.toml     the scene with all that was set; meshes and heights are inside of it
-stats.jsonl    a line of figures for each frame, the first one at the start
-stats.json     the figures of the whole run, once it has ended
-stats.csv      those of all frames as a table, likewise
-states/        checkpoints: whole states, from which the run goes on to the last bit
+run.toml       the options of the run, and the version of this layout
+scene.toml     the scene as it was run, with meshes and heights embedded
+stats.jsonl    one line of figures for each frame, the first one at the start
+stats.json     figures of the whole run, written at its end
+stats.csv      figures of all frames as a table, written at its end
+states/        checkpoints: complete states, from which the run can be resumed bit for bit
 NAME*          pictures, films and files of frames
 """
 
@@ -28,18 +28,18 @@ from wavetank.foundation.version import VERSION
 from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import Instant
 
-FILE, SCENE, STATS, SUMMARY, STATES = "run.toml", "scene.toml", "stats.jsonl", "stats.json", "states"
+FILE, SCENE, STATS, SUMMARY = "run.toml", "scene.toml", "stats.jsonl", "stats.json"
 TABLE = "stats.csv"
 LARGEST_STATS = 4_000_000_000  # bytes: a day of water at 60 frames per second
 LONGEST_ROW = 400_000  # characters
 
 
 class Run(Model):
-    """What was ordered."""
+    """The options of a run, as run.toml has them."""
 
     format: Literal[1] = 1
-    wavetank: str = VERSION  # that began it
-    name: str = "run"  # front part of the files' names
+    wavetank: str = VERSION  # that started it
+    name: str = "run"  # prefix of file names
     arch: str = "cpu"
     seconds: Annotated[float, Field(ge=0, le=86400, allow_inf_nan=False)] = 0.0  # of water
     start: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0  # s: time of the water at the first frame
@@ -56,14 +56,14 @@ class Run(Model):
 
 
 class RunFolder:
-    """Such a folder, to be written or read."""
+    """A run's folder, open for reading or writing."""
 
     def __init__(self, path: Path, run: Run, scene: Scene) -> None:
         self.path, self.run, self.scene = path, run, scene
 
     @classmethod
     def create(cls, path: str | Path, run: Run, scene: Scene) -> "RunFolder":
-        """Begin a run in a folder, with what it needs to be repeated."""
+        """Create the folder of a new run, with what is needed to repeat it."""
         folder = cls(make_folder(path), run, scene)
         scene.save(folder.path / SCENE)
         for stale in (STATS, SUMMARY, TABLE):
@@ -79,7 +79,7 @@ class RunFolder:
 
     @classmethod
     def open(cls, path: str | Path) -> "RunFolder":
-        """Open the folder of a run; raises `WavetankError` for what is none."""
+        """Open the folder of a run; raises `WavetankError` for any other path."""
         place = Path(path) / FILE
         origin = printable(place)
         with explain_errors(origin, "run"):
@@ -93,13 +93,8 @@ class RunFolder:
             return cls(Path(path), Run.parse(table, origin), Scene.load(Path(path) / SCENE))
 
     @property
-    def states(self) -> Path:
-        """The folder of checkpoints, made where there is none."""
-        return make_folder(self.path / STATES)
-
-    @property
     def base(self) -> Path:
-        """Front part of the paths of what the run writes."""
+        """Prefix of the paths of the run's files."""
         return self.path / self.run.name
 
     # --- figures ---
@@ -110,15 +105,15 @@ class RunFolder:
             file.write(_line(row))
 
     def stats(self) -> list[dict[str, float]]:
-        """Return the figures of all frames that were finished; raises `WavetankError` for lines that are none."""
+        """Return the figures of all finished frames; raises `WavetankError` for malformed lines."""
         path = self.path / STATS
         if not path.exists():
             return []
-        *lines, _ = read_text(path, "figures", LARGEST_STATS).split("\n")  # the last one was not finished, or is empty
+        *lines, _ = read_text(path, "figures", LARGEST_STATS).split("\n")  # the last one is empty, or was not finished
         return [_row(line, f"{printable(path)}, line {number}") for number, line in enumerate(lines, 1)]
 
     def write_table(self) -> Path:
-        """Write the figures of all frames as a table of text, a column each, and return its path."""
+        """Write the figures of all frames as CSV and return its path."""
         rows = self.stats()
         names = list(dict.fromkeys(name for row in rows for name in row))
         with atomic_write(self.path / TABLE) as partial, partial.open("w", encoding="utf-8", newline="") as file:
@@ -128,7 +123,7 @@ class RunFolder:
         return self.path / TABLE
 
     def keep_stats(self, count: int) -> None:
-        """Drop the figures of all but the first `count` frames, before a run goes on from there."""
+        """Keep the figures of the first `count` frames only, before the run continues from there."""
         rows = self.stats()[:count]
         with atomic_write(self.path / STATS) as partial:
             partial.write_text("".join(map(_line, rows)), encoding="utf-8")
@@ -136,18 +131,18 @@ class RunFolder:
     # --- frames ---
 
     def has_instants(self) -> bool:
-        """Say whether frames were written from which everything else can be made: npz or h5, with all their parts."""
+        """Say whether complete frames were written: npz or h5, with all parts that other formats need."""
         whole = not self.run.only or {"particles", "foam", "solids"} <= {*self.run.only}
         return whole and (self._has_tables() or any(self._archives()))
 
     def instants(self) -> Iterator[Instant]:
-        """Yield the frames that were written."""
+        """Yield the written frames."""
         if self._has_tables():
             return hdf5.read(self._hdf5())
         return (npz.read(path, self.scene) for path in self._archives())
 
     def instant_at(self, time: float) -> Instant:
-        """Return the frame that was written nearest to a time of the water [s]; raises `WavetankError` without any."""
+        """Return the written frame nearest to a time of the water [s]; raises `WavetankError` without any."""
         between, archives = self.run.every / self.run.fps, self._archives()
         number = max(0, round((time - self.run.start) / between))
         if self._has_tables():
@@ -173,7 +168,7 @@ class RunFolder:
 
 
 def _line(row: Mapping[str, float]) -> str:
-    """Return a line of JSON, which knows no NaN: null is, say, the time that the frame before the first one took."""
+    """Return a row as a line of JSON, with null for non-finite numbers."""
     return json.dumps({name: value if math.isfinite(value) else None for name, value in row.items()}) + "\n"
 
 
@@ -184,7 +179,7 @@ def _row(line: str, origin: str) -> dict[str, float]:
         row = None
     if not isinstance(row, dict) or any(not isinstance(value, int | float | None) for value in row.values()):
         raise WavetankError(
-            f"{origin} is no table of numbers, as the figures of a frame are; restore or remove the file."
+            f"{origin} is not a table of numbers, which the figures of a frame are; restore or delete the file."
         )
     return {name: math.nan if value is None else value for name, value in row.items()}
 

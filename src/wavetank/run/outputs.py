@@ -1,4 +1,4 @@
-"""All files of a run's frames: which formats, which parts, and a thread that writes them."""
+"""The files that a run's frames are written to, by a thread of their own."""
 
 import glob
 from collections.abc import Callable, Collection, Sequence
@@ -11,16 +11,16 @@ from wavetank.formats.plan import Plan, Series, Shapes, Viewpoint
 from wavetank.formats.surface import check_surface, with_surfaces
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.retry import Retry
-from wavetank.run.background import Background
+from wavetank.run.background import BackgroundWriter
 from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import PARTS, Instant
 
-TRIED, WORTH_A_WORD = 10, 1_000_000_000  # frames by which the size of all is judged; bytes of all
+MEASURED_FRAMES, LARGE = 10, 1_000_000_000  # frames that predict the size of all; bytes worth a warning
 USUAL = ("particles", "foam", "solids")
 
 
 def parts_named(only: Collection[str]) -> frozenset[str]:
-    """Return the parts that `--only` names, all but the surface without any; raises `WavetankError`."""
+    """Return the parts that `--only` names, without any all but the surface; raises `WavetankError`."""
     wrong = next((name for name in only if name not in PARTS), None)
     if wrong is not None:
         raise WavetankError(f"--only {wrong} is not allowed; a frame has the parts {', '.join(PARTS)}.")
@@ -28,7 +28,7 @@ def parts_named(only: Collection[str]) -> frozenset[str]:
 
 
 def check_exports(names: Sequence[str], only: Collection[str], scene: Scene) -> list[ModuleType]:
-    """Return the modules of these formats; raises `WavetankError` for what cannot be written of this scene."""
+    """Return the modules of formats; raises `WavetankError` for those that cannot hold this scene."""
     modules = [exporter_named(name) for name in names]
     if "surface" in parts_named(only) and modules:
         check_surface(scene)
@@ -42,7 +42,7 @@ def check_exports(names: Sequence[str], only: Collection[str], scene: Scene) -> 
 
 
 def bytes_of(files: Sequence[str]) -> int:
-    """Return the size of files, ##### for the number of a frame; of a folder that of all in it."""
+    """Return the size of files and folders [bytes]; ##### in a name matches the number of any frame."""
     found = [
         path
         for name in map(Path, files)
@@ -53,7 +53,7 @@ def bytes_of(files: Sequence[str]) -> int:
 
 
 class Outputs:
-    """Writes frames into files beside the simulation."""
+    """Writes frames into files in parallel with the simulation."""
 
     def __init__(
         self,
@@ -76,53 +76,53 @@ class Outputs:
         self._series: list[Series] = [
             module.write(plan) if module.KIND == "series" else _EachFrame(module, plan) for module in modules
         ]
-        self._background = Background() if modules else None
+        self._background = BackgroundWriter() if modules else None
         self._frames, self._tell = frames, tell
 
     @property
     def files(self) -> list[str]:
-        """Names of the files, ##### for the number of a frame."""
+        """Names of the files, with ##### for the number of a frame."""
         return [name for series in self._series for name in series.files]
 
     @property
     def waited(self) -> float:
-        """Seconds that the simulation waited for the writer [s]."""
+        """Time that the simulation waited for the writer [s]."""
         return self._background.waited if self._background else 0.0
 
     def write(self, number: int, frame: Any) -> None:
-        """Have a `Frame` or an `Instant` written as number `number`; returns once there is room for it to wait.
+        """Queue a `Frame` or an `Instant` as number `number`; wait while the queue is full.
 
-        Raises what went wrong with one before.
+        Raises the error of an earlier frame.
         """
         if self._background is None:
             return
         instant = Instant.of(frame)
         self.shapes.learn(instant.standing)
         self._background.put(lambda: self._write(number, instant), instant.size)
-        if number + 1 == TRIED < self._frames:
+        if number + 1 == MEASURED_FRAMES < self._frames:
             self.drain()
-            expected = bytes_of(self.files) / TRIED * self._frames
-            if expected > WORTH_A_WORD:
-                self._tell(f"all frames will take about {expected / 1e9:.1f} GB; --every 2 writes half of them.")
+            expected = bytes_of(self.files) / MEASURED_FRAMES * self._frames
+            if expected > LARGE:
+                self._tell(f"all frames will take about {expected / 1e9:.1f} GB; --every 2 halves that.")
 
     def _write(self, number: int, instant: Instant) -> None:
         if self._needs_surface:
             instant = with_surfaces(instant)
         instant = instant.only(self.parts)
         for series in self._series:
-            # What grows is patient itself: a frame is appended once.
+            # A growing file retries itself, as a frame must be appended once.
             if series.repeatable:
                 self.retry.call(lambda series=series: series.write(number, instant))  # type: ignore[misc]
             else:
                 series.write(number, instant)
 
     def drain(self) -> None:
-        """Wait until all that was given is in the files; raises what went wrong."""
+        """Wait until all frames are in the files; raises the error of one."""
         if self._background is not None:
             self._background.drain()
 
     def close(self, *, hurry: bool = False) -> None:
-        """Write what waits and complete the files; raises what went wrong. In a `hurry` nothing is tried again."""
+        """Write queued frames and complete the files; raises the error of one. In a `hurry` nothing is retried."""
         if hurry:
             self.retry.stop.set()
         try:
@@ -140,7 +140,7 @@ class Outputs:
 
 
 class _EachFrame:
-    """A file for each frame."""
+    """One file for each frame."""
 
     repeatable = True
 

@@ -1,7 +1,7 @@
-"""Being asked to end: Ctrl-C, SIGTERM, a closed terminal.
+"""Signals that end a command: Ctrl-C, SIGTERM, a closed terminal.
 
-The first of them lets the frame at hand be finished and every file be completed; a second one stops at once, and what
-is finished so far plays. The exit code is 128 plus the number of the first signal, as shells have it: 130 after Ctrl-C,
+The first one lets the current frame be finished and every file be completed; a second one stops at once, and a video
+plays as far as it got. The exit code is 128 plus the number of the first signal, as shells have it: 130 after Ctrl-C,
 143 after SIGTERM, 129 after a closed terminal (docs/promises.md).
 """
 
@@ -14,15 +14,15 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
-ASKED = ("SIGINT", "SIGTERM", "SIGHUP")
-AGAIN = 0.01  # s after which a signal comes again that came in a finalizer
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+RETRY = 0.01  # s after which a signal that arrived in a finalizer is sent again
 
 
-class Asked:
-    """Whether, and by what, this process was asked to end."""
+class StopRequest:
+    """Whether, and by which signal, this process was asked to end; true once it was."""
 
     def __init__(self) -> None:
-        self.signal = 0  # the first that came
+        self.signal = 0  # number of the first one
         self._event = threading.Event()
 
     def __bool__(self) -> bool:
@@ -33,8 +33,8 @@ class Asked:
         """The exit code."""
         return 128 + self.signal if self.signal else 0
 
-    def note(self, number: int) -> None:
-        """Take note of a signal; raises `KeyboardInterrupt` where one came before."""
+    def receive(self, number: int) -> None:
+        """Record a signal; raises `KeyboardInterrupt` where one came before."""
         if number == getattr(signal, "SIGHUP", None):
             _leave_terminal()
         if self._event.is_set():
@@ -44,30 +44,30 @@ class Asked:
 
 
 @contextlib.contextmanager
-def asked_to_end(then: Callable[[], None] = lambda: None, say: str = "") -> Iterator[Asked]:
-    """Tell whether the process is asked to end while the context lasts; call `then`, and `say` a line, at the first."""
-    asked = Asked()
+def stop_on_signal(then: Callable[[], None] = lambda: None, say: str = "") -> Iterator[StopRequest]:
+    """Catch signals within the context; at the first one call `then` and print the line `say`."""
+    stop = StopRequest()
     if threading.current_thread() is not threading.main_thread():
-        yield asked
+        yield stop
         return
 
-    def note(number: int, frame: Any) -> None:
-        if asked and _is_in_finalizer(frame):  # where an interrupt would be printed and forgotten
-            threading.Timer(AGAIN, os.kill, (os.getpid(), number)).start()
+    def handle(number: int, frame: Any) -> None:
+        if stop and _is_in_finalizer(frame):  # which would swallow a KeyboardInterrupt
+            threading.Timer(RETRY, os.kill, (os.getpid(), number)).start()
             return
-        asked.note(number)
+        stop.receive(number)
         if say:
             with contextlib.suppress(OSError, ValueError, RuntimeError):
                 os.write(sys.stderr.fileno(), f"\nwavetank: {say}\n".encode())
         then()
 
     before = {}
-    for name in ASKED:
+    for name in SIGNALS:
         number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:  # as of nohup, which is to be kept
-            before[number] = signal.signal(number, note)
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:  # set by nohup
+            before[number] = signal.signal(number, handle)
     try:
-        yield asked
+        yield stop
     finally:
         for number, action in before.items():
             signal.signal(number, action)
@@ -82,7 +82,7 @@ def _is_in_finalizer(frame: Any) -> bool:
 
 
 def _leave_terminal() -> None:
-    """Write nowhere from now on, where a terminal was: it is gone, and a line to it would be an error."""
+    """Send output to the null device where it went to the terminal, which is gone: writing to it would fail."""
     for number in (0, 1, 2):
         with contextlib.suppress(OSError):
             if stat.S_ISCHR(os.fstat(number).st_mode):

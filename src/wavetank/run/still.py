@@ -1,4 +1,4 @@
-"""One picture of a scene, of a saved state or of a run."""
+"""Still pictures of a scene, a saved state or an archived run."""
 
 import time
 from collections.abc import Callable
@@ -13,8 +13,8 @@ from wavetank.formats import exporter_for
 from wavetank.foundation.atomic_write import partial_path
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.version import VERSION
-from wavetank.run.archived import frame_at, is_kept
-from wavetank.run.signals import Asked, asked_to_end
+from wavetank.run.archived import frame_at, is_archive
+from wavetank.run.signals import StopRequest, stop_on_signal
 from wavetank.scene.scene import Scene
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.simulation import Simulation
@@ -24,11 +24,11 @@ from wavetank.view.film.samples import Watch
 from wavetank.view.renderer import ROOM, Renderer, affordable
 from wavetank.view.style import Style, quality_options
 
-SAMPLES = ".samples.npz"  # what the file of a picture that was stopped ends in
-STOPS = "asked to end; the samples are being kept (once more stops at once)"
-PARTS = ("{task.description}", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-USUAL_TIME = 0.5  # s: when a scene is shown unless told
-#: the same for bundled scenes whose best moment is another one
+SAMPLES = ".samples.npz"  # suffix of the samples of an interrupted picture
+STOPS = "interrupted; saving the samples (once more stops at once)"
+COLUMNS = ("{task.description}", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+USUAL_TIME = 0.5  # s: time of a scene's picture by default
+#: the same for bundled scenes with another best moment
 SHOWN_AT = {
     "still-tank": 1.0,
     "still-tank-2d": 1.0,
@@ -59,7 +59,7 @@ SHOWN_AT = {
 }
 
 
-def take(
+def render_still(
     world: str,
     scene: Scene | None,
     path: Path,
@@ -76,29 +76,29 @@ def take(
     console: Console | None = None,
     **options: Any,
 ) -> dict[str, Any]:
-    """Write a picture with its scene, time and view as metadata, and return what it cost.
+    """Render a picture to `path`, with scene, time and view as metadata; return its figures.
 
-    `world` is the name of `scene`, or without one the file of a saved state, or the folder of a run. With
-    `timings` a second picture is taken, pass by pass, after the kernels are compiled.
+    `world` is the name of `scene`, or without one the file of a saved state or an archived run. With `timings` it is
+    rendered a second time, with compiled kernels, and each pass is timed.
     """
     writer = exporter_for(path, "picture")
-    partial_path(path)  # what is wrong shows before the work
+    partial_path(path)  # raises before the work where the file cannot be written
     supersample, chosen = quality_options(quality, samples)
     style = {**chosen, **options}
     view = Style(**style).kind
-    if scene is None and is_kept(world):
+    if scene is None and is_archive(world):
         frame = frame_at(world, at, arch)
     else:
-        frame = _open(world, scene, at, arch or "cpu").frame(view.coloured)
+        frame = _simulation_at(world, scene, at, arch or "cpu").frame(view.coloured)
     renderer = Renderer(width, height, affordable(width, height, supersample))
-    camera = _camera_of(frame, eye, target, width / max(height, 1))
+    camera = _camera_at(frame, eye, target, width / max(height, 1))
     began = time.perf_counter()
     with (
-        asked_to_end(say=STOPS if style["traced"] else "") as asked,
-        Progress(*PARTS, console=console or Console(stderr=True), transient=True, disable=not style["traced"]) as bar,
+        stop_on_signal(say=STOPS if style["traced"] else "") as stop,
+        Progress(*COLUMNS, console=console or Console(stderr=True), transient=True, disable=not style["traced"]) as bar,
     ):
         watch = Watch(path=path.with_name(path.name + SAMPLES) if style["traced"] else None)
-        watch.tell = telling(bar, asked)
+        watch.tell = progress_callback(bar, stop)
         image = renderer.render(frame, camera, watch=watch, **style)
     if not watch.whole:
         return {
@@ -106,7 +106,7 @@ def take(
             "samples": watch.done,
             "of": style["samples"],
             "interrupted": True,
-            "exit_code": asked.code,
+            "exit_code": stop.code,
         }
     figures: dict[str, Any] = {
         "file": str(path),
@@ -128,19 +128,19 @@ def take(
     return figures
 
 
-def telling(bar: Progress, asked: Asked, name: str = "samples") -> Callable[[int, int], bool]:
-    """Return what shows the samples of a picture in a bar, with the time that is left, and stops where `asked` to."""
+def progress_callback(bar: Progress, stop: StopRequest, name: str = "samples") -> Callable[[int, int], bool]:
+    """Return a callback that shows finished samples in `bar`, and returns False to stop."""
     task = bar.add_task(name, total=None)
 
     def tell(done: int, of: int) -> bool:
         bar.update(task, completed=done, total=of)
-        return not asked
+        return not stop
 
     return tell
 
 
-def _open(world: str, scene: Scene | None, at: float | None, arch: str) -> Simulation:
-    """Return the world at the time `at` [s]."""
+def _simulation_at(world: str, scene: Scene | None, at: float | None, arch: str) -> Simulation:
+    """Return the simulation at the time `at` [s]."""
     sim = Simulation(scene, arch=arch) if scene is not None else Simulation.restore(world, arch=arch)
     if at is None:
         at = SHOWN_AT.get(world, USUAL_TIME) if scene is not None else sim.time
@@ -152,8 +152,8 @@ def _open(world: str, scene: Scene | None, at: float | None, arch: str) -> Simul
     return sim
 
 
-def _camera_of(frame: Frame, eye: str | None, target: str | None, aspect: float) -> Camera:
-    """Return the camera that two texts of the form ``2,1,3`` ask for; what neither says frames the water."""
+def _camera_at(frame: Frame, eye: str | None, target: str | None, aspect: float) -> Camera:
+    """Return the camera with `eye` and `target` as texts of the form ``2,1,3``; by default it frames the water."""
     usual = Camera.framing_extent(extent_of_water(frame), aspect)
     return Camera(
         eye=_point("eye", eye) if eye else usual.eye,

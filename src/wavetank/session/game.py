@@ -1,4 +1,4 @@
-"""A game: a goal, the water as it is, and what has become of it."""
+"""A game: one attempt at the goal of a level, and its outcome."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ HARMLESS = ("foam", "foam_lifetime")  # parameters that do not act on the water
 
 
 class Game:
-    """Watches one attempt at a goal. Raises `WavetankError` for a goal with tools that there are not."""
+    """Judges one attempt at a goal. Raises `WavetankError` for a goal with unknown tools."""
 
     def __init__(self, goal: Goal, frame: Frame) -> None:
         for name, options in (goal.tools or {}).items():
@@ -21,10 +21,10 @@ class Game:
             TOOL_NAMES[name].parse(options, f"goal.tools.{name}")
         self.goal = goal
         self.outcome = ""  # won or lost, at the end
-        self.elapsed = 0.0  # s of water that were computed; going back does not give them back
-        self.held = 0.0  # s since all aims are met
+        self.elapsed = 0.0  # s of water that were computed; going back does not lower it
+        self.held = 0.0  # s for which all aims have been met
         self.strokes = 0
-        self.worst = 0.0  # of the forbidden: the largest share of what is allowed so far
+        self.worst = 0.0  # largest value so far of forbidding aims, over their limits
         self.start = [int(counted(aim, frame).sum()) for aim in goal.aims]
         self.values = [0.0] * len(goal.aims)
         self._measure(frame)
@@ -40,7 +40,7 @@ class Game:
         return (tools or {}).get(name) or {}
 
     def watch(self, frame: Frame, duration: float) -> None:
-        """Judge the frame at the end of `duration` [s]; once the game is over nothing changes."""
+        """Judge a frame of `duration` [s]; once the game is over nothing changes."""
         if self.outcome:
             return
         self.elapsed += duration
@@ -57,7 +57,7 @@ class Game:
 
     @property
     def progress(self) -> float:
-        """How much is done, 0 to 1: the mean of the aims, or of the time where it only has to be endured."""
+        """Progress, 0 to 1: the mean of the aims, or the share of time where it only has to be endured."""
         if self.outcome == "won":
             return 1.0
         if self.goal.is_endured:
@@ -67,17 +67,17 @@ class Game:
 
     @property
     def mark(self) -> float:
-        """What the stars ask to be small: time [s], or the worst share where time has to be endured."""
+        """What stars reward when small: time [s], or the worst share where time has to be endured."""
         return self.worst if self.goal.is_endured else self.elapsed
 
     @property
     def stars(self) -> int:
-        """Stars, 1 to 3, that a win now is worth: by time [s], or by how little of the allowed share got wet."""
+        """Stars, 1 to 3, of a win now: by time [s], or by how little of the allowed share got wet."""
         first, second = self.goal.stars or ((0.4, 0.75) if self.goal.is_endured else self._divide_time())
         return 0 if self.outcome == "lost" else 3 if self.mark <= first else 2 if self.mark <= second else 1
 
     def describe(self) -> dict[str, Any]:
-        """Return the goal and how it stands as plain data, for fronts."""
+        """Return the goal and its progress as plain data."""
         goal = self.goal
         return {
             "text": goal.text,

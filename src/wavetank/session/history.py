@@ -1,16 +1,16 @@
-"""The past of a world in memory: a ring of instants to go back to, and bookmarks."""
+"""The history of a world in memory: a ring of instants to go back to, and bookmarks."""
 
 import bisect
 
 from wavetank.simulation.snapshot import Packed, Snapshot
 
 EVERY = 0.1  # s of water between two instants
-MEMORY = 256 * 2**20  # bytes that the ring may take
+MEMORY = 256 * 2**20  # bytes of the ring
 BOOKMARKS = 20
 
 
 class History:
-    """Instants in the order of their time. What lies after the present is kept until time goes on."""
+    """Instants in the order of their time; after going back, later ones stay until time passes."""
 
     def __init__(self, memory: int = MEMORY) -> None:
         self.memory = memory
@@ -19,12 +19,12 @@ class History:
         self.bookmarks: dict[str, Packed] = {}
         self._size = 0
 
-    def wants(self, time: float) -> bool:
-        """Say whether the instant at `time` [s], the latest so far, is one to keep."""
+    def is_due(self, time: float) -> bool:
+        """Return whether the instant at `time` [s], the latest so far, is due to be recorded."""
         return not self.times or time >= self.times[-1] + EVERY - 1e-9
 
-    def keep(self, snapshot: Snapshot) -> None:
-        """Add an instant; what was kept from here on was another future and goes, and the oldest where room ends."""
+    def record(self, snapshot: Snapshot) -> None:
+        """Record an instant; later ones are dropped, and the oldest where memory is exceeded."""
         self.forget_from(snapshot.time)
         packed = Packed(snapshot)
         self.instants.append(packed)
@@ -41,13 +41,13 @@ class History:
         del self.instants[first:], self.times[first:]
 
     def before(self, time: float) -> Snapshot | None:
-        """Return the last instant that is not after `time` [s], the first there is if all are; None without any."""
+        """Return the last instant not after `time` [s], else the first one; None without any."""
         if not self.instants:
             return None
         return self.instants[max(0, bisect.bisect_right(self.times, time + 1e-9) - 1)].unpack()
 
     def last_finite(self) -> Snapshot | None:
-        """Return the last instant whose numbers are numbers; those behind it are forgotten."""
+        """Return the last instant without non-finite values; later ones are dropped."""
         while self.instants:
             instant = self.instants[-1].unpack()
             if instant.is_finite:
@@ -56,5 +56,5 @@ class History:
         return None
 
     def clear(self) -> None:
-        """Forget all, bookmarks too: the world is another."""
+        """Drop all instants and bookmarks."""
         self.instants, self.times, self.bookmarks, self._size = [], [], {}, 0

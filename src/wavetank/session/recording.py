@@ -1,7 +1,7 @@
-"""Sessions on disk: the scene and the timed commands as TOML, and the way back to the same particles.
+"""Recordings: a session's scene and timed commands as TOML, replayed to the same particles.
 
-A command stands with the number of frames that were computed before it. Physics repeats bit for bit on one machine, so
-the list is the whole session; the digest of the particles at the end tells whether it did.
+Each command has the number of frames that were computed before it. Physics repeats bit for bit on one machine, so the
+list is the whole session; the digest of the particles at the end verifies it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -46,16 +46,16 @@ class Recording(Model):
         digest: str = "",
         log: Sequence[tuple[int, Command]] | None = None,
     ) -> "Recording":
-        """Return all that was done in `session`, which began with the scene `start`.
+        """Return the recording of `session`, which started with the scene `start`.
 
-        Or all that had been done when it had computed `frames`, with the `digest` and the `log` of that moment.
-        Raises `WavetankError` where a script added forces or took some away: what is no command cannot be repeated.
+        `frames`, `digest` and `log` are of an earlier moment, where given. Raises `WavetankError` where a script added
+        or removed forces, as only commands can be replayed.
         """
-        if session.uncommanded:
-            names = ", ".join(sorted(session.uncommanded))
+        if session.unrecorded_forces:
+            names = ", ".join(sorted(session.unrecorded_forces))
             raise WavetankError(
-                f"this session cannot be recorded: a script changed its forces ({names}); a recording has those of the "
-                "scene, [[forces]], and what is done by commands."
+                f"this session cannot be recorded: a script changed its forces ({names}); a recording holds the "
+                "scene's own, [[forces]], and commands only."
             )
         return cls(
             version=VERSION,
@@ -70,7 +70,7 @@ class Recording(Model):
         )
 
     def save(self, path: str | Path) -> None:
-        """Write this as TOML; a file of that name is replaced in one move."""
+        """Write this as TOML; a file of that name is replaced atomically."""
         with atomic_write(path) as partial:
             partial.write_text(self.text(), encoding="utf-8")
 
@@ -80,14 +80,14 @@ class Recording(Model):
 
     @classmethod
     def load(cls, path: str | Path) -> "Recording":
-        """Read a recording; raises `WavetankError` for what is none."""
+        """Read a recording; raises `WavetankError` for any other file."""
         origin = printable(path)
         with explain_errors(origin, "recording"):
             recording: Recording = cls.parse(parse_toml(read_text(path, "recording"), origin, READ), origin)
         return recording
 
     def timed_commands(self, origin: str = "recording") -> list[tuple[int, Command]]:
-        """Return the commands with the frame before which each is carried out; raises `WavetankError`."""
+        """Return each command with the frame before which it is applied; raises `WavetankError`."""
         result: list[tuple[int, Command]] = []
         for number, table in enumerate(self.commands):
             frame = table.get("frame")
@@ -105,9 +105,9 @@ class Recording(Model):
 
 
 def replay(recording: Recording, arch: str = "cpu", origin: str = "recording") -> Iterator[Session]:
-    """Do a session again; yield it at the start and after every frame.
+    """Replay a session; yield it at the start and after every frame.
 
-    Pauses take no time. Raises `WavetankError` for a recording that is not one.
+    Pauses take no time. Raises `WavetankError` for an invalid recording.
     """
     commands = recording.timed_commands(origin)
     session = Session(Scene.parse(recording.scene, origin), arch, most_particles=recording.most_particles)

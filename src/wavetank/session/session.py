@@ -1,6 +1,6 @@
-"""A session: a world, the commands that act on it, its past, and time that passes.
+"""A session: a world, the commands that act on it, its history, and time.
 
-Fronts submit commands from any thread; everything else happens in the one thread that calls `turn`.
+Commands are submitted from any thread; everything else happens in the one thread that calls `turn`.
 """
 
 import math
@@ -18,19 +18,19 @@ from wavetank.session.state import SessionState
 from wavetank.simulation.simulation import Simulation
 
 MOST_PARTICLES = 200_000
-SLUGGISH, SWIFT = 0.045, 0.025  # s: a frame that takes longer is made shorter, one that takes less longer again
+SLOW_FRAME, FAST_FRAME = 0.045, 0.025  # s of computing: above it frames are divided, below it less so
 MOST_PARTS = 8  # of a frame; shorter time steps would turn density errors into velocity
-WORTH = 1.0  # a frame takes no less than so many times its picture, or pictures would eat the time
+FRAME_PER_PICTURE = 1.0  # least time of a frame over that of its picture, or pictures would take most of the time
 MOST_SLOW = 8  # slow commands in the queue
-SPARED, SHORTEST_REST = 2.0, 0.1  # times as long as such a command took, and s at least, none follows it
+PAUSE, SHORTEST_PAUSE = 2.0, 0.1  # until the next slow command: times the duration of the last, and s at least
 LONGEST_NOTE = 400  # characters
-Refused = Callable[[str], None] | None  # is told why a command failed
-Waiting = tuple[Command, Refused]
-MOST_WAITING = 4096  # commands in the queue; what comes on top is dropped
+Report = Callable[[str], None] | None  # takes the reason why a command failed
+Waiting = tuple[Command, Report]
+MOST_WAITING = 4096  # commands in the queue; more are dropped
 
 
 class Session(SessionState):
-    """One running world and all that is done to it.
+    """A running world to which commands are applied.
 
     `log` lists every command that took effect, with the number of frames computed before it: `recording` writes it.
     """
@@ -45,33 +45,33 @@ class Session(SessionState):
         own: Simulation | None = None,
     ) -> None:
         super().__init__(scene, arch, most_particles, history or History(), own)
-        self.ticks = 0  # frames computed since the session began, whatever was rewound
+        self.ticks = 0  # frames computed since the session started; going back does not lower it
         self.log: list[tuple[int, Command]] = []
-        self.smooth = False  # whether frames are made shorter on a slow machine
-        self.picture_seconds = 0.0  # that the front takes for a picture, for that choice
-        self.changes = 0  # grows whenever a picture would look different
-        self.uncommanded: set[str] = set()  # forces that came or went without a command: no recording has them
+        self.smooth = False  # whether frames are divided on a slow machine
+        self.picture_seconds = 0.0  # s that a picture takes, for that choice
+        self.changes = 0  # increases whenever a picture would look different
+        self.unrecorded_forces: set[str] = set()  # names of forces that a script added or removed
         self._waiting: list[Waiting] = []
-        self._spared_until = 0.0  # on the clock of the process, until which nothing that takes long is done
+        self._slow_after = 0.0  # s of `perf_counter`, until which slow commands wait
         self._latest: dict[Any, int] = {}
         self._lock, self._wake = threading.Lock(), threading.Event()
 
     @classmethod
     def of(cls, sim: Simulation) -> "Session":
-        """Return a session of someone's own simulation, as it is: it stays that object whatever is begun anew.
+        """Return a session of a given simulation, which stays the same object after resets and other scenes.
 
-        What is not done by commands, as `sim.advance` between two turns, is in no recording.
+        Only commands are recorded, not calls such as `sim.advance`.
         """
         scene = sim.scene.model_copy(deep=True)
         return cls(scene, sim.arch or "cpu", most_particles=max(MOST_PARTICLES, 2 * sim.count), own=sim)
 
     # --- commands ---
 
-    def submit(self, command: Command, refused: Refused = None) -> bool:
-        """Put a command into the queue, from any thread; say whether there was room.
+    def submit(self, command: Command, report_refusal: Report = None) -> bool:
+        """Queue a command, from any thread; return whether there was room.
 
-        Where it fails `refused` is told why, in the simulation's thread; without it, everyone is, by a note.
-        Of those that take long few wait, and another beginning takes the place of one that was not reached yet.
+        Where it fails, `report_refusal` is called with the reason, in the simulation's thread; by default it becomes a
+        note to all viewers. At most `MOST_SLOW` slow commands wait, and only the last one that restarts.
         """
         with self._lock:
             key = command.coalescing_key
@@ -85,52 +85,52 @@ class Session(SessionState):
                     return False
             if key is not None and key in self._latest:
                 place = self._latest[key]
-                self._waiting[place] = command.after(self._waiting[place][0]), refused
+                self._waiting[place] = command.after(self._waiting[place][0]), report_refusal
             elif len(self._waiting) >= MOST_WAITING:
                 return False
             else:
                 if key is None:
-                    # Nothing moves past a command that others may depend on.
+                    # Later commands must not overtake this one.
                     self._latest.clear()
                 else:
                     self._latest[key] = len(self._waiting)
-                self._waiting.append((command, refused))
+                self._waiting.append((command, report_refusal))
         self._wake.set()
         return True
 
-    def drain(self, *, sparing: bool = False) -> int:
-        """Carry out the waiting commands in order and return how many there were; failures become notes.
+    def drain(self, *, defer_slow: bool = False) -> int:
+        """Apply the queued commands in order and return how many; failures become notes.
 
-        `sparing` the time of those who watch, one that takes long waits, and all behind it, until twice as much time
-        has passed as the one before took: most of the time belongs to the water, whatever comes.
+        With `defer_slow` a slow command, and all after it, wait until twice the duration of the last slow one has
+        passed, so that most of the time remains for the water.
         """
         with self._lock:
             commands, self._waiting = self._waiting, []
             self._latest.clear()
-        for number, (command, refused) in enumerate(commands):
-            if sparing and command.is_slow and time.perf_counter() < self._spared_until:
+        for number, (command, report_refusal) in enumerate(commands):
+            if defer_slow and command.is_slow and time.perf_counter() < self._slow_after:
                 with self._lock:
                     self._waiting[:0] = commands[number:]
-                    self._latest.clear()  # places have changed; what comes joins those behind it only
+                    self._latest.clear()  # positions have changed: no coalescing with those ahead
                 return number
-            self._carry_out(command, refused)
+            self._apply_safely(command, report_refusal)
         return len(commands)
 
-    def _carry_out(self, command: Command, refused: Refused) -> None:
-        """Carry out one command; whatever goes wrong becomes a note to who gave it, and the water goes on."""
-        began, self.refused = time.perf_counter(), refused or self.note
+    def _apply_safely(self, command: Command, report_refusal: Report) -> None:
+        """Apply one command; any error is reported to its sender, and the water continues."""
+        began, self.report_refusal = time.perf_counter(), report_refusal or self.note
         try:
             with explain_errors(f"The command {command.kind!r} failed", "command"):
                 self.apply(command)
         except WavetankError as error:
-            self.refused(str(error)[:LONGEST_NOTE])
-        self.refused = self.note
+            self.report_refusal(str(error)[:LONGEST_NOTE])
+        self.report_refusal = self.note
         if command.is_slow:
             end = time.perf_counter()
-            self._spared_until = end + max(SPARED * (end - began), SHORTEST_REST)
+            self._slow_after = end + max(PAUSE * (end - began), SHORTEST_PAUSE)
 
     def apply(self, command: Command) -> None:
-        """Carry out one command now; raises `WavetankError` and changes nothing where it is not allowed."""
+        """Apply one command now; raises `WavetankError` and changes nothing where it is not allowed."""
         if self.game is not None:
             command = command.as_allowed(self.game)
         command.apply(self)
@@ -141,35 +141,35 @@ class Session(SessionState):
 
     @property
     def frame_duration(self) -> float:
-        """Seconds of water in a frame [s]; slow motion has shorter ones, as long as they hold a good time step."""
+        """Seconds of water in a frame [s]; less in slow motion, but not below a good time step."""
         longest = self.sim.scene.frame_time * min(1.0, max(self.speed, 1.0 / MOST_PARTS), 1.0 / self.frame_parts)
         try:
             return self.sim.full_steps_time(longest) if self.fills_frames else longest
-        except WavetankError:  # the frame itself will say it
+        except WavetankError:  # computing the frame will raise it
             return longest
 
     def tick(self) -> float:
-        """Compute one frame, with what the hands do to it, and return the seconds of water in it [s]."""
+        """Compute one frame, with the tools in use, and return its duration [s of water]."""
         duration = self.frame_duration
         self._note_uncommanded_forces()
         for tool, hand in [*self.hands.values(), *self.running.values()]:
             hand.pass_time(duration)
-            self.let_act(hand, tool.hold, hand, duration)
+            self.run_tool(hand, tool.hold, hand, duration)
         self.carry_solids(duration)
         self._advance(duration)
-        if not self.sim.pushed:  # else too little time has passed for a frame, and they still wait for it
-            self.commanded = []
+        if not self.sim.pushed:  # else no frame was due yet, and they still wait for it
+            self.tool_forces = []
         self.ticks += 1
         self.changes += 1
         if self.game is not None:
             self.game.watch(self.sim.frame(measured=False), duration)
         self.history.forget_from(self.sim.time)
-        if self.history.wants(self.sim.time):
-            self.history.keep(self.sim.snapshot())
+        if self.history.is_due(self.sim.time):
+            self.history.record(self.sim.snapshot())
         return duration
 
     def _advance(self, duration: float) -> None:
-        """Let the water move; where an expression of the scene has no value time stops, and a note says why."""
+        """Advance the water; an error pauses it and becomes a note."""
         try:
             self.sim.advance(duration)
         except WavetankError as error:
@@ -182,15 +182,17 @@ class Session(SessionState):
         self.sim.notes.clear()
 
     def _go_back(self) -> None:
-        """Go to the last kept instant whose numbers are numbers."""
+        """Go back to the last instant of the history without non-finite values."""
         instant = self.history.last_finite()
         if instant is not None:
-            self.go_to(instant)
-            self.note(f"Back at t = {instant.time:.3g} s, and paused; what was changed since then is as it was left.")
+            self.restore(instant)
+            self.note(
+                f"Went back to t = {instant.time:.3g} s and paused; later changes of parameters and solids remain."
+            )
 
     def turn(self) -> bool:
-        """Carry out what waits and compute a frame if one is due; say whether anything happened."""
-        happened = self.drain(sparing=self.smooth) > 0
+        """Apply queued commands and compute a frame if one is due; return whether anything happened."""
+        happened = self.drain(defer_slow=self.smooth) > 0
         if self.paused and not self.steps_left:
             self.pace.stop()
             return happened
@@ -205,37 +207,37 @@ class Session(SessionState):
         return True
 
     def _note_uncommanded_forces(self) -> None:
-        """Take note of forces that a script added or took away itself."""
+        """Record forces that a script added or removed, which no recording can hold."""
         now, declared = self.sim.forces, self.sim.scene.forces
-        commanded = {id(force) for force in self.commanded}
+        tool_forces = {id(force) for force in self.tool_forces}
         changed = [force for force in now if force not in declared] + [force for force in declared if force not in now]
-        changed += [force for force in self.sim.pushed if id(force) not in commanded]
-        self.uncommanded.update(type(force).__name__ for force in changed)
+        changed += [force for force in self.sim.pushed if id(force) not in tool_forces]
+        self.unrecorded_forces.update(type(force).__name__ for force in changed)
 
     def _fit_frame(self, took: float) -> None:
-        """Shorten the frames of a machine that is too slow for them; a command, so that a recording knows."""
-        most, parts = max(SLUGGISH, WORTH * self.picture_seconds), self.frame_parts
+        """Divide frames on a machine that is too slow for whole ones, by a command, so that it is recorded."""
+        most, parts = max(SLOW_FRAME, FRAME_PER_PICTURE * self.picture_seconds), self.frame_parts
         several = self.sim.time_steps > 1
         late = several and self.pace.is_late(self.speed)
         if several and took > 1.2 * most:
             parts = min(MOST_PARTS, math.ceil(parts * took / most))
-        elif took < most * SWIFT / SLUGGISH:
+        elif took < most * FAST_FRAME / SLOW_FRAME:
             parts = max(1, parts - 1)
         if parts != self.frame_parts or (late and not self.fills_frames):
             self.apply(FrameLength(parts=parts, filled=self.fills_frames or late))
 
     def wake(self) -> None:
-        """End `rest` early, from any thread."""
+        """End a `rest` early, from any thread."""
         self._wake.set()
 
     def rest(self, longest: float = 0.1, *, asleep: bool = False) -> None:
-        """Wait until a command comes or a frame is due, at most `longest` [s]; `asleep` no frame is."""
+        """Wait until a command comes or a frame is due, at most `longest` [s]; `asleep`: no frame is due."""
         wait = self.time_to_rest(longest, asleep=asleep)
         if wait > 0.0:
             self._wake.wait(wait)
         self._wake.clear()
 
     def time_to_rest(self, longest: float, *, asleep: bool = False) -> float:
-        """Return the time until a frame is due [s], `longest` at most; `asleep` none is."""
+        """Return the time until a frame is due, at most `longest` [s]; `asleep`: no frame is due."""
         running = (not self.paused or self.steps_left) and not asleep
         return min(longest, self.pace.wait(time.perf_counter())) if running else longest

@@ -119,10 +119,10 @@ def test_a_session_goes_back_in_time():
     before, kept = session.sim.snapshot(), session.sim.positions
     session.sim.add_solid(wt.Mesh.of(*CUBE, center=(0.7, 0.5, 0.25), size=0.1))
     session.tick()
-    session.go_to(before)
+    session.restore(before)
     np.testing.assert_array_equal(session.sim.positions, kept)
     assert len(session.sim.scene.solids) == 1
-    assert wt.Scene.from_text(session.present_scene().text()).solids[0].data == SCENE.solids[0].data
+    assert wt.Scene.from_text(session.current_scene().text()).solids[0].data == SCENE.solids[0].data
 
 
 def test_a_cup_of_faces_is_shaken_and_keeps_its_water():

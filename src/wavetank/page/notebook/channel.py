@@ -1,6 +1,6 @@
-"""The widget in a notebook's cell: what goes over the kernel's channel, and who looks at the other end.
+"""The widget in a notebook's cell, and its messages over the kernel's channel.
 
-Nothing of it is an address: messages and pictures take the way that the notebook has to its kernel, however far it is.
+There is no server: messages and pictures use the connection that the notebook has to its kernel, local or remote.
 """
 
 import functools
@@ -17,7 +17,7 @@ from wavetank.foundation.input_limits import explain_errors
 from wavetank.page.theme import COLORS
 from wavetank.page.viewers import Ray, Submit, Viewer, Viewers
 
-PATIENCE = 15.0  # s without an answer to a picture after which nobody is there any more
+TIMEOUT = 15.0  # s without an acknowledged picture after which there is no viewer any more
 Table = dict[str, Any]
 
 
@@ -39,7 +39,7 @@ def widget_class() -> type[Any]:
 
 
 class Seat(Viewer):
-    """All views of the widget together: they show the same, and any of them may answer."""
+    """All views of the widget as one viewer: they show the same, and any of them may acknowledge."""
 
     def __init__(self, widget: Any) -> None:
         super().__init__(None)
@@ -54,39 +54,39 @@ class Seat(Viewer):
 
 
 class Channel:
-    """Hears and tells the views of one widget; everything happens in the kernel's own thread."""
+    """Exchanges messages with the views of one widget, in the kernel's own thread."""
 
     def __init__(self, submit: Submit, ray: Ray, hello: Callable[[], Table]) -> None:
         self.widget = widget_class()()
         self.viewers = Viewers(submit, ray, hello)
         self.seat = self.viewers.driver = Seat(self.widget)
         self.viewers.all.append(self.seat)
-        self.views: set[str] = set()  # that were opened and did not say goodbye
-        self.hidden = False  # behind another tab of the browser
-        self.heard: Callable[[], None] = lambda: None
+        self.views: set[str] = set()  # that are open
+        self.hidden = False  # whether the browser shows another tab
+        self.on_message: Callable[[], None] = lambda: None
         self._sent_at = 0.0  # s, on the clock of the process
         self.widget.on_msg(self._hear)
 
     @property
-    def looks(self) -> bool:
-        """Whether someone does: a view is open, is not behind another tab, and answers."""
-        answers = not self.seat.is_busy or time.monotonic() - self._sent_at < PATIENCE
+    def has_viewers(self) -> bool:
+        """Whether a view is open, visible and responds."""
+        answers = not self.seat.is_busy or time.monotonic() - self._sent_at < TIMEOUT
         return bool(self.views) and not self.hidden and answers
 
-    def tell(self, message: Table) -> None:
+    def send(self, message: Table) -> None:
         """Send a message to all views."""
         if self.views:
             self.seat.post(message)
 
     def show(self, picture: bytes) -> None:
-        """Send a picture as soon as the one before was shown."""
+        """Send a picture once the previous one was shown."""
         if not self.seat.is_busy:
             self._sent_at = time.monotonic()
         self.seat.show(picture)
 
     def close(self) -> None:
-        """Say goodbye and close the widget."""
-        self.tell({"type": "end"})
+        """Close the widget and its views."""
+        self.send({"type": "end"})
         self.widget.close()
 
     def _hear(self, widget: Any, content: Any, buffers: Any) -> None:
@@ -94,27 +94,27 @@ class Channel:
             with explain_errors("a message", "command"):
                 self._act(content if isinstance(content, dict) else {})
         except WavetankError as error:
-            self.tell({"type": "note", "text": str(error)[:400]})
-        self.heard()
+            self.send({"type": "note", "text": str(error)[:400]})
+        self.on_message()
 
     def _act(self, table: Table) -> None:
         do, view = table.get("do"), str(table.get("view", ""))[:80]
         if do == "open":
             self.views.add(view)
             self.seat.is_busy, self.seat.next_picture, self.seat.is_new, self.hidden = False, None, True, False
-            self.tell(self.viewers.hello())
+            self.send(self.viewers.hello())
         elif do == "leave":
             self.views.discard(view)
-            self.viewers.lift_pointers()
+            self.viewers.end_tools()
         elif do == "hidden":
             self.hidden = table.get("on") is True
         else:
-            self._sent_at = time.monotonic()  # who says something is there
+            self._sent_at = time.monotonic()  # any message shows that it responds
             self.viewers.hear(self.seat, table)
 
 
 def _plain(value: Any) -> Any:
-    """Return data without numbers that JSON has no word for."""
+    """Return data with null for numbers that JSON does not have."""
     if isinstance(value, dict):
         return {key: _plain(member) for key, member in value.items()}
     if isinstance(value, list | tuple):

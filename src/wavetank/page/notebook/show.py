@@ -1,7 +1,7 @@
-"""`wt.show`: the water in a cell of a notebook, to be played with.
+"""`wt.show`: an interactive view of a simulation in a notebook.
 
-The water moves in the kernel's own thread, as a task of its event loop, between cells: what is shown is the very object
-that the cells hold, no lock is needed, and while a cell runs the water stands still.
+The simulation runs in the kernel's own thread, as a task of its event loop, between cells: the view shows the same
+object that the cells use, no lock is needed, and while a cell runs the water is paused.
 """
 
 import asyncio
@@ -16,10 +16,10 @@ import numpy as np
 from PIL import Image
 
 from wavetank.foundation.errors import WavetankError
-from wavetank.page.about import everything
+from wavetank.page.about import hello_message
 from wavetank.page.aim import aim
 from wavetank.page.fitting import fits
-from wavetank.page.loop import REST, Loop, News
+from wavetank.page.loop import REST, Loop, Report
 from wavetank.page.notebook.channel import Channel
 from wavetank.page.picture import jpeg
 from wavetank.page.viewers import Viewer
@@ -29,36 +29,36 @@ from wavetank.session.pace import share_interpreter
 from wavetank.session.session import Session
 from wavetank.simulation.simulation import Simulation
 
-BREATH = 0.002  # s between two frames, at least, in which the kernel hears what it is asked
-KEPT_EVERY = 4.0  # s between two pictures that are kept in the notebook while the water moves
-KEPT_WIDTH = 640  # px, at most, of the picture that is kept
+YIELD_TIME = 0.002  # s between two frames, at least, for the kernel's other tasks
+SAVE_EVERY = 4.0  # s between two pictures that are saved in the notebook while the water moves
+SAVED_WIDTH = 640  # px, at most, of the saved picture
 WIDGET_VIEW = "application/vnd.jupyter.widget-view+json"
 
 _shown: dict[Simulation, "Show"] = {}  # until they are stopped
 
 
 class Show:
-    """Water in a notebook. As the last expression of a cell it is shown; `stop` ends it, and leaves its last picture.
+    """An interactive view in a notebook, displayed as the last expression of a cell; `stop` leaves its last picture.
 
-    `sim` is what moves: the simulation that was given, or that of the scene. What a cell does to it is seen at once.
+    `sim` is the simulation that was given, or that of the scene; changes by a cell are shown at once.
     """
 
     def __init__(self, session: Session) -> None:
         self.session = session
         self._events = _running_events()
-        self.channel = Channel(session.submit, self._ray, lambda: everything(session))
-        self.channel.heard = self._wake
+        self.channel = Channel(session.submit, self._ray, lambda: hello_message(session))
+        self.channel.on_message = self._wake
         self.channel.viewers.aim, self.channel.viewers.fit = self._aim, self._fit
         self.loop = Loop(session, self)
         self._woken = asyncio.Event()
-        self._packer = concurrent.futures.ThreadPoolExecutor(1, "wavetank jpeg")
-        self._packing: concurrent.futures.Future[Any] | None = None
-        self._keeping: concurrent.futures.Future[Any] | None = None
-        self._last: np.ndarray | None = None  # picture that was shown
-        self._kept: np.ndarray | None = None  # and that was kept
-        self._kept_at, self._keep_id = 0.0, f"wavetank-{uuid.uuid4().hex}"
-        self._told: dict[str, Any] = {}
-        self._told_world: dict[str, Any] = {}
+        self._encoder = concurrent.futures.ThreadPoolExecutor(1, "wavetank jpeg")
+        self._encoding: concurrent.futures.Future[Any] | None = None
+        self._saving: concurrent.futures.Future[Any] | None = None
+        self._last: np.ndarray | None = None  # shown picture
+        self._saved: np.ndarray | None = None  # saved picture
+        self._saved_at, self._saved_id = 0.0, f"wavetank-{uuid.uuid4().hex}"
+        self._sent: dict[str, Any] = {}
+        self._sent_world: dict[str, Any] = {}
         self._stopped = False
         share_interpreter()
         _after_each_cell(self._cell_has_run)
@@ -70,23 +70,23 @@ class Show:
         return self.session.sim
 
     def play(self) -> None:
-        """Let time run."""
+        """Resume."""
         self.session.submit(Pause(on=False))
 
     def pause(self) -> None:
-        """Let time stand still."""
+        """Pause."""
         self.session.submit(Pause(on=True))
 
     def stop(self) -> None:
-        """End the show; its last picture stays in the notebook, and the simulation as it is."""
+        """End the view; its last picture stays in the notebook, and the simulation as it is."""
         if self._stopped:
             return
         self._stopped = True
         self.loop.stop()
         self.session.drain()
-        self._keep(self._png(self.loop.painter.paint(sharp=True)))
+        self._save(self._png(self.loop.painter.paint(sharp=True)))
         self.channel.close()
-        self._packer.shutdown(wait=False)
+        self._encoder.shutdown(wait=False)
         _shown.pop(self.sim, None)
 
     def __repr__(self) -> str:
@@ -96,16 +96,16 @@ class Show:
     # --- in a cell ---
 
     def _ipython_display_(self, **_: Any) -> None:
-        """Show the picture that stays, and the widget below, which puts itself into the picture's place."""
+        """Display the saved picture, and the widget below, which hides it."""
         from IPython.display import publish_display_data
 
         picture = self._picture()
-        publish_display_data(picture, transient={"display_id": self._keep_id})
+        publish_display_data(picture, transient={"display_id": self._saved_id})
         if not self._stopped:
             publish_display_data(self._widget())
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
-        """Return the widget and, for a reader without a kernel, the picture of now."""
+        """Return the widget and, for readers without a kernel, a current picture."""
         return self._picture() | ({} if self._stopped else self._widget())
 
     def _picture(self) -> dict[str, Any]:
@@ -118,56 +118,56 @@ class Show:
         view = {"version_major": 2, "version_minor": 0, "model_id": self.channel.widget.model_id}
         return {WIDGET_VIEW: view, "text/plain": "wavetank: run this cell to play."}
 
-    def _keep(self, png: bytes) -> None:
-        """Put a picture in the place of the one that the notebook keeps."""
+    def _save(self, png: bytes) -> None:
+        """Replace the picture that is saved in the notebook."""
         from IPython.display import publish_display_data
 
-        publish_display_data(self._bundle(png), transient={"display_id": self._keep_id}, update=True)
+        publish_display_data(self._bundle(png), transient={"display_id": self._saved_id}, update=True)
 
     # --- the task ---
 
     async def _play(self) -> None:
         while not self._stopped:
             self.loop.turn_or_pause()
-            self._keep_sometimes()
-            wait = self.session.time_to_rest(REST, asleep=not self.looks)
+            self._save_sometimes()
+            wait = self.session.time_to_rest(REST, asleep=not self.has_viewers)
             self._woken.clear()
-            await asyncio.sleep(BREATH)
-            if wait > BREATH and not self._woken.is_set():
+            await asyncio.sleep(YIELD_TIME)
+            if wait > YIELD_TIME and not self._woken.is_set():
                 with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(self._woken.wait(), wait - BREATH)
+                    await asyncio.wait_for(self._woken.wait(), wait - YIELD_TIME)
 
     def _wake(self) -> None:
         self._woken.set()
 
     def _cell_has_run(self, *_: Any) -> bool:
-        """A cell may have changed the water, and no time passed for it; say whether to hear of the next one, too."""
+        """Show what a cell has changed, without catching up its time; return whether to be called again."""
         self.session.changes += 1
         self.session.pace.stop()
         self.session.history.forget_from(self.sim.time + 1e-6)
         self._wake()
         return not self._stopped
 
-    def _keep_sometimes(self) -> None:
-        """Keep a picture every few seconds while the water moves, and the one at which it came to stand."""
+    def _save_sometimes(self) -> None:
+        """Save a picture every few seconds while the water moves, and the last one when it pauses."""
         now, image = self._events.time(), self._last
-        rests = self.session.paused or not self.looks
-        if image is None or image is self._kept or now - self._kept_at < (0.5 if rests else KEPT_EVERY):
+        rests = self.session.paused or not self.has_viewers
+        if image is None or image is self._saved or now - self._saved_at < (0.5 if rests else SAVE_EVERY):
             return
-        if self._keeping is None or self._keeping.done():
-            self._kept_at, self._kept = now, image
-            self._keeping = self._packer.submit(self._pack_kept, image)
+        if self._saving is None or self._saving.done():
+            self._saved_at, self._saved = now, image
+            self._saving = self._encoder.submit(self._encode_saved, image)
 
-    def _pack_kept(self, image: np.ndarray) -> None:
+    def _encode_saved(self, image: np.ndarray) -> None:
         png = self._png(image)
-        self._events.call_soon_threadsafe(lambda: None if self._stopped else self._keep(png))
+        self._events.call_soon_threadsafe(lambda: None if self._stopped else self._save(png))
 
     def _png(self, image: np.ndarray) -> bytes:
-        """Pack a picture for the notebook: not large, and of so few colours that it is small."""
+        """Encode a small PNG with few colours, for the notebook."""
         picture = Image.fromarray(image)
-        if picture.width > KEPT_WIDTH:
+        if picture.width > SAVED_WIDTH:
             picture = picture.resize(
-                (KEPT_WIDTH, round(picture.height * KEPT_WIDTH / picture.width)), Image.Resampling.LANCZOS
+                (SAVED_WIDTH, round(picture.height * SAVED_WIDTH / picture.width)), Image.Resampling.LANCZOS
             )
         stream = io.BytesIO()
         picture.quantize(192, Image.Quantize.MEDIANCUT).save(stream, "PNG", optimize=True)
@@ -176,37 +176,37 @@ class Show:
     # --- for the loop: see `loop.Audience` ---
 
     @property
-    def looks(self) -> bool:
-        """Whether someone looks."""
-        return self.channel.looks
+    def has_viewers(self) -> bool:
+        """Whether there is a viewer."""
+        return self.channel.has_viewers
 
     @property
-    def is_ready(self) -> bool:
-        """Whether someone waits for a picture, and none is being packed."""
-        packed = self._packing is None or self._packing.done()
-        return self.looks and packed and self.channel.seat.next_picture is None
+    def wants_picture(self) -> bool:
+        """Whether a viewer waits for a picture, and none is being encoded."""
+        packed = self._encoding is None or self._encoding.done()
+        return self.has_viewers and packed and self.channel.seat.next_picture is None
 
     @property
-    def is_new(self) -> bool:
-        """Whether someone has just come."""
+    def has_new_viewer(self) -> bool:
+        """Whether a view was just opened."""
         return self.channel.seat.is_new
 
     @property
     def size(self) -> tuple[int, int] | None:
-        """Of the place for the picture [px]."""
+        """Width and height of the picture on the screen [px]."""
         return self.channel.seat.size
 
     @property
     def detail(self) -> str:
-        """How fine pictures are."""
+        """Resolution of pictures."""
         return self.channel.viewers.detail
 
     def show(self, image: np.ndarray, regions: list[dict[str, Any]]) -> None:
         """Send a picture."""
         self.channel.seat.is_new, self._last = False, image
-        self._packing = self._packer.submit(self._pack, image)
+        self._encoding = self._encoder.submit(self._encode, image)
 
-    def _pack(self, image: np.ndarray) -> None:
+    def _encode(self, image: np.ndarray) -> None:
         picture = jpeg(image)
         self._events.call_soon_threadsafe(self._send, picture)
 
@@ -214,14 +214,14 @@ class Show:
         if not self._stopped:
             self.channel.show(picture)
 
-    def tell(self, news: News, notes: list[str]) -> None:
-        """Send how things stand, where anything has changed."""
-        told = {**news.status, "notes": notes, **news.figures}
-        if news.world != self._told_world:
-            self._told_world = told["world"] = news.world
-        if told != self._told:
-            self._told = told
-            self.channel.tell({"type": "status", **told})
+    def send_report(self, report: Report, notes: list[str]) -> None:
+        """Send the status, where anything has changed."""
+        message = {**report.status, "notes": notes, **report.figures}
+        if report.world != self._sent_world:
+            self._sent_world = message["world"] = report.world
+        if message != self._sent:
+            self._sent = message
+            self.channel.send({"type": "status", **message})
 
     def _aim(self, viewer: Viewer, tool: str, u: float, v: float, reach: float) -> None:
         viewer.post({"type": "aim", **aim(self.session, tool, u, v, reach, self.loop.painter.wanted)})
@@ -231,15 +231,15 @@ class Show:
 
     def _ray(self, u: float, v: float, tool: str) -> dict[str, Any]:
         width, height = self.loop.painter.wanted
-        origin, direction = self.session.camera_of(tool).ray(u * width, v * height, width, height)
+        origin, direction = self.session.camera_for(tool).ray(u * width, v * height, width, height)
         return {"origin": tuple(map(float, origin)), "direction": tuple(map(float, direction))}
 
 
 def show(what: Any, arch: str = "cpu") -> Show:
-    """Show a simulation, a scene, its name or a `Session` in a notebook, to be played with.
+    """Show a simulation, a scene, its name or a `Session` in a notebook, with tools.
 
-    A `Simulation` is shown as the object that it is: `sim.time` is what is seen, and what a cell does to it is seen at
-    once. Shown again it is the same show. Raises `WavetankError` outside of a notebook, and without its extra packages.
+    The view of a `Simulation` shows that object, and changes by cells at once; a second call returns the same view.
+    Raises `WavetankError` outside of a notebook, and without its extra packages.
     """
     if isinstance(what, Simulation):
         if what not in _shown:
@@ -271,7 +271,7 @@ def _running_events() -> asyncio.AbstractEventLoop:
 
 
 def _after_each_cell(act: Any) -> None:
-    """Have `act` called after each cell until it says that it is enough."""
+    """Have `act` called after each cell until it returns False."""
     from IPython.core.getipython import get_ipython
 
     events = get_ipython().events

@@ -1,4 +1,4 @@
-// Where the hand would act: a ring on the surface that the pointer's ray meets, a line to the floor, and aiming by keys.
+// Preview of the tool: a ring on the surface under the pointer, a line to the floor; and aiming by keyboard.
 
 import { find, note, svg } from "./make.js";
 import { on, send } from "./link.js";
@@ -7,7 +7,7 @@ import { hand } from "./tools.js";
 const drawing = find("aim"), under = svg("polyline", { class: "under" }), ring = svg("polyline", {}), drop = svg("polyline", { class: "drop" }), foot = svg("polyline", { class: "drop" }), cross = find("cross");
 drawing.append(drop, foot, under, ring);
 
-const BETWEEN = 50, SELDOM = 600; // ms between two questions while the pointer moves, and while it rests: each takes time from the water
+const BETWEEN = 50, SELDOM = 600; // ms between two requests while the pointer moves, and while it rests: each takes time from the water
 let place = null, asked = 0, answered = 0, told = "";
 
 /** Say where the pointer is, as shares of the picture; null where it is not over it. */
@@ -61,7 +61,7 @@ on("aim", (aim) => {
   answered = performance.now();
   if (key !== told) setTimeout(ask, BETWEEN);
 });
-// Under a pointer that rests the water moves.
+// The water moves under a resting pointer.
 on("status", ({ paused }) => { if (place && !paused && performance.now() - answered > SELDOM) ask(); });
 on("closed", () => { place = null; asked = 0; show(null); });
 
@@ -73,10 +73,10 @@ export const keys = { get on() { return aiming !== null; }, get down() { return 
 
 /** Enter: begin to aim, put the tool down, lift it. */
 export function enter() {
-  if (hand.tool.name === "look") { note("Choose a tool first: Tab goes to them, or press its key."); return; }
+  if (hand.tool.name === "look") { note("Choose a tool first: press its key, or Tab to it."); return; }
   if (!aiming) {
     aiming = { x: 0.5, y: 0.5 };
-    note("Aiming: the arrows move (with Shift slowly), Enter puts the tool down and lifts it, Escape ends.");
+    note("Aiming: arrows move (Shift: slowly), Enter presses and releases the tool, Escape ends.");
     move();
   } else if (!down) {
     down = true;

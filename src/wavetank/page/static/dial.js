@@ -40,7 +40,7 @@ export function dial(change) {
     const box = face.getBoundingClientRect();
     const x = (event.clientX - box.left - box.width / 2) / box.width * 92, y = (box.height / 2 - (event.clientY - box.top)) / box.height * 92;
     let size = Math.min(MOST, Math.hypot(x, y) / 22 * EARTH), angle = Math.atan2(y, x);
-    // It clicks into place near upright, near Earth's and near none.
+    // It snaps to upright, to Earth's gravity and to zero.
     const step = Math.PI / 2, near = Math.round(angle / step) * step;
     if (Math.abs(angle - near) < 0.09) angle = near;
     if (Math.abs(size - EARTH) < 1) size = EARTH;

@@ -1,4 +1,4 @@
-// A level: what is asked, how it stands, its regions over the picture, and what became of it.
+// A level: goal, progress, its regions over the picture, and the result; forces on bodies.
 
 import { find, make, say, svg } from "./make.js";
 import { on, send } from "./link.js";
@@ -7,7 +7,7 @@ const hud = find("hud"), banner = find("banner"), drawing = find("regions"), nam
 const EDGES = [[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [5, 7], [7, 6], [6, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
 let regions = [], game = null, shown = "", waits = false, lit = null;
 
-/** An arrow with its number: what the water does to a body; or a number alone, the power of a joint. */
+/** Draw a force on a body as an arrow with a number, or the power of a joint as a number. */
 function drawForce(outline, mark, text) {
   const [x, y] = outline.at(-1), label = make("span", { className: `force ${mark}`, textContent: text });
   if (outline.length > 1) {
@@ -25,7 +25,7 @@ function drawForce(outline, mark, text) {
   names.append(label);
 }
 
-/** Numbers make way for each other: from above to below each moves below those that it would lie on. */
+/** Separate overlapping numbers: from top to bottom, each is moved below those that it would cover. */
 function part() {
   const placed = [], gap = 2;
   const labels = [...names.querySelectorAll(".force")].map((label) => ({ label, box: label.getBoundingClientRect() }));
@@ -70,7 +70,7 @@ const go = (name) => send({ do: "load", name });
 const seconds = (value) => `${value.toFixed(1)} s`;
 
 const parts = {
-  level: make("small"), text: make("p"), begin: make("p", { className: "begin", textContent: "Time begins with your first touch." }), bar: make("div", { className: "bar" }, make("div")), clock: make("b"), stars: make("span"), strokes: make("span"),
+  level: make("small"), text: make("p"), begin: make("p", { className: "begin", textContent: "Time starts with your first touch." }), bar: make("div", { className: "bar" }, make("div")), clock: make("b"), stars: make("span"), strokes: make("span"),
 };
 hud.append(make("div", { className: "line" }, parts.level, parts.strokes, parts.stars, parts.clock), parts.text, parts.begin, parts.bar);
 
@@ -106,7 +106,7 @@ function showBanner() {
     ...(won ? [stars(game.stars)] : []),
     make("p", { textContent: game.verdict }),
     make("div", { className: "row" }, skip, retry, next));
-  // Who plays by keys goes on from here; who types elsewhere is left alone.
+  // Focus it for the keyboard, unless something else has the focus.
   if (document.activeElement === document.body || document.activeElement === find("picture")) (next ?? retry).focus({ preventScroll: true });
 }
 

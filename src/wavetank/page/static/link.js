@@ -1,21 +1,21 @@
-// The socket: commands out, pictures and status in. It comes back by itself.
+// The web socket: commands out, pictures and status in. It reconnects by itself.
 
 const token = new URLSearchParams(location.search).get("token") ?? sessionStorage.getItem("wavetank token") ?? "";
 if (token) sessionStorage.setItem("wavetank token", token);
-// The token stays out of the address bar, of screenshots and of the history.
+// The token is removed from the address bar, and so from screenshots and the history.
 if (location.search) history.replaceState(null, "", location.pathname);
 
 const listeners = {};
 let socket = null;
 let wait = 250;
-let run = ""; // of the server that this page was opened with: another number is another server
+let run = ""; // identifies the run of the server that this page belongs to
 
-/** Call `act` with every message of a type, and with "picture", "open" and "closed". */
+/** Call `act` for every message of a type, and for "picture", "open" and "closed". */
 export function on(type, act) {
   (listeners[type] ??= []).push(act);
 }
 
-/** Let all hear of a message, or of something that happened on the page. */
+/** Pass a message, or an event of the page, to all listeners. */
 export function tell(type, value) {
   for (const act of listeners[type] ?? []) act(value);
 }
@@ -25,12 +25,12 @@ export function send(command) {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
 }
 
-/** Address of a file of the server that needs the token. */
+/** Return the address of a file of the server, with the token. */
 export function link(path) {
   return `${path}?token=${encodeURIComponent(token)}`;
 }
 
-/** Whether there is a connection that should say something. */
+/** Return whether the connection is open. */
 export const pending = () => socket?.readyState === WebSocket.OPEN;
 
 export function connect() {
@@ -43,22 +43,22 @@ export function connect() {
     else {
       const message = JSON.parse(data);
       if (message.type === "hello") {
-        const anew = run && run !== message.run;
+        const restarted = run && run !== message.run;
         run = message.run;
         tell("hello", message);
-        if (anew) tell("anew");
+        if (restarted) tell("restarted");
       } else tell(message.type, message);
     }
   };
   socket.onclose = async () => {
     tell("closed");
-    // A server that began anew has another token, and would refuse this page for ever.
+    // A restarted server has another token and would refuse this page indefinitely.
     const now = await fetch("/page/run").then((answer) => (answer.ok ? answer.text() : ""), () => "");
-    if (now && now !== run && !(await welcome())) { tell("refused", run !== ""); return; }
+    if (now && now !== run && !(await accepted())) { tell("refused", run !== ""); return; }
     setTimeout(connect, wait);
     wait = Math.min(4000, 1.6 * wait);
   };
 }
 
-/** Whether the server would let this page in. */
-const welcome = () => fetch(link("/"), { method: "HEAD" }).then((answer) => answer.ok, () => true);
+/** Return whether the server accepts this page's token. */
+const accepted = () => fetch(link("/"), { method: "HEAD" }).then((answer) => answer.ok, () => true);

@@ -1,4 +1,4 @@
-// How it looks, and what is measured.
+// View, colours, light, and measured figures.
 
 import { colour, find, make, note, pretty, say, words } from "./make.js";
 import { link, on, send } from "./link.js";
@@ -8,7 +8,7 @@ import { seen } from "./stage.js";
 const rows = {};
 const past = {};
 const suns = {};
-let touched = 0; // when a sun was last moved here: what comes back late must not pull the slider
+let touched = 0; // when the sun was last moved here: a late status must not move the slider back
 let about = { views: [], colorings: [], paints: [] };
 
 function pills(title, choices, current, act) {
@@ -30,10 +30,10 @@ function build() {
     make("h3", { textContent: "Measured" }), figures,
     make("h3", { textContent: "Keep" }),
     make("div", { className: "links" },
-      make("a", { href: link("/picture.png"), download: "wavetank.png", textContent: "Save this picture, sharp" }),
-      make("a", { href: link("/scene.toml"), download: "scene.toml", textContent: "Save what is there as a scene" }),
-      make("a", { href: link("/recording.toml"), download: "session.toml", textContent: "Save this session, to be replayed" })));
-  for (const [key, label] of [["error", "Compression, mean"], ["energy", "Kinetic energy"], ["frame", "Frame computed in"], ["picture", "Picture painted in"]]) {
+      make("a", { href: link("/picture.png"), download: "wavetank.png", textContent: "Save this picture at full resolution" }),
+      make("a", { href: link("/scene.toml"), download: "scene.toml", textContent: "Save the current world as a scene" }),
+      make("a", { href: link("/recording.toml"), download: "session.toml", textContent: "Save this session for replay" })));
+  for (const [key, label] of [["error", "Density error, mean"], ["energy", "Kinetic energy"], ["frame", "Frame"], ["picture", "Picture"]]) {
     const value = make("b", {}), canvas = make("canvas", { width: 270, height: 34 });
     figures.append(make("div", { className: "figure" }, make("span", { textContent: label }), value, canvas));
     rows[key] = { value, canvas };
@@ -46,9 +46,9 @@ export const toggleForces = () => send({ do: "view", forces: !about.forces });
 /** Where the slice lies. */
 function slice() {
   const [axis, place] = about.cut;
-  const move = control({ name: "place", label: "Where along it", low: 0, high: 100, unit: "%", straight: true, sentence: "Where the slice lies, from end to end of the world." }, 100 * place,
+  const move = control({ name: "place", label: "Position", low: 0, high: 100, unit: "%", straight: true, sentence: "Position of the slice, from one end of the world to the other." }, 100 * place,
     (value) => send({ do: "view", place: value / 100 }));
-  return [...(about.dim === 3 ? pills("Slice across", ["x", "y", "z"].map((name) => [name, name]), axis, (name) => send({ do: "view", axis: name })) : []),
+  return [...(about.dim === 3 ? pills("Slice normal", ["x", "y", "z"].map((name) => [name, name]), axis, (name) => send({ do: "view", axis: name })) : []),
     ...(about.dim === 3 ? [move.element] : [])];
 }
 
@@ -60,8 +60,8 @@ function light() {
     return suns[name].element;
   };
   return [...pills("Light", about.environments.map((name) => [name, words(name)]), environment, (name) => send({ do: "light", environment: name })),
-    slider("azimuth", "Sun, around", 0, 360, "Where the sun stands, from the front over the right.", azimuth),
-    slider("elevation", "Sun, height", lowest, highest, "How high the sun stands above the horizon.", elevation)];
+    slider("azimuth", "Sun azimuth", 0, 360, "Direction of the sun, from the front towards the right.", azimuth),
+    slider("elevation", "Sun elevation", lowest, highest, "Height of the sun above the horizon.", elevation)];
 }
 
 /** What the colours mean, over the picture. */
@@ -101,13 +101,13 @@ const unit = make("span");
 find("stats").append(wide(stats.count, " particles · "), stats.rate, unit, wide(" · compression ", stats.error));
 const behind = make("span");
 find("late").append(behind, wide(" real time"));
-find("late").title = "This machine is slower than real time; the water slows down rather than cheat.";
+find("late").title = "This machine is slower than real time, so the water moves in slow motion.";
 
 let pictures = [performance.now(), 0], paused = false;
 setInterval(() => {
   const now = performance.now(), rate = 1000 * (seen.pictures - pictures[1]) / (now - pictures[0]);
   pictures = [now, seen.pictures];
-  const rests = paused && rate < 2; // a picture that rests is not a slow one
+  const rests = paused && rate < 2; // pictures are rare while paused, not slow
   say(stats.rate, rests ? "paused" : rate.toFixed(0));
   say(unit, rests ? "" : " fps");
 }, 1000);
@@ -119,7 +119,7 @@ on("status", (status) => {
     ]);
     const before = shape();
     about = { ...about, ...status.world };
-    if (shape() !== before) build(); // a slider that is moved stays
+    if (shape() !== before) build(); // a slider that is being moved stays
     if (performance.now() - touched > 600) for (const name in suns) suns[name].show(about.light[name]);
     legend();
   }
@@ -139,5 +139,5 @@ on("role", ({ driving, viewers }) => {
   const chip = find("role");
   chip.hidden = driving && viewers < 2;
   chip.replaceChildren(driving ? `${viewers - 1} watching` : "Watching");
-  if (!driving) chip.append(make("button", { textContent: "Take the helm", onclick: () => send({ do: "drive" }) }));
+  if (!driving) chip.append(make("button", { textContent: "Take control", onclick: () => send({ do: "drive" }) }));
 });

@@ -1,4 +1,4 @@
-// The page: tabs, keys, help. Everything else is in the file of its name.
+// The page: tabs, keys, help. Other files have one part each, by name.
 
 import { colour, find, make, narrow, note } from "./make.js";
 import { connect, on, send } from "./link.js";
@@ -51,13 +51,13 @@ const ACTIONS = {
   panel: () => panel(), help: () => help(), aim: enter,
 };
 
-// On a phone nobody has a right button: what fingers do is said once, where there is room for it.
+// A phone has no right button: what fingers do is shown once.
 function gestures(event) {
   if (event.pointerType !== "touch") return;
   removeEventListener("pointerdown", gestures, true);
   if (localStorage.getItem("wavetank gestures")) return;
   localStorage.setItem("wavetank gestures", "told");
-  note("One finger uses the tool. Two turn the view, and zoom when they part.", ["Got it", () => {}]);
+  note("One finger uses the tool. Two fingers turn the view, and pinch to zoom.", ["Got it", () => {}]);
 }
 addEventListener("pointerdown", gestures, true);
 
@@ -69,14 +69,14 @@ function help() {
     ...keys.filter(({ label }) => label).map(({ label, text }) => row(label, text)),
     ...tools.filter((tool) => tool.key).map((tool) => row(tool.key.toUpperCase(), tool.label))),
   make("h2", { className: "second", textContent: "Pointer" }), make("div", { className: "keys" },
-    row("left, one finger", "Use the tool"), row("right, two fingers", "Turn the view"), row("wheel, pinch", "Zoom"), row("middle, Shift", "Move the view"), row("double click a slider", "Its default")),
+    row("left, one finger", "Use the tool"), row("right, two fingers", "Turn the view"), row("wheel, pinch", "Zoom"), row("middle, Shift", "Move the view"), row("double-click a slider", "Reset it")),
   make("button", { className: "accent", textContent: "Close", onclick: () => dialog.close() }));
   dialog.showModal();
 }
 find("help-toggle").onclick = help;
 find("help").onclick = (event) => { if (event.target === find("help")) find("help").close(); };
 
-// Whether the focus came by the keyboard: only then Space and Enter belong to the button that has it.
+// Whether the focus was moved by the keyboard: only then Space and Enter go to the focused button.
 let byKeys = false;
 const keyed = (on) => { byKeys = on; document.body.classList.toggle("by-keys", on); };
 addEventListener("pointerdown", () => keyed(false), true);

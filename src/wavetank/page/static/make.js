@@ -1,4 +1,4 @@
-// Small ways to make elements.
+// Helpers that make elements.
 
 /** An element with properties and children; `on...` are listeners, `data` goes to the dataset. */
 export function make(tag, { data, ...properties } = {}, ...children) {
@@ -31,7 +31,7 @@ export const colour = (name) => getComputedStyle(document.documentElement).getPr
 
 export const find = (id) => document.getElementById(id);
 
-/** A number as a person writes it. */
+/** Format a number for people. */
 export function pretty(value, digits = 3) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
@@ -42,25 +42,25 @@ export function pretty(value, digits = 3) {
   return Number(value.toPrecision(size >= 1e4 ? 6 : digits)).toLocaleString("en", { maximumFractionDigits: 8 });
 }
 
-/** The number that a person typed: with commas between thousands, or one for the decimals. */
+/** Parse a typed number, with commas between thousands or a decimal comma. */
 export function typed(text) {
   const plain = text.trim().replace(/[\s\u00a0]/g, "");
   return parseFloat(/^-?\d{1,3}(,\d{3})+(?!\d)/.test(plain) ? plain.replaceAll(",", "") : plain.replace(",", "."));
 }
 
-/** A parameter's name in words. */
+/** Return a parameter's name in words. */
 export const words = (name) => name.charAt(0).toUpperCase() + name.slice(1).replaceAll("_", " ");
 
-/** Whether the page is a phone's, upright or on its side: then the panel lies over the picture. */
+/** Matches phones, upright or sideways, where the panel covers the picture. */
 export const narrow = matchMedia("(max-width: 760px), (max-height: 500px)");
 
-/** Set an element's text; a page that is told the same again has nothing to lay out. */
+/** Set an element's text, without a new layout where it is the same. */
 export function say(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
 let shown = [];
-/** Show a sentence for a while, with a button where `action` is [its text, what it does]. */
+/** Show a sentence for a while, with a button where `action` is [label, function]. */
 export function note(text, action) {
   if (shown.includes(text)) return;
   shown.push(text);

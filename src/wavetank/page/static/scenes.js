@@ -1,4 +1,4 @@
-// Scenes as small drawings; any scene file can be dropped on the page.
+// Thumbnails of scenes; any scene file can be dropped on the page.
 
 import { colour, find, make, note, pretty } from "./make.js";
 import { on, send, tell } from "./link.js";
@@ -45,7 +45,7 @@ function draw(canvas, scene) {
 function begin(scene) {
   const left = last > 0.5;
   send({ do: "load", name: scene.name, particles: coarser(scene) ? fits[scene.name].particles : 0 });
-  if (left) note("Another scene.", ["Undo", () => send({ do: "undo" })]);
+  if (left) note("Scene changed.", ["Undo", () => send({ do: "undo" })]);
   tell("chosen", scene);
 }
 
@@ -97,7 +97,7 @@ function build({ scenes, title, dim }) {
   const pick = make("button", { className: "quiet", textContent: "Open a file …", onclick: () => file.click() });
   pick.style.gridColumn = "1 / -1"; pick.style.padding = "9px";
   find("scenes").replaceChildren(make("div", { id: "scenes-detail" }), make("div", { className: "fit" }, fit, make("label", { for: "fit", textContent: "Fit scenes to this machine" })),
-    heading("Levels"), ...levels.map(card), heading("Scenes"), ...others.map(card), pick, file, make("p", { textContent: "Or drop it anywhere on this page: the TOML file of a scene begins it, an OBJ becomes a solid." }));
+    heading("Levels"), ...levels.map(card), heading("Scenes"), ...others.map(card), pick, file, make("p", { textContent: "Or drop it anywhere on this page: a scene's TOML file starts that scene, an OBJ mesh becomes a solid." }));
   named({ title, dim });
 }
 

@@ -1,9 +1,9 @@
-// One control for one number, choice, colour or switch: parameters and tool options look alike.
+// Controls for a number, choice, colour or switch, of parameters and options of tools.
 
 import { colour, make, pretty, typed, words } from "./make.js";
 import { on } from "./link.js";
 
-let units = {}; // what a share of the world is worth, and what that is called
+let units = {}; // factor and name of units relative to the world's size
 on("hello", (hello) => { units = hello.units; });
 on("status", ({ world }) => { if (world) units = world.units; });
 let count = 0;
@@ -19,7 +19,7 @@ function scale(low, high, straight) {
   return [(x) => low + (high - low) * x ** power, (v) => ((v - low) / (high - low)) ** (1 / power)];
 }
 
-/** Make a control from a declaration; `change(value)` hears of it. Returns { element, show(value) }. */
+/** Make a control from a description; `change(value)` is called when it is changed. Returns { element, show(value) }. */
 export function control(about, value, change) {
   const id = `control-${count += 1}`;
   const label = make("label", { title: about.sentence ?? "", for: id }, about.label ?? words(about.name));
@@ -63,7 +63,7 @@ function slider(element, about, value, change) {
   };
   range.onkeydown = (event) => {
     const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
-    if (!way || !whole) return; // a hundredth of the way would be no step
+    if (!way || !whole) return; // a hundredth of the range would be less than one
     event.preventDefault();
     show(set(now + way));
   };

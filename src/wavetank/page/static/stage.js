@@ -1,4 +1,4 @@
-// The picture, and hands on it: the tool with one pointer, the camera with the other buttons, the wheel or two fingers.
+// The picture and its pointers: one pointer uses the tool; other buttons, the wheel or two fingers move the camera.
 
 import { find, note } from "./make.js";
 import { on, pending, send } from "./link.js";
@@ -13,7 +13,7 @@ export const seen = { pictures: 0, bytes: 0 };
 
 on("picture", async (blob) => {
   const bitmap = await createImageBitmap(blob).catch(() => null);
-  // One picture is on its way at a time; the next is asked for before this one is drawn.
+  // One picture is in flight at a time; the next is requested before this one is drawn.
   send({ do: "ack" });
   if (!bitmap) return;
   if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) Object.assign(canvas, { width: bitmap.width, height: bitmap.height });
@@ -22,13 +22,13 @@ on("picture", async (blob) => {
   seen.pictures += 1; seen.bytes += blob.size;
   veil.classList.add("gone");
 });
-on("closed", () => { find("veil-text").textContent = "The connection is gone; trying again …"; veil.classList.remove("gone"); pointers.clear(); tooling = null; });
+on("closed", () => { find("veil-text").textContent = "Connection lost; reconnecting …"; veil.classList.remove("gone"); pointers.clear(); tooling = null; });
 on("refused", (ours) => {
-  find("veil-text").textContent = ours ? "wavetank was started anew, and this page belongs to the run before: open the link that it printed."
-    : "This page opens with the link that wavetank printed, token included.";
+  find("veil-text").textContent = ours ? "wavetank was restarted, and this page belongs to the previous run: open the link that it printed."
+    : "Open this page with the link that wavetank printed, which includes the token.";
 });
 on("open", () => { tellSize(); });
-on("anew", () => note("wavetank was started anew: what was here before is gone with it."));
+on("restarted", () => note("wavetank was restarted: the previous session is lost."));
 
 // A scene that is made for the first time is compiled; until then no picture comes and nothing is told.
 const WAIT = 1500; // ms without a word after which the page says why
@@ -70,7 +70,7 @@ canvas.onpointerdown = (event) => {
   canvas.setPointerCapture(event.pointerId);
   pointers.set(event.pointerId, { ...where(event), mode: modeOf(event) });
   if (pointers.size === 2) {
-    // A second finger turns the first one's tool into a look around.
+    // A second finger ends the first one's tool and moves the camera.
     lift();
     for (const pointer of pointers.values()) pointer.mode = "both";
     pinch = spread();
@@ -84,7 +84,7 @@ canvas.onpointerdown = (event) => {
 canvas.onpointermove = (event) => {
   const at = where(event);
   const pointer = pointers.get(event.pointerId);
-  const looks = pointer && pointer.mode !== "tool"; // then nothing is aimed at, and no time spent on it
+  const looks = pointer && pointer.mode !== "tool"; // then there is no preview of the tool
   if (event.pointerType === "mouse" || pointers.size === 1) hover(looks ? null : at);
   if (!pointer) return;
   const [dx, dy] = [at.x - pointer.x, at.y - pointer.y];
@@ -100,7 +100,7 @@ canvas.onpointermove = (event) => {
   }
 };
 
-// The hand sends at most one place for each picture of the screen; the last one is always sent.
+// At most one position is sent for each frame of the screen; the last one is always sent.
 let next = null;
 function move({ x, y }) {
   if (!next) requestAnimationFrame(() => { if (next && tooling !== null) send({ do: "point-move", ...next }); next = null; });
@@ -117,7 +117,7 @@ function spread() {
   return a && b ? Math.hypot((a.x - b.x) * a.width, (a.y - b.y) * a.height) : 0;
 }
 
-/** Between the fingers. */
+/** Return the point between two fingers. */
 function middle() {
   const [a, b] = [...pointers.values()];
   return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 };

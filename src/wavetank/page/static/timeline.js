@@ -1,4 +1,4 @@
-// Time: play, step, back, the scrubber with its bookmarks, the pace.
+// Time: play, step, back, the scrubber with its bookmarks, the speed.
 
 import { find, icon, make, note, pretty, say } from "./make.js";
 import { on, send } from "./link.js";
@@ -6,7 +6,7 @@ import { on, send } from "./link.js";
 let speeds = [[1, "1 ×"]];
 const now = { time: 0, paused: false, speed: 1, past: [0, 0], bookmarks: [] };
 const scrub = find("scrub"), speed = find("speed");
-const marks = new Map(); // bookmark -> time at which it was set, as seen here
+const marks = new Map(); // bookmark -> time at which it was set on this page
 let held = 0;
 
 on("hello", (hello) => {
@@ -23,7 +23,7 @@ export const time = {
   reset: () => {
     const left = now.time > 0.5;
     send({ do: "reset" });
-    if (left) note("The scene begins anew.", ["Undo", () => send({ do: "undo" })]);
+    if (left) note("Restarted.", ["Undo", () => send({ do: "undo" })]);
   },
   faster: (by) => send({ do: "speed", factor: speeds[Math.min(speeds.length - 1, Math.max(0, closest(now.speed) + by))][0] }),
   bookmark: () => {
@@ -67,7 +67,7 @@ on("status", (status) => {
     drawn = list;
     find("bookmarks").replaceChildren(...status.bookmarks.map(flag));
   }
-  // The range grows while the water moves. Flags move with it and stay what they are, or a click on one would be lost.
+  // The range grows while the water moves. Flags are moved, not recreated, or a click on one would be lost.
   status.bookmarks.forEach((name, k) => {
     const at = marks.get(name) ?? parseFloat(name);
     find("bookmarks").children[k].style.left = `${100 * Math.min(1, Math.max(0, ((at || 0) - from) / (to - from)))}%`;
@@ -75,7 +75,7 @@ on("status", (status) => {
 });
 
 function flag(name) {
-  const result = make("button", { title: `${name}: click to go there, right click (Delete) to forget it`, "aria-label": `Bookmark ${name}` });
+  const result = make("button", { title: `${name}: click to go there, right-click or Delete to remove it`, "aria-label": `Bookmark ${name}` });
   result.onclick = () => send({ do: "bookmark", name, action: "go" });
   const forget = (event) => { event.preventDefault(); send({ do: "bookmark", name, action: "forget" }); };
   result.oncontextmenu = forget;

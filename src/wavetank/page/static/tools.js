@@ -1,10 +1,10 @@
-// The rail of tools, the card with the options of the one in hand, and those that go on by themselves.
+// The bar of tools, the card with the options of the current one, and those that keep running.
 
 import { find, icon, make, narrow, words } from "./make.js";
 import { on, send } from "./link.js";
 import { control } from "./slider.js";
 
-let look = { name: "look", options: [], cursor: false }; // until the server tells
+let look = { name: "look", options: [], cursor: false }; // until the server sends it
 const chosen = new Map(); // options by tool
 const buttons = new Map();
 export const hand = { tool: look, options: {}, fixed: {} };
@@ -53,8 +53,8 @@ on("hello", ({ tools: list }) => {
 
 let told = "", rules = "";
 on("status", ({ running, game, world }) => {
-  if (world) card(hand.tool); // lengths are others in a world of another size
-  // A level has its own tools; what it fixes has no slider.
+  if (world) card(hand.tool); // lengths depend on the size of the world
+  // A level has its own tools; options that it fixes have no slider.
   const now = JSON.stringify(game?.tools ?? null);
   if (now !== rules) {
     rules = now;
@@ -66,8 +66,8 @@ on("status", ({ running, game, world }) => {
   told = running.join();
   for (const [name, button] of buttons) button.classList.toggle("on", running.includes(name));
   find("running").replaceChildren(...running.map((name) =>
-    make("button", { textContent: `${words(name)}  ✕`, title: "Stop it", "aria-label": `Stop ${name}`, onclick: () => send({ do: "tool-stop", tool: name }) })));
+    make("button", { textContent: `${words(name)}  ✕`, title: "Stop", "aria-label": `Stop ${name}`, onclick: () => send({ do: "tool-stop", tool: name }) })));
 });
 
-/** Whether the level, if there is one, has this tool. */
+/** Return whether the level, if there is one, allows a tool. */
 export const allows = (name) => !allowed || name === "look" || name in allowed;

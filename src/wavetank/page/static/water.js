@@ -1,4 +1,4 @@
-// The panel of parameters: drawn from their declarations; what is live acts at once, the rest waits for a reset.
+// The panel of parameters, made from their descriptions: live ones act at once, others wait for a restart.
 
 import { find, make, pretty, words } from "./make.js";
 import { on, send } from "./link.js";
@@ -7,7 +7,7 @@ import { dial } from "./dial.js";
 
 const controls = new Map();
 const pending = new Map();
-let touched = new Map(); // when a value was last set here: what comes back late must not pull the slider
+let touched = new Map(); // when a value was last set here: a late status must not move the slider back
 
 function set(about, value) {
   touched.set(about.name, performance.now());
@@ -37,7 +37,7 @@ function build({ parameters, values }) {
     } else {
       const range = about.name === "spacing" ? { low: values.spacing / 2, high: values.spacing * 2, default: null } : {};
       made = control({ ...about, ...range }, values[about.name], (v) => set(about, v));
-      if (!about.live) made.element.querySelector("label").append(make("small", { textContent: "at restart", title: "Takes effect when the water starts again" }));
+      if (!about.live) made.element.querySelector("label").append(make("small", { textContent: "at restart", title: "Takes effect at the next restart" }));
     }
     controls.set(about.name, made);
     (about.everyday ? everyday : more).append(made.element);
@@ -57,7 +57,7 @@ function update(world) {
 on("hello", (hello) => { declared = hello.parameters; shown = `${hello.title} ${hello.dim}`; build(hello); });
 on("status", ({ world, game }) => {
   if (world) update(world);
-  // In a level the water stays as it is: what cannot be changed takes no focus.
+  // A level allows no changes: disabled controls take no focus.
   for (const part of [find("everyday"), find("more")]) part.inert = Boolean(game);
-  find("water").tabIndex = game ? 0 : -1; // what scrolls must be reached
+  find("water").tabIndex = game ? 0 : -1; // so that it can be scrolled by keyboard
 });

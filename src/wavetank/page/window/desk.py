@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from wavetank.foundation.errors import WavetankError
-from wavetank.page.about import everything
+from wavetank.page.about import hello_message
 from wavetank.page.dropped import command_for
 from wavetank.page.keys import LOOK
 from wavetank.page.window.engine import Engine
@@ -49,7 +49,7 @@ class Desk:
 
     def __post_init__(self) -> None:
         """Read the declarations."""
-        self.declared = everything(self.engine.session)
+        self.declared = hello_message(self.engine.session)
         self.shown = self.engine.shown
 
     @property
@@ -174,7 +174,7 @@ class Desk:
                 return str(error)
             return f"{file} is a solid now; carry it with Grab."
 
-        self.engine.ask(job).add_done_callback(lambda answer: self.engine.notes.put(answer.result()))
+        self.engine.call(job).add_done_callback(lambda answer: self.engine.notes.put(answer.result()))
 
     def begin(self, **which: str) -> None:
         """Begin a bundled scene or level by `name`, or one whose file says `text`."""

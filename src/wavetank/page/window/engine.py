@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.foundation.errors import WavetankError
-from wavetank.page.loop import Loop, News
+from wavetank.page.loop import Loop, Report
 from wavetank.session.commands import Command
 from wavetank.session.pace import share_interpreter
 from wavetank.session.session import Session
@@ -20,7 +20,7 @@ FIGURES_EVERY = 0.2  # s between two measurements, at least
 
 
 @dataclasses.dataclass(frozen=True)
-class Shown(News):
+class Shown(Report):
     """What a front draws: it never reads the session itself, which another thread is changing."""
 
     image: np.ndarray | None = None  # uint8 [height, width, 3]
@@ -31,13 +31,13 @@ class Shown(News):
 class Engine:
     """Turns a session and paints it until `stop`. `submit` and `do` may be called from any thread."""
 
-    looks = is_ready = True  # see `loop.Audience`
-    is_new = False
+    has_viewers = wants_picture = True  # see `loop.Audience`
+    has_new_viewer = False
 
     def __init__(self, session: Session) -> None:
         self.session, self.loop = session, Loop(session, self, FIGURES_EVERY)
-        self.painter, self.ask = self.loop.painter, self.loop.ask
-        self.shown = Shown(**vars(self.loop.news()))
+        self.painter, self.call = self.loop.painter, self.loop.call
+        self.shown = Shown(**vars(self.loop.report()))
         self.notes: queue.SimpleQueue[str] = queue.SimpleQueue()
         self.failure: BaseException | None = None
         self.size = self.painter.asked  # px of the place for the picture; the front sets it
@@ -66,11 +66,11 @@ class Engine:
         """Publish a picture."""
         self.shown = dataclasses.replace(self.shown, image=image, number=self.shown.number + 1, regions=regions)
 
-    def tell(self, news: News, notes: list[str]) -> None:
+    def send_report(self, report: Report, notes: list[str]) -> None:
         """Publish how things stand."""
         for sentence in notes:
             self.notes.put(sentence)
-        self.shown = dataclasses.replace(self.shown, **vars(news))
+        self.shown = dataclasses.replace(self.shown, **vars(report))
 
     def _run(self) -> None:
         try:

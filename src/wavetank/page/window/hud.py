@@ -162,7 +162,7 @@ def _card(desk: Desk, game: dict[str, Any], box: Box) -> None:
         imgui.text_unformatted(game["text"].replace(" %", "\u00a0%"))
         imgui.pop_text_wrap_pos()
         if desk.status["waits"]:
-            imgui.text_colored(rgba(WARM), "Time begins with your first touch.")
+            imgui.text_colored(rgba(WARM), "Time starts with your first touch.")
         at = imgui.get_cursor_screen_pos()
         draw.add_rect_filled(at, ImVec2(at.x + right, at.y + 7), ink(RAISED), 7.0)
         done = max(7.0, game["progress"] * right)

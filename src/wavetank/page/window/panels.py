@@ -66,7 +66,7 @@ def _water(desk: Desk) -> None:
             ),
         )
         imgui.pop_text_wrap_pos()
-        if button("Start again with this", on=True, wide=-1):
+        if button("Restart with these", on=True, wide=-1):
             keys.begin_again(desk)
         low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
         desk.places["again"] = (low.x, low.y, high.x, high.y)
@@ -167,7 +167,7 @@ def _look(desk: Desk) -> None:
     detail = pills(DETAILS, desk.engine.detail)
     if detail:
         desk.engine.detail = detail
-        desk.engine.ask(lambda: setattr(desk.engine.session, "changes", desk.engine.session.changes + 1))
+        desk.engine.call(lambda: setattr(desk.engine.session, "changes", desk.engine.session.changes + 1))
     width, height = desk.engine.painter.last_size
     imgui.text_colored(rgba(SOFT), f"{width} × {height} pixels in {desk.status['picture_ms']:.0f} ms")
 
@@ -254,7 +254,7 @@ def _keep(desk: Desk) -> None:
         if button(text, wide=-1):
             path = free_name(Path.cwd() / name)
             job = functools.partial(write, desk, path)
-            desk.say(_written(desk.engine.ask(job), path))
+            desk.say(_written(desk.engine.call(job), path))
         low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
         desk.places[f"keep.{name}"] = (low.x, low.y, high.x, high.y)
         imgui.text_colored(rgba(SOFT), sentence)
@@ -287,7 +287,7 @@ def _session(desk: Desk, path: Path) -> None:
 
 
 def _scene(desk: Desk, path: Path) -> None:
-    desk.engine.session.present_scene().save(path)
+    desk.engine.session.current_scene().save(path)
 
 
 def _picture(desk: Desk, path: Path) -> None:

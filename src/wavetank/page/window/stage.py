@@ -76,7 +76,7 @@ class Stage:
     def ray(self, u: float, v: float) -> dict[str, Any]:
         """Return the ray through a place of the picture, given as shares of width and height."""
         _, _, width, height = self.box
-        camera = self.desk.engine.session.camera_of(self.desk.tool)
+        camera = self.desk.engine.session.camera_for(self.desk.tool)
         origin, direction = camera.ray(u * width, v * height, width, height)  # type: ignore[arg-type]
         return {"origin": tuple(map(float, origin)), "direction": tuple(map(float, direction))}
 
@@ -174,7 +174,7 @@ class Stage:
         if question != self._question and (tool or self._question[0]) and not (rests and tool):
             self._asked_at = now
             (u, v), engine, size = question[1], self.desk.engine, self.desk.engine.painter.wanted
-            self._asked = engine.ask(lambda: aim(engine.session, tool, u, v, reach, size))
+            self._asked = engine.call(lambda: aim(engine.session, tool, u, v, reach, size))
             self._question = question
 
     def _card(self, at: ImVec2) -> None:

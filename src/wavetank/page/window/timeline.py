@@ -64,7 +64,7 @@ def icon_button(name: str, path: str, sentence: str, *, big: bool = False) -> bo
 def footer(desk: Desk) -> None:
     """Draw the buttons of time and the scrubber."""
     em, status, engine = imgui.get_font_size(), desk.status, desk.engine
-    if icon_button("again", RESET, "Start again (R)"):
+    if icon_button("again", RESET, "Restart (R)"):
         keys.begin_again(desk)
     imgui.same_line()
     if icon_button("back", BACK, "One second back (,)"):
@@ -93,7 +93,7 @@ def footer(desk: Desk) -> None:
     changed, number = imgui.combo("##speed", nearest_speed(status["speed"]), names)
     if changed:
         engine.do(Speed, factor=SPEEDS[number][0])
-    hint("Pace of time ([ and ])")
+    hint("Speed of time ([ and ])")
 
 
 def _scrubber(desk: Desk, wide: float) -> None:

@@ -19,7 +19,7 @@ class Pause(Command):
 
     def apply(self, state: SessionState) -> None:
         """Pause or resume."""
-        state.paused, state.steps_left, state.waits = self.on, 0, False
+        state.paused, state.steps_left, state.awaits_touch = self.on, 0, False
 
 
 class Step(Command):
@@ -30,7 +30,7 @@ class Step(Command):
 
     def apply(self, state: SessionState) -> None:
         """Pause, and let the session compute them."""
-        state.paused, state.waits = True, False
+        state.paused, state.awaits_touch = True, False
         state.steps_left += self.frames
 
 
@@ -76,7 +76,7 @@ class Rewind(Command):
         """Go back; without any instant, do nothing."""
         snapshot = state.history.before(self.time)
         if snapshot is not None:
-            state.go_to(snapshot)
+            state.restore(snapshot)
 
 
 class Bookmark(Command):
@@ -98,6 +98,6 @@ class Bookmark(Command):
         if self.name not in bookmarks:
             raise WavetankError(f"there is no bookmark {self.name!r}; there are: {', '.join(bookmarks) or 'none'}.")
         if self.action == "go":
-            state.go_to(bookmarks[self.name].unpack())
+            state.restore(bookmarks[self.name].unpack())
         else:
             del bookmarks[self.name]

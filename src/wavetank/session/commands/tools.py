@@ -40,16 +40,16 @@ class ToolBegin(_Ray):
         """Let the tool begin; the same pointer, or the same tool where it runs on by itself, ends first."""
         tool = state.tool_named(self.tool, self.options)
         if self.pointer in state.hands:
-            state.lift(self.pointer)
+            state.end_tool(self.pointer)
         if tool.name in state.running:
-            state.lift(tool.name)
+            state.end_tool(tool.name)
         hand = Hand(state.sim, self.origin, self.direction, state.most_particles, tool.through_water)
         state.hands[self.pointer] = (tool, hand)
-        if tool.tilts and state.upright is None:
-            state.upright = tuple(state.sim.gravity)
-        if state.waits:
-            state.paused = state.waits = False
-        state.let_act(hand, tool.begin, hand)
+        if tool.tilts and state.untilted_gravity is None:
+            state.untilted_gravity = tuple(state.sim.gravity)
+        if state.awaits_touch:
+            state.paused = state.awaits_touch = False
+        state.run_tool(hand, tool.begin, hand)
         if state.game is not None:
             state.game.strokes += 1
 
@@ -65,7 +65,7 @@ class ToolMove(_Ray):
         if self.pointer in state.hands:
             tool, hand = state.hands[self.pointer]
             hand.aim(self.origin, self.direction)
-            state.let_act(hand, tool.move, hand)
+            state.run_tool(hand, tool.move, hand)
 
 
 class ToolEnd(Command):
@@ -82,7 +82,7 @@ class ToolEnd(Command):
                 del state.hands[self.pointer]
                 state.running[tool.name] = (tool, hand)
             else:
-                state.lift(self.pointer)
+                state.end_tool(self.pointer)
 
 
 class ToolStop(Command):
@@ -94,4 +94,4 @@ class ToolStop(Command):
     def apply(self, state: SessionState) -> None:
         """Stop it."""
         for name in [name for name in state.running if self.tool in ("", name)]:
-            state.lift(name)
+            state.end_tool(name)

@@ -42,7 +42,7 @@ class SetParameter(WorldEdit):
             raise WavetankError(f"gravity = {value} is too strong; its length must be at most {STRONGEST:g} m/s^2.")
         setattr(state.sim, name, value)
         if name == "gravity":
-            state.upright = None
+            state.untilted_gravity = None
 
 
 class Reset(Command):
@@ -58,10 +58,10 @@ class Reset(Command):
         unknown = next((name for name in self.parameters if name not in Parameters.model_fields), None)
         if unknown is not None:
             raise WavetankError(f"{unknown!r} is not a parameter.")
-        state.lift_all()
+        state.end_all_tools()
         scene, camera, paused = state.changed_scene(self.parameters), state.chosen_camera, state.paused
         state.begin(scene)
-        state.camera, state.paused = camera, paused or state.waits
+        state.camera, state.paused = camera, paused or state.awaits_touch
 
 
 class LoadScene(Command):
@@ -92,7 +92,7 @@ class LoadScene(Command):
             raise WavetankError(f"{self.name!r} is not a bundled scene; those are {known}.")
         if self.particles and scene.goal is None:
             scene = with_particles(scene, self.particles)
-        state.lift_all()
+        state.end_all_tools()
         state.begin(scene)
 
 

@@ -1,4 +1,4 @@
-"""Wind: a jet of air that blows the way the hand is dragged."""
+"""Wind: a drag force towards the velocity of an air jet, along the drag of the pointer."""
 
 from typing import ClassVar
 
@@ -11,17 +11,17 @@ from wavetank.session.tools.tool import Tool, option
 
 
 class Blow(Tool):
-    """A fan."""
+    """Apply wind."""
 
     name: ClassVar[str] = "wind"
     label: ClassVar[str] = "Wind"
-    sentence: ClassVar[str] = "Hold to blow away from you; drag to blow the way you drag."
+    sentence: ClassVar[str] = "Hold to blow away from you; drag to choose the direction."
     icon: ClassVar[str] = "M3 9h10a3 3 0 1 0-3-3M3 13h15a3 3 0 1 1-3 3M3 17h7a2 2 0 1 1-2 2"
     key: ClassVar[str] = "6"
 
     radius: float = option(0.2, 0.02, 1.0, "L", "Radius of the jet.")
     speed: float = option(1.2, 0.0, 4.0, "√(gL)", "Speed of the air.")
-    drag: float = option(2.0, 0.1, 50.0, "1/s", "How fast the water follows it.")
+    drag: float = option(2.0, 0.1, 50.0, "1/s", "Rate at which the water takes the air's velocity.")
     keep: bool = option(False, None, None, "", "Goes on when you let go.")
 
     @override

@@ -1,4 +1,4 @@
-"""Cutter: removes the water along the pointer's ray, as a wire cuts cheese."""
+"""Cutter: removes the water along the pointer's ray."""
 
 from typing import ClassVar
 
@@ -7,15 +7,15 @@ from pydantic import PrivateAttr
 from typing_extensions import override
 
 from wavetank.session.tools.hand import Hand
-from wavetank.session.tools.picking import far_side
+from wavetank.session.tools.picking import exit_point
 from wavetank.session.tools.tool import Tool, option
 from wavetank.view.extent import extent_of
 
-MOST_STEPS = 24  # tubes that one movement is cut in
+MOST_STEPS = 24  # capsules that one movement is divided into
 
 
 class Cut(Tool):
-    """A blade."""
+    """Remove water along rays."""
 
     name: ClassVar[str] = "cut"
     label: ClassVar[str] = "Cut"
@@ -43,6 +43,6 @@ class Cut(Tool):
             if hand.sim.scene.dim == 3:
                 way = place - hand.origin
                 way /= max(float(np.linalg.norm(way)), 1e-9)
-                near, (far, _) = hand.origin, far_side(extent_of(hand.sim.scene), hand.origin, way)
+                near, (far, _) = hand.origin, exit_point(extent_of(hand.sim.scene), hand.origin, way)
             hand.sim.remove_inside(near, far, radius)
         self._last = hand.point

@@ -1,4 +1,4 @@
-"""Drop: lets a body fall into the water."""
+"""Drop: adds a body above the pointer, which falls into the water."""
 
 import math
 from typing import ClassVar, Literal
@@ -15,18 +15,18 @@ MOST_BODIES = 60
 
 
 class Drop(Tool):
-    """Let a body fall."""
+    """Add a falling body."""
 
     name: ClassVar[str] = "drop"
     label: ClassVar[str] = "Drop"
-    sentence: ClassVar[str] = "Click to let a body fall; it floats or sinks as its density says."
+    sentence: ClassVar[str] = "Click to drop a body; its density decides whether it floats or sinks."
     icon: ClassVar[str] = "M8 2h8v8H8zM12 12v4m-2-2 2 2 2-2M3 20c3-2 6-2 9 0s6 2 9 0"
     key: ClassVar[str] = "o"
 
-    shape: Literal["box", "ball", "log", "plank"] = option("box", None, None, "", "What it is.")
-    radius: float = option(0.06, 0.02, 0.3, "L", "Half its size.")
-    density: float = option(0.4, 0.05, 10.0, "water", "Density, over that of water.")
-    height: float = option(0.1, 0.0, 0.5, "L", "How high over the place you point at it is let go.")
+    shape: Literal["box", "ball", "log", "plank"] = option("box", None, None, "", "Shape.")
+    radius: float = option(0.06, 0.02, 0.3, "L", "Half of its size.")
+    density: float = option(0.4, 0.05, 10.0, "water", "Density relative to water.")
+    height: float = option(0.1, 0.0, 0.5, "L", "Height above the pointer.")
 
     @override
     def begin(self, hand: Hand) -> None:

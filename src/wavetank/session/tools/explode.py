@@ -1,4 +1,4 @@
-"""Explosion: the water is thrown away from a point just under the surface."""
+"""Explosion: one radial impulse from a point below the surface."""
 
 from typing import ClassVar
 
@@ -12,16 +12,16 @@ from wavetank.session.tools.tool import Tool, option
 
 
 class Explode(Tool):
-    """A bang."""
+    """Apply a radial impulse."""
 
     name: ClassVar[str] = "explosion"
     label: ClassVar[str] = "Explosion"
-    sentence: ClassVar[str] = "Click for a bang under the surface."
+    sentence: ClassVar[str] = "Click for an explosion under the surface."
     icon: ClassVar[str] = "M12 2l2 6 5-3-2 5 5 2-5 2 2 5-5-3-2 6-2-6-5 3 2-5-5-2 5-2-2-5 5 3z"
     key: ClassVar[str] = "8"
 
-    radius: float = option(0.25, 0.02, 1.0, "L", "How far it is felt.")
-    speed: float = option(1.5, 0.1, 4.0, "√(gL)", "Speed it gives in the middle.")
+    radius: float = option(0.25, 0.02, 1.0, "L", "Radius of its effect.")
+    speed: float = option(1.5, 0.1, 4.0, "√(gL)", "Speed that it gives at the centre.")
     _done: bool = PrivateAttr(False)
 
     @override

@@ -1,4 +1,4 @@
-"""Freeze: water under the pointer turns to ice that keeps its place, until it is melted."""
+"""Freeze: particles at the pointer become fixed, until they are melted."""
 
 from typing import ClassVar
 
@@ -9,7 +9,7 @@ from wavetank.session.tools.tool import Tool, option
 
 
 class Freeze(Tool):
-    """Turn water to ice and back."""
+    """Freeze water, or melt it."""
 
     name: ClassVar[str] = "freeze"
     label: ClassVar[str] = "Freeze"
@@ -17,7 +17,7 @@ class Freeze(Tool):
     icon: ClassVar[str] = "M12 2v20M3.500 7l17 10M20.500 7l-17 10M9 3.500l3 3 3-3M9 20.500l3-3 3 3"
     key: ClassVar[str] = "7"
 
-    radius: float = option(0.08, 0.01, 0.5, "L", "Radius of the touch.")
+    radius: float = option(0.08, 0.01, 0.5, "L", "Radius.")
     melt: bool = option(False, None, None, "", "Melts instead.")
 
     @override

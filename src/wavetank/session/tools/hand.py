@@ -1,21 +1,21 @@
-"""A hand in the water: a pointer that is down, where it is and how fast it moves."""
+"""A pointer that is down in the world: its position and velocity."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from wavetank.session.tools.picking import Hit, on_plane, pick
+from wavetank.session.tools.picking import Hit, intersect_plane, pick
 from wavetank.simulation.simulation import Simulation
 from wavetank.view.extent import extent_of
 
-LARGEST_PACE = 3.0  # of the hand, in units of `Hand.speed`
+FASTEST = 3.0  # limit of the velocity, in units of `Hand.speed`
 
 
 class Hand:
-    """What a tool gets to work with.
+    """A pointer in the world, for tools.
 
-    It begins at what the pointer's ray meets and then moves in the plane through that point which faces the eye, so
-    that waves passing under the pointer do not throw it back and forth. `look` picks anew.
+    It starts where the pointer's ray hits something, and then moves in the plane through that point that faces the
+    camera, so that passing waves do not move it back and forth. `pick_again` returns the hit of the current ray.
     """
 
     def __init__(
@@ -27,11 +27,11 @@ class Hand:
         through_water: bool = False,
     ) -> None:
         self.sim, self.most_particles = sim, most
-        self.notes: list[str] = []  # for the person, one sentence each
+        self.notes: list[str] = []  # messages to viewers, one sentence each
         extent = extent_of(sim.scene)
         self.lower, self.upper = extent.lower, extent.upper
-        self.size = float((extent.upper - extent.lower).max())  # m, length of the world
-        self.speed = float(np.sqrt(9.81 * self.size))  # m/s, a natural speed in a world of that size
+        self.size = float((extent.upper - extent.lower).max())  # m, L: length of the world
+        self.speed = float(np.sqrt(9.81 * self.size))  # m/s, sqrt(g L)
         self.origin, self.direction = _ray(origin, direction)
         self.hit: Hit = pick(sim, self.origin, self.direction, through_water)
         self.anchor = self._inside(self.hit.point)
@@ -45,30 +45,30 @@ class Hand:
         return float(self.sim.scene.spacing)
 
     def aim(self, origin: Sequence[float], direction: Sequence[float]) -> None:
-        """Follow the pointer to another ray."""
+        """Move along the plane to another ray."""
         self.origin, self.direction = _ray(origin, direction)
-        point = on_plane(self.origin, self.direction, self.anchor, self.normal)
+        point = intersect_plane(self.origin, self.direction, self.anchor, self.normal)
         if point is not None:
             self.point = self._inside(point)
 
-    def look(self) -> Hit:
-        """Return what the ray meets now."""
+    def pick_again(self) -> Hit:
+        """Return what the ray hits now."""
         hit = pick(self.sim, self.origin, self.direction)
         return Hit(hit.kind, self._inside(hit.point), hit.name)
 
     def pass_time(self, duration: float) -> None:
-        """Measure the hand's velocity over a frame of `duration` [s], limited to what water can follow."""
+        """Compute the velocity over a frame of `duration` [s], limited to what water can follow."""
         velocity = (self.point - self.before) / duration
         pace = float(np.linalg.norm(velocity))
-        self.velocity = velocity * min(1.0, LARGEST_PACE * self.speed / max(pace, 1e-12))
+        self.velocity = velocity * min(1.0, FASTEST * self.speed / max(pace, 1e-12))
         self.before = self.point
 
     def radius(self, share: float) -> float:
-        """Return a share of the world's length [m], but never so small that nothing is inside."""
+        """Return a share of the world's length [m], but at least 1.5 particle spacings."""
         return max(share * self.size, 1.5 * self.spacing)
 
     def flat(self, vector: np.ndarray) -> tuple[float, ...]:
-        """Return a vector in space as one of this world, 2-D or 3-D."""
+        """Return the components of a 3-D vector that this world has, 2 or 3."""
         return tuple(float(part) for part in vector[: self.sim.scene.dim])
 
     def _inside(self, point: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Attract and repel: a point that pulls the water to itself."""
+"""Attract and repel: a central force on the water around the pointer."""
 
 from typing import ClassVar
 
@@ -10,7 +10,7 @@ from wavetank.session.tools.tool import Tool, option
 
 
 class Magnet(Tool):
-    """Pull the water to the pointer, or push it away."""
+    """Attract the water to the pointer, or repel it."""
 
     name: ClassVar[str] = "attract"
     label: ClassVar[str] = "Attract"
@@ -18,9 +18,9 @@ class Magnet(Tool):
     icon: ClassVar[str] = "M6 4v8a6 6 0 0 0 12 0V4M6 8h4M14 8h4M10 4v8a2 2 0 0 0 4 0V4M6 4h4M14 4h4"
     key: ClassVar[str] = "3"
 
-    radius: float = option(0.25, 0.02, 1.0, "L", "How far it reaches.")
-    strength: float = option(10.0, -20.0, 20.0, "9.81 m/s²", "Acceleration in the middle; negative repels.")
-    keep: bool = option(False, None, None, "", "Goes on when you let go.")
+    radius: float = option(0.25, 0.02, 1.0, "L", "Radius of its effect.")
+    strength: float = option(10.0, -20.0, 20.0, "9.81 m/s²", "Acceleration at the centre; negative repels.")
+    keep: bool = option(False, None, None, "", "Keeps running when you let go.")
 
     @override
     def hold(self, hand: Hand, duration: float) -> None:

@@ -1,4 +1,4 @@
-"""Paddle: a wall across the tank that comes down where the pointer is and follows it."""
+"""Paddle: a wall across the tank that is lowered at the pointer and follows it."""
 
 from typing import ClassVar
 
@@ -6,18 +6,18 @@ import numpy as np
 from pydantic import PrivateAttr
 from typing_extensions import override
 
-from wavetank.session.tools.carry import TOOL_SOLID, carry
 from wavetank.session.tools.hand import Hand
+from wavetank.session.tools.solids import TOOL_SOLID, move_towards
 from wavetank.session.tools.tool import Tool, option
 from wavetank.solids.shapes import Box
 
 
 class Paddle(Tool):
-    """A moving wall."""
+    """Move a wall along the tank."""
 
     name: ClassVar[str] = "paddle"
     label: ClassVar[str] = "Paddle"
-    sentence: ClassVar[str] = "Hold to dip a wall into the water; drag it along the tank."
+    sentence: ClassVar[str] = "Hold to lower a wall into the water; drag it along the tank."
     icon: ClassVar[str] = "M10 3h4v13h-4zM3 19c3-2 6-2 9 0s6 2 9 0M18 9l3 3-3 3M6 9l-3 3 3 3"
     key: ClassVar[str] = "b"
     cursor_radius: ClassVar[bool] = False
@@ -40,7 +40,7 @@ class Paddle(Tool):
             return
         where = hand.sim.solids.poses[hand.sim.solids.find(self._held)][0].copy()
         goal = np.array([hand.point[0], hand.lower[1] + 0.5 * self.height * (hand.upper - hand.lower)[1], where[2]])
-        carry(hand.sim, self._held, goal, None, self.pace * hand.speed * duration, inside=False)
+        move_towards(hand.sim, self._held, goal, None, self.pace * hand.speed * duration, inside=False)
 
     @override
     def end(self, hand: Hand) -> None:

@@ -1,10 +1,10 @@
-"""What a pointer's ray meets first: the water's surface, a solid, or the inside of the tank.
+"""The first hit of a pointer's ray: the water's surface, a solid, or the inside of the tank.
 
     code     symbol   meaning                                            unit
     origin   o        start of the ray                                   m
     way      w        its unit direction                                 1
     t                 distance along it                                  m
-    reach             radius of a particle as a hand feels it            m
+    reach             radius of a particle for picking            m
 
 Solids by sphere tracing (Hart 1996, 10.1007/s003710050084). A positive float orders like its bits, so the nearest
 particle is an integer minimum and does not depend on threads.
@@ -27,7 +27,7 @@ REACH = 0.75  # d: balls of this radius close the surface
 
 @dataclasses.dataclass(frozen=True)
 class Hit:
-    """Where a ray ended."""
+    """Where a ray ends."""
 
     kind: str  # water, solid, tank or air
     point: np.ndarray  # m, [3]
@@ -66,15 +66,15 @@ def trace_solids(distances: qd.types.ndarray(), solids: SolidSet, origin: vec3, 
 
 
 def pick(sim: Simulation, origin: np.ndarray, way: np.ndarray, through_water: bool = False) -> Hit:
-    """Return what the ray from `origin` along the unit vector `way` meets first.
+    """Return the first hit of the ray from `origin` [m] along the unit vector `way`.
 
-    In a 2-D world that is the place in its plane. A ray that meets nothing ends inside the tank's far side, and one
-    that misses the tank where it passes its middle. `through_water` looks for solids under it.
+    In a 2-D world that is the point in its plane. A ray that hits nothing ends inside the tank's far side, and one that
+    misses the tank at its point next to the middle. With `through_water` only solids are hit.
     """
     extent = extent_of(sim.scene)
     if sim.scene.dim == 2:
         origin, way = _above_plane(origin, way)
-    end, kind = far_side(extent, origin, way)
+    end, kind = exit_point(extent, origin, way)
     nearest = float(np.linalg.norm(end - origin)) if sim.scene.dim == 3 else np.inf
     name = ""
     start, heading = origin.astype(np.float32), way.astype(np.float32)
@@ -96,8 +96,8 @@ def pick(sim: Simulation, origin: np.ndarray, way: np.ndarray, through_water: bo
     return Hit(kind, end if kind in ("tank", "air") else origin + nearest * way, name)
 
 
-def far_side(extent: Extent, origin: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, str]:
-    """Return where the ray leaves the box of the world, or passes its middle if it misses it."""
+def exit_point(extent: Extent, origin: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, str]:
+    """Return where the ray leaves the box of the world, or passes its middle if it misses it, and what is there."""
     with np.errstate(divide="ignore", invalid="ignore"):
         a, b = (extent.lower - origin) / way, (extent.upper - origin) / way
     a, b = np.nan_to_num(a, nan=-np.inf), np.nan_to_num(b, nan=np.inf)
@@ -109,7 +109,7 @@ def far_side(extent: Extent, origin: np.ndarray, way: np.ndarray) -> tuple[np.nd
     return origin + max(0.0, float((extent.middle - origin) @ way)) * way, "air"
 
 
-def on_plane(origin: np.ndarray, way: np.ndarray, point: np.ndarray, normal: np.ndarray) -> np.ndarray | None:
+def intersect_plane(origin: np.ndarray, way: np.ndarray, point: np.ndarray, normal: np.ndarray) -> np.ndarray | None:
     """Return where the ray meets the plane through `point`, or None if it runs along it or away from it."""
     slope = float(way @ normal)
     if abs(slope) < 1e-6:
@@ -119,11 +119,11 @@ def on_plane(origin: np.ndarray, way: np.ndarray, point: np.ndarray, normal: np.
 
 
 def _in_plane(origin: np.ndarray, way: np.ndarray) -> np.ndarray:
-    point = on_plane(origin, way, np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    point = intersect_plane(origin, way, np.zeros(3), np.array([0.0, 0.0, 1.0]))
     return np.array([origin[0], origin[1], 0.0]) if point is None else point * [1.0, 1.0, 0.0]
 
 
 def _above_plane(origin: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A ray straight at the plane, from just above the place that the given ray meets."""
+    """Return a ray perpendicular to the plane, from just above the point where the given ray hits it."""
     place: Any = _in_plane(origin, way)
     return place + [0.0, 0.0, 1e-3], np.array([0.0, 0.0, -1.0])

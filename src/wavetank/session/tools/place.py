@@ -1,4 +1,4 @@
-"""Place: puts a solid into the world; it swells to its size and pushes the water aside."""
+"""Place: adds a solid, which grows to its size and displaces the water."""
 
 from typing import ClassVar, Literal
 
@@ -6,27 +6,27 @@ import numpy as np
 from pydantic import PrivateAttr
 from typing_extensions import override
 
-from wavetank.session.tools.carry import carry
 from wavetank.session.tools.hand import Hand
+from wavetank.session.tools.solids import move_towards
 from wavetank.session.tools.tool import Tool, option
 from wavetank.solids.shapes import Box, Capsule, Sphere
 from wavetank.solids.solid import Solid
 
 MOST_SOLIDS = 24
-SWELL = 0.35  # s
+SWELL = 0.35  # s in which the solid grows to its size
 
 
 class Place(Tool):
-    """Put a solid into the water."""
+    """Add a solid."""
 
     name: ClassVar[str] = "place"
     label: ClassVar[str] = "Place"
-    sentence: ClassVar[str] = "Click to place a solid; keep dragging to carry it."
+    sentence: ClassVar[str] = "Click to place a solid; keep dragging to move it."
     icon: ClassVar[str] = "M12 3l8 4.500v9L12 21l-8-4.500v-9zM12 12l8-4.500M12 12v9M12 12 4 7.500"
     key: ClassVar[str] = "p"
 
-    shape: Literal["ball", "box", "post"] = option("ball", None, None, "", "What it is.")
-    radius: float = option(0.07, 0.02, 0.3, "L", "Half its size.")
+    shape: Literal["ball", "box", "post"] = option("ball", None, None, "", "Shape.")
+    radius: float = option(0.07, 0.02, 0.3, "L", "Half of its size.")
     _held: str = PrivateAttr("")
 
     @override
@@ -55,4 +55,4 @@ class Place(Tool):
     @override
     def hold(self, hand: Hand, duration: float) -> None:
         if self._held in hand.sim.solids.names and float(np.linalg.norm(hand.point - hand.anchor)) > 0.01 * hand.size:
-            carry(hand.sim, self._held, hand.point, None, 0.8 * hand.speed * duration)
+            move_towards(hand.sim, self._held, hand.point, None, 0.8 * hand.speed * duration)

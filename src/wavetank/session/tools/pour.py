@@ -1,4 +1,4 @@
-"""Pour: a hose that fills in water where there is room for it."""
+"""Pour: emits particles from a nozzle, where there is free space."""
 
 from typing import ClassVar, Literal
 
@@ -11,24 +11,24 @@ from wavetank.session.tools.hand import Hand
 from wavetank.session.tools.tool import Color, Tool, dye_of, option
 from wavetank.simulation.sources import rows_due
 
-GAP, WALL = 0.9, 0.5  # d: room that new particles have from others and from walls
-MOST_LAYERS = 8  # in a frame
+GAP, WALL = 0.9, 0.5  # d: least distance of new particles from others and from walls
+MOST_LAYERS = 8  # of particles in a frame
 
 
 class Pour(Tool):
-    """A hose."""
+    """Emit particles."""
 
     name: ClassVar[str] = "pour"
     label: ClassVar[str] = "Pour"
-    sentence: ClassVar[str] = "Hold to pour water from above, or straight ahead like a fireman."
+    sentence: ClassVar[str] = "Hold to pour water from above, or straight ahead."
     icon: ClassVar[str] = "M4 5h9a4 4 0 0 1 4 4v2M14 11h6M17 14v2M17 19v2M13 15v2M21 15v2"
     key: ClassVar[str] = "4"
 
     width: float = option(0.1, 0.01, 0.5, "L", "Width of the jet.")
     speed: float = option(0.5, 0.05, 2.0, "√(gL)", "Speed of the jet.")
-    aim: Literal["down", "ahead"] = option("down", None, None, "", "Where the hose points.")
+    aim: Literal["down", "ahead"] = option("down", None, None, "", "Direction of the jet.")
     color: Color = option("", None, None, "color", "Dye in the water.")
-    keep: bool = option(False, None, None, "", "Goes on when you let go.")
+    keep: bool = option(False, None, None, "", "Keeps running when you let go.")
     _way: float = PrivateAttr(0.0)
     _nozzle: np.ndarray | None = PrivateAttr(None)
 
@@ -42,9 +42,9 @@ class Pour(Tool):
         self._aim(hand)
 
     def _aim(self, hand: Hand) -> None:
-        """Find the nozzle once a movement: water that rises under a resting pointer must not move it."""
+        """Place the nozzle once per movement: water that rises under a resting pointer must not move it."""
         half = 0.5 * max(self.width * hand.size, hand.spacing)
-        point = hand.look().point
+        point = hand.pick_again().point
         if hand.sim.scene.dim == 3 and self.aim == "down":
             point = point.copy()
             point[1] = hand.upper[1]
@@ -72,13 +72,13 @@ class Pour(Tool):
         places = places.astype(np.float32)
         places = places[hand.sim.free_places(places, GAP * spacing, WALL * spacing)]
         if hand.sim.count + len(places) > hand.most_particles:
-            hand.notes.append(f"There are {hand.sim.count:,} particles; at most {hand.most_particles:,} are poured.")
+            hand.notes.append(f"There are {hand.sim.count:,} particles; pouring stops at {hand.most_particles:,}.")
             return
         velocity = (speed * ahead)[: hand.sim.scene.dim]
         hand.sim.add(places, np.tile(velocity, (len(places), 1)), np.full(len(places), dye_of(self.color)))
 
     def _disc(self, hand: Hand, ahead: np.ndarray) -> np.ndarray:
-        """Places of one layer around the nozzle, [n, 3]."""
+        """Return the positions of one layer of particles relative to the nozzle [m], [n, 3]."""
         side = np.cross(ahead, [0.0, 0.0, 1.0] if abs(ahead[2]) < 0.9 else [0.0, 1.0, 0.0])
         side /= np.linalg.norm(side)
         up = np.cross(side, ahead)

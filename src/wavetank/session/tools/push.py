@@ -1,4 +1,4 @@
-"""Push and pull: the water goes where the hand goes."""
+"""Push and pull: a drag force towards the pointer's velocity."""
 
 from typing import ClassVar
 
@@ -10,16 +10,16 @@ from wavetank.session.tools.tool import Tool, option
 
 
 class Push(Tool):
-    """Take the water along."""
+    """Drag the water along with the pointer."""
 
     name: ClassVar[str] = "push"
     label: ClassVar[str] = "Push"
-    sentence: ClassVar[str] = "Drag through the water: it goes where the hand goes."
+    sentence: ClassVar[str] = "Drag through the water to move it with the pointer."
     icon: ClassVar[str] = "M4 12h13m-5-5 5 5-5 5M20 5v14"
     key: ClassVar[str] = "1"
 
-    radius: float = option(0.13, 0.01, 0.5, "L", "Radius of the hand.")
-    grip: float = option(60.0, 1.0, 100.0, "1/s", "How firmly it holds the water.")
+    radius: float = option(0.13, 0.01, 0.5, "L", "Radius.")
+    grip: float = option(60.0, 1.0, 100.0, "1/s", "Rate at which the water takes the pointer's velocity.")
 
     @override
     def hold(self, hand: Hand, duration: float) -> None:

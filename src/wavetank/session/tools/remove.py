@@ -1,4 +1,4 @@
-"""Remove: takes the solid under the pointer out of the world."""
+"""Remove: removes the solid under the pointer."""
 
 from typing import ClassVar
 
@@ -9,11 +9,11 @@ from wavetank.session.tools.tool import Tool
 
 
 class Remove(Tool):
-    """Take a solid away."""
+    """Remove a solid."""
 
     name: ClassVar[str] = "remove"
     label: ClassVar[str] = "Remove"
-    sentence: ClassVar[str] = "Click a solid to take it away."
+    sentence: ClassVar[str] = "Click a solid to remove it."
     icon: ClassVar[str] = "M12 3l8 4.5v5M4 7.5v9L12 21M12 12 4 7.5 12 3M12 12v9M12 12l8-4.5M16 16l5 5M21 16l-5 5"
     key: ClassVar[str] = "x"
     cursor_radius: ClassVar[bool] = False

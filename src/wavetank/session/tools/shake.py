@@ -1,4 +1,4 @@
-"""Shake: the tank follows the hand on a spring, and the water in it lags behind."""
+"""Shake: the inertial force in a tank that follows the pointer on a spring."""
 
 from typing import ClassVar
 
@@ -23,7 +23,7 @@ class Shake(Tool):
     key: ClassVar[str] = "k"
     cursor_radius: ClassVar[bool] = False
 
-    strength: float = option(1.0, 0.1, 4.0, "", "Way of the tank for a way of the hand.")
+    strength: float = option(1.0, 0.1, 4.0, "", "Distance that the tank moves, over that of the pointer.")
     _offset: np.ndarray = PrivateAttr(default_factory=lambda: np.zeros(3))
     _velocity: np.ndarray = PrivateAttr(default_factory=lambda: np.zeros(3))
 

@@ -10,17 +10,17 @@ from wavetank.session.tools.tool import Tool, option
 
 
 class Stir(Tool):
-    """Turn the water round."""
+    """Apply a vortex force around the pointer."""
 
     name: ClassVar[str] = "stir"
     label: ClassVar[str] = "Stir"
-    sentence: ClassVar[str] = "Hold to make a whirl; drag to move it."
+    sentence: ClassVar[str] = "Hold to make a whirlpool; drag to move it."
     icon: ClassVar[str] = "M12 12a3 3 0 1 1 3 3 6 6 0 1 1 3-9M6 16a8.500 8.500 0 0 0 12 3"
     key: ClassVar[str] = "2"
 
-    radius: float = option(0.22, 0.02, 0.5, "L", "Radius of the whirl.")
-    speed: float = option(1.2, -2.0, 2.0, "√(gL)", "Speed at the rim; negative turns the other way.")
-    keep: bool = option(False, None, None, "", "Goes on when you let go.")
+    radius: float = option(0.22, 0.02, 0.5, "L", "Radius of the whirlpool.")
+    speed: float = option(1.2, -2.0, 2.0, "√(gL)", "Speed at the rim; negative turns the other way round.")
+    keep: bool = option(False, None, None, "", "Keeps running when you let go.")
 
     @override
     def hold(self, hand: Hand, duration: float) -> None:

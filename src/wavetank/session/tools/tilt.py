@@ -1,4 +1,4 @@
-"""Tilt: gravity leans the way the hand is dragged, as if the tank were tilted."""
+"""Tilt: turns gravity along the drag of the pointer, as if the tank were tilted."""
 
 from typing import ClassVar
 

@@ -1,4 +1,4 @@
-"""What every tool has. A tool is one file: what it is called, its options, and what it does while it is held."""
+"""The base class of tools. A tool is one file: name, texts, options, and what it does while it is held."""
 
 from typing import Annotated, Any, ClassVar
 
@@ -9,7 +9,7 @@ from wavetank.session.tools.hand import Hand
 
 
 def option(default: Any, low: float | None, high: float | None, unit: str, sentence: str) -> Any:
-    """Declare an option: default, range (inclusive), unit and one sentence; fronts draw their controls from it."""
+    """Declare an option: default, inclusive range, unit and one sentence, from which its control is made."""
     limits: dict[str, Any] = {} if low is None else {"ge": low, "le": high, "allow_inf_nan": False}
     return Field(default=default, description=sentence, json_schema_extra={"unit": unit}, **limits)
 
@@ -18,38 +18,38 @@ Color = Annotated[str, Field(pattern=r"^(#[0-9a-fA-F]{6})?$")]
 
 
 class Tool(Model):
-    """Something a hand can do. Lengths are shares of the world's length, speeds of the square root of g times it."""
+    """What a pointer does to the world. Lengths are in units of the world's length L, speeds in sqrt(g L)."""
 
     name: ClassVar[str]
     label: ClassVar[str]
     sentence: ClassVar[str]
     icon: ClassVar[str]  # SVG path in a square of 24, drawn with a line
     key: ClassVar[str] = ""
-    through_water: ClassVar[bool] = False  # whether the pointer reaches what is under the surface
-    cursor_radius: ClassVar[bool] = True  # whether fronts show `radius` around the pointer
-    tilts: ClassVar[bool] = False  # whether it leans the tank, which pictures then show
-    takes: ClassVar[str] = ""  # solid or body, where a click takes hold of one: fronts light it up
+    through_water: ClassVar[bool] = False  # whether the pointer's ray ignores the water
+    cursor_radius: ClassVar[bool] = True  # whether `radius` is shown around the pointer
+    tilts: ClassVar[bool] = False  # whether it tilts the tank, which pictures then show
+    takes: ClassVar[str] = ""  # "solid" or "body": what a click would take, which is then highlighted
 
     @property
     def lasting(self) -> bool:
-        """Whether this goes on when the pointer is lifted."""
+        """Whether this runs on when the pointer is lifted."""
         return bool(getattr(self, "keep", False))
 
     def begin(self, hand: Hand) -> None:
-        """The pointer goes down, perhaps while time stands still."""
+        """Handle the pointer going down, perhaps while paused."""
 
     def move(self, hand: Hand) -> None:
-        """The pointer has moved, perhaps while time stands still."""
+        """Handle a movement of the pointer, perhaps while paused."""
 
     def hold(self, hand: Hand, duration: float) -> None:
-        """A frame of `duration` [s] is about to be computed."""
+        """Act on the next frame, of `duration` [s]."""
 
     def end(self, hand: Hand) -> None:
-        """The pointer goes up, or the world is about to be another."""
+        """Handle the pointer going up, or the end of this world."""
 
 
 def describe(tool: type[Tool]) -> dict[str, Any]:
-    """Return a tool and its options as plain data, for fronts to draw."""
+    """Return a tool and its options as plain data, for the controls of a page."""
     options = []
     for name, field in tool.model_fields.items():
         low = next((m.ge for m in field.metadata if hasattr(m, "ge")), None)

@@ -1,6 +1,6 @@
-"""Wave maker: a piston at the end of the tank, regular or random.
+"""Wave maker: a piston at the end of the tank, with regular or random waves.
 
-The stroke S (1 - cos wt) begins at rest. Random waves are a sum of eight sines with frequencies around the given one
+The stroke S (1 - cos wt) starts at rest. Random waves are a sum of eight sines with frequencies around the given one
 and phases by the golden ratio, the same in every run.
 """
 
@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import PrivateAttr
 from typing_extensions import override
 
-from wavetank.session.tools.carry import TOOL_SOLID
 from wavetank.session.tools.hand import Hand
+from wavetank.session.tools.solids import TOOL_SOLID
 from wavetank.session.tools.tool import Tool, option
 from wavetank.solids.shapes import Box
 
@@ -19,7 +19,7 @@ GOLDEN = 0.6180339887
 
 
 class Waves(Tool):
-    """A piston that makes waves."""
+    """Make waves with a piston."""
 
     name: ClassVar[str] = "waves"
     label: ClassVar[str] = "Waves"
@@ -28,10 +28,10 @@ class Waves(Tool):
     key: ClassVar[str] = "w"
     cursor_radius: ClassVar[bool] = False
 
-    stroke: float = option(0.04, 0.005, 0.15, "L", "Half of the piston's way.")
-    frequency: float = option(0.45, 0.05, 2.0, "√(g/L)", "Strokes in the time that suits the tank.")
+    stroke: float = option(0.04, 0.005, 0.15, "L", "Half of the piston's stroke.")
+    frequency: float = option(0.45, 0.05, 2.0, "√(g/L)", "Frequency, in units of the tank's own.")
     kind: Literal["sine", "random"] = option("sine", None, None, "", "Regular or random waves.")
-    keep: bool = option(True, None, None, "", "Goes on when you let go.")
+    keep: bool = option(True, None, None, "", "Keeps running when you let go.")
     _held: str = PrivateAttr("")
     _time: float = PrivateAttr(0.0)
     _side: float = PrivateAttr(1.0)

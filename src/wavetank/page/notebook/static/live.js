@@ -1,4 +1,4 @@
-// The water in a cell: pictures and status come over the kernel's channel, hands and controls go back on it.
+// The view in a cell: pictures and status come over the kernel's channel, pointers and controls go back.
 
 const words = (name) => { const text = name.replaceAll("_", " ").replaceAll("-", " "); return text[0].toUpperCase() + text.slice(1); };
 const pretty = (value, digits = 3) => (Number.isFinite(value) ? Number(value.toPrecision(Math.abs(value) >= 1e4 ? 6 : digits)).toLocaleString("en", { maximumFractionDigits: 8 }) : "");
@@ -21,7 +21,7 @@ function drawn(tag, attributes, ...children) {
 
 const icon = (path) => drawn("svg", { viewBox: "0 0 24 24", "aria-hidden": "true" }, drawn("path", { d: path }));
 
-/** One control from a declaration; `change(value)` hears of it, `show(value)` puts it where the world has it. */
+/** Make a control from a description; `change(value)` is called when it is changed, `show(value)` sets it. */
 function control(about, value, change, units = {}) {
   const label = words(about.name), title = about.sentence ?? "";
   if (about.choices?.length || typeof value === "boolean") {
@@ -39,7 +39,7 @@ function control(about, value, change, units = {}) {
   const whole = about.whole ?? Number.isInteger(about.default), low = about.low ?? 0;
   const high = Math.min(about.high ?? Infinity, Math.max(1, 4 * Math.abs(about.default ?? 1), 2 * Math.abs(value)));
   const said = make("output", {}), range = make("input", { type: "range", min: low, max: high, step: whole ? 1 : (high - low) / 200, "aria-label": label });
-  const [factor, unit] = units[about.unit] ?? [1, about.unit ?? ""]; // shares of the world are said in metres and newtons
+  const [factor, unit] = units[about.unit] ?? [1, about.unit ?? ""]; // units relative to the world's size, in metres and newtons
   const show = (now) => {
     if (!range.matches(":active")) range.value = now;
     said.textContent = `${pretty(factor * Number(now))} ${unit}`;
@@ -59,15 +59,15 @@ function render({ model, el }) {
   const stage = make("div", { className: "stage" }, canvas, aim, legend);
   const bar = make("div", { className: "bar" }), tools = make("div", { className: "tools", role: "toolbar", "aria-label": "Tools" });
   const card = make("div", { className: "card" }), parameters = make("div", { className: "card" }), notes = make("div", { className: "notes", role: "status" });
-  const more = make("details", {}, make("summary", { textContent: "Parameters and looks" }), parameters);
+  const more = make("details", {}, make("summary", { textContent: "Parameters and view" }), parameters);
   const root = make("div", { className: "wavetank-live", "data-lm-suppress-shortcuts": "true", hidden: true }, stage, bar, tools, card, more, notes);
   el.append(root);
 
   let about = null, tool = null, now = {}, world = {}, poster = null, sliders = new Map(), chosen = new Map(), parameter = new Map();
 
-  // --- the picture that the notebook keeps stands above, until there is a live one ---
+  // --- the picture saved in the notebook is hidden while there is a live one ---
   function hidePoster() {
-    // It is the output before this one; what is outside of the cell's outputs is not looked at.
+    // It is the output before this one, within the outputs of the cell.
     for (let node = el, up = 0; node && up < 8 && !node.matches(".jp-OutputArea, .jp-Cell, .output_container"); node = node.parentElement, up += 1) {
       const before = node.previousElementSibling;
       if (before?.querySelector("img") && !before.querySelector("canvas")) { poster = before; break; }
@@ -88,10 +88,10 @@ function render({ model, el }) {
   const pause = make("button", { onclick: () => send({ do: "pause", on: !now.paused }) });
   const step = make("button", { title: "One frame (.)", "aria-label": "One frame", onclick: () => send({ do: "step" }) }, icon("M6 5l8 7-8 7zM17 5v14"));
   const back = make("button", { title: "One second back (,)", "aria-label": "One second back", onclick: () => send({ do: "rewind", time: Math.max(0, now.time - 1) }) }, icon("M18 5l-8 7 8 7zM7 5v14"));
-  const again = make("button", { title: "Start again (R)", "aria-label": "Start again", onclick: () => send({ do: "reset" }) }, icon("M5 12a7 7 0 1 0 2.500-5.400M5 4v4h4"));
-  const undo = make("button", { title: "Undo the last start (Z)", "aria-label": "Undo", hidden: true, onclick: () => send({ do: "undo" }) }, icon("M8 5L4 9l4 4M4 9h9a6 6 0 0 1 0 12h-3"));
-  const home = make("button", { title: "See all (H)", "aria-label": "See all", onclick: () => send({ do: "home" }) }, icon("M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5M9 12h6M12 9v6"));
-  const pace = make("select", { title: "Pace of time", "aria-label": "Pace of time" });
+  const again = make("button", { title: "Restart (R)", "aria-label": "Restart", onclick: () => send({ do: "reset" }) }, icon("M5 12a7 7 0 1 0 2.500-5.400M5 4v4h4"));
+  const undo = make("button", { title: "Undo the last restart (Z)", "aria-label": "Undo", hidden: true, onclick: () => send({ do: "undo" }) }, icon("M8 5L4 9l4 4M4 9h9a6 6 0 0 1 0 12h-3"));
+  const home = make("button", { title: "Reset the view (H)", "aria-label": "Reset the view", onclick: () => send({ do: "home" }) }, icon("M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5M9 12h6M12 9v6"));
+  const pace = make("select", { title: "Speed of time", "aria-label": "Speed of time" });
   const said = make("span", { className: "said" });
   pace.onchange = () => send({ do: "speed", factor: Number(pace.value) });
   bar.append(back, pause, step, again, undo, home, pace, said);
@@ -112,7 +112,7 @@ function render({ model, el }) {
       showWorld();
       if (more.open) send({ do: "fit" });
     }
-    // Under a pointer that rests the water moves.
+    // The water moves under a resting pointer.
     if (hovered && !status.paused && performance.now() - answered > SELDOM) ask();
   }
 
@@ -131,7 +131,7 @@ function render({ model, el }) {
     }) : [make("span", { textContent: told.title }), strip, make("span", { className: "ends" }, ...told.ticks.map((value) => make("b", { textContent: pretty(value) })))]));
   }
 
-  // --- how fine the water is: what the machine can be expected to make of it ---
+  // --- number of particles, and the pace to expect on this machine ---
   const fine = make("div", { className: "fine" });
   more.ontoggle = () => { if (more.open) send({ do: "fit" }); };
   function showFit({ here }) {
@@ -148,7 +148,7 @@ function render({ model, el }) {
     range.oninput = show;
     range.onchange = () => send({ do: "reset", parameters: { spacing: here[range.value].spacing } });
     show();
-    fine.append(make("label", { title: "Starts again with as many particles." }, make("span", { textContent: "Detail" }), range, said));
+    fine.append(make("label", { title: "Restarts with that many particles." }, make("span", { textContent: "Detail" }), range, said));
   }
 
   function note(text) {
@@ -157,7 +157,7 @@ function render({ model, el }) {
     setTimeout(() => line.remove(), 8000);
   }
 
-  // --- tools, parameters, looks: drawn from what the kernel declares ---
+  // --- tools, parameters, view: made from the kernel's descriptions ---
   function choose(name) {
     tool = about.tools.find((other) => other.name === name);
     const options = chosen.get(name) ?? {};
@@ -180,7 +180,7 @@ function render({ model, el }) {
     const live = hello.parameters.filter((each) => each.live && (each.choices.length || typeof each.default !== "object"));
     for (const each of live) parameter.set(each.name, control(each, hello.values[each.name], (value) => send({ do: "set", name: each.name, value }), hello.units));
     const looks = [["view", hello.views, hello.view], ["color_by", hello.colorings, hello.color_by]].map(([name, choices, value]) =>
-      control({ name, choices, sentence: name === "view" ? "What is drawn." : "What particles are coloured by." }, value, (chosen) => send({ do: "view", [name]: chosen })).element);
+      control({ name, choices, sentence: name === "view" ? "What is drawn." : "Quantity that colours the particles." }, value, (chosen) => send({ do: "view", [name]: chosen })).element);
     parameters.replaceChildren(fine, ...looks, ...[...parameter.values()].map(({ element }) => element));
     if (!tool) choose("push"); else choose(tool.name);
     showWorld();
@@ -197,8 +197,8 @@ function render({ model, el }) {
   const watcher = new ResizeObserver(() => { clearTimeout(resizing); resizing = setTimeout(tellSize, 150); });
   watcher.observe(canvas);
 
-  // --- where the hand would act: a ring on the surface that the pointer's ray meets, a line to the floor ---
-  const BETWEEN = 80, SELDOM = 600; // ms between two questions while the pointer moves, and while it rests
+  // --- preview of the tool: a ring on the surface under the pointer, a line to the floor ---
+  const BETWEEN = 80, SELDOM = 600; // ms between two requests while the pointer moves, and while it rests
   let hovered = null, asked = 0, answered = 0, told = "";
   const question = () => (hovered ? `${hovered.x} ${hovered.y} ${tool?.name}` : "");
   function hover(at) {
@@ -230,7 +230,7 @@ function render({ model, el }) {
     if (question() !== told) setTimeout(ask, BETWEEN);
   }
 
-  // --- hands ---
+  // --- pointers ---
   const pointers = new Map();
   let tooling = null, pinch = 0, next = null, beat = 0;
   const where = (event) => {
@@ -267,7 +267,7 @@ function render({ model, el }) {
     const [dx, dy] = [at.x - pointer.x, at.y - pointer.y];
     Object.assign(pointer, at);
     if (event.pointerId === tooling) {
-      // At most thirty places a second go over the channel, and the last one always does.
+      // At most thirty positions a second are sent, and always the last one.
       if (!next) beat = setTimeout(() => { if (next && tooling !== null) send({ do: "point-move", x: next.x, y: next.y }); next = null; }, 33);
       next = at;
     } else if (pointer.mode === "turn") turn(dx, dy, at.shape);
