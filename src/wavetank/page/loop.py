@@ -129,7 +129,9 @@ class Loop:
         size = self.audience.size
         if size is not None and size != self.painter.asked:
             self.painter.want(*size)
-        if self.audience.has_viewers:
+        if self.audience.has_new_viewer or self._painted < 0:  # before the first frame, whose kernels take longest
+            self._paint(time.perf_counter())
+        if self.audience.has_viewers and not (self._painted >= 0 and self.session.compile_ahead()):
             self.session.turn()
         else:  # so that the first viewer sees the start
             self.session.drain()

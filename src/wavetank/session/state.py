@@ -18,6 +18,7 @@ from wavetank.session.history import History
 from wavetank.session.pace import Pace
 from wavetank.session.tools import TOOL_NAMES, Hand, Tool
 from wavetank.session.tools.solids import TOOL_SOLID, move_towards
+from wavetank.session.warm_up import launches
 from wavetank.simulation.cost import cost_of
 from wavetank.simulation.simulation import Simulation
 from wavetank.simulation.snapshot import Snapshot
@@ -96,7 +97,6 @@ class SessionState:
         sim = Simulation(scene, self.arch)
         if scene.emitters:
             sim.scene.assign("most_particles", min(scene.most_particles or self.most_particles, self.most_particles))
-        sim.load_kernels()
         self._store_for_undo(cost.bytes)
         give_back()
         if self.own is not None:
@@ -104,7 +104,7 @@ class SessionState:
         self._enter(scene, self._adopted(sim))
 
     def _enter(self, scene: Scene, sim: Simulation) -> None:
-        sim.load_kernels()
+        self.warm_up = launches(sim)
         game = Game(scene.goal, sim.frame(measured=False)) if scene.goal else None
         self.scene, self.sim, self.game = scene, sim, game
         self.hands, self.running, self.moving = {}, {}, {}
@@ -143,6 +143,7 @@ class SessionState:
         self.chosen_camera = then.camera
         self.highlighted, self.untilted_gravity, self.steps_left = "", None, 0
         self.paused, self.awaits_touch = then.paused, then.awaits_touch
+        self.warm_up = launches(self.sim)
 
     def _current_world(self) -> World:
         sim = self.sim if self.own is None else copy.copy(self.sim)  # the given object becomes the other world
@@ -152,6 +153,13 @@ class SessionState:
         """Let a level that has just started wait for the first touch, if `starts_on_touch`."""
         self.awaits_touch = self.starts_on_touch and self.game is not None and not self.sim.frame_number
         self.paused = self.paused or self.awaits_touch
+
+    def compile_ahead(self) -> bool:
+        """Compile a few kernels that tools may need; return whether there were any left."""
+        if self.warm_up:
+            self.warm_up.pop(0)()
+            return True
+        return False
 
     def note(self, sentence: str) -> None:
         """Add a message to viewers; those who show `notes` empty it."""
