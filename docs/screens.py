@@ -15,7 +15,7 @@ from PIL import Image
 
 import wavetank as wt
 from benchmarks.browser.chromium import Browser
-from wavetank.page.server import WebFront
+from wavetank.page.server import PageServer
 from wavetank.session import commands as do
 from wavetank.session.session import Session
 
@@ -29,7 +29,7 @@ def page(scene: wt.Scene, size: tuple[int, int]) -> Iterator[tuple[Browser, Sess
     """Open the page on a scene that waits."""
     session = Session(scene)
     session.submit(do.Pause(on=True))
-    front = WebFront(session, port=0)
+    front = PageServer(session, port=0)
     front.start()
     thread = threading.Thread(target=front.run)
     thread.start()

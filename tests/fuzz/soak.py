@@ -17,7 +17,7 @@ from pathlib import Path
 
 import wavetank as wt
 from wavetank.formats.npz import write_npz
-from wavetank.page.server import WebFront
+from wavetank.page.server import PageServer
 from wavetank.scene.scene import bundled_levels, bundled_scenes
 from wavetank.session.session import Session
 
@@ -60,7 +60,7 @@ def main() -> int:
         name for name in (*bundled_scenes(), *bundled_levels()) if name.endswith("-2d") or name in bundled_levels()
     ]
     session = Session(wt.Scene.load("double-dam-2d"), most_particles=20_000)
-    front = WebFront(session, port=0)
+    front = PageServer(session, port=0)
     front.start()
     thread = threading.Thread(target=front.run)
     thread.start()

@@ -6,7 +6,7 @@ import pytest
 from watcher import Watcher
 
 import wavetank as wt
-from wavetank.page.server import WebFront
+from wavetank.page.server import PageServer
 from wavetank.session.session import Session
 
 
@@ -15,7 +15,7 @@ class Playing:
 
     def __init__(self, scene: wt.Scene) -> None:
         self.session = Session(scene)
-        self.front = WebFront(self.session, port=0)
+        self.front = PageServer(self.session, port=0)
         self.front.start()
         self.thread = threading.Thread(target=self.front.run)
         self.thread.start()

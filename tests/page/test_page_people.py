@@ -363,14 +363,14 @@ def test_a_colour_switches_the_view_and_has_a_legend_and_a_slice_moves(open_page
 
 def test_a_page_of_another_run_says_so_and_stops_asking(open_page, browser):  # noqa: F811
     """Another server on the same port: with another token the page says what to do; with the same one it goes on."""
-    from wavetank.page.server import WebFront
+    from wavetank.page.server import PageServer
     from wavetank.session.session import Session
 
     world = open_page(BASIN)
     port = world.front.port
     world.front.stop()
     world.thread.join(30)
-    other = WebFront(Session(BASIN), port=port)  # at once: the port of a run that has ended is free
+    other = PageServer(Session(BASIN), port=port)  # at once: the port of a run that has ended is free
     other.start()
     try:
         browser.wait_for("document.querySelector('#veil-text').textContent.includes('restarted')", 30)

@@ -43,11 +43,11 @@ class Hud:
             self._save_score(game)
         levels = bundled_levels()
         place = levels.index(self._level) + 1 if self._level in levels else 0
-        told = game.describe()
-        for aim in told["aims"]:
+        described = game.describe()
+        for aim in described["aims"]:
             aim["label"] = _label(aim)
         return {
-            **told,
+            **described,
             "level": self._level,
             "next": levels[place] if 0 < place < len(levels) else "",
             "heading": f"Level {place} of {len(levels)}" if place else "Level",
@@ -108,15 +108,15 @@ class Hud:
                 way *= min(1.0, LONGEST_ARROW * longest / max(float(np.linalg.norm(way)), 1e-30))
                 places = self._in_picture(np.array([start, start + way]), size)
                 if places and float(np.linalg.norm(mean)) > SMALLEST_FORCE * weight:
-                    told = f"{three(float(np.linalg.norm(mean)))} N"
-                    shown.append({"corners": [], "outline": places, "mark": mark, "label": told})
+                    label = f"{three(float(np.linalg.norm(mean)))} N"
+                    shown.append({"corners": [], "outline": places, "mark": mark, "label": label})
         for name, power in sim.joints.powers.items():
             if math.isfinite(power):
                 (mean,) = self._mean((name, "power"), np.array([power]))
                 at = sim.joints[name].place
-                told = f"{name}: {three(float(mean))} W"
+                label = f"{name}: {three(float(mean))} W"
                 shown.append(
-                    {"corners": [], "outline": self._in_picture(at[None], size), "mark": "power", "label": told}
+                    {"corners": [], "outline": self._in_picture(at[None], size), "mark": "power", "label": label}
                 )
         return [row for row in shown if row["outline"]]
 

@@ -109,24 +109,24 @@ def play_in_browser(
     token: str = "",
 ) -> None:
     """Serve the page until Ctrl-C, and print its address with `token`, by default a random one."""
-    from wavetank.page.server import PORT, WebFront
+    from wavetank.page.server import PORT, PageServer
 
     check_folder(record)
     session = Session(scene, arch, most_particles=most)
-    front = WebFront(session, host, port, _checked_token(token))
-    with _stopped_by_signal(front.stop):
-        front.start()
+    server = PageServer(session, host, port, _checked_token(token))
+    with _stopped_by_signal(server.stop):
+        server.start()
         where = "" if is_loopback(host) else " (anyone with this link can take control; not encrypted)"
-        if port is None and front.port != PORT:
-            print(f"port {PORT} is in use; using {front.port} (--port chooses another)", flush=True)
-        print(f"wavetank plays at {front.url}{where} (Ctrl-C stops it)", flush=True)
+        if port is None and server.port != PORT:
+            print(f"port {PORT} is in use; using {server.port} (--port chooses another)", flush=True)
+        print(f"wavetank plays at {server.url}{where} (Ctrl-C stops it)", flush=True)
         if browser:
-            threading.Thread(target=webbrowser.open, args=(front.url,), daemon=True).start()
-        with recorded(record, session, scene, front.call):
+            threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
+        with recorded(record, session, scene, server.call):
             try:
-                front.run()
+                server.run()
             finally:
-                front.stop()
+                server.stop()
 
 
 def _checked_token(token: str) -> str | None:

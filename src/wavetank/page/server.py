@@ -60,7 +60,7 @@ class Protocol(H11Protocol):
         self.transport.close()
 
 
-class WebFront:
+class PageServer:
     """Serves one session."""
 
     def __init__(

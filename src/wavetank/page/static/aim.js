@@ -8,7 +8,7 @@ const drawing = find("aim"), under = svg("polyline", { class: "under" }), ring =
 drawing.append(drop, foot, under, ring);
 
 const BETWEEN = 50, SELDOM = 600; // ms between two requests while the pointer moves, and while it rests: each takes time from the water
-let place = null, asked = 0, answered = 0, told = "";
+let place = null, asked = 0, answered = 0, shown = "";
 
 /** Say where the pointer is, as shares of the picture; null where it is not over it. */
 export function hover(at) {
@@ -22,11 +22,11 @@ function ask() {
   const key = place ? `${place.x} ${place.y} ${hand.tool.name} ${JSON.stringify(hand.options)}` : "";
   if (!place || hand.tool.name === "look") {
     show(null);
-    if (told) send({ do: "hover" });
-    told = "";
+    if (shown) send({ do: "hover" });
+    shown = "";
     return;
   }
-  told = key;
+  shown = key;
   asked = performance.now();
   send({ do: "hover", x: place.x, y: place.y, tool: hand.tool.name, reach: reach() });
 }
@@ -59,7 +59,7 @@ on("aim", (aim) => {
   show(aim);
   const key = `${place.x} ${place.y} ${hand.tool.name} ${JSON.stringify(hand.options)}`;
   answered = performance.now();
-  if (key !== told) setTimeout(ask, BETWEEN);
+  if (key !== shown) setTimeout(ask, BETWEEN);
 });
 // The water moves under a resting pointer.
 on("status", ({ paused }) => { if (place && !paused && performance.now() - answered > SELDOM) ask(); });

@@ -110,7 +110,7 @@ function showBanner() {
   if (document.activeElement === document.body || document.activeElement === find("picture")) (next ?? retry).focus({ preventScroll: true });
 }
 
-on("regions", (told) => { regions = told.regions; drawRegions(); });
+on("regions", (message) => { regions = message.regions; drawRegions(); });
 on("status", (status) => {
   ({ game, waits } = status);
   document.body.classList.toggle("playing-level", Boolean(game));

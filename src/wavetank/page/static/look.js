@@ -66,17 +66,17 @@ function light() {
 
 /** What the colours mean, over the picture. */
 function legend() {
-  const box = find("legend"), told = about.legend;
-  box.hidden = !told;
-  if (!told) return;
-  const bar = make("canvas", { width: told.colors.length, height: 1 }), g = bar.getContext("2d");
-  told.colors.forEach((color, k) => { g.fillStyle = color; g.fillRect(k, 0, 1, 1); });
-  box.replaceChildren(...(told.names ? told.names.map(([name, color]) => {
+  const box = find("legend"), shown = about.legend;
+  box.hidden = !shown;
+  if (!shown) return;
+  const bar = make("canvas", { width: shown.colors.length, height: 1 }), g = bar.getContext("2d");
+  shown.colors.forEach((color, k) => { g.fillStyle = color; g.fillRect(k, 0, 1, 1); });
+  box.replaceChildren(...(shown.names ? shown.names.map(([name, color]) => {
     const patch = make("i");
     patch.style.background = color;
     return make("span", { className: "key" }, patch, name);
-  }) : [make("span", { textContent: told.title }), bar,
-    make("span", { className: "ends" }, ...told.ticks.map((value) => make("b", { textContent: pretty(value) })))]));
+  }) : [make("span", { textContent: shown.title }), bar,
+    make("span", { className: "ends" }, ...shown.ticks.map((value) => make("b", { textContent: pretty(value) })))]));
 }
 
 function plot(key, value, text) {

@@ -119,7 +119,7 @@ async function open(file) {
 let known = [], sizes = {}, count = 0, last = 0;
 const write = () => { for (const scene of known) if (sizes[scene.name]) sizes[scene.name].textContent = size(scene); };
 on("hello", build);
-on("fit", (told) => { fits = told.scenes; write(); detail(told.here); });
+on("fit", (message) => { fits = message.scenes; write(); detail(message.here); });
 on("status", ({ world, scores, game, count: now, time }) => {
   inLevel = Boolean(game); count = now; last = time;
   if (world) { named(world); if (!find("scenes").hidden) send({ do: "fit" }); }

@@ -51,7 +51,7 @@ on("hello", ({ tools: list }) => {
   choose(hand.tool.name === "look" && !chosen.size ? "push" : hand.tool.name);
 });
 
-let told = "", rules = "";
+let shown = "", rules = "";
 on("status", ({ running, game, world }) => {
   if (world) card(hand.tool); // lengths depend on the size of the world
   // A level has its own tools; options that it fixes have no slider.
@@ -62,8 +62,8 @@ on("status", ({ running, game, world }) => {
     for (const [name, button] of buttons) button.hidden = Boolean(allowed) && name !== "look" && !(name in allowed);
     choose(allowed ? Object.keys(allowed)[0] : hand.tool.name);
   }
-  if (running.join() === told) return;
-  told = running.join();
+  if (running.join() === shown) return;
+  shown = running.join();
   for (const [name, button] of buttons) button.classList.toggle("on", running.includes(name));
   find("running").replaceChildren(...running.map((name) =>
     make("button", { textContent: `${words(name)}  ✕`, title: "Stop", "aria-label": `Stop ${name}`, onclick: () => send({ do: "tool-stop", tool: name }) })));

@@ -119,16 +119,16 @@ function render({ model, el }) {
   /** What there is to undo, and what the colours mean. */
   function showWorld() {
     undo.hidden = world.undo === null;
-    const told = world.legend;
-    legend.hidden = !told;
-    if (!told) return;
+    const shown = world.legend;
+    legend.hidden = !shown;
+    if (!shown) return;
     const strip = make("i", { className: "strip" });
-    strip.style.background = `linear-gradient(to right, ${told.colors.join()})`;
-    legend.replaceChildren(...(told.names ? told.names.map(([name, color]) => {
+    strip.style.background = `linear-gradient(to right, ${shown.colors.join()})`;
+    legend.replaceChildren(...(shown.names ? shown.names.map(([name, color]) => {
       const patch = make("i");
       patch.style.background = color;
       return make("span", { className: "key" }, patch, name);
-    }) : [make("span", { textContent: told.title }), strip, make("span", { className: "ends" }, ...told.ticks.map((value) => make("b", { textContent: pretty(value) })))]));
+    }) : [make("span", { textContent: shown.title }), strip, make("span", { className: "ends" }, ...shown.ticks.map((value) => make("b", { textContent: pretty(value) })))]));
   }
 
   // --- number of particles, and the pace to expect on this machine ---
@@ -199,7 +199,7 @@ function render({ model, el }) {
 
   // --- preview of the tool: a ring on the surface under the pointer, a line to the floor ---
   const BETWEEN = 80, SELDOM = 600; // ms between two requests while the pointer moves, and while it rests
-  let hovered = null, asked = 0, answered = 0, told = "";
+  let hovered = null, asked = 0, answered = 0, sent = "";
   const question = () => (hovered ? `${hovered.x} ${hovered.y} ${tool?.name}` : "");
   function hover(at) {
     hovered = at;
@@ -210,11 +210,11 @@ function render({ model, el }) {
     if (performance.now() - asked < 1000) return;
     if (!hovered || !tool || tool.name === "look") {
       showAim({});
-      if (told) send({ do: "hover" });
-      told = "";
+      if (sent) send({ do: "hover" });
+      sent = "";
       return;
     }
-    told = question();
+    sent = question();
     asked = performance.now();
     const value = (name) => chosen.get(tool.name)?.[name] ?? tool.options.find((each) => each.name === name)?.default;
     send({ do: "hover", x: hovered.x, y: hovered.y, tool: tool.name, reach: tool.cursor ? value("radius") ?? (value("width") ?? 0.1) / 2 : 0 });
@@ -227,7 +227,7 @@ function render({ model, el }) {
     answered = performance.now();
     if (!hovered) { ask(); return; }
     showAim(message);
-    if (question() !== told) setTimeout(ask, BETWEEN);
+    if (question() !== sent) setTimeout(ask, BETWEEN);
   }
 
   // --- pointers ---
