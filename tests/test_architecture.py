@@ -183,23 +183,6 @@ TANGLED: set[str] = {
     "view/film/light.py:shine",
     "view/film/march.py:first_water",
     "view/film/paths.py:follow",
-    "view/optics/water_volume.py:through_body",
-    "view/optics/adaptive_sampling.py:even_pixel",
-    "view/optics/sunlight.py:through_clear",
-    "view/passes/backdrop.py:divide",
-    "view/passes/backdrop.py:paint_together",
-    "view/passes/drops.py:walk",
-    "view/passes/ellipsoids.py:fit",
-    "view/passes/flatten.py:blur",
-    "view/passes/foam.py:add_disc",
-    "view/passes/foam.py:blend",
-    "view/passes/foam.py:splat",
-    "view/passes/shutter.py:smear",
-    "view/passes/spheres.py:claim",
-    "view/passes/spheres.py:splat",
-    "view/passes/surface.py:fill_ellipse",
-    "view/passes/thickness.py:add",
-    "view/passes/water.py:lay",
 }
 
 

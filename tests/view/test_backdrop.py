@@ -1,5 +1,7 @@
 """What lies behind the water, in the light that this leaves of the sun."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -31,17 +33,21 @@ def test_moving_water_leaves_no_trace_behind(samples, scene):
 @pytest.mark.parametrize("samples", [1, 2])
 @pytest.mark.parametrize("eye", [0, 1])
 def test_pixels_together_get_what_each_gets_alone(monkeypatch, samples, eye):
-    sim, renderer, paint = (
+    sim, renderer, light = (
         Simulation(Scene.load("obstacle-tank").changed(spacing=0.06)),
         Renderer(*SIZE, samples),
-        backdrop.paint,
+        backdrop.light_backdrop,
     )
     sim.advance(0.5)
     seen = []
     for alone in (False, True):
         with monkeypatch.context() as patch:
             if alone:
-                patch.setattr(backdrop, "paint", lambda *a: paint(*a[:-1], 100 + a[-1] % 100))
+                patch.setattr(
+                    backdrop,
+                    "light_backdrop",
+                    lambda *a: light(*a[:-1], dataclasses.replace(a[-1], lanes=1, rest=True)),
+                )
             renderer._stages.forget()
             renderer.render(sim.frame(), EYES[eye], view="water")
             seen.append(renderer.buffers.water.backdrop.behind.to_numpy())

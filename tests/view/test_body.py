@@ -9,11 +9,10 @@ from wavetank import Box, Camera, Capsule, Scene, Simulation, Sphere, Tank
 from wavetank.device.compiler import download, qd, upload
 from wavetank.solids.distance import SolidSet
 from wavetank.view.lens import Lens, basis, lens_at, ray_direction, vec2, vec3, vec4, view_ray
-from wavetank.view.optics.normals import normal_of, rise_at
+from wavetank.view.optics.normals import normal_of, rise_at, unevenness
 from wavetank.view.optics.rays import OPEN, box
 from wavetank.view.optics.rays import Box as Walls
 from wavetank.view.optics.water_volume import crossed_about, solid_ahead
-from wavetank.view.passes.water import unevenness
 from wavetank.view.renderer import Renderer
 
 D = 0.05

@@ -18,10 +18,14 @@ def both(monkeypatch):
     """Pictures of 2 x 2 samples, as they are, and with every sample shaded and the ray of every pixel followed."""
 
     def pictures(frame, camera=None, **style):
-        renderer, lay, optics_of = Renderer(*SIZE, 2), water.lay, water.optics_of
+        renderer, shade, optics_of = Renderer(*SIZE, 2), water.shade_water, water.optics_of
         shown = renderer.render(frame, camera, view="water", legend=False, **style).astype(int)
         with monkeypatch.context() as patch:
-            patch.setattr(water, "lay", lambda *arguments: lay(*arguments[:-1], arguments[-1] % 100))
+            patch.setattr(
+                water,
+                "shade_water",
+                lambda *known: shade(*known[:-1], dataclasses.replace(known[-1], supersampled=False)),
+            )
             patch.setattr(water, "optics_of", lambda *known: dataclasses.replace(optics_of(*known), apart=0.0))
             resolved = renderer.render(frame, camera, view="water", legend=False, **style).astype(int)
         return shown, resolved

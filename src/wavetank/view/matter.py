@@ -7,6 +7,7 @@ cloudy one one sees as far as its world is wide, about.
 
 import numpy as np
 
+from wavetank.device.compiler import download, shares_memory
 from wavetank.foundation.materials import Material
 from wavetank.simulation.frame import Frame
 from wavetank.view.colormaps import rgb_of, to_linear
@@ -37,3 +38,8 @@ def matter_of(frame: Frame, extent: Extent) -> np.ndarray:
     if not scene.materials:
         table[0, :3] = -1.0
     return table if frame.frozen_count else table[:-1]
+
+
+def may_be_dyed(frame: Frame) -> bool:
+    """Whether any particle may be dyed: True as well where the host would have to wait for the device to know."""
+    return not shares_memory() or bool(download(frame.dye)[: frame.count].any())

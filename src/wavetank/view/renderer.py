@@ -23,6 +23,7 @@ from wavetank.view.glare import add_glare, excess_of
 from wavetank.view.images import Images
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
 from wavetank.view.look import fluid_optics, usual_depth
+from wavetank.view.matter import may_be_dyed
 from wavetank.view.optics.dyes import ICE, lay_ice
 from wavetank.view.optics.ray_interpolation import GROUP
 from wavetank.view.passes import tonemap
@@ -135,6 +136,7 @@ class Renderer:
             tint=tint,
             usual=usual_depth(extent),
             plane=style.plane(extent, frame.scene.tank is not None),
+            dyed=may_be_dyed(frame),
             lit=-1 if style.lit is None else style.lit,
             hasty=style.hasty,
             shutter=float(style.shutter),

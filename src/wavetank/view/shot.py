@@ -29,6 +29,7 @@ class Shot:
     scattering: float  # 1/m: what makes deep water shine
     tint: Any  # numpy f32 [3]: colour of the light that comes back out of deep water
     usual: float  # m: water that gives its colour to what is behind it
+    dyed: bool  # whether any of the water may be dyed
     lit: int  # number of a solid that shines, -1 for none
     hasty: bool  # whether outlines stay rough
     shutter: float  # s: for which what moves is smeared

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.device.compiler import lanes, qd, threads, upload
+from wavetank.device.compiler import download, lanes, qd, shares_memory, threads, upload
 from wavetank.simulation.frame import Frame
 from wavetank.view.buffers import Buffers, Light, new_light
 from wavetank.view.cells import Cells, new_cells
@@ -113,6 +113,10 @@ class WaterBuffers:
                 self.known.clear()
             self.known[key] = kind(*parts)
         return self.known[key]
+
+    def may_have_drops(self, count: int) -> bool:
+        """Whether any of `count` particles may be a drop: True where the host would wait for the device to know."""
+        return not shares_memory() or bool(download(self.ellipsoids.lone)[:count].any())
 
     def drops(self, frame: Frame) -> Drops:
         """Return what is known of a frame's drops, the same object for the same arrays."""

@@ -103,7 +103,7 @@ def behind_drop(
 
 
 @qd.func
-def shine(
+def drop_radiance(
     pixels: Pixels,
     surface: WaterSurface,
     drops: Drops,

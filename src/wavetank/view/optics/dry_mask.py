@@ -14,8 +14,8 @@ from wavetank.view.water_buffers import SunlitWater
 
 
 @qd.kernel(fastcache=True)
-def find_wet(sunlit: SunlitWater, water: qd.types.ndarray()):
-    """Mark the cells where something is read, of `water` along the sun's rays or of caustics, that is not nought."""
+def mark_wet_cells(sunlit: SunlitWater, water: qd.types.ndarray()):
+    """Mark the cells where something is read, of `water` along the sun's rays or of caustics, that is not zero."""
     cells, texels = sunlit.wet.shape[0], sunlit.depth.shape[0]
     wide = (texels + cells - 1) // cells
     for row, column in qd.ndrange(sunlit.wet.shape[0], sunlit.wet.shape[0]):
@@ -29,7 +29,7 @@ def find_wet(sunlit: SunlitWater, water: qd.types.ndarray()):
 
 @qd.func
 def cells_between(lowest, highest, texels, cells):
-    """(first and last column, first and last row) of the cells between two places in texels, as they are noted."""
+    """(first and last column, first and last row) of the cells between two places in texels, packed as above."""
     wide = (texels + cells - 1) // cells
     low, high = qd.max(lowest, 0.0), qd.min(highest, texels - 1.0)
     result = (1 << 29) | 127 | (127 << 14)
@@ -40,7 +40,7 @@ def cells_between(lowest, highest, texels, cells):
 
 
 @qd.func
-def is_dry(wet: qd.template(), known):
+def all_cells_dry(wet: qd.template(), known):
     """Whether all cells are dry between which pixels lie that are `known`; False of others."""
     found = qd.cast(known & (1 << 29) == 0, qd.i32)
     if found == 0:
@@ -51,12 +51,12 @@ def is_dry(wet: qd.template(), known):
 
 
 @qd.func
-def holds_dry(known):
+def drawn_dry(known):
     """Whether pixels show no water's shadow."""
     return (known >> 30) & 1 == 1
 
 
 @qd.func
-def noted(known, dry):
+def with_dryness(known, dry):
     """What is known of pixels that have been painted, in no water's shadow where `dry`."""
     return (known & ~(1 << 30)) | (qd.cast(dry, qd.i32) << 30)

@@ -31,10 +31,9 @@ class Optics:
     tall: qd.i32  # and rows of them
     apart: qd.f32  # computed pixels between the ends of two rays, up to which those between need not be followed
     turn: qd.i32  # columns by which the first group of those is fewer
-    under: qd.i32  # 1 where the eye is in the water
 
 
-def optics_of(shot: Shot, under: int = 0, samples: int = 1, tall: int = 1) -> Optics:
+def optics_of(shot: Shot, samples: int = 1, tall: int = 1) -> Optics:
     """Return what the fluid of a picture does to light."""
     return remembered(
         Optics(
@@ -48,7 +47,6 @@ def optics_of(shot: Shot, under: int = 0, samples: int = 1, tall: int = 1) -> Op
             spacing=shot.extent.spacing,
             disc=DISC[2] * shot.extent.spacing,
             slack=2.0 * shot.radius,
-            under=under,
             samples=samples,
             tall=tall,
             apart=APART * GROUP * samples,

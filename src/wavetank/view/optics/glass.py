@@ -28,8 +28,8 @@ def line_cover(line, depth, slack):
 
 
 @qd.func
-def with_tank(lens: Lens, look: Look, box: Box, origin, direction, depth, line, radiance):
-    """Radiance with panes and lines laid over it."""
+def behind_panes(lens: Lens, look: Look, box: Box, origin, direction, depth, radiance):
+    """Radiance with the panes of the tank laid over it that lie before `depth` [m]; without panes what it was."""
     result = radiance
     if look.glass > 0.0:
         panes = box_interval(origin, direction, box)
@@ -39,5 +39,11 @@ def with_tank(lens: Lens, look: Look, box: Box, origin, direction, depth, line, 
                     result += look.glass * (look.pane - result)
         elif look.glass == 1.0:  # a plane: particles are wider than their distance to the wall
             result = look.horizon
-    cover = look.line_strength * line_cover(line, depth, 1e30)
-    return result + cover * (look.line - result)
+    return result
+
+
+@qd.func
+def with_lines(look: Look, line, radiance):
+    """Radiance with an edge of the tank laid over it, given as in `edge_coverage`."""
+    cover = look.line_strength * line_cover(line, 1e30, 1e30)
+    return radiance + cover * (look.line - radiance)

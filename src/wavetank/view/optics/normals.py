@@ -36,20 +36,20 @@ def normal_of(lens: Lens, row, column, z, rise):
 
 
 @qd.func
-def normal_beside(lens: Lens, row, column, z, limit, depth: qd.template()):
-    """Normal of the surface at about the depth `z` that a neighbouring pixel shows; towards the eye where none does."""
-    best, r, c = limit, row, column
-    for k in qd.static(range(4)):
-        i = qd.min(qd.max(row + qd.static((0, 0, 1, -1)[k]), 0), depth.shape[0] - 1)
-        j = qd.min(qd.max(column + qd.static((1, -1, 0, 0)[k]), 0), depth.shape[1] - 1)
-        off = qd.abs(qd.bit_cast(depth[i, j], qd.f32) - z)
+def neighbour_near_depth(depth: qd.template(), row, column, z, limit):
+    """(row, column, 1) of the neighbouring pixel that shows the surface nearest to the depth `z`, within `limit` [m].
+
+    Where none does the last is 0.
+    """
+    best, result = limit, qd.Vector([row, column, 0])
+    for k in range(4):  # right, left, below, above
+        step = 1 - 2 * (k % 2)
+        r = qd.min(qd.max(row + qd.select(k >= 2, step, 0), 0), depth.shape[0] - 1)
+        c = qd.min(qd.max(column + qd.select(k < 2, step, 0), 0), depth.shape[1] - 1)
+        off = qd.abs(qd.bit_cast(depth[r, c], qd.f32) - z)
         if off < best:
-            best, r, c = off, i, j
-    n = -lens.forward
-    if best < limit:
-        there = qd.bit_cast(depth[r, c], qd.f32)
-        n = normal_of(lens, r, c, there, rise_at(r, c, there, 3.0 * limit, depth))
-    return n
+            best, result = off, qd.Vector([r, c, 1])
+    return result
 
 
 @qd.func

@@ -1,67 +1,96 @@
-"""Rays in a body of water that need not be followed, because they lie between two that were.
+"""Rays through a body of water that need not be traced, because they lie between two that were.
 
-Of every `group` of pixels in a row the last is followed first. Where it shows the same as the last of the group
-before, the pixels between show what lies between: the place in the picture where their rays end is then found without
-a ray, and read by each for itself, so that it is sharp. Elsewhere each is followed by itself, or shares a ray with the
-pixel beside it.
-
-    code          symbol   meaning                                                         unit
-    seen                   radiance at the end of a ray, and its way through the water     1, m
-    above                  radiance and share of a solid that is mirrored where it enters  1
-    place                  (column, row, kind) of what it shows, see `through_body`        px, px, 1
+Of every `group_size` pixels in a row the last is traced first. Where it shows the same as the last of the group before,
+the pixels between show what lies between: the place in the picture where their rays end is then found without a ray,
+and read by each for itself, so that it is sharp. Elsewhere each is traced by itself, or shares a ray with the next
+pixel.
 """
 
 from wavetank.device.compiler import qd
-from wavetank.view.lens import vec2, vec4
+from wavetank.view.lens import vec2, vec3, vec4
 from wavetank.view.optics.bilinear import picture_at
+
+#: A ray that was traced through the water, see `trace_water_volume`, and the surface where it entered.
+TracedRay = qd.types.struct(
+    seen=vec4,  # radiance at its end, and its way through the water [m]; negative where the water is not a body
+    mirrored=vec4,  # radiance and share of a solid that is mirrored where it enters
+    place=vec3,  # (column, row, kind) of what it shows [px]; a kind of 0 is none
+    depth=qd.f32,  # m: of the surface
+    confidence=qd.f32,  # that the water is a body, 0 to 1
+    uneven=qd.f32,  # standard deviation of the normals of the surface
+    column=qd.f32,  # px: where it entered
+    layer=qd.i32,  # of the pixel that the surface is, -1 for none
+    pixel=qd.i32,  # number in the row, -1 for none
+)
+
+#: How the surface shines there: the share of what is behind that it lets through, and what is mirrored and scattered.
+SurfaceShading = qd.types.struct(passed=vec3, added=vec3)
 
 
 @qd.func
-def group():
-    """Pixels of a row of which one is followed where they show the same."""
+def no_ray():
+    """A ray that shows nothing."""
+    return TracedRay(
+        seen=vec4(0.0, 0.0, 0.0, -1.0),
+        mirrored=vec4(0.0, 0.0, 0.0, 0.0),
+        place=vec3(0.0, 0.0, 0.0),
+        depth=-1.0,
+        confidence=0.0,
+        uneven=0.0,
+        column=0.0,
+        layer=-1,
+        pixel=-1,
+    )
+
+
+@qd.func
+def no_shading():
+    """A shading that is not known: a negative share."""
+    return SurfaceShading(passed=vec3(-1.0, 0.0, 0.0), added=vec3(0.0, 0.0, 0.0))
+
+
+@qd.func
+def group_size():
+    """Pixels of a row of which one is traced where they show the same."""
     return 4
 
 
-GROUP = group.fn()
+GROUP = group_size.fn()
 APART = 6.0  # groups of pixels: between rays that end farther from each other nothing is taken
 
 
 @qd.func
-def alike(seen, above, place, other_seen, other_above, other_place, apart):
+def rays_agree(first, last, apart):
     """Whether what two rays show has what is between them in between.
 
     So it is where neither has met a body, where they show places of one kind that are less than `apart` [px], or nearly
-    the same light and not two places of different kinds: at their border pixels would show one and the other by turns.
-    Nothing is alike where `apart` is 0.
+    the same light and not two places of different kinds: at their border pixels would show one and the other in turn.
+    Nothing agrees where `apart` is 0.
     """
-    result = seen[3] < 0.0 and other_seen[3] < 0.0
-    if seen[3] >= 0.0 and other_seen[3] >= 0.0:
-        off = qd.max(qd.abs(place[0] - other_place[0]), qd.abs(place[1] - other_place[1]))
-        result = place[2] > 0.0 and place[2] == other_place[2] and off < apart
-        if not result and qd.min(place[2], other_place[2]) <= 0.0:
-            away = qd.abs(other_seen - seen)
+    result = first.seen[3] < 0.0 and last.seen[3] < 0.0
+    if first.seen[3] >= 0.0 and last.seen[3] >= 0.0:
+        off = qd.max(qd.abs(first.place[0] - last.place[0]), qd.abs(first.place[1] - last.place[1]))
+        result = first.place[2] > 0.0 and first.place[2] == last.place[2] and off < apart
+        if not result and qd.min(first.place[2], last.place[2]) <= 0.0:
+            away = qd.abs(last.seen - first.seen)
             result = qd.max(away[0], away[1], away[2]) < 0.05
-    step = qd.abs(other_above - above)
+    step = qd.abs(last.mirrored - first.mirrored)
     return apart > 0.0 and result and qd.max(step[0], step[1], step[2], step[3]) < 0.05
 
 
 @qd.func
-def shaded_alike(share, added, other_share, other_added):
-    """Whether the surface between two pixels shines as what lies between them.
-
-    Of each it is told which share of what is behind it lets through, negative where that is not known, and what is
-    mirrored and scattered on top. Both may be up to 0.15 apart.
-    """
-    apart = qd.max(qd.abs(other_share - share).max(), qd.abs(other_added - added).max())
-    return qd.min(share[0], other_share[0]) >= 0.0 and apart < 0.15
+def shadings_agree(first, last):
+    """Whether both shadings are known, and up to 0.15 apart."""
+    apart = qd.max(qd.abs(last.passed - first.passed).max(), qd.abs(last.added - first.added).max())
+    return qd.min(first.passed[0], last.passed[0]) >= 0.0 and apart < 0.15
 
 
 @qd.func
-def seen_between(picture: qd.template(), share, seen, place, other_seen, other_place):
-    """(radiance, way) of a ray between two, by its share of the way from the first to the other."""
-    result = seen + share * (other_seen - seen)
-    if place[2] > 0.0 and place[2] == other_place[2]:
-        spot = place + share * (other_place - place)
+def radiance_between(picture: qd.template(), first, last, share):
+    """(radiance, way) of a ray between two, at a share of the way from the first to the last."""
+    result = first.seen + share * (last.seen - first.seen)
+    if first.place[2] > 0.0 and first.place[2] == last.place[2]:
+        spot = first.place + share * (last.place - first.place)
         shown = picture_at(picture, vec2(spot[0], spot[1]))
         result = vec4(shown.x, shown.y, shown.z, result[3])
     return result

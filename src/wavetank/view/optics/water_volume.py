@@ -1,4 +1,4 @@
-"""A tank as a body of water: the bent ray from where it enters to where it leaves, or meets the floor.
+"""The water in a tank as a volume: the bent ray from where it enters to where it leaves, or meets the floor.
 
 Between flat panes the way of a ray has a closed form: it ends at the nearest of them, of the floor and of the surface.
 Seen from within, panes and surface mirror totally what meets them at more than 48.6 degrees from their normal, which is
@@ -72,7 +72,7 @@ def normal_above(sun: Lens, first: qd.template(), at, spacing):
     """Normal of the surface at the point `at` on it, out of the water, between four texels of the sun's map."""
     place = to_pixel(sun, to_view(sun, at)) - 0.5
     n = 1e-6 * -sun.forward
-    for k in qd.static(range(4)):
+    for k in range(4):  # one copy of the code to compile
         row = qd.min(qd.max(qd.cast(qd.floor(place.y), qd.i32) + k // 2, 0), first.shape[0] - 1)
         column = qd.min(qd.max(qd.cast(qd.floor(place.x), qd.i32) + k % 2, 0), first.shape[1] - 1)
         z = qd.bit_cast(first[row, column], qd.f32)
@@ -105,9 +105,9 @@ def about_depth(sun: Lens, first: qd.template(), walls: Box, at, spacing):
 
 
 @qd.func
-def wholeness(sun: Lens, first: qd.template(), inside: Inside, optics: Optics, at, bent):
+def volume_confidence(sun: Lens, first: qd.template(), inside: Inside, optics: Optics, at, bent):
     """How much of a body the water is, 0 to 1, that a `bent` ray has entered at `at`, two spacings farther; and how
-    much of one it is where its surface is calm, see `calm`.
+    much of one it is where its surface is calm, see `calmness`.
 
     Broken water leaves air in the sun's way. It is 0 where there is none. A block that ends before the tank does
     leaves air there as well: below a calm surface no more is asked for than eight spacings of water.
@@ -139,7 +139,7 @@ def wholeness(sun: Lens, first: qd.template(), inside: Inside, optics: Optics, a
 
 
 @qd.func
-def calm(uneven):
+def calmness(uneven):
     """How calm a surface is, 0 to 1, whose normals have the standard deviation `uneven`."""
     return 1.0 - smoothstep((uneven - 0.1) / 0.3)
 
@@ -254,8 +254,47 @@ def surface_before(sun: Lens, first: qd.template(), walls: Box, p, ahead, far, a
     return result
 
 
+#: A ray on its way through the water and out of it.
+Path = qd.types.struct(
+    p=vec3,  # m: where its next straight piece begins
+    ahead=vec3,  # unit: its direction
+    outside=qd.i32,  # 1 where that piece is outside, after it has left the water
+    above=qd.i32,  # 1 where that piece is outside, of the ray that was mirrored where the first one entered
+    past=qd.i32,  # 1 where the piece is followed again, past a solid that has a share of it
+    bounces=qd.i32,  # pieces in the water so far
+    done=qd.i32,  # 1 where it shows something
+    shown=vec3,  # radiance of that
+    way=qd.f32,  # m: through the water
+    waits=qd.i32,  # 1 where what is mirrored at the place that the ray has left is still to be followed:
+    turned=vec3,  # m: from there
+    again=vec3,  # unit: in this direction
+    share=qd.f32,  # share of the light that comes from there, or from past a solid
+    left=vec4,  # radiance and way of the rest
+    mirrored=vec4,  # radiance and share of a solid above the water
+    place=vec3,  # (column, row, kind) of what it shows
+)
+
+#: A straight piece of a ray, and what it ends at.
+Piece = qd.types.struct(
+    length=qd.f32,  # m
+    normal=vec3,  # of the wall or the surface that it ends at, out of the water
+    hit=vec4,  # normal of a solid, and the way [m] to it
+    solid=qd.i32,  # number of that solid
+    cover=qd.f32,  # share of it that the solid has
+)
+
+#: What a piece shows at its end: `usual`, or what the picture shows at a point.
+Ending = qd.types.struct(
+    usual=vec3,  # radiance
+    at=vec3,  # m
+    in_picture=qd.i32,  # 1 where the picture may show the point
+    near=qd.f32,  # m: within which depth of it the picture has to show a solid; 0 for anything
+    goes_on=qd.i32,  # 1 where the ray does not end there
+)
+
+
 @qd.func
-def through_body(
+def trace_water_volume(
     depth: qd.template(),
     picture: qd.template(),
     first: qd.template(),
@@ -267,143 +306,225 @@ def through_body(
     at,
     bent,
     mirrored,
-    whole,
+    confidence,
     uneven,
-    solid: qd.template(),
+    solids: qd.template(),
 ):
     """(radiance at its end, way through the water) of a ray that has entered the water of a tank at `at`, and
     (radiance, share) of the solid that the ray which is `mirrored` there meets, and (column, row, kind) of the place
-    of the picture that is all it shows; where rays beside it have the same kind, their places lie between. A kind of 0
-    is none.
+    of the picture that is all it shows; where neighbouring rays have the same kind, their places lie between. A kind of
+    0 is none.
 
-    The way is negative where the water is no body, by `wholeness`; nothing is found then but what is mirrored; nothing
-    is where `mirrored` is nought. The standard deviation of the normals where it entered is `uneven`: rays that enter
-    around it spread about as much.
+    The way is negative where the water is not a body, by its `confidence`; nothing is found then but what is mirrored;
+    nothing is where `mirrored` is zero. The standard deviation of the normals where it entered is `uneven`: rays that
+    enter around it spread about as much.
 
     All that a straight piece may meet, and all that it may show, is asked for in one place: compilers copy each
     function to wherever it is called, and the time that they take grows faster than what they get.
     """
-    shown, total, seen_above = vec3(0.0, 0.0, 0.0), 0.0, vec4(0.0, 0.0, 0.0, 0.0)
-    lead = vec3(0.0, 0.0, 0.0)
-    p, ahead = qd.min(qd.max(at, inside.walls.lower), inside.walls.upper), bent
-    # Where a ray leaves that is mirrored as well, what leaves first is kept, and what is mirrored there goes on.
-    left, share, waits, turned, again = vec4(0.0, 0.0, 0.0, 0.0), 0.0, 0, p, ahead
-    # A piece of 0 is in the water, of 1 outside where it has left, of 2 outside where it was mirrored at first; where a
-    # solid has a share of it, it is looked at again, past that one.
-    piece, past, within, done = 0, 0, 0, 0
-    if whole <= 0.0:
-        total, done = -1.0, 1
-    for _ in range(qd.static(7 if solid else 5)):
-        if done == 1 and waits == 1:
-            left = vec4(shown.x, shown.y, shown.z, total)
-            p, ahead, waits, piece, done = turned, again, 0, 0, 0
-        if done == 0 and piece == 0 and within == 3:
-            shown, done = optics.glow, 1
-        if qd.static(solid):
-            if done == 1 and piece < 2 and mirrored.y != 0.0:
-                p, ahead, piece, done = at, mirrored, 2, 0
-        if done == 0:
-            n, s = vec3(0.0, 1.0, 0.0), 1e3
-            if piece == 0:
-                met = wall_ahead(inside.walls, p, ahead)
-                n, s = vec3(met[0], met[1], met[2]), met[3]
-            # What it shows: `usual`, or what the picture shows at a `place`, of a solid within `near` of it.
-            shows, place, usual, near, cover = 0, p, vec3(0.0, 0.0, 0.0), 0.0, 0.0
-            hit, k = vec4(0.0, 0.0, 0.0, 0.0), 0
-            if qd.static(solid):
-                if past == 0:
-                    hit, k, found = solid_ahead(
-                        inside.solids,
-                        inside.paints,
-                        p,
-                        ahead,
-                        s,
-                        0.1 * optics.spacing,
-                        qd.select(piece == 2, 0.0, uneven),
-                    )
-                    cover = found
-                    if share > 0.0:
-                        cover = qd.select(cover > 0.5, 1.0, 0.0)
-            if piece == 0:
-                # The surface before a solid is one that is on the way to the wall and to the solid: the way ends in the
-                # ground beside a lake, and above a solid that sticks out there is no water, either. At a shore both
-                # are in one place, and the solid is met unless it is clearly above.
-                # What has just come in is below the surface, however the sun's map of it and the eye's differ.
-                least = qd.select(within == 0, 0.2, 0.0) * optics.spacing
-                far, met = qd.select(cover > 0.0, hit[3], s), vec4(0.0, 0.0, 0.0, s)
-                for search in range(2):
-                    if search == 0 or (cover > 0.0 and met[3] < far):
-                        end, above = qd.select(search == 0, s, far), qd.select(search == 0, least, optics.spacing)
-                        met = surface_before(sun, first, inside.walls, p, ahead, end, above, optics.spacing)
-                if met[3] < far:
-                    n, s, cover = vec3(met[0], met[1], met[2]), met[3], 0.0
-            if qd.static(solid):
-                if past == 0:
-                    if cover > 0.0:
-                        shows, place, near, s = 1, p + hit.w * ahead, 2.0 * optics.spacing, hit.w
-                        # On it, not as far before it as it is met.
-                        place -= 0.1 * optics.spacing * vec3(hit.x, hit.y, hit.z)
-                        sunny = 1.0
-                        if piece == 0:
-                            deep = about_depth(sun, first, inside.walls, place, optics.spacing)
-                            sunny = qd.exp(-0.6 * qd.max(deep, 0.0) * optics.absorption.y)
-                        usual = surface_radiance(
-                            look,
-                            inside.paints[k],
-                            vec3(hit.x, hit.y, hit.z),
-                            -ahead,
-                            vec2(sunny, 0.8),
-                            0.4 * look.wrap,
-                            0.0,
-                        )
-                past = 0
-            ends = 1
-            if cover == 0.0 and piece == 1:
-                usual = environment(look, ahead)
-                if ahead.y < -1e-3:
-                    shows, place = 1, p + (qd.max(p.y, 0.0) / -ahead.y) * ahead
-            elif cover == 0.0 and piece == 0:
-                within += 1
-                total += s
-                p += s * ahead
-                if n.y < -0.5:
-                    shows, place = 1, p
-                    usual = look.below * qd.exp(-0.6 * optics.usual * optics.absorption)
-                else:
-                    ends = 0
-                    out = crossed_about(ahead, n, uneven)
-                    if ahead.dot(n) <= 0.0:  # the normal of a bent surface, which is turned away from the ray
-                        out = vec4(ahead.x, ahead.y, ahead.z, 0.0)
-                    ahead = reflected(ahead, -n)
-                    if out[3] < qd.select(share == 0.0, 1.0, 0.5):  # divided before, it takes the way of most of it
-                        turned, again, piece = p, ahead, 1
-                        ahead = vec3(out[0], out[1], out[2])
-                        if share == 0.0:
-                            share = qd.max(out[3] - faint(), 0.0) / (1.0 - faint())
-                            waits = qd.select(share > 0.0, 1, 0)
-            if ends == 1:
-                there = vec3(0.0, 0.0, 0.0)
-                if shows == 1:
-                    usual, there = seen_at(depth, picture, lens, place, usual, near, solid)
-                way = total + qd.select(cover > 0.0 and piece == 0, s, 0.0)
-                if piece == 2:
-                    done = 1
-                    if cover > 0.0:
-                        seen_above = vec4(usual.x, usual.y, usual.z, 1.0)
-                elif cover > 0.0 and cover < 1.0:
-                    left, share, past = vec4(usual.x, usual.y, usual.z, way), 1.0 - cover, 1
-                else:
-                    shown, total, done = usual, way, 1
-                    if there.z > 0.999 and cover == 0.0:
-                        lead = vec3(there.x, there.y, 1.0 + piece + 2.0 * within)
-    if done == 0:
-        shown = optics.glow
-    if share > 0.0:
-        # One way for both, with what each of them is swallowed less or more on its own.
-        way = share * total + (1.0 - share) * left[3]
-        shown = share * qd.exp((way - total) * optics.absorption) * shown
-        shown += (1.0 - share) * qd.exp((way - left[3]) * optics.absorption) * vec3(left[0], left[1], left[2])
-        total = way
-    if share > 0.0 or seen_above[3] > 0.0:
-        lead.z = 0.0
-    return vec4(shown.x, shown.y, shown.z, total), seen_above, lead
+    path = begin_path(inside.walls, at, bent, confidence)
+    for _ in range(qd.static(7 if solids else 5)):
+        resume(path, optics, at, mirrored, solids)
+        if path.done == 0:
+            piece = follow_piece(path, sun, first, optics, inside, uneven, solids)
+            ending = Ending(usual=vec3(0.0, 0.0, 0.0), at=path.p, in_picture=0, near=0.0, goes_on=0)
+            if qd.static(solids):
+                if path.past == 0 and piece.cover > 0.0:
+                    show_solid(ending, piece, path, sun, first, look, optics, inside)
+                path.past = 0
+            if piece.cover == 0.0 and path.outside == 1:
+                show_surroundings(ending, path, look)
+            elif piece.cover == 0.0 and path.above == 0:
+                cross_boundary(ending, path, piece, look, optics, uneven)
+            if ending.goes_on == 0:
+                end_piece(path, piece, ending, depth, picture, lens, solids)
+    if path.done == 0:
+        path.shown = optics.glow
+    if path.share > 0.0:
+        join_shares(path, optics)
+    if path.share > 0.0 or path.mirrored[3] > 0.0:
+        path.place.z = 0.0
+    return vec4(path.shown.x, path.shown.y, path.shown.z, path.way), path.mirrored, path.place
+
+
+@qd.func
+def begin_path(walls: Box, at, bent, confidence):
+    """A ray that enters the water at `at` [m]; it is done at once where the water is not a body."""
+    start, absent = qd.min(qd.max(at, walls.lower), walls.upper), confidence <= 0.0
+    nothing = vec3(0.0, 0.0, 0.0)
+    return Path(
+        p=start,
+        ahead=bent,
+        outside=0,
+        above=0,
+        past=0,
+        bounces=0,
+        done=qd.cast(absent, qd.i32),
+        shown=nothing,
+        way=qd.select(absent, -1.0, 0.0),
+        waits=0,
+        turned=start,
+        again=bent,
+        share=0.0,
+        left=vec4(0.0, 0.0, 0.0, 0.0),
+        mirrored=vec4(0.0, 0.0, 0.0, 0.0),
+        place=nothing,
+    )
+
+
+@qd.func
+def resume(path: qd.template(), optics: Optics, at, mirrored, solids: qd.template()):
+    """Go on with what waits: what was mirrored where the ray left, then what is `mirrored` at `at` where it entered."""
+    if path.done == 1 and path.waits == 1:
+        path.left = vec4(path.shown.x, path.shown.y, path.shown.z, path.way)
+        path.p, path.ahead = path.turned, path.again
+        path.waits, path.outside, path.done = 0, 0, 0
+    if path.done == 0 and path.outside + path.above == 0 and path.bounces == 3:
+        path.shown, path.done = optics.glow, 1
+    if qd.static(solids):
+        if path.done == 1 and path.above == 0 and mirrored.y != 0.0:
+            path.p, path.ahead = at, mirrored
+            path.outside, path.above, path.done = 0, 1, 0
+
+
+@qd.func
+def follow_piece(
+    path: qd.template(), sun: Lens, first: qd.template(), optics: Optics, inside: Inside, uneven, solids: qd.template()
+):
+    """The straight piece of a ray from where it is on, as far as it comes."""
+    piece = Piece(length=1e3, normal=vec3(0.0, 1.0, 0.0), hit=vec4(0.0, 0.0, 0.0, 0.0), solid=0, cover=0.0)
+    in_water = path.outside + path.above == 0
+    if in_water:
+        met = wall_ahead(inside.walls, path.p, path.ahead)
+        piece.normal, piece.length = vec3(met[0], met[1], met[2]), met[3]
+    if qd.static(solids):
+        if path.past == 0:
+            spread = qd.select(path.above == 1, 0.0, uneven)
+            hit, k, cover = solid_ahead(
+                inside.solids, inside.paints, path.p, path.ahead, piece.length, 0.1 * optics.spacing, spread
+            )
+            if path.share > 0.0:
+                cover = qd.select(cover > 0.5, 1.0, 0.0)
+            piece.hit, piece.solid, piece.cover = hit, k, cover
+    if in_water:
+        meet_surface(piece, path, sun, first, optics, inside.walls)
+    return piece
+
+
+@qd.func
+def meet_surface(
+    piece: qd.template(), path: qd.template(), sun: Lens, first: qd.template(), optics: Optics, walls: Box
+):
+    """End a piece in the water at the surface, where it meets that before a wall or a solid.
+
+    The surface before a solid is one that is on the way to the wall and to the solid: the way ends in the ground next
+    to a lake, and above a solid that sticks out there is no water, either. At a shore both are in one place, and the
+    solid is met unless it is clearly above. What has just come in is below the surface, however the sun's map of it and
+    the eye's differ.
+    """
+    least = qd.select(path.bounces == 0, 0.2, 0.0) * optics.spacing
+    far, met = qd.select(piece.cover > 0.0, piece.hit[3], piece.length), vec4(0.0, 0.0, 0.0, piece.length)
+    for search in range(2):
+        if search == 0 or (piece.cover > 0.0 and met[3] < far):
+            end, above = qd.select(search == 0, piece.length, far), qd.select(search == 0, least, optics.spacing)
+            met = surface_before(sun, first, walls, path.p, path.ahead, end, above, optics.spacing)
+    if met[3] < far:
+        piece.normal, piece.length, piece.cover = vec3(met[0], met[1], met[2]), met[3], 0.0
+
+
+@qd.func
+def show_solid(
+    ending: qd.template(),
+    piece: qd.template(),
+    path: qd.template(),
+    sun: Lens,
+    first: qd.template(),
+    look: Look,
+    optics: Optics,
+    inside: Inside,
+):
+    """End a piece at the solid that it meets: a point of its surface, in the light that the water leaves."""
+    n = vec3(piece.hit.x, piece.hit.y, piece.hit.z)
+    ending.in_picture, ending.near, piece.length = 1, 2.0 * optics.spacing, piece.hit.w
+    ending.at = path.p + piece.hit.w * path.ahead
+    # On it, not as far before it as it is met.
+    ending.at -= 0.1 * optics.spacing * n
+    sunny = 1.0
+    if path.outside + path.above == 0:
+        deep = about_depth(sun, first, inside.walls, ending.at, optics.spacing)
+        sunny = qd.exp(-0.6 * qd.max(deep, 0.0) * optics.absorption.y)
+    ending.usual = surface_radiance(
+        look, inside.paints[piece.solid], n, -path.ahead, vec2(sunny, 0.8), 0.4 * look.wrap, 0.0
+    )
+
+
+@qd.func
+def show_surroundings(ending: qd.template(), path: qd.template(), look: Look):
+    """End a piece that has left the water, at the floor or in the sky."""
+    ending.usual = environment(look, path.ahead)
+    if path.ahead.y < -1e-3:
+        ending.in_picture = 1
+        ending.at = path.p + (qd.max(path.p.y, 0.0) / -path.ahead.y) * path.ahead
+
+
+@qd.func
+def cross_boundary(
+    ending: qd.template(), path: qd.template(), piece: qd.template(), look: Look, optics: Optics, uneven
+):
+    """End a piece in the water at the floor, or let it leave, be mirrored, or be divided, at a pane or the surface."""
+    path.bounces += 1
+    path.way += piece.length
+    path.p += piece.length * path.ahead
+    if piece.normal.y < -0.5:
+        ending.in_picture, ending.at = 1, path.p
+        ending.usual = look.below * qd.exp(-0.6 * optics.usual * optics.absorption)
+    else:
+        ending.goes_on = 1
+        out = crossed_about(path.ahead, piece.normal, uneven)
+        if path.ahead.dot(piece.normal) <= 0.0:  # the normal of a bent surface, which is turned away from the ray
+            out = vec4(path.ahead.x, path.ahead.y, path.ahead.z, 0.0)
+        path.ahead = reflected(path.ahead, -piece.normal)
+        if out[3] < qd.select(path.share == 0.0, 1.0, 0.5):  # divided before, it takes the way of most of it
+            path.turned, path.again, path.outside = path.p, path.ahead, 1
+            path.ahead = vec3(out[0], out[1], out[2])
+            if path.share == 0.0:
+                path.share = qd.max(out[3] - faint(), 0.0) / (1.0 - faint())
+                path.waits = qd.select(path.share > 0.0, 1, 0)
+
+
+@qd.func
+def end_piece(
+    path: qd.template(),
+    piece: qd.template(),
+    ending: qd.template(),
+    depth: qd.template(),
+    picture: qd.template(),
+    lens: Lens,
+    solids: qd.template(),
+):
+    """Note what a piece shows at its end; where a solid has a share of it, the piece is followed again past that."""
+    there = vec3(0.0, 0.0, 0.0)
+    if ending.in_picture == 1:
+        ending.usual, there = seen_at(depth, picture, lens, ending.at, ending.usual, ending.near, solids)
+    seen, in_water = ending.usual, path.outside + path.above == 0
+    way = path.way + qd.select(piece.cover > 0.0 and in_water, piece.length, 0.0)
+    if path.above == 1:
+        path.done = 1
+        if piece.cover > 0.0:
+            path.mirrored = vec4(seen.x, seen.y, seen.z, 1.0)
+    elif piece.cover > 0.0 and piece.cover < 1.0:
+        path.left, path.share, path.past = vec4(seen.x, seen.y, seen.z, way), 1.0 - piece.cover, 1
+    else:
+        path.shown, path.way, path.done = seen, way, 1
+        if there.z > 0.999 and piece.cover == 0.0:
+            path.place = vec3(there.x, there.y, 1.0 + path.outside + 2.0 * path.bounces)
+
+
+@qd.func
+def join_shares(path: qd.template(), optics: Optics):
+    """Add up what both parts of a divided ray show, over one way: of each is absorbed less or more on its own."""
+    way = path.share * path.way + (1.0 - path.share) * path.left[3]
+    first = vec3(path.left[0], path.left[1], path.left[2])
+    path.shown = path.share * qd.exp((way - path.way) * optics.absorption) * path.shown
+    path.shown += (1.0 - path.share) * qd.exp((way - path.left[3]) * optics.absorption) * first
+    path.way = way

@@ -80,6 +80,15 @@ def shape(dim: int, d: float) -> Shape:
     )
 
 
+#: Weighted sums over the neighbours of a particle, of their places from it.
+Moments = qd.types.struct(
+    weight=qd.f32,  # sum of the weights
+    mean=vec3,  # m
+    square=vec3,  # m^2: xx, yy, zz
+    mixed=vec3,  # m^2: xy, xz, yz
+)
+
+
 @qd.kernel(fastcache=True)
 def fit(ellipsoids: Ellipsoids, cells: Cells, walls: Box, shape: Shape, dim: qd.template(), count: qd.i32):
     """Fit an ellipsoid to the neighbourhood of every particle that may be seen."""
@@ -89,11 +98,11 @@ def fit(ellipsoids: Ellipsoids, cells: Cells, walls: Box, shape: Shape, dim: qd.
             if cells.own == 1 and cells.start[k + 1] > cells.start[k]:
                 cells.fill[k] = deep(cells, k, walls)
     for a in range(count):
-        p = cells.x[a]
-        cell = cells.cell[cells.order[a]]
         ellipsoids.outward[a] = vec3(0.0, 0.0, 0.0)
         ellipsoids.size[count + a] = -1.0
         ellipsoids.lone[a], ellipsoids.lone[count + a] = 0, 0
+        p = cells.x[a]
+        cell = cells.cell[cells.order[a]]
         if cells.fill[cell] == 1:
             # Full water all around: a ball, seen through a wall if at all.
             touch, to_wall = near_walls(p, walls, shape.spacing, dim)
@@ -102,66 +111,77 @@ def fit(ellipsoids: Ellipsoids, cells: Cells, walls: Box, shape: Shape, dim: qd.
                 ellipsoids, a, p, touch, to_wall, joined(ball_there, touch, to_wall, shape.beyond), shape.spacing
             )
         else:
-            weight = 0.0
-            mean, square, mixed = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
-            scale = 1.0 / (shape.reach * shape.reach)
-            for row in range(qd.static(9 if dim == 3 else 3)):
-                layer = cells.nx * (row % 3 - 1)
-                if qd.static(dim == 3):
-                    layer += cells.nx * cells.ny * (row // 3 - 1)
-                low = (cell + layer - 1) % cells.cells
-                over = qd.max(low + 3 - cells.cells, 0)
-                for part in range(1 + qd.min(over, 1)):
-                    begin = cells.start[low]
-                    end = cells.start[low + 3 - over]
-                    if part == 1:
-                        begin = 0
-                        end = cells.start[over]
-                    for b in range(begin, end):
-                        r = cells.x[b] - p
-                        w = qd.max(1.0 - r.dot(r) * scale, 0.0)
-                        s = w * r
-                        weight += w
-                        mean += s
-                        square += s * r
-                        mixed += vec3(s.x * r.y, s.x * r.z, s.y * r.z)
-            weight = qd.max(weight, 1e-6)
-            mean /= weight
-            # In units of the variance along an axis of full water, 1/7 (3-D) or 1/6 (2-D) of the square of the reach.
-            unit = qd.static(7.0 if dim == 3 else 6.0) * scale
-            diagonal = qd.max((square / weight - mean * mean) * unit, 0.0)
-            side = (mixed / weight - vec3(mean.x * mean.y, mean.x * mean.z, mean.y * mean.z)) * unit
-            n, o = squared(diagonal, side)
-            few = qd.static(2.0 if dim == 3 else 1.5)
-            trust = qd.min(qd.max((weight - few) / qd.static(3.5 if dim == 3 else 1.5), 0.0), 1.0)
-            diagonal = trust * (shape.least + shape.growth * n) + (1.0 - trust) * shape.ball
-            side = trust * shape.growth * o
-            touch, to_wall = near_walls(p, walls, shape.spacing, dim)
-            if qd.static(dim == 3):
-                if weight < 3.0:  # no more than two next to it, or some farther off; walls are no neighbours
-                    ellipsoids.lone[a] = 1
-            free, share = 1.0 - touch, 1.0
-            for k in qd.static(range(dim)):
-                share *= share_before_wall(qd.abs(to_wall[k]) / shape.reach)
-            diagonal = joined(diagonal, touch, to_wall, shape.beyond)
-            side *= vec3(free.x * free.y, free.x * free.z, free.y * free.z)
-            mean *= free
-            if qd.static(dim == 2):
-                diagonal.z = trust * shape.depth_2d + (1.0 - trust) * shape.ball
-            if weight > shape.full * share:
-                put_inside(ellipsoids, a, p, touch, to_wall, diagonal, shape.spacing)
-            else:
-                out = mean.norm()
-                flat = qd.static(0.31 if dim == 3 else 0.34) * shape.reach  # out of a particle in a flat surface
-                at_surface = qd.min(qd.max((out / flat - 0.5) / 0.35, 0.0), 1.0)
-                pull = 0.9 * trust * at_surface * (1.0 - flat / qd.max(out, 0.3 * flat))
-                ellipsoids.center[a] = p + touch * to_wall + pull * mean
-                ellipsoids.outward[a] = -trust * mean / shape.reach
-                ellipsoids.axes[a], ellipsoids.mixed[a] = squared(diagonal, side)
-                ellipsoids.size[a] = qd.max(diagonal.x, diagonal.y, diagonal.z) + side.norm()
-                if qd.static(dim == 3):
-                    ellipsoids.lone[count + a] = ellipsoids.lone[a]
-                    mirror(ellipsoids, a, count + a, p, walls, shape.mirrored)
+            fit_to_neighbours(ellipsoids, cells, walls, shape, a, cell, dim, count)
+
+
+@qd.func
+def fit_to_neighbours(
+    ellipsoids: Ellipsoids, cells: Cells, walls: Box, shape: Shape, a, cell, dim: qd.template(), count
+):
+    """Fit an ellipsoid to what is around the particle at the sorted place `a`."""
+    p, scale = cells.x[a], 1.0 / (shape.reach * shape.reach)
+    moments = moments_around(cells, p, cell, scale, dim)
+    weight = qd.max(moments.weight, 1e-6)
+    mean = moments.mean / weight
+    # In units of the variance along an axis of full water, 1/7 (3-D) or 1/6 (2-D) of the square of the reach.
+    unit = qd.static(7.0 if dim == 3 else 6.0) * scale
+    diagonal = qd.max((moments.square / weight - mean * mean) * unit, 0.0)
+    side = (moments.mixed / weight - vec3(mean.x * mean.y, mean.x * mean.z, mean.y * mean.z)) * unit
+    n, o = squared(diagonal, side)
+    few = qd.static(2.0 if dim == 3 else 1.5)
+    trust = qd.min(qd.max((weight - few) / qd.static(3.5 if dim == 3 else 1.5), 0.0), 1.0)
+    diagonal = trust * (shape.least + shape.growth * n) + (1.0 - trust) * shape.ball
+    side = trust * shape.growth * o
+    touch, to_wall = near_walls(p, walls, shape.spacing, dim)
+    if qd.static(dim == 3):
+        if weight < 3.0:  # no more than two next to it, or some farther off; walls are not neighbours
+            ellipsoids.lone[a] = 1
+    free, share = 1.0 - touch, 1.0
+    for k in qd.static(range(dim)):
+        share *= share_before_wall(qd.abs(to_wall[k]) / shape.reach)
+    diagonal = joined(diagonal, touch, to_wall, shape.beyond)
+    side *= vec3(free.x * free.y, free.x * free.z, free.y * free.z)
+    mean *= free
+    if qd.static(dim == 2):
+        diagonal.z = trust * shape.depth_2d + (1.0 - trust) * shape.ball
+    if weight > shape.full * share:
+        put_inside(ellipsoids, a, p, touch, to_wall, diagonal, shape.spacing)
+    else:
+        out = mean.norm()
+        flat = qd.static(0.31 if dim == 3 else 0.34) * shape.reach  # out of a particle in a flat surface
+        at_surface = qd.min(qd.max((out / flat - 0.5) / 0.35, 0.0), 1.0)
+        pull = 0.9 * trust * at_surface * (1.0 - flat / qd.max(out, 0.3 * flat))
+        ellipsoids.center[a] = p + touch * to_wall + pull * mean
+        ellipsoids.outward[a] = -trust * mean / shape.reach
+        ellipsoids.axes[a], ellipsoids.mixed[a] = squared(diagonal, side)
+        ellipsoids.size[a] = qd.max(diagonal.x, diagonal.y, diagonal.z) + side.norm()
+        if qd.static(dim == 3):
+            ellipsoids.lone[count + a] = ellipsoids.lone[a]
+            mirror(ellipsoids, a, count + a, p, walls, shape.mirrored)
+
+
+@qd.func
+def moments_around(cells: Cells, p, cell, scale, dim: qd.template()):
+    """Add up what lies in the cells around the point `p` in a cell; `scale` [1/m^2] is that of the weights."""
+    result = Moments(weight=0.0, mean=vec3(0.0, 0.0, 0.0), square=vec3(0.0, 0.0, 0.0), mixed=vec3(0.0, 0.0, 0.0))
+    for row in range(qd.static(9 if dim == 3 else 3)):
+        layer = cells.nx * (row % 3 - 1)
+        if qd.static(dim == 3):
+            layer += cells.nx * cells.ny * (row // 3 - 1)
+        low = (cell + layer - 1) % cells.cells
+        over = qd.max(low + 3 - cells.cells, 0)  # cells of the row that are numbered from 0 again
+        for part in range(1 + qd.min(over, 1)):
+            begin = qd.select(part == 0, cells.start[low], 0)
+            end = cells.start[qd.select(part == 0, low + 3 - over, over)]
+            for b in range(begin, end):
+                r = cells.x[b] - p
+                w = qd.max(1.0 - r.dot(r) * scale, 0.0)
+                s = w * r
+                result.weight += w
+                result.mean += s
+                result.square += s * r
+                result.mixed += vec3(s.x * r.y, s.x * r.z, s.y * r.z)
+    return result
 
 
 @qd.func

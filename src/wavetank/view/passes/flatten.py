@@ -193,31 +193,38 @@ def blur(
                     )
             if together == 0:
                 for column in range(left_end, right_end):
-                    key = depth[row, column]
-                    q = qd.bit_cast(key, qd.f32)
-                    kept = key & 7
-                    if kept < 7 and q != 0.0 and q > -1e8:
-                        grain, spread, step, reach = reach_of(q, lens, window, clean)
-                        room = qd.min(row, rows - 1 - row) * down + qd.min(column, columns - 1 - column) * across
-                        last = qd.min(qd.cast(qd.min(reach, qd.cast(room, qd.f32)) / step + 1e-3, qd.i32), window.taps)
-                        ratio = ratio_of(spread, step)
-                        decay, gauss = ratio * ratio, 1.0
-                        total, weight = 0.0, 1.0
-                        for k in range(1, last + 1):
-                            gauss *= ratio
-                            ratio *= decay
-                            off = k * qd.cast(step, qd.i32)
-                            left = qd.bit_cast(depth[row - off * down, column - off * across], qd.f32)
-                            right = qd.bit_cast(depth[row + off * down, column + off * across], qd.f32)
-                            bend = 0.5 * (left + right) - q
-                            w = gauss * alike(bend, left - right, grain, window)
-                            total += w * bend
-                            weight += w
-                        q += (1.0 - kept / 7.0) * total / weight
-                        key = (qd.bit_cast(q, qd.i32) & ~7) | kept
+                    key = blur_pixel(depth, lens, window, row, column, down, across, clean)
                     if final == 1:
-                        key = depth_of(q, lens.perspective)
+                        key = depth_of(qd.bit_cast(key, qd.f32), lens.perspective)
                     result[row, column] = key
+
+
+@qd.func
+def blur_pixel(depth: qd.template(), lens: Lens, window: Window, row, column, down, across, clean):
+    """The bits of q of a pixel, blurred along its row or column, and of how far before the tank it lies."""
+    key = depth[row, column]
+    q = qd.bit_cast(key, qd.f32)
+    kept = key & 7
+    if kept < 7 and q != 0.0 and q > -1e8:
+        grain, spread, step, reach = reach_of(q, lens, window, clean)
+        room = qd.min(row, depth.shape[0] - 1 - row) * down + qd.min(column, depth.shape[1] - 1 - column) * across
+        last = qd.min(qd.cast(qd.min(reach, qd.cast(room, qd.f32)) / step + 1e-3, qd.i32), window.taps)
+        ratio = ratio_of(spread, step)
+        decay, gauss = ratio * ratio, 1.0
+        total, weight = 0.0, 1.0
+        for k in range(1, last + 1):
+            gauss *= ratio
+            ratio *= decay
+            off = k * qd.cast(step, qd.i32)
+            left = qd.bit_cast(depth[row - off * down, column - off * across], qd.f32)
+            right = qd.bit_cast(depth[row + off * down, column + off * across], qd.f32)
+            bend = 0.5 * (left + right) - q
+            w = gauss * alike(bend, left - right, grain, window)
+            total += w * bend
+            weight += w
+        q += (1.0 - kept / 7.0) * total / weight
+        key = (qd.bit_cast(q, qd.i32) & ~7) | kept
+    return key
 
 
 @qd.func

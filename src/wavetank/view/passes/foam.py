@@ -262,15 +262,21 @@ def add_disc(
                 wall = qd.bit_cast(solid_depth[down, across], qd.f32)
                 if behind < froth.deepest and c.z - 0.15 * froth.size < wall + froth.sunk:
                     tau = qd.cast(strength * rest * share_seen(behind, froth.deepest) + 0.5, qd.i32)
-                    if tau > 0:
-                        added += tau
-                        qd.atomic_add(maps.sums[row, column, 0], tau)
-                        if light > 0.5:
-                            qd.atomic_add(maps.sums[row, column, 1], tau)
-                        if behind > 0.0 and behind < 1e3:
-                            deep = tau * qd.min(behind * 4.0 / froth.size, 20.0)
-                            qd.atomic_add(maps.sums[row, column, 2], qd.cast(deep + 0.5, qd.i32))
+                    added += add_to_pixel(maps.sums, row, column, tau, light, behind, froth.size)
     return added
+
+
+@qd.func
+def add_to_pixel(sums: qd.template(), row, column, tau, light, behind, size):
+    """Add an optical depth [1/4096] that lies `behind` [m] the surface to the sums of a pixel, and return it."""
+    if tau > 0:
+        qd.atomic_add(sums[row, column, 0], tau)
+        if light > 0.5:
+            qd.atomic_add(sums[row, column, 1], tau)
+        if behind > 0.0 and behind < 1e3:
+            deep = tau * qd.min(behind * 4.0 / size, 20.0)
+            qd.atomic_add(sums[row, column, 2], qd.cast(deep + 0.5, qd.i32))
+    return qd.max(tau, 0)
 
 
 @qd.kernel(fastcache=True)
@@ -288,54 +294,69 @@ def splat(
     count: qd.i32,
 ):
     """Add the optical depth of every particle to the pixels it covers, and to the relief."""
-    d, samples, grain = froth.size, froth.samples, froth.grain
     for i in range(count):
         x = lift(diffuse.x[i])
         c = to_view(lens, x)
         if c.z > lens.near:
-            radius, strength = size_and_strength(diffuse.kind[i], diffuse.age[i] / diffuse.life[i], diffuse.id[i])
-            scale = d * pixels_per_metre(lens, c.z) / samples  # px of a spacing
-            middle, reach = to_pixel(lens, c) / samples, 1.5 * scale + 2.0
-            if (
-                middle.x > -reach
-                and middle.y > -reach
-                and middle.x < maps.sums.shape[1] + reach
-                and middle.y < maps.sums.shape[0] + reach
-            ):
-                # As many discs as keep each of them small; all together cover what one of that radius would.
-                parts = qd.min(qd.max((radius * scale / froth.fine) ** 2, froth.parts), froth.most_parts)
-                each = radius * scale * qd.sqrt(1.0 / parts)
-                way = lift(diffuse.v[i]) * froth.shutter
-                light = sunlit(sun, sun_depth, x, 2.0 * d)
-                added = 0
-                for k in range(qd.cast(qd.ceil(parts), qd.i32)):
-                    away, instant, own = place_in_cloud(diffuse.id[i], k, diffuse.kind[i], dim)
-                    at = x + d * away + instant * way
-                    for axis in qd.static(range(dim)):  # not outside of the glass
-                        at[axis] = qd.min(qd.max(at[axis], walls.lower[axis]), walls.upper[axis])
-                    p = to_view(lens, at)
-                    if p.z > lens.near:
-                        r = qd.min(each * own, froth.largest)
-                        wide = qd.max(r, froth.least)
-                        # What is smaller than a pixel is as faint as it is small.
-                        full = 4096.0 * strength * (r / wide) ** 2 * qd.min(parts - k, 1.0)
-                        added += add_disc(
-                            maps, p, to_pixel(lens, p) / samples, wide, full, light, depth, solid_depth, froth
-                        )
+            scale = froth.size * pixels_per_metre(lens, c.z) / froth.samples  # px of a spacing
+            middle, reach = to_pixel(lens, c) / froth.samples, 1.5 * scale + 2.0
+            inside = qd.min(middle.x, middle.y) > -reach
+            if inside and middle.x < maps.sums.shape[1] + reach and middle.y < maps.sums.shape[0] + reach:
+                light = sunlit(sun, sun_depth, x, 2.0 * froth.size)
+                added = add_cloud(maps, diffuse, i, x, scale, light, depth, solid_depth, lens, walls, froth, dim)
                 if added > 0:
-                    texel = middle / grain - 0.5
-                    row, column = qd.cast(qd.floor(texel.y), qd.i32), qd.cast(qd.floor(texel.x), qd.i32)
-                    per = added / qd.cast(grain * grain, qd.f32)
-                    for n in qd.static(range(4)):
-                        down, across = row + n // 2, column + n % 2
-                        share = (1.0 - qd.abs(texel.y - down)) * (1.0 - qd.abs(texel.x - across))
-                        if (
-                            down >= 0
-                            and across >= 0
-                            and down * grain < maps.sums.shape[0]
-                            and across * grain < maps.sums.shape[1]
-                        ):
-                            qd.atomic_add(maps.relief[down, across], qd.cast(qd.min(share * per, 1e6) + 0.5, qd.i32))
+                    add_to_relief(maps, middle, added, froth.grain)
+
+
+@qd.func
+def add_cloud(
+    maps: FoamMaps,
+    diffuse: Diffuse,
+    i,
+    x,
+    scale,
+    light,
+    depth: qd.template(),
+    solid_depth: qd.template(),
+    lens: Lens,
+    walls: Box,
+    froth: Froth,
+    dim: qd.template(),
+):
+    """Add the discs of particle `i` at `x`, where a spacing is `scale` [px]; return what was added, in 1/4096."""
+    radius, strength = size_and_strength(diffuse.kind[i], diffuse.age[i] / diffuse.life[i], diffuse.id[i])
+    # As many discs as keep each of them small; all together cover what one of that radius would.
+    parts = qd.min(qd.max((radius * scale / froth.fine) ** 2, froth.parts), froth.most_parts)
+    each = radius * scale * qd.sqrt(1.0 / parts)
+    way = lift(diffuse.v[i]) * froth.shutter
+    added = 0
+    for k in range(qd.cast(qd.ceil(parts), qd.i32)):
+        away, instant, own = place_in_cloud(diffuse.id[i], k, diffuse.kind[i], dim)
+        at = x + froth.size * away + instant * way
+        for axis in qd.static(range(dim)):  # not outside of the glass
+            at[axis] = qd.min(qd.max(at[axis], walls.lower[axis]), walls.upper[axis])
+        p = to_view(lens, at)
+        if p.z > lens.near:
+            r = qd.min(each * own, froth.largest)
+            wide = qd.max(r, froth.least)
+            # What is smaller than a pixel is as faint as it is small.
+            full = 4096.0 * strength * (r / wide) ** 2 * qd.min(parts - k, 1.0)
+            added += add_disc(maps, p, to_pixel(lens, p) / froth.samples, wide, full, light, depth, solid_depth, froth)
+    return added
+
+
+@qd.func
+def add_to_relief(maps: FoamMaps, middle, added, grain):
+    """Spread what was added around a place in the picture over the four nearest texels of the relief."""
+    texel = middle / grain - 0.5
+    row, column = qd.cast(qd.floor(texel.y), qd.i32), qd.cast(qd.floor(texel.x), qd.i32)
+    per = added / qd.cast(grain * grain, qd.f32)
+    for n in range(4):
+        down, across = row + n // 2, column + n % 2
+        share = (1.0 - qd.abs(texel.y - down)) * (1.0 - qd.abs(texel.x - across))
+        inside = down * grain < maps.sums.shape[0] and across * grain < maps.sums.shape[1]
+        if qd.min(down, across) >= 0 and inside:
+            qd.atomic_add(maps.relief[down, across], qd.cast(qd.min(share * per, 1e6) + 0.5, qd.i32))
 
 
 @qd.func
@@ -355,15 +376,11 @@ def shape(maps: FoamMaps, lens: Lens, look: Look, rows: qd.i32, columns: qd.i32,
     for row, column in qd.ndrange(rows, columns):
         sun, sky = 1.0, 1.0
         if qd.static(dim == 3):
-            here = height_at(maps, row, column, rows, columns)
-            left, right = (
-                height_at(maps, row, column - 1, rows, columns),
-                height_at(maps, row, column + 1, rows, columns),
-            )
-            above, below = (
-                height_at(maps, row - 1, column, rows, columns),
-                height_at(maps, row + 1, column, rows, columns),
-            )
+            heights = qd.Matrix.zero(qd.f32, 1, 5)  # here, left, right, above, below
+            for k in range(5):  # one copy of the code to compile
+                down, across = qd.select(k > 2, 2 * k - 7, 0), qd.select(k == 1, -1, qd.select(k == 2, 1, 0))
+                heights[0, k] = height_at(maps, row + down, column + across, rows, columns)
+            here, left, right, above, below = heights[0, 0], heights[0, 1], heights[0, 2], heights[0, 3], heights[0, 4]
             # Foam lies on water: its plain faces up as much as the eye.
             n = from_view(lens, vec3(left - right, below - above, -0.35)) + vec3(0.0, 0.35, 0.0)
             n = n.normalized(1e-6)
@@ -377,31 +394,39 @@ def shape(maps: FoamMaps, lens: Lens, look: Look, rows: qd.i32, columns: qd.i32,
 def blend(pixels: Pixels, maps: FoamMaps, depth: qd.types.ndarray(), strips: Strips, froth: Froth):
     """Lay the sums over the picture: what sun and sky give them or, over nothing, what it is in air."""
     for task in range(strips.count):
-        foam_row, first, last = strip(strips, task, maps.sums.shape[0], maps.sums.shape[1])
-        samples = froth.samples
-        for foam_column in range(first, last):
-            tau = maps.sums[foam_row, foam_column, 0]
+        row, first, last = strip(strips, task, maps.sums.shape[0], maps.sums.shape[1])
+        for column in range(first, last):
+            tau = maps.sums[row, column, 0]
             if tau > 0:
-                per = 1.0 / qd.cast(tau, qd.f32)
-                place = vec2(foam_column + 0.5, foam_row + 0.5) / qd.cast(froth.grain, qd.f32)
-                r, c, r1, c1, v, u = corners(place, maps.light.shape[0], maps.light.shape[1], 1.001)
-                top = maps.light[r, c] + u * (maps.light[r, c1] - maps.light[r, c])
-                low = maps.light[r1, c] + u * (maps.light[r1, c1] - maps.light[r1, c])
-                share = top + v * (low - top)
-                # Froth scatters: a fifth of the sun comes around whatever is in the way.
-                sun = share.x * (0.2 + 0.8 * maps.sums[foam_row, foam_column, 1] * per)
-                under = qd.exp(-maps.sums[foam_row, foam_column, 2] * per * froth.swallow)
-                white = under * (sun * froth.in_sun + share.y * froth.in_sky)
-                most = 1.0 - qd.exp(-tau / 4096.0)
-                for row in range(foam_row * samples, foam_row * samples + samples):
-                    for column in range(foam_column * samples, foam_column * samples + samples):
-                        light, cover = white, most
-                        if froth.flat == 1 and depth[row, column] == 0x7F000000:  # FARTHEST
-                            light = froth.in_air
-                        if froth.line_strength > 0.0:  # the tank's edges stay in front
-                            here = qd.bit_cast(depth[row, column], qd.f32)
-                            cover *= 1.0 - froth.line_strength * line_cover(
-                                pixels.lines[row, column], here, froth.slack
-                            )
-                        before = pixels.color[row, column]
-                        pixels.color[row, column] = before + cover * (light - before)  # += would be atomic
+                white, cover = froth_radiance(maps, froth, row, column, tau), 1.0 - qd.exp(-tau / 4096.0)
+                for k in range(froth.samples * froth.samples):
+                    r, c = row * froth.samples + k // froth.samples, column * froth.samples + k % froth.samples
+                    blend_sample(pixels, depth, froth, white, cover, r, c)
+
+
+@qd.func
+def froth_radiance(maps: FoamMaps, froth: Froth, row, column, tau):
+    """Radiance of the froth over a pixel of the picture, in the light that its relief and the water above it leave."""
+    per = 1.0 / qd.cast(tau, qd.f32)
+    place = vec2(column + 0.5, row + 0.5) / qd.cast(froth.grain, qd.f32)
+    r, c, r1, c1, v, u = corners(place, maps.light.shape[0], maps.light.shape[1], 1.001)
+    top = maps.light[r, c] + u * (maps.light[r, c1] - maps.light[r, c])
+    low = maps.light[r1, c] + u * (maps.light[r1, c1] - maps.light[r1, c])
+    share = top + v * (low - top)
+    # Froth scatters: a fifth of the sun comes around whatever is in the way.
+    sun = share.x * (0.2 + 0.8 * maps.sums[row, column, 1] * per)
+    under = qd.exp(-maps.sums[row, column, 2] * per * froth.swallow)
+    return under * (sun * froth.in_sun + share.y * froth.in_sky)
+
+
+@qd.func
+def blend_sample(pixels: Pixels, depth: qd.template(), froth: Froth, white, cover, row, column):
+    """Lay froth over one sample; the edges of the tank stay in front."""
+    light, share = white, cover
+    if froth.flat == 1 and depth[row, column] == 0x7F000000:  # FARTHEST
+        light = froth.in_air
+    if froth.line_strength > 0.0:
+        here = qd.bit_cast(depth[row, column], qd.f32)
+        share *= 1.0 - froth.line_strength * line_cover(pixels.lines[row, column], here, froth.slack)
+    before = pixels.color[row, column]
+    pixels.color[row, column] = before + share * (light - before)  # += would be atomic

@@ -178,61 +178,130 @@ def smear(
         if moves(motion.way, texel_row, texel_column, rows, columns, shutter.least):
             for row in range(texel_row * grain, qd.min((texel_row + 1) * grain, high)):
                 for column in range(texel_column * grain, qd.min((texel_column + 1) * grain, wide)):
-                    way, mark = 2.0 * map_at(motion.way, vec2(column + 0.5, row + 0.5) / grain, vec2(0.0, 0.0)), 0
-                    length = way.norm()
-                    down, across = row * samples, column * samples
-                    moving = length > 2.0 * shutter.least
-                    if moving and at_pane(lens, walls, down, across, surface.nearest[down, across], shutter.visible):
-                        moving = False
-                        for side in range(2):
-                            r, c = pixel_along(row, column, (side - 0.5) * way, high, wide)
-                            r, c = r * samples, c * samples
-                            if not at_pane(lens, walls, r, c, surface.nearest[r, c], shutter.visible):
-                                moving = True
-                    if moving:
-                        total, weight, cover = vec3(0.0, 0.0, 0.0), 0.0, 0.0
-                        here, line, wet, own, edge = 0, 0, False, vec3(0.0, 0.0, 0.0), 0.0
-                        cuts = qd.min(qd.max(qd.cast(0.4 * length, qd.i32) + 3, samples * samples), shutter.cuts)
-                        for k in range(cuts):
-                            # The samples of a pixel take turns.
-                            i, j = k // qd.static(samples) % qd.static(samples), k % qd.static(samples)
-                            if qd.static(samples > 1) or k == 0:
-                                own_r, own_c = down + i, across + j
-                                here, line = surface.nearest[own_r, own_c], pixels.lines[own_r, own_c]
-                                wet, own = here < pixels.depth[own_r, own_c], pixels.color[own_r, own_c]
-                                if line != 0:
-                                    edge = line_cover(line, qd.bit_cast(here, qd.f32), shutter.slack)
-                            share = (k + 0.5) / cuts - 0.5
-                            r, c = pixel_along(row, column, share * way, high, wide)
-                            r, c = r * samples + i, c * samples + j
-                            there = surface.nearest[r, c]
-                            # Of what stands still, and of what hides the water, a pixel beside them shows nothing.
-                            gives = there < pixels.depth[r, c]
-                            if wet:
-                                gives = gives or there > here
-                            elif gives:
-                                gives = there < here
-                            open = 0.5 - qd.abs(share)
-                            if gives:
-                                if pixels.lines[r, c] == 0:
-                                    total += open * qd.min(pixels.color[r, c], shutter.white)
-                                    weight += open
-                            elif line == 0:
-                                total += open * own
-                                weight += open
-                            if line != 0:
-                                cover += edge / cuts
-                        if weight > 0.0:
-                            mark = 1
-                            total /= weight
-                            pixels.normal[down, across] = total + look.line_strength * cover * (look.line - total)
-                    surface.rim[down, across] = mark
+                    smear_pixel(pixels, surface, motion, lens, look, walls, shutter, row, column, high, wide, samples)
     for texel_row, texel_column in qd.ndrange(rows, columns):
         if moves(motion.way, texel_row, texel_column, rows, columns, shutter.least):
             for row in range(texel_row * grain, qd.min((texel_row + 1) * grain, high)):
                 for column in range(texel_column * grain, qd.min((texel_column + 1) * grain, wide)):
-                    if surface.rim[row * samples, column * samples] == 1:
-                        for k in range(qd.static(samples * samples)):
-                            pixels.color[row * samples + k // samples, column * samples + k % samples] = pixels.normal[
-                                row * samples, column * samples
-                            ]
+                    copy_smeared(pixels, surface.rim, row * samples, column * samples, samples)
+
+
+@qd.func
+def copy_smeared(pixels: Pixels, mark: qd.template(), top, left, samples: qd.template()):
+    """Give all samples of a pixel what was written for it, if anything was; its first lies at `top`, `left`."""
+    if mark[top, left] == 1:
+        for k in range(qd.static(samples * samples)):
+            pixels.color[top + k // samples, left + k % samples] = pixels.normal[top, left]
+
+
+@qd.func
+def smear_pixel(
+    pixels: Pixels,
+    surface: WaterSurface,
+    motion: Motion,
+    lens: Lens,
+    look: Look,
+    walls: Box,
+    shutter: Shutter,
+    row,
+    column,
+    high,
+    wide,
+    samples: qd.template(),
+):
+    """Write the mean along the way of a pixel to `pixels.normal`, and 1 to `surface.rim`; 0 where it stands still."""
+    way, mark = 2.0 * map_at(motion.way, vec2(column + 0.5, row + 0.5) / shutter.grain, vec2(0.0, 0.0)), 0
+    down, across = row * samples, column * samples
+    length = way.norm()
+    if length > 2.0 * shutter.least:
+        if not stands_at_pane(surface, lens, walls, shutter, row, column, way, high, wide, samples):
+            total, weight, cover = mean_along(pixels, surface, shutter, row, column, way, length, high, wide, samples)
+            if weight > 0.0:
+                mark = 1
+                total /= weight
+                pixels.normal[down, across] = total + look.line_strength * cover * (look.line - total)
+    surface.rim[down, across] = mark
+
+
+@qd.func
+def stands_at_pane(
+    surface: WaterSurface,
+    lens: Lens,
+    walls: Box,
+    shutter: Shutter,
+    row,
+    column,
+    way,
+    high,
+    wide,
+    samples: qd.template(),
+):
+    """Whether a pixel shows water through a pane, and so does the picture at both ends of its way."""
+    stands = True
+    for k in range(3):  # the pixel, then both ends
+        r, c = row, column
+        if k > 0:
+            r, c = pixel_along(row, column, (k - 1.5) * way, high, wide)
+        if stands:
+            r, c = r * samples, c * samples
+            stands = at_pane(lens, walls, r, c, surface.nearest[r, c], shutter.visible)
+    return stands
+
+
+@qd.func
+def mean_along(
+    pixels: Pixels,
+    surface: WaterSurface,
+    shutter: Shutter,
+    row,
+    column,
+    way,
+    length,
+    high,
+    wide,
+    samples: qd.template(),
+):
+    """(weighted sum of radiance along the way of a pixel, sum of the weights, share that edges of the tank cover).
+
+    The shutter opens and closes gradually: what is seen in the middle of the way counts most.
+    """
+    total, weight, cover = vec3(0.0, 0.0, 0.0), 0.0, 0.0
+    here, line, wet, own, edge = 0, 0, False, vec3(0.0, 0.0, 0.0), 0.0
+    cuts = qd.min(qd.max(qd.cast(0.4 * length, qd.i32) + 3, samples * samples), shutter.cuts)
+    for k in range(cuts):
+        # The samples of a pixel take turns.
+        i, j = k // qd.static(samples) % qd.static(samples), k % qd.static(samples)
+        if qd.static(samples > 1) or k == 0:
+            own_r, own_c = row * samples + i, column * samples + j
+            here, line = surface.nearest[own_r, own_c], pixels.lines[own_r, own_c]
+            wet, own = here < pixels.depth[own_r, own_c], pixels.color[own_r, own_c]
+            if line != 0:
+                edge = line_cover(line, qd.bit_cast(here, qd.f32), shutter.slack)
+        share = (k + 0.5) / cuts - 0.5
+        r, c = pixel_along(row, column, share * way, high, wide)
+        r, c = r * samples + i, c * samples + j
+        open = 0.5 - qd.abs(share)
+        if gives_light(surface.nearest[r, c], pixels.depth[r, c], here, wet):
+            if pixels.lines[r, c] == 0:
+                total += open * qd.min(pixels.color[r, c], shutter.white)
+                weight += open
+        elif line == 0:
+            total += open * own
+            weight += open
+        if line != 0:
+            cover += edge / cuts
+    return total, weight, cover
+
+
+@qd.func
+def gives_light(there, solid, here, wet):
+    """Whether a pixel shows what another does, at the depth `there` before a solid, as it moves past; bits of depths.
+
+    Of what stands still, and of what hides the water, a pixel next to them shows nothing.
+    """
+    gives = there < solid
+    if wet:
+        gives = gives or there > here
+    elif gives:
+        gives = there < here
+    return gives

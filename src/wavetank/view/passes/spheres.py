@@ -84,6 +84,18 @@ def show_ice(
             seen[i][k] = qd.select(frozen[i] == 1, x[i][k], lens.eye[k] - 1e3 * lens.forward[k])
 
 
+@qd.func
+def ball_of(x: qd.template(), i, depth: qd.template(), lens: Lens, radius, largest):
+    """Centre (view coordinates) and radius as drawn [m] of a particle's ball, and the box of pixels (first and last
+    column, first and last row) that it may cover; none where it is not before the eye.
+    """
+    c, r, box = to_view(lens, lift(x[i])), radius, qd.Vector([0, -1, 0, -1])
+    if c.z > lens.near + radius:
+        r = qd.min(radius, largest / pixels_per_metre(lens, c.z))
+        box = box_of_ball(lens, c, r, depth.shape[0], depth.shape[1])
+    return c, r, box
+
+
 @qd.kernel(fastcache=True)
 def splat(depth: qd.types.ndarray(), x: qd.types.ndarray(), lens: Lens, radius: qd.f32, largest: qd.f32, count: qd.i32):
     """Lower `depth` to that of every ball."""
@@ -92,36 +104,30 @@ def splat(depth: qd.types.ndarray(), x: qd.types.ndarray(), lens: Lens, radius: 
         i = n
         if lens.forward.dot(lift(x[0]) - lift(x[count - 1])) > 0.0:
             i = count - 1 - n
-        c = to_view(lens, lift(x[i]))
-        if c.z > lens.near + radius:
-            r = qd.min(radius, largest / pixels_per_metre(lens, c.z))
-            box = box_of_ball(lens, c, r, depth.shape[0], depth.shape[1])
-            near = qd.bit_cast(c.z - r, qd.i32)
-            for row in range(box[2], box[3] + 1):
-                for column in range(box[0], box[1] + 1):
-                    if near < depth[row, column]:
-                        key = qd.bit_cast(ball_depth(view_ray(lens, row, column), c, r), qd.i32)
-                        # A look before the atomic saves most of them; depths only ever fall.
-                        if key > 0 and key < depth[row, column]:
-                            qd.atomic_min(depth[row, column], key)
+        c, r, box = ball_of(x, i, depth, lens, radius, largest)
+        near = qd.bit_cast(c.z - r, qd.i32)
+        for row in range(box[2], box[3] + 1):
+            for column in range(box[0], box[1] + 1):
+                if near < depth[row, column]:
+                    key = qd.bit_cast(ball_depth(view_ray(lens, row, column), c, r), qd.i32)
+                    # A look before the atomic saves most of them; depths only ever fall.
+                    if key > 0 and key < depth[row, column]:
+                        qd.atomic_min(depth[row, column], key)
 
 
 @qd.kernel(fastcache=True)
 def claim(pixels: Pixels, x: qd.types.ndarray(), lens: Lens, radius: qd.f32, largest: qd.f32, count: qd.i32):
     """Write the place of the particle that is nearest at each pixel, the lowest place where several are."""
     for i in range(count):
-        c = to_view(lens, lift(x[i]))
-        if c.z > lens.near + radius:
-            r = qd.min(radius, largest / pixels_per_metre(lens, c.z))
-            box = box_of_ball(lens, c, r, pixels.depth.shape[0], pixels.depth.shape[1])
-            near = qd.bit_cast(c.z - r, qd.i32) - 8
-            for row in range(box[2], box[3] + 1):
-                for column in range(box[0], box[1] + 1):
-                    if near <= pixels.depth[row, column]:
-                        key = qd.bit_cast(ball_depth(view_ray(lens, row, column), c, r), qd.i32)
-                        # Two kernels may round the same sum differently: a few last digits are forgiven.
-                        if key > 0 and key <= pixels.depth[row, column] + 8:
-                            qd.atomic_min(pixels.surface[row, column], i)
+        c, r, box = ball_of(x, i, pixels.depth, lens, radius, largest)
+        near = qd.bit_cast(c.z - r, qd.i32) - 8
+        for row in range(box[2], box[3] + 1):
+            for column in range(box[0], box[1] + 1):
+                if near <= pixels.depth[row, column]:
+                    key = qd.bit_cast(ball_depth(view_ray(lens, row, column), c, r), qd.i32)
+                    # Two kernels may round the same sum differently: a few last digits are forgiven.
+                    if key > 0 and key <= pixels.depth[row, column] + 8:
+                        qd.atomic_min(pixels.surface[row, column], i)
 
 
 @qd.kernel(fastcache=True)

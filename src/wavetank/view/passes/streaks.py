@@ -20,7 +20,7 @@ from wavetank.view.buffers import Buffers, FoamMaps, Pixels
 from wavetank.view.cells import Cells
 from wavetank.view.lens import Lens, pixels_between, pixels_per_metre, to_pixel, to_view, vec2, vec3, vec4
 from wavetank.view.look import Look
-from wavetank.view.optics.drop import drop_of, motion_of, rough_of, shine, way_of
+from wavetank.view.optics.drop import drop_of, drop_radiance, motion_of, rough_of, way_of
 from wavetank.view.optics.fluid import Optics, optics_of
 from wavetank.view.optics.glass import line_cover
 from wavetank.view.shot import Shot
@@ -38,7 +38,9 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if frame.dim == 2 or frame.count == 0 or shot.shutter <= 0.0 or under_water(shot, buffers):
         return
     water, sums, seen = water_of(buffers, shot), buffers.foam, buffers.streak_box
-    drops, optics = water.drops(frame), optics_of(shot, 0, buffers.supersample)
+    if not water.may_have_drops(frame.count):
+        return
+    drops, optics = water.drops(frame), optics_of(shot, buffers.supersample)
     motion = motion_of(shot.shutter, buffers.supersample)
     bound(seen, sums, drops, water.cells, shot.lens, optics, motion, frame.count)
     lay(
@@ -200,7 +202,9 @@ def lines(
             side = 0.85 * (n // 3 - 1)
             place = to_pixel(lens, c) - 0.5 + wide * side * vec2(-along.y, along.x)
             place += (0.85 * (n % 3 - 1) * wide * qd.sqrt(1.0 - side * side)) * along
-            seen = shine(pixels, surface, drops, cells, lens, look, optics, a, place.y, place.x, c, r, 0.3) / 3.0
+            seen = (
+                drop_radiance(pixels, surface, drops, cells, lens, look, optics, a, place.y, place.x, c, r, 0.3) / 3.0
+            )
             if n < 3:
                 low += seen
             elif n < 6:
@@ -263,7 +267,7 @@ def add(
                         # Where the drop is when the pixel sees the middle of what it sees of it.
                         moved = 0.5 * (qd.max(u - half, -long) + qd.min(u + half, long)) / scale
                         there = vec3(c.x + moved * along.x, c.y - moved * along.y, c.z)
-                        seen = shine(
+                        seen = drop_radiance(
                             pixels,
                             surface,
                             drops,

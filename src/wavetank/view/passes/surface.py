@@ -16,6 +16,7 @@ Within an ellipsoid rays count as parallel; at a distance of a hundred radii tha
 """
 
 import dataclasses
+import enum
 from typing import Any
 
 from wavetank.device.compiler import qd, threads
@@ -31,6 +32,14 @@ from wavetank.view.water_buffers import Ellipsoids, water_of
 LARGEST = 0.25  # of the picture's height: radius up to which an ellipsoid is drawn
 GAP = 2.0  # d: what an outline stands before by more, it stands out from
 AWAY = 0.12  # how much an ellipsoid faces away that no eye can see
+
+
+class Part(enum.IntEnum):
+    """Which pixels of an ellipse are filled."""
+
+    ALL = 0  # those whose centres lie inside
+    WHOLE = 1  # those that are covered as a whole
+    OUTLINE = 2  # those that are covered in part
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -118,13 +127,13 @@ def splat(
                 if ellipsoids.size[j] > 0.0 and ellipsoids.lone[j] <= limits.lone:
                     if may_be_seen(ellipsoids, j, image, lens, walls, limits.away):
                         ellipsoids.edge[j] = fill_ellipse(
-                            depth, rim, ellipsoids, j, lens, limits, qd.static(1 if soft else 0)
+                            depth, rim, ellipsoids, j, lens, limits, qd.static(Part.WHOLE if soft else Part.ALL)
                         )
     # What stands out from nothing in the finished depth has no outline, whatever the order of the threads.
     for n in range(2 * count):
         if qd.static(soft):
             if ellipsoids.edge[n] == 1:
-                fill_ellipse(depth, rim, ellipsoids, n, lens, limits, 2)
+                fill_ellipse(depth, rim, ellipsoids, n, lens, limits, qd.static(Part.OUTLINE))
     # Pixels that only outlines cover get their depth.
     for task in range(strips.count):
         row, first, last = strip(strips, task, depth.shape[0], depth.shape[1])
@@ -151,19 +160,36 @@ def may_be_seen(ellipsoids: Ellipsoids, i, image, lens: Lens, walls: Box, away):
     return c.z > lens.near + ellipsoids.size[i] and not hidden
 
 
-@qd.func
-def fill_ellipse(
-    depth: qd.template(), rim: qd.template(), ellipsoids: Ellipsoids, i, lens: Lens, limits: Limits, part: qd.template()
-):
-    """Lower `depth` to that of one ellipsoid, or raise `rim` to the share of a pixel that its outline covers.
+#: An ellipsoid as the eye sees it: an ellipse of pixels, and its front over them.
+Ellipse = qd.types.struct(
+    middle=vec2,  # px
+    tall=qd.f32,  # px: half its height, outline included
+    curve=qd.f32,  # 1/px^2: P^-1 along a row, pxx
+    cross=qd.f32,  # 1/px^2: pxy
+    steep=qd.f32,  # 1/px^2: pyy
+    per=qd.f32,  # 1 / pxx
+    lean=qd.f32,  # by how much the middle of a row moves from row to row
+    fall=qd.f32,  # 1/px^2: p in the middle of a row, per square of its height
+    slope=vec2,  # m/px: of the plane through the outline
+    half=qd.f32,  # m: half thickness over that plane
+    depth=qd.f32,  # m: of its centre
+    nearest=qd.i32,  # bits of its least depth [m]
+    inner=qd.f32,  # p is at least 1 - inner half a pixel inside the outline
+    outer=qd.f32,  # and at most this half a pixel outside of it
+    narrow=qd.f32,  # px: its lesser radius
+)
 
-    Part 0 takes the pixels whose centres lie inside. Part 1 takes those that are covered as a whole, as if the outline
-    were straight, and returns whether it may have left others to part 2.
+
+@qd.func
+def ellipse_of(ellipsoids: Ellipsoids, i, lens: Lens, limits: Limits, outlined: qd.template()):
+    """Ellipse of pixels that an ellipsoid covers; where it is `outlined` its outline is half a pixel wide on each side.
+
+    p(u, v) = pxx u^2 + 2 pxy u v + pyy v^2 is 1 on the outline.
     """
     c, size = to_view(lens, ellipsoids.center[i]), ellipsoids.size[i]
     scale = pixels_per_metre(lens, c.z)
     shrink = qd.min(1.0, limits.largest / (size * scale))
-    axes, mixed, left_over = ellipsoids.axes[i], ellipsoids.mixed[i], 0
+    axes, mixed = ellipsoids.axes[i], ellipsoids.mixed[i]
     # Rotated into the view ...
     a, b, f = lens.right, lens.up, lens.forward
     middle = lens.middle
@@ -182,57 +208,103 @@ def fill_ellipse(
     pxx, pyy, pxy = yy / area, xx / area, -xy / area
     gx, gy = pxx * xz + pxy * yz, pxy * xz + pyy * yz
     half = qd.sqrt(qd.max(zz - gx * xz - gy * yz, 0.0))
-    # p(u, v) = pxx u^2 + 2 pxy u v + pyy v^2 is 1 on the outline; half a pixel outside it is `outer` at most, and half
-    # a pixel inside at least 1 - `inner`.
     inner, outer, narrow = 0.0, 1.0, 1.0
-    if qd.static(part != 0):
+    if qd.static(outlined):
         narrow = qd.sqrt(qd.max(0.5 * (xx + yy) - qd.sqrt(0.25 * (xx - yy) ** 2 + xy * xy), 0.04))
         rest = qd.max(1.0 - 0.5 / narrow, 0.0)
         inner, outer = 1.0 - rest * rest, (1.0 + 0.5 / narrow) ** 2
-    nearest = qd.bit_cast(qd.max(c.z - qd.sqrt(zz), 1e-6), qd.i32)
-    rows, columns = depth.shape[0], depth.shape[1]
-    tall = qd.sqrt(yy * outer)
-    per, lean, fall = 1.0 / pxx, -pxy / pxx, pyy - pxy * pxy / pxx
-    first, last = pixels_between(middle.y - tall - 0.5, middle.y + tall - 0.5, rows)
+    return Ellipse(
+        middle=middle,
+        tall=qd.sqrt(yy * outer),
+        curve=pxx,
+        cross=pxy,
+        steep=pyy,
+        per=1.0 / pxx,
+        lean=-pxy / pxx,
+        fall=pyy - pxy * pxy / pxx,
+        slope=vec2(gx, gy),
+        half=half,
+        depth=c.z,
+        nearest=qd.bit_cast(qd.max(c.z - qd.sqrt(zz), 1e-6), qd.i32),
+        inner=inner,
+        outer=outer,
+        narrow=narrow,
+    )
+
+
+@qd.func
+def fill_ellipse(
+    depth: qd.template(), rim: qd.template(), ellipsoids: Ellipsoids, i, lens: Lens, limits: Limits, part: qd.template()
+):
+    """Lower `depth` to that of one ellipsoid, or raise `rim` to the share of a pixel that its outline covers.
+
+    Part `Part.ALL` takes the pixels whose centres lie inside; `Part.WHOLE` those that are covered as a whole, as if the
+    outline were straight, and returns 1 where it may have left others to `Part.OUTLINE`, else 0.
+    """
+    left_over = 0
+    ellipse = ellipse_of(ellipsoids, i, lens, limits, qd.static(part != Part.ALL))
+    middle, lean = ellipse.middle, ellipse.lean
+    first, last = pixels_between(middle.y - ellipse.tall - 0.5, middle.y + ellipse.tall - 0.5, depth.shape[0])
     for row in range(first, last + 1):
         v = middle.y - row - 0.5
-        reach = 1.0 - v * v * fall
-        room = (reach + outer - 1.0) * per
+        reach = 1.0 - v * v * ellipse.fall
+        room = (reach + ellipse.outer - 1.0) * ellipse.per
         if room > 0.0:
             wide = qd.sqrt(room)
-            at = middle.x + lean * v - 0.5
-            base = c.z + (gx * lean + gy) * v
-            left, right = pixels_between(at - wide, at + wide, columns)
-            # What an outline covers in part lies at both ends of a row.
-            before, after = right, right + 1
-            if qd.static(part == 2):
-                whole = qd.sqrt(qd.max((reach - inner) * per, 0.0))
-                before = qd.min(qd.cast(qd.floor(qd.max(at - whole, left - 2.0)), qd.i32) + 1, right)
-                after = qd.max(qd.cast(qd.floor(qd.min(at + whole, right + 1.0)), qd.i32), before + 1)
-            for side in range(qd.static(2 if part == 2 else 1)):
-                for column in range(qd.select(side == 0, left, after), qd.select(side == 0, before, right) + 1):
-                    u = column - at  # from the middle of the row
-                    inside = reach - pxx * u * u
-                    tried = depth[row, column] > nearest
-                    if qd.static(part == 2):
-                        tried = inside < inner
-                    if tried:
-                        front = base + gx * u - half * qd.sqrt(qd.max(inside, 0.0))
-                        key = qd.bit_cast(front, qd.i32)
-                        if key > 0 and key < depth[row, column]:
-                            cover = 1.0
-                            if qd.static(part != 0):
-                                if inside < inner:
-                                    # Distance to the outline [px]: p - 1 over its gradient.
-                                    slope = 2.0 * vec2(pxx * u, pxy * (u + lean * v) + pyy * v)
-                                    cover = qd.min(0.5 + qd.min(inside / qd.max(slope.norm(), 1e-6), narrow), 1.0)
-                            if cover >= 1.0:
-                                if qd.static(part != 2):
-                                    qd.atomic_min(depth[row, column], key)
-                            elif cover > 0.0 and qd.bit_cast(depth[row, column], qd.f32) > front + limits.gap:
-                                left_over = 1
-                                if qd.static(part == 2):
-                                    qd.atomic_max(rim[row, column], rim_mark(cover, key))
+            at = middle.x + lean * v - 0.5  # column of the middle of the row
+            left, right = pixels_between(at - wide, at + wide, depth.shape[1])
+            if qd.static(part == Part.OUTLINE):
+                # What an outline covers in part lies at both ends of a row.
+                solid = qd.sqrt(qd.max((reach - ellipse.inner) * ellipse.per, 0.0))
+                before = qd.min(qd.cast(qd.floor(qd.max(at - solid, left - 2.0)), qd.i32) + 1, right)
+                after = qd.max(qd.cast(qd.floor(qd.min(at + solid, right + 1.0)), qd.i32), before + 1)
+                for side in range(2):
+                    begin, end = qd.select(side == 0, left, after), qd.select(side == 0, before, right)
+                    for column in range(begin, end + 1):
+                        left_over |= fill_pixel(depth, rim, ellipse, limits, row, column, at, v, reach, part)
+            else:
+                for column in range(left, right + 1):
+                    left_over |= fill_pixel(depth, rim, ellipse, limits, row, column, at, v, reach, part)
+    return left_over
+
+
+@qd.func
+def fill_pixel(
+    depth: qd.template(),
+    rim: qd.template(),
+    ellipse: qd.template(),
+    limits: Limits,
+    row,
+    column,
+    at,
+    v,
+    reach,
+    part: qd.template(),
+):
+    """Fill one pixel of a row whose middle lies at the column `at`, `v` pixels above that of the ellipse."""
+    left_over, u = 0, column - at
+    inside = reach - ellipse.curve * u * u  # 1 - p
+    tried = depth[row, column] > ellipse.nearest
+    if qd.static(part == Part.OUTLINE):
+        tried = inside < ellipse.inner
+    if tried:
+        base = ellipse.depth + (ellipse.slope.x * ellipse.lean + ellipse.slope.y) * v
+        front = base + ellipse.slope.x * u - ellipse.half * qd.sqrt(qd.max(inside, 0.0))
+        key = qd.bit_cast(front, qd.i32)
+        if key > 0 and key < depth[row, column]:
+            cover = 1.0
+            if qd.static(part != Part.ALL):
+                if inside < ellipse.inner:
+                    # Distance to the outline [px]: p - 1 over its gradient.
+                    slope = 2.0 * vec2(ellipse.curve * u, ellipse.cross * (u + ellipse.lean * v) + ellipse.steep * v)
+                    cover = qd.min(0.5 + qd.min(inside / qd.max(slope.norm(), 1e-6), ellipse.narrow), 1.0)
+            if cover >= 1.0:
+                if qd.static(part != Part.OUTLINE):
+                    qd.atomic_min(depth[row, column], key)
+            elif cover > 0.0 and qd.bit_cast(depth[row, column], qd.f32) > front + limits.gap:
+                left_over = 1
+                if qd.static(part == Part.OUTLINE):
+                    qd.atomic_max(rim[row, column], rim_mark(cover, key))
     return left_over
 
 

@@ -15,7 +15,7 @@ from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, view_ray
 from wavetank.view.look import Look
 from wavetank.view.optics.edge_coverage import line_mark
-from wavetank.view.optics.glass import slack, with_tank
+from wavetank.view.optics.glass import behind_panes, slack, with_lines
 from wavetank.view.optics.rays import Box
 from wavetank.view.shot import Shot
 
@@ -109,13 +109,7 @@ def blend(pixels: Pixels, lens: Lens, look: Look, box: Box):
     """Lay panes and lines over the picture."""
     for row, column in qd.ndrange(pixels.depth.shape[0], pixels.depth.shape[1]):
         ray = view_ray(lens, row, column)
-        pixels.color[row, column] = with_tank(
-            lens,
-            look,
-            box,
-            ray_origin(lens, ray),
-            ray_direction(lens, ray),
-            qd.bit_cast(pixels.depth[row, column], qd.f32),
-            pixels.lines[row, column],
-            pixels.color[row, column],
-        )
+        origin, direction = ray_origin(lens, ray), ray_direction(lens, ray)
+        z = qd.bit_cast(pixels.depth[row, column], qd.f32)
+        shown = behind_panes(lens, look, box, origin, direction, z, pixels.color[row, column])
+        pixels.color[row, column] = with_lines(look, pixels.lines[row, column], shown)

@@ -86,18 +86,15 @@ def add_up(shot: Shot, water: WaterBuffers, thickness: Thickness, lens: Lens, co
     )
     rows, columns = thickness.water.shape
     parts = int(thickness.sums.shape[0]) // int(rows * columns)
-    add(
-        thickness,
-        cells.x,
-        water.ellipsoids.lone,
-        strips_of(thickness.water),
-        lens,
-        disc,
-        parts,
-        int(threads() > 0),
-        frame.count,
-    )
-    stain(thickness, cells, water.ellipsoids.lone, frame.dye, lens, disc, frame.count)
+    alone = water.ellipsoids.lone
+    if threads() > 0:
+        add_in_parts(thickness, cells.x, alone, strips_of(thickness.water), lens, disc, parts, frame.count)
+    else:
+        add_at_once(thickness, cells.x, alone, lens, disc, frame.count)
+    if shot.dyed:
+        stain(thickness, cells, water.ellipsoids.lone, frame.dye, lens, disc, frame.count)
+    else:
+        thickness.stained.fill(0)
     if thickness.fluids:
         part(thickness, cells, water.ellipsoids.lone, frame.material, lens, disc, frame.count)
 
@@ -135,8 +132,17 @@ def thickness_in(at, row, column):
     return at.w * near * near
 
 
+@qd.func
+def disc_seen(x: qd.template(), alone: qd.template(), lens: Lens, disc: Disc, i, rows, columns):
+    """As `disc_of` has it, for particle `i`; its box is empty where it is left to the drops."""
+    at, box = disc_of(lens, disc, x[i], disc.peak, rows, columns)
+    if alone[i] > disc.lone:
+        box[1] = -1
+    return at, box
+
+
 @qd.kernel(fastcache=True)
-def add(
+def add_in_parts(
     thickness: Thickness,
     x: qd.types.ndarray(),
     alone: qd.types.ndarray(),
@@ -144,52 +150,64 @@ def add(
     lens: Lens,
     disc: Disc,
     parts: qd.i32,
-    shared_out: qd.template(),
     count: qd.i32,
 ):
-    """Add up every particle's disc.
-
-    Where the particles are `shared_out`, each of their `parts` has sums of its own, and no thread waits for another.
-    """
+    """Add up every particle's disc: each of the `parts` of them has sums of its own, so that no thread waits."""
     rows, columns = thickness.water.shape[0], thickness.water.shape[1]
-    if qd.static(shared_out):
-        for turn in range(512 * parts):
-            if turn & 511 == 0:  # the compiler gives a thread 512 turns at least
-                part = turn >> 9
-                for k in range(part * rows * columns, (part + 1) * rows * columns):
-                    thickness.sums[k] = 0
-                # In runs that take turns, because some parts of the water are nearer than others.
-                for run in range((count + 63) // 64):
-                    if run % parts == part:
-                        for i in range(64 * run, qd.min(64 * run + 64, count)):
-                            at, box = disc_of(lens, disc, x[i], disc.peak, rows, columns)
-                            if alone[i] > disc.lone:
-                                box[1] = -1
-                            for row in range(box[0], box[1] + 1):
-                                begin = (part * rows + row) * columns
-                                for column in range(box[2], box[3] + 1):
-                                    more = qd.cast(thickness_in(at, row, column) + 0.5, qd.i32)
-                                    place = begin + column
-                                    thickness.sums[place] = thickness.sums[place] + more  # += would be atomic
-        for task in range(strips.count):
-            row, first, last = strip(strips, task, rows, columns)
-            for column in range(first, last):
-                total = 0
-                for part in range(parts):
-                    total += thickness.sums[(part * rows + row) * columns + column]
-                thickness.water[row, column] = total
-    else:
-        for row, column in qd.ndrange(rows, columns):
-            thickness.water[row, column] = 0
-        for i in range(count):
-            at, box = disc_of(lens, disc, x[i], disc.peak, rows, columns)
-            if alone[i] > disc.lone:
-                box[1] = -1
-            for row in range(box[0], box[1] + 1):
-                for column in range(box[2], box[3] + 1):
-                    more = qd.cast(thickness_in(at, row, column) + 0.5, qd.i32)
-                    if more > 0:
-                        qd.atomic_add(thickness.water[row, column], more)
+    for turn in range(512 * parts):
+        if turn & 511 == 0:  # the compiler gives a thread 512 turns at least
+            add_part(thickness.sums, x, alone, lens, disc, turn >> 9, parts, rows, columns, count)
+    for task in range(strips.count):
+        row, first, last = strip(strips, task, rows, columns)
+        for column in range(first, last):
+            total = 0
+            for part in range(parts):
+                total += thickness.sums[(part * rows + row) * columns + column]
+            thickness.water[row, column] = total
+
+
+@qd.func
+def add_part(
+    sums: qd.template(),
+    x: qd.template(),
+    alone: qd.template(),
+    lens: Lens,
+    disc: Disc,
+    part,
+    parts,
+    rows,
+    columns,
+    count,
+):
+    """Add up the discs of one part of the particles: runs of 64 in turn, as some parts of the water are nearer."""
+    for k in range(part * rows * columns, (part + 1) * rows * columns):
+        sums[k] = 0
+    for run in range((count + 63) // 64):
+        if run % parts == part:
+            for i in range(64 * run, qd.min(64 * run + 64, count)):
+                at, box = disc_seen(x, alone, lens, disc, i, rows, columns)
+                for row in range(box[0], box[1] + 1):
+                    begin = (part * rows + row) * columns
+                    for column in range(box[2], box[3] + 1):
+                        more = qd.cast(thickness_in(at, row, column) + 0.5, qd.i32)
+                        sums[begin + column] = sums[begin + column] + more  # += would be atomic
+
+
+@qd.kernel(fastcache=True)
+def add_at_once(
+    thickness: Thickness, x: qd.types.ndarray(), alone: qd.types.ndarray(), lens: Lens, disc: Disc, count: qd.i32
+):
+    """Add up every particle's disc in one map."""
+    rows, columns = thickness.water.shape[0], thickness.water.shape[1]
+    for row, column in qd.ndrange(rows, columns):
+        thickness.water[row, column] = 0
+    for i in range(count):
+        at, box = disc_seen(x, alone, lens, disc, i, rows, columns)
+        for row in range(box[0], box[1] + 1):
+            for column in range(box[2], box[3] + 1):
+                more = qd.cast(thickness_in(at, row, column) + 0.5, qd.i32)
+                if more > 0:
+                    qd.atomic_add(thickness.water[row, column], more)
 
 
 @qd.kernel(fastcache=True)
