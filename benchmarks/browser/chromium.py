@@ -18,12 +18,12 @@ NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 def executable() -> str | None:
-    """Return the path of a Chromium, None where there is none."""
+    """Return the path of a Chromium, None without one."""
     return next((path for name in NAMES if (path := shutil.which(name))), None)
 
 
 class Browser:
-    """A headless Chromium with one page; `folder` is for its profile. Raises `WavetankError` where there is none."""
+    """A headless Chromium with one page; `folder` is for its profile. Raises `WavetankError` without a Chromium."""
 
     def __init__(self, folder: Path, width: int = 1280, height: int = 800) -> None:
         from websockets.sync.client import connect

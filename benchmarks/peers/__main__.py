@@ -19,8 +19,8 @@ app = typer.Typer(
 
 @app.command()
 def dam(
-    pbf_count: Annotated[int, typer.Argument(metavar="[PBF]", help="Particles beside its PBF.")] = 60_000,
-    dfsph_count: Annotated[int, typer.Argument(metavar="[DFSPH]", help="Particles beside its DFSPH.")] = 8_000,
+    pbf_count: Annotated[int, typer.Argument(metavar="[PBF]", help="Particles next to its PBF.")] = 60_000,
+    dfsph_count: Annotated[int, typer.Argument(metavar="[DFSPH]", help="Particles next to its DFSPH.")] = 8_000,
     seconds: Seconds = 0.5,
     repeats: Annotated[int, typer.Option(help="Turns that the medians are taken over, 2 or more.")] = 3,
     threads: Threads = None,

@@ -148,7 +148,7 @@ def fastest_of_ours(dam: Dam, target: float, seconds: float, say: Say) -> Settin
         for iterations in OUR_ITERATIONS:
 
             def setting(wave: float, iterations: int = iterations, grid: float = grid) -> Setting:
-                # A fast particle is followed as a fast wave is; waves are no matter where a grid carries the pressure.
+                # A fast particle is followed as a fast wave is; waves do not matter where a grid carries the pressure.
                 return {
                     "iterations": iterations,
                     "substeps": 1,

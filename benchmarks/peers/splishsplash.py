@@ -78,7 +78,7 @@ def box() -> str:
 
 
 def configure(solver: Any, order: dict[str, Any]) -> None:
-    """Set how far the pressure solver goes: so many iterations, or until its own errors [%] are met."""
+    """Set when the pressure solver stops: after `iterations`, or below its own errors [%]."""
     if order["method"] == "pbf":
         solver.setValueFloat(solver.MAX_ERROR, 1e-10)
         solver.setValueUInt(solver.MAX_ITERATIONS, order["iterations"])

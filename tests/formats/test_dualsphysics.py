@@ -198,7 +198,7 @@ def test_laminar_viscosity_and_density(read):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("<case>", "no XML"),
+        ("<case>", "not XML"),
         ("<robot/>", "casedef"),
         ("<!DOCTYPE a><case/>", "document type"),
         ("<case><casedef><geometry><definition dp='0'/></geometry></casedef></case>", "dp = 0"),

@@ -182,8 +182,8 @@ def test_what_holds_besides_is_joined(arm):
 @pytest.mark.parametrize(
     ("before", "after", "what"),
     [
-        ("<mujoco", "<mujocoo", "no XML"),
-        ('<mujoco model="arm">', '<muj><mujoco model="arm">', "no XML"),
+        ("<mujoco", "<mujocoo", "not XML"),
+        ('<mujoco model="arm">', '<muj><mujoco model="arm">', "not XML"),
         ('type="sphere" size="0.06"', 'type="cone" size="0.06"', "is a cone; box, sphere"),
         ('type="sphere" size="0.06"', 'type="sphere" size="-1"', "radius = -1"),
         ('type="sphere" size="0.06"', 'type="sphere" size="nan"', "is not 1 numbers"),

@@ -251,7 +251,7 @@ def test_particles_of_houdini(scene, tmp_path):
 
 def test_what_has_no_counterpart_is_told(scene):
     elastic = [{"id": "Fluid", "elasticityMethod": 3}, {"id": "water"}]
-    with pytest.raises(wt.WavetankError, match="no fluid in it that wavetank could simulate; Fluid is an elastic"):
+    with pytest.raises(wt.WavetankError, match="it contains no fluid that wavetank can simulate; Fluid is an elastic"):
         load_splishsplash(scene(Materials=elastic))
     blocks = [{"start": [0, 0, 0], "end": [1, 1, 1]}, {"id": "water", "start": [1, 0, 0], "end": [2, 1, 1]}]
     read = load_splishsplash(
@@ -279,7 +279,7 @@ def test_the_command_writes_a_scene_that_needs_no_other_file(scene, tmp_path, mo
     monkeypatch.setattr("sys.argv", ["wavetank", "import", str(path), "-o", str(out)])
     with pytest.raises(SystemExit):
         main()
-    assert "there is no file '../models/wedge.obj' beside it" in capsys.readouterr().err
+    assert "there is no file '../models/wedge.obj' next to it" in capsys.readouterr().err
 
 
 DAMAGED = (

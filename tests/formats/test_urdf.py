@@ -86,7 +86,7 @@ def test_meshes_lie_beside_it(arm):
 @pytest.mark.parametrize(
     ("before", "after", "what"),
     [
-        ("<robot", "<robt", "no XML"),
+        ("<robot", "<robt", "not XML"),
         ('<child link="cup"/>', '<child link="cap"/>', "does not have: cap"),
         ('<parent link="post"/>', '<parent link="cup"/>', "no joints lead from its root to cup, fore"),
         ('<sphere radius="0.06"/>', "<cone/>", "has a cone; box, sphere"),

@@ -164,9 +164,9 @@ def test_live_parameters():
     assert sim.gravity == (1.0, 0.0, 0.0)
     with pytest.raises(AttributeError):
         _ = sim.no_such_thing
-    with pytest.raises(wt.WavetankError, match=r"'viscositty' is no parameter; did you mean 'viscosity'\?"):
+    with pytest.raises(wt.WavetankError, match=r"'viscositty' is not a parameter; did you mean 'viscosity'\?"):
         sim.viscositty = 0.5
-    with pytest.raises(wt.WavetankError, match="spacing cannot change while the water runs.*changed"):
+    with pytest.raises(wt.WavetankError, match="spacing cannot change during a simulation.*changed"):
         sim.spacing = 0.5
     sim.note = "of my own"
 

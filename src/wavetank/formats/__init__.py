@@ -38,7 +38,7 @@ def exporter_named(name: str, *kinds: str) -> ModuleType:
 
 
 def exporter_for(path: str | Path, *kinds: str) -> ModuleType:
-    """Return the module that writes `path`, chosen by its suffix; raises `WavetankError` if there is none."""
+    """Return the module that writes files with the suffix of `path`; raises `WavetankError` for an unknown one."""
     for module in EXPORTERS:
         if Path(path).suffix.lower() in module.SUFFIXES and (not kinds or module.KIND in kinds):
             return module

@@ -34,11 +34,11 @@ def read_bgeo(path: str | Path) -> np.ndarray:
         except (OSError, EOFError, zlib.error) as error:
             raise WavetankError(f"{origin}: these particles cannot be read: {one_line(error)}.") from None
         except (struct.error, ValueError) as error:
-            raise WavetankError(f"{origin}: this is no .bgeo file of version {VERSION}: {error}.") from None
+            raise WavetankError(f"{origin}: this is not a .bgeo file of version {VERSION}: {error}.") from None
 
 
 def _points(file: Any, size: int) -> np.ndarray:
-    """Return the points of an open file that takes so many bytes on the disk; raises `ValueError`."""
+    """Return the points of an open file of `size` bytes; raises `ValueError`."""
 
     def unpacked(form: str) -> tuple[Any, ...]:
         return struct.unpack(form, file.read(struct.calcsize(form)))

@@ -1,7 +1,11 @@
-"""A file that others can open at any moment while it grows, and after a kill.
+"""A file that others can open at any moment while it grows, and after a kill: copy-on-write below HDF5.
 
-What is new is written behind the end that readers know of. What changes in front of that end is kept in memory until
-`commit`, which writes it in one go, the first page first: HDF5 keeps there how long the file is.
+Data beyond the committed end go to disk at once, where no reader looks yet. Changes before it (object headers, B-tree
+nodes) stay in memory until `commit`, which writes them together, the first page first: its superblock has the length.
+
+HDF5's own means do less. SWMR marks the file as being written; a kill leaves the mark, and nothing opens it then.
+`flush` writes metadata in any order. Copying to a temporary name writes the whole file each time. A virtual dataset
+over one file per frame is rewritten for each frame, and readers open them all.
 """
 
 from pathlib import Path
@@ -14,7 +18,7 @@ PAGE = 16384  # bytes
 
 
 class CommittedFile:
-    """The file object of such a file, as h5py wants one. It gets its name with the first `commit`."""
+    """A file object for h5py. It gets its name with the first `commit`."""
 
     def __init__(self, path: str | Path, retry: Retry) -> None:
         self.path, self.retry = Path(path), retry
@@ -23,30 +27,30 @@ class CommittedFile:
             self._file = self._partial.open("w+b", buffering=0)
         except OSError as error:
             raise WavetankError(f"{str(path)!r} cannot be written: {error.strerror or error}.") from error
-        self._place = 0  # where the next read or write begins
-        self._size = 0  # bytes, for the one who writes
-        self._known = 0  # bytes that readers know of
-        self._pages: dict[int, bytearray] = {}  # changed ones in front of `_known`
+        self._place = 0  # position of the next read or write
+        self._size = 0  # bytes, as the writer sees it
+        self._known = 0  # bytes that are committed
+        self._pages: dict[int, bytearray] = {}  # changed since, before `_known`
 
     # --- the file object ---
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """Move to a place, as of any file."""
+        """Set the position, as of any file."""
         self._place = offset + (0, self._place, self._size)[whence]
         return self._place
 
     def tell(self) -> int:
-        """Return the place."""
+        """Return the position."""
         return self._place
 
     def read(self, length: int) -> bytes:
-        """Return so many bytes from the present place on."""
+        """Return `length` bytes from the current position."""
         result = bytearray(length)
         self.readinto(memoryview(result))
         return bytes(result)
 
     def readinto(self, buffer: memoryview) -> int:
-        """Fill `buffer` from the present place on; zeros beyond the end."""
+        """Fill `buffer` from the current position; zeros beyond the end."""
         view = memoryview(buffer).cast("B")
         at, length = self._place, len(view)
         found = self._get(length, at)
@@ -60,7 +64,7 @@ class CommittedFile:
         return length
 
     def write(self, data: memoryview) -> int:
-        """Write at the present place, or keep it in memory where readers look already."""
+        """Write at the current position: to disk beyond the committed end, else to memory."""
         view = memoryview(data).cast("B")
         at, end = self._place, self._place + len(view)
         while at < min(end, self._known):
@@ -78,19 +82,19 @@ class CommittedFile:
         return len(view)
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the size; what readers know of stays until `commit`."""
+        """Set the size; the committed part stays until `commit`."""
         self._size = self._place if size is None else size
         if self._size > self._known:
             self.retry.call(lambda: self._file.truncate(self._size))
         return self._size
 
     def flush(self) -> None:
-        """Do nothing: `commit` is what counts."""
+        """Do nothing: `commit` writes."""
 
     # --- for readers ---
 
     def commit(self) -> None:
-        """Let readers see all that was written."""
+        """Make all that was written visible to readers."""
         pages, self._pages = self._pages, {}
         for page in sorted(pages):
             self._put(memoryview(pages[page])[: max(0, self._size - page * PAGE)], page * PAGE)
@@ -105,7 +109,7 @@ class CommittedFile:
         self._file.close()
 
     def abandon(self) -> None:
-        """Close without what was not committed; without a commit nothing is left."""
+        """Close and drop what was not committed; without any commit, the file."""
         self._file.close()
         if self._partial is not None:
             self._partial.unlink(missing_ok=True)

@@ -57,7 +57,7 @@ class _Reader:
         assert geometry is not None and definition is not None
         dp = float(definition.attrib["dp"])
         if not 0.0 < dp < 1e6:
-            raise WavetankError(f"dp = {dp:g} is no distance of particles; it must be above 0 m.")
+            raise WavetankError(f"dp = {dp:g} is not a particle spacing; it must be above 0 m.")
         self.drawing = Drawing(path, geometry, dp, self.notes)
         self.spacing = spacing or dp
         self.domain = [self.drawing.vector(definition.find(f"point{end}")) for end in ("min", "max")]
@@ -68,7 +68,7 @@ class _Reader:
         items = self.drawing.items
         drawn = [item for item in items if item.what == "fluid"]
         if not drawn:
-            raise WavetankError("there is no fluid in it that wavetank could simulate")
+            raise WavetankError("it contains no fluid that wavetank can simulate")
         walls = self._walls(items, drawn)
         tank = self._tank(walls, items)
         self._tell_of_holes(items, walls)
@@ -131,7 +131,7 @@ class _Reader:
             margin = np.maximum(4.0 * self.spacing, 0.1 * (upper - lower))
             lower, upper = lower - margin, upper + margin
             faces: tuple[str, ...] = ()
-            self.notes.append("there is no box of walls around the fluid; the tank is open on all sides.")
+            self.notes.append("no box of walls surrounds the fluid; the tank is open on all sides.")
         else:
             (lower, upper), faces = walls.corners(), walls.faces
             if "top" not in faces:

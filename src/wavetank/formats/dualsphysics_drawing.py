@@ -62,7 +62,7 @@ class Item:
     points: np.ndarray  # [m], [n, 3]: lower and upper corner, center, ends of the axis, or vertices; before the matrix
     matrix: np.ndarray  # [4, 4]
     radius: float = 0.0  # m
-    faces: Any = None  # names of the faces of a box that is none but its faces; triangles [m, 3] of a mesh
+    faces: Any = None  # names of the faces of a box that consists of its faces; triangles [m, 3] of a mesh
     is_filling: bool = False  # whether it fills what is free in a box
 
     @property
@@ -120,7 +120,7 @@ class Drawing:
             known = _NAME.sub(lambda m: repr(self.variables[m[0]]) if m[0] in self.variables else m[0], plain)
             value = Expression(known)(0.0)
         if not math.isfinite(value):
-            raise WavetankError(f"{one_line(text, 60)} is no finite number.")
+            raise WavetankError(f"{one_line(text, 60)} is not a finite number.")
         return value
 
     def vector(self, row: Element | None, usual: float = 0.0) -> np.ndarray:

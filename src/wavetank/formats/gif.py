@@ -46,7 +46,7 @@ class GifWriter:
         self._pictures.append(Image.fromarray(image).quantize(256, dither=Image.Dither.NONE))
 
     def close(self) -> None:
-        """Write the file; without a single picture there is none."""
+        """Write the file, if there is any picture."""
         pictures, self._pictures = self._pictures, []
         if not pictures:
             return
@@ -75,7 +75,7 @@ class GifWriter:
 
 
 def resized(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return a picture, uint8 [height, width, 3], with so many pixels in width and height."""
+    """Resize a picture, uint8 [height, width, 3]."""
     from PIL import Image
 
     if image.shape[1::-1] == size:

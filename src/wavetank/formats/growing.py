@@ -1,4 +1,4 @@
-"""HDF5 files that grow by a frame at a time, and can be opened at any of them: rows of columns, one after the other."""
+"""HDF5 files that grow frame by frame and can be opened after each: columns hold the rows of all frames."""
 
 import contextlib
 import math
@@ -14,10 +14,10 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.memory import in_words
 from wavetank.foundation.retry import Retry
 
-CHUNK = 1 << 17  # bytes of a column that lie together, about
+CHUNK = 1 << 17  # bytes of a chunk, about
 LARGEST = 2**48  # bytes
-FEW = 128  # rows that lie together of what has one for each frame: as many are written for each
-#: what h5py and what it read end in where a file is damaged
+FEW = 128  # rows per chunk of a column with one row per frame
+#: what h5py, and what reads its values, raise for a damaged file
 UNREADABLE = (OSError, KeyError, IndexError, ValueError, TypeError, RuntimeError, AttributeError, ArithmeticError)
 
 
@@ -77,7 +77,7 @@ class GrowingFile:
         self.frames += 1
 
     def close(self) -> None:
-        """Close the file; without a frame there is none."""
+        """Close the file; it is removed if it has no frame."""
         try:
             self.file.close()
         finally:
@@ -87,17 +87,17 @@ class GrowingFile:
                 self.disk.abandon()
 
 
-def opened(path: str | Path) -> Any:
-    """Open such a file for reading; raises `WavetankError` for what is none."""
+def open_hdf5(path: str | Path) -> Any:
+    """Open an HDF5 file for reading; raises `WavetankError` for any other file."""
     h5py = import_h5py()
-    input_limits.open_regular(path, LARGEST, "HDF5 file").close()  # a file, and none that waits
+    input_limits.open_regular(path, LARGEST, "HDF5 file").close()  # a regular file, not a pipe
     with damaged(path):
         return h5py.File(path, "r")
 
 
 @contextlib.contextmanager
 def damaged(path: str | Path) -> Iterator[None]:
-    """Make one sentence of what a damaged file ends in."""
+    """Raise what a damaged file causes as a `WavetankError` of one line."""
     origin = input_limits.printable(path)
     with input_limits.explain_errors(origin, "HDF5 file"):
         try:
@@ -145,7 +145,7 @@ def table_rows(group: Any, frame: int) -> dict[str, np.ndarray]:
 
 def frames_of(path: str | Path, read: Callable[[Any, int], Any], counter: str, first: int = 0) -> Iterator[Any]:
     """Yield what `read` makes of each frame of a file, from the one with the number `first` on."""
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         with damaged(path):
             frames = int(file.attrs[counter])
         for frame in range(first, frames):

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.formats.growing import GrowingFile, Table, damaged, frames_of, import_h5py, opened, table_rows
+from wavetank.formats.growing import GrowingFile, Table, damaged, frames_of, import_h5py, open_hdf5, table_rows
 from wavetank.formats.plan import Plan
 from wavetank.formats.surface import WaterSurface
 from wavetank.foundation.errors import WavetankError
@@ -159,7 +159,7 @@ def read(path: str | Path, first: int = 0) -> Iterator[Instant]:
 
     Raises `WavetankError` for another file.
     """
-    with opened(path) as file, damaged(path):
+    with open_hdf5(path) as file, damaged(path):
         if file.attrs.get("format") != "wavetank" or COUNTER not in file.attrs:
             raise WavetankError(f"{path}: this HDF5 file was not written by wavetank; it has no format and {COUNTER}.")
         if file.attrs["layout"] != VERSION_OF_LAYOUT:
@@ -195,13 +195,13 @@ def read(path: str | Path, first: int = 0) -> Iterator[Instant]:
 
 def times(path: str | Path) -> list[float]:
     """Return the time of the water [s] at each frame of such a file."""
-    with opened(path) as file, damaged(path):
+    with open_hdf5(path) as file, damaged(path):
         return [float(time) for time in file["frames/time"][: int(file.attrs.get(COUNTER, 0))]]
 
 
 def rate(path: str | Path) -> float:
     """Return the frames per second of water of such a file."""
-    with opened(path) as file, damaged(path):
+    with open_hdf5(path) as file, damaged(path):
         fps = float(file.attrs.get("fps", 30.0))
     if not 0.0 < fps <= 1000.0:
         raise WavetankError(f"{path}: {fps} frames per second are not allowed; a rate lies between 0 and 1000.")

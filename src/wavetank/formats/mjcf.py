@@ -155,7 +155,7 @@ class _Reader:
         joints, geoms, told = [], 0.0, None
         self.bodies += 1
         if self.bodies > MOST_LINKS:
-            raise WavetankError(f"it has more than {MOST_LINKS} bodies; at most so many are allowed.")
+            raise WavetankError(f"it has more than {MOST_LINKS} bodies, which is the limit.")
         self.places[str(row.get("name"))] = (owner, at)
         for child, pose, inner in self._flat(row, at, around):
             if child.tag == "geom":
@@ -270,7 +270,7 @@ class _Reader:
         return (unit * (lower - begins), unit * (upper - begins)) if limited == "true" and lower < upper else None
 
     def _equalities(self) -> None:
-        """Add joints for bodies that are connected or welded besides."""
+        """Add joints for bodies that equality constraints connect or weld."""
         for row in self.root.findall("equality/*"):
             ends = [self.places.get(str(row.get(key, ""))) for key in ("body1", "body2")]
             if row.tag not in ("connect", "weld") or ends[0] is None or (row.get("body2") and ends[1] is None):

@@ -162,7 +162,7 @@ def _add_stream(container: Any, width: int, height: int, rate: Fraction, quality
 
 
 def join(parts: Sequence[Path], path: Path) -> None:
-    """Write one file with the pictures of the `parts`, one behind the other; nothing is encoded anew.
+    """Write one file with the pictures of the `parts`, concatenated without encoding again.
 
     The index goes first (faststart), so that a browser plays while it loads. Raises `WavetankError` where the file
     cannot be written.

@@ -38,12 +38,12 @@ def write_npz(path: str | Path, frame: Any) -> None:
 
 
 def read_npz(path: str | Path) -> dict[str, np.ndarray]:
-    """Return the arrays of a file by name; raises `WavetankError` for what is none, or costs too much."""
+    """Return the arrays of a file by name; raises `WavetankError` for other files or too large ones."""
     return read_arrays(path, "frame of particles")
 
 
 def read(path: str | Path, scene: Scene) -> Instant:
-    """Return the instant of `scene` that a file holds; raises `WavetankError` for a file that holds none."""
+    """Return the instant of `scene` that a file holds; raises `WavetankError` for any other file."""
     origin = printable(path)
     with explain_errors(origin, "frame of particles"):
         arrays = read_npz(path)
@@ -58,7 +58,7 @@ def read(path: str | Path, scene: Scene) -> Instant:
         except (KeyError, ValueError, TypeError, OverflowError) as error:
             if isinstance(error, WavetankError):
                 raise
-            raise WavetankError(f"{origin}: these are no particles that wavetank wrote: {one_line(error)}.") from None
+            raise WavetankError(f"{origin}: this is not a frame that wavetank wrote: {one_line(error)}.") from None
 
 
 write = write_npz

@@ -93,7 +93,7 @@ def tiny(name: str, notes: list[str]) -> Solid:
 def mesh_at(link: str, found: Path | None, name: str, scale: Any, place: Pose) -> Mesh:
     """Return the mesh of the file `found`, which a robot calls `name`, at a pose in the frame of its link."""
     if found is None:
-        raise WavetankError(f"link {link}: there is no file {name} beside it or in the folders around.")
+        raise WavetankError(f"link {link}: there is no file {name} next to it or in the folders around.")
     if found.suffix.lower() not in SUFFIXES:
         raise WavetankError(
             f"link {link}: {found.name} is not read; meshes are {', '.join(SUFFIXES)} files: convert it."

@@ -44,7 +44,7 @@ def load_robot(
 
 
 def is_mjcf(path: Path) -> bool:
-    """Say whether an XML file is a model of MuJoCo. Raises `WavetankError` for what is no XML."""
+    """Say whether an XML file is a model of MuJoCo. Raises `WavetankError` for what is not XML."""
     return parse_xml(read_text(path, "XML file", LARGEST), printable(path), "this file").tag == "mujoco"
 
 

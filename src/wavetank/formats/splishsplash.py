@@ -87,7 +87,7 @@ class _Reader:
         emitters = [self._emitter(row, materials) for row in self._list("Emitters") if not self._is_elastic(row)]
         if not fluids and not emitters:
             raise WavetankError(
-                f"{self.path}: there is no fluid in it that wavetank could simulate"
+                f"{self.path}: it contains no fluid that wavetank can simulate"
                 + (f"; {', '.join(sorted(self.elastic))} is an elastic solid." if self.elastic else ".")
             )
         used = {fluid.material for fluid in fluids} | {emitter.material for emitter in emitters}

@@ -21,7 +21,7 @@ from wavetank.solids.shapes import Box, Sphere
 from wavetank.solids.solid import Solid
 
 ROUND = 1e-3  # of a radius: how equal distances from the middle of a ball are
-STRAIGHT = 1e-6  # rad: less is no rotation
+STRAIGHT = 1e-6  # rad: below it there is no rotation
 CORNER = 1e-9  # m: what is nearer is the same corner
 BALL = 1  # collisionObjectType
 
@@ -82,14 +82,14 @@ class Solids:
 
     @staticmethod
     def find_file(scene: Path, name: str) -> Path:
-        """Return a file that a scene names: beside it, or in the peer's package; raises `WavetankError`."""
+        """Return a file that a scene names: next to it, or in the peer's package; raises `WavetankError`."""
         plain = name.replace("\\", "/")
         places = [scene.parent / plain, scene.parent / Path(plain).name, *_packaged(plain)]
         for place in places:
             if place.is_file():
                 return place
         raise WavetankError(
-            f"{scene}: there is no file {name!r} beside it, and none in an installed pysplishsplash; put it there."
+            f"{scene}: there is no file {name!r} next to it or in an installed pysplishsplash; put it there."
         )
 
     def add(self, number: int, row: dict[str, Any]) -> None:

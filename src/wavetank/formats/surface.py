@@ -99,7 +99,7 @@ def reconstruct(
     )
     triangles = mesh.mesh.triangles.astype(np.int32)
     vertices = mesh.mesh.vertices.astype(np.float64)
-    normals = np.nan_to_num(mesh.point_attributes["normals"].astype(np.float64))  # of a speck there may be none
+    normals = np.nan_to_num(mesh.point_attributes["normals"].astype(np.float64))  # NaN for tiny components
     normals[~normals.any(axis=1)] = (0.0, 1.0, 0.0)
     _fit_volume(vertices, normals, triangles, len(positions) * scene.spacing**3, scene)
     velocity = mesh.point_attributes["velocity"].astype(np.float32)

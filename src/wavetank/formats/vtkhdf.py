@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.formats.growing import GrowingFile, import_h5py, opened
+from wavetank.formats.growing import GrowingFile, import_h5py, open_hdf5
 from wavetank.formats.plan import Plan
 from wavetank.formats.polydata import Piece, pieces_of
 from wavetank.foundation.errors import WavetankError
@@ -56,7 +56,7 @@ class VtkHdfSeries:
         path, kept = self._path(name), self.plan.kept
         if name not in self.plan.parts or not path.is_file():
             return
-        with opened(path) as file:
+        with open_hdf5(path) as file:
             if int(file["VTKHDF/Steps"].attrs[COUNTER]) < kept:
                 raise WavetankError(f"{path} has fewer than the {kept} frames that are to be kept.")
             for step in range(kept):

@@ -1,4 +1,4 @@
-"""VTK's XML files for every ParaView: a `.vtp` for each part of each frame, and a `.vtp.series` that lists them."""
+"""VTK XML files for any ParaView: a `.vtp` for each part of each frame, and a `.vtp.series` that lists them."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Numbers that change with time, as text: a small grammar of its own, read by Python's parser and never executed.
+"""Numbers over time as text: a small grammar, parsed by Python's parser and never executed.
 
     0.3*sin(2*pi*0.8*t)      smoothstep(1, 3, t)      clamp(t - 2, 0, 1) * 45*deg
 
@@ -14,7 +14,7 @@ from collections.abc import Callable
 from wavetank.foundation.errors import WavetankError
 
 LONGEST, MOST_PARTS = 400, 200  # characters of a text; numbers, names and operations in it
-TRIED = 60.0  # s: so far a text is tried before it is taken, TRIES times a second
+TRIED = 60.0  # s that an expression is evaluated for before it is accepted, TRIES times a second
 TRIES = 20
 
 Value = Callable[[float], float]  # of the time [s]
@@ -84,7 +84,7 @@ class Expression:
         self._value = _compiled(text)
 
     def __call__(self, time: float) -> float:
-        """Return the value at `time` [s]; raises `WavetankError` where there is none, or no finite one."""
+        """Return the value at `time` [s]; raises `WavetankError` where it is undefined or non-finite."""
         try:
             value = self._value(time)
         except ZeroDivisionError:
@@ -100,14 +100,14 @@ class Expression:
         return float(value)
 
     def check(self) -> None:
-        """Try the first minute; raises `WavetankError` where there is no finite value."""
+        """Evaluate the first minute; raises `WavetankError` where the value is non-finite."""
         for number in range(round(TRIED * TRIES) + 1):
             self(number / TRIES)
 
 
 @functools.lru_cache(maxsize=1024)
 def expression(text: str) -> Expression:
-    """Return the expression of a text, tried over its first minute; raises `WavetankError` for one that is none."""
+    """Parse a text; raises `WavetankError` if that fails or it is non-finite in its first minute."""
     result = Expression(text)
     result.check()
     return result
@@ -126,13 +126,13 @@ def _compiled(text: str) -> Value:
         raise WavetankError(f"{shown(text)} has more than {MOST_PARTS} parts; write a shorter expression.")
     if isinstance(tree.body, ast.Tuple):
         raise WavetankError(
-            f"{shown(text)} is no single number; write several in brackets, as [{text.replace(',', ', ')}]."
+            f"{shown(text)} is not a single number; write several in brackets, as [{text.replace(',', ', ')}]."
         )
     return _value_of(tree.body, text)
 
 
 def _value_of(node: ast.AST, text: str) -> Value:
-    """Return what computes one node of the tree; what is not listed here does not exist."""
+    """Compile one node of the tree; nodes that are not listed here are refused."""
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
         try:
             number = float(node.value)  # type: ignore[arg-type]

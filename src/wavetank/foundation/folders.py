@@ -1,4 +1,4 @@
-"""Where this system keeps what belongs to a user of this program."""
+"""Folders for a user's data and caches."""
 
 import os
 from pathlib import Path
@@ -6,12 +6,12 @@ from pathlib import Path
 import platformdirs
 
 NAME = "wavetank"
-#: where files were kept before on macOS, whatever XDG_DATA_HOME says
+#: of earlier versions on macOS, which ignored XDG_DATA_HOME
 EARLIER = Path("Library", "Application Support", NAME)
 
 
 def data_folder() -> Path:
-    """Return the folder of what is to stay, such as high scores; `WAVETANK_DATA` says otherwise."""
+    """Return the folder of persistent data, such as high scores; `WAVETANK_DATA` overrides it."""
     if own := os.environ.get("WAVETANK_DATA"):
         return Path(own)
     folder, earlier = platformdirs.user_data_path(NAME, appauthor=False), Path.home() / EARLIER
@@ -19,7 +19,7 @@ def data_folder() -> Path:
 
 
 def cache_folder() -> Path:
-    """Return the folder of what can be made again at any time; `WAVETANK_CACHE` says otherwise."""
+    """Return the folder of what can be recomputed at any time; `WAVETANK_CACHE` overrides it."""
     if own := os.environ.get("WAVETANK_CACHE"):
         return Path(own)
     return platformdirs.user_cache_path(NAME, appauthor=False, opinion=False)

@@ -1,4 +1,4 @@
-"""How much memory there is, and numbers of bytes and seconds in words."""
+"""Free memory, and numbers of bytes and seconds in words."""
 
 import contextlib
 import ctypes
@@ -13,19 +13,19 @@ _ARENA_MAX = -8  # M_ARENA_MAX of malloc.h
 
 
 def free_memory() -> int | None:
-    """Return the bytes that this process may still take, about; None where the system does not tell."""
+    """Estimate the bytes that this process may still allocate; None where the system does not tell."""
     found = [free for free in (_of_machine(), *map(_of_group, *zip(*_LIMITS, strict=True)), _of_process()) if free]
     return min(found) if found else None
 
 
 def give_back() -> None:
-    """Give back to the system what was freed, where the C library keeps it (glibc; malloc_trim(3)); else do nothing."""
+    """Return freed memory to the system where the C library keeps it (glibc; malloc_trim(3))."""
     with contextlib.suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
 
 
 def share_arenas() -> None:
-    """Let threads allocate from two arenas (glibc; mallopt(3)): one uses what another has freed. Else do nothing."""
+    """Limit the heap to two arenas, so that threads reuse what others freed (glibc; mallopt(3))."""
     with contextlib.suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).mallopt(_ARENA_MAX, 2)
 

@@ -13,14 +13,14 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from wavetank.foundation.errors import WavetankError
 
-FARTHEST = 1e9  # of a number that has no other bound: beyond it single precision squares to what is no number
+FARTHEST = 1e9  # of a number that has no other bound: the square of more overflows in single precision
 Number = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, le=FARTHEST, allow_inf_nan=False)]
 Vector = tuple[Number, Number] | tuple[Number, Number, Number]
 Size = tuple[Positive, Positive] | tuple[Positive, Positive, Positive]
 Quaternion = tuple[Number, Number, Number, Number]
 
-MOST_TOLD = 200  # errors of a table that are compared
+MOST_COMPARED = 200  # errors of a table
 LIST = "a list of numbers, as [0, -9.81, 0]"
 METRES = "m"  # marks the fields of a scene that are lengths: `Scene.scaled` multiplies these and nothing else
 Length = Annotated[Positive, METRES]
@@ -43,22 +43,22 @@ class _OneSentence(ModelMetaclass):
 
 
 class Model(BaseModel, metaclass=_OneSentence):
-    """Strictly validated data: unknown keys are refused, assignments are checked, true and false are no numbers."""
+    """Validated data: unknown keys are refused, assignments checked, booleans not accepted as numbers."""
 
     model_config = ConfigDict(extra="forbid", validate_assignment=True, arbitrary_types_allowed=True)
 
     @model_validator(mode="before")
     @classmethod
-    def _no_truth_for_numbers(cls, table: Any) -> Any:
+    def _refuse_booleans_for_numbers(cls, table: Any) -> Any:
         for name, value in table.items() if isinstance(table, dict) else ():
-            refused = _truth_for_a_number(cls, name, value)
+            refused = _boolean_for_number(cls, name, value)
             if refused:
                 raise refused
         return table
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Set a field to what is valid, like any other attribute of a model."""
-        refused = _truth_for_a_number(type(self), name, value)
+        refused = _boolean_for_number(type(self), name, value)
         if refused:
             details = InitErrorDetails(type=refused, loc=(), input=value)
             raise ValidationError.from_exception_data(type(self).__name__, [details])
@@ -76,18 +76,18 @@ class Model(BaseModel, metaclass=_OneSentence):
             raise WavetankError((f"{origin}: " if origin else "") + sentence(report, cls)) from None
 
 
-def _truth_in(value: Any) -> str:
-    """Say whether a value "is" true or false, has them "among" its elements, or, with nothing, neither."""
+def _boolean_in(value: Any) -> str:
+    """Return "is" for a boolean, "among" for a list or array that contains one, an empty text for all else."""
     if isinstance(value, bool | np.bool_):
         return "is"
     if isinstance(value, np.ndarray):
         return "among" if value.dtype == bool else ""
-    return "among" if isinstance(value, list | tuple) and any(map(_truth_in, value)) else ""
+    return "among" if isinstance(value, list | tuple) and any(map(_boolean_in, value)) else ""
 
 
 @functools.cache
 def _numbers(model: type[BaseModel], name: str) -> str:
-    """Say what numbers a field is for, if for any, and neither for true and false nor for anything."""
+    """Return "a number" or "a whole number" for a field of numbers only, an empty text for all others."""
     field = model.model_fields.get(name)
     kinds = _types(field.annotation) if field else []
     if bool in kinds or Any in kinds:
@@ -95,20 +95,20 @@ def _numbers(model: type[BaseModel], name: str) -> str:
     return "a number" if float in kinds else "a whole number" if int in kinds else ""
 
 
-def _truth_for_a_number(model: type[BaseModel], name: str, value: Any) -> PydanticCustomError | None:
-    """Return the error where a field for numbers is given true or false, which pydantic takes for 1 and 0."""
-    found = _truth_in(value)
+def _boolean_for_number(model: type[BaseModel], name: str, value: Any) -> PydanticCustomError | None:
+    """Return the error for a boolean in a field of numbers, which pydantic would accept as 1 or 0; else None."""
+    found = _boolean_in(value)
     allowed = _numbers(model, name) if found else ""
     if not allowed:
         return None
     allowed = LIST if found == "among" else allowed
     return PydanticCustomError(
-        "truth", "true and false are no numbers", {"name": name, "value": value, "allowed": allowed}
+        "truth", "booleans are not accepted as numbers", {"name": name, "value": value, "allowed": allowed}
     )
 
 
 def is_length(field: FieldInfo) -> bool:
-    """Say whether a field holds lengths [m]."""
+    """Return whether a field holds lengths [m]."""
     return METRES in field.metadata or any(METRES in getattr(t, "__metadata__", ()) for t in _types(field.annotation))
 
 
@@ -120,8 +120,8 @@ def numeric_fields(model: type[BaseModel]) -> tuple[str, ...]:
 
 
 def sentence(report: ValidationError, model: type[BaseModel]) -> str:
-    """Say the most telling error of `report` in one line: key, value, what is allowed."""
-    errors = report.errors(include_url=False)[:MOST_TOLD]
+    """Return the most informative error of `report` as one sentence: key, value, what is allowed."""
+    errors = report.errors(include_url=False)[:MOST_COMPARED]
     # An unknown key explains more than what it leads to, and in a union the deepest complaint is the meant one.
     error = max(errors, key=lambda e: (e["type"] == "extra_forbidden", len(e["loc"])))
     key = _key(error["loc"]) or model.__name__

@@ -17,7 +17,7 @@ from wavetank.foundation.model import METRES, Model, Vector
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """What one declaration says, for whoever lists parameters."""
+    """One declaration, for lists of parameters."""
 
     name: str
     default: Any  # None where it must be given
@@ -126,13 +126,13 @@ LIVE = frozenset(p.name for p in PARAMETERS if p.live)
 
 
 def refuse_assignment(name: str) -> None:
-    """Refuse `name` for an attribute of a running world if it is, or nearly is, that of a parameter."""
+    """Raise `WavetankError` for an attribute of a running simulation that is, or resembles, a parameter."""
     if any(p.name == name for p in PARAMETERS):
         raise WavetankError(
-            f"{name} cannot change while the water runs; begin anew: Simulation(sim.scene.changed({name}=...))."
+            f"{name} cannot change during a simulation; make a new one: Simulation(sim.scene.changed({name}=...))."
         )
     for near in difflib.get_close_matches(name, LIVE, 1, 0.8):
-        raise WavetankError(f"{name!r} is no parameter; did you mean {near!r}?")
+        raise WavetankError(f"{name!r} is not a parameter; did you mean {near!r}?")
 
 
 

@@ -9,7 +9,7 @@ from wavetank.foundation.errors import WavetankError
 
 
 def length_of(vector: np.ndarray) -> float:
-    """Return the length of a vector [n], also of one whose squares are no numbers any more: what a file says may be."""
+    """Return the length of a vector [n], also where the squares of its components overflow."""
     largest = float(np.abs(vector).max())
     return float(np.linalg.norm(vector)) if 1e-100 < largest < 1e100 else math.hypot(*vector.tolist())
 
@@ -28,19 +28,19 @@ def unit_quaternion(rotation: Sequence[float] | float) -> np.ndarray:
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the quaternion that turns by `b` first and then by `a`."""
+    """Return the Hamilton product: the rotation by `b`, then by `a`."""
     w, v = a[0] * b[0] - a[1:] @ b[1:], a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
     return np.concatenate([[w], v])
 
 
 def inverse(q: np.ndarray) -> np.ndarray:
-    """Return the unit quaternion that turns back what `q` turns."""
+    """Return the inverse of a unit quaternion."""
     return q * (1.0, -1.0, -1.0, -1.0)
 
 
 def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return vector `v`, or vectors [n, 3], turned by the unit quaternion `q`."""
-    # Written out: `np.cross` takes 20 us for one vector, and a world with many bodies turns many in each step.
+    """Return vector `v`, or vectors [n, 3], rotated by the unit quaternion `q`."""
+    # Written out: `np.cross` takes 20 us per vector, and a scene with many bodies rotates many in each step.
     w, x, y, z = q.tolist()
     a, b, c = v[..., 0], v[..., 1], v[..., 2]
     d, e, f = y * c - z * b + w * a, z * a - x * c + w * b, x * b - y * a + w * c
@@ -59,7 +59,7 @@ def matrix_of(rotations: np.ndarray) -> np.ndarray:
 
 
 def turn_from_y(axis: np.ndarray) -> np.ndarray:
-    """Return the shortest turn that takes the y axis to the direction of `axis` (identity for a zero vector)."""
+    """Return the smallest rotation from the y axis to the direction of `axis` (identity for a zero vector)."""
     length = length_of(axis)
     if length < 1e-12:
         return np.array([1.0, 0.0, 0.0, 0.0])
@@ -72,7 +72,7 @@ def turn_from_y(axis: np.ndarray) -> np.ndarray:
 
 
 def interpolate(a: np.ndarray, b: np.ndarray, share: float) -> np.ndarray:
-    """Return the unit quaternion that lies `share` of the shortest way from `a` to `b`."""
+    """Return the unit quaternion at `share` (0 to 1) of the shortest rotation from `a` to `b` (slerp)."""
     cosine = float(a @ b)
     b = -b if cosine < 0 else b
     angle = float(np.arccos(min(abs(cosine), 1.0)))

@@ -12,7 +12,7 @@ from wavetank.foundation.tracks import checked_track, track, varies
 
 
 class Timed(Model):
-    """Data with numbers that may change; a field holds what its number is at t = 0, `over_time` what it does."""
+    """Data with numbers that may change; a field holds its value at t = 0, `over_time` the track."""
 
     over_time: dict[str, Any] = {}  # by the names of fields; made from expressions and keyframes in their places
 
@@ -51,7 +51,7 @@ class Timed(Model):
         return self
 
     def at(self, time: float) -> Self:
-        """Return this as it is at `time` [s]; raises `WavetankError` where a number is then not allowed."""
+        """Return a copy with the values at `time` [s]; raises `WavetankError` for a value that is not allowed."""
         if not self.over_time:
             return self
         now = {name: track(plain)(time).tolist() for name, plain in self.over_time.items()}

@@ -1,6 +1,6 @@
-"""What a number or a vector does over time, as plain data: constant, expressions, or keyframes.
+"""A number or vector over time as plain data: constant, expressions, or keyframes.
 
-    5.0                                     always the same
+    5.0                                     constant
     "3 + 2*sin(2*pi*t)"                     an expression of t [s], see `expressions.py`
     ["0.2*sin(t)", -9.81, 0]                one for each component
     [{time=0, value=2.0}, {time=1.5, value=0.0}]                     keyframes, straight lines between them, then held
@@ -28,7 +28,7 @@ Track = Callable[[float], np.ndarray]  # of the time [s]
 
 
 class Keys:
-    """Values [k, n] at rising times [s]; before the first and after the last they hold, or begin anew."""
+    """Values [k, n] at rising times [s]; before the first and after the last they hold, or repeat."""
 
     def __init__(
         self, times: Sequence[float], values: np.ndarray, between: str = "linear", after: str = "hold"
@@ -49,7 +49,7 @@ class Keys:
         return np.asarray(a + bend)
 
     def place(self, time: float) -> tuple[int, float, int]:
-        """Return the keyframe before `time` [s], the share of the way to the next, and how many loops are over."""
+        """Return the keyframe before `time` [s], the share of the way to the next, and how many loops have passed."""
         first, last = float(self.times[0]), float(self.times[-1])
         loops = 0
         if self.after == "loop" and time > last > first:
@@ -89,7 +89,7 @@ def check_times(times: Sequence[float], what: str) -> None:
 
 
 def varies(plain: Any) -> bool:
-    """Say whether plain data, where a number or a vector is expected, is one that changes with time."""
+    """Return whether plain data, where a number or a vector is expected, changes with time."""
     if isinstance(plain, list | tuple):
         return any(isinstance(part, str | dict) for part in plain)
     return isinstance(plain, str | dict)
@@ -118,7 +118,7 @@ def checked_track(plain: Any, what: str, size: int | None = None) -> Any:
 
 
 def track(plain: Any) -> Track:
-    """Return the function of time that plain data says; raises `WavetankError` for what is none."""
+    """Return the function of time that plain data describes; raises `WavetankError` for other data."""
     return _track(json.dumps(plain))
 
 

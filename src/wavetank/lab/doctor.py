@@ -41,7 +41,7 @@ IN_FORCE = "in force"
 def examine(no_window: str | None = None) -> dict[str, Any]:
     """Return versions, back ends and what is missing, as plain data: {"ok": bool, "checks": [...]}.
 
-    `no_window` is why there can be no window here, None where there can.
+    `no_window` is the reason why no window can open, None if one can.
     """
     checks = [
         _check("wavetank", importlib.metadata.version("wavetank"), ""),

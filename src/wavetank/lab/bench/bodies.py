@@ -30,7 +30,7 @@ DENSITIES = (300.0, 500.0, 700.0, 900.0, 1500.0)  # kg/m^3
 
 
 def rain(count: int, edge: float, particles: int = PARTICLES) -> Scene:
-    """Return a pool of about so many particles, with `count` bodies of that `edge` [m] above it, in two layers."""
+    """Return a pool of about `particles`, with `count` bodies of that `edge` [m] above it, in two layers."""
     rng, bodies, (columns, rows) = np.random.default_rng(2), [], (9, 3)
     for number in range(count):
         column, row, layer = number % columns, number // columns % rows, number // (columns * rows)
@@ -72,7 +72,7 @@ def bodies(
         raise WavetankError(f"--seconds = {seconds} is not allowed with --bodies; it must be from 0.1 to 60.")
     started = compiler.start(arch, threads=threads)
     scenes = {"none": rain(0, 1.0, particles)} | {name: rain(COUNT, edge, particles) for name, edge in SIZES.items()}
-    for name, scene in scenes.items():  # what is new to the compiler is no part of a frame
+    for name, scene in scenes.items():  # compiling does not count
         say(f"{name}: a first splash")
         Simulation(scene, arch).advance(min(0.7, seconds))
     worlds = {name: Simulation(scene, arch) for name, scene in scenes.items()}

@@ -179,7 +179,7 @@ def measure_ceilings(scene: Scene, arch: str) -> dict[str, float]:
 def share(
     cost: Cost, run: dict[str, Any], launches: float, seconds: float, ceilings: dict[str, float]
 ) -> dict[str, Any]:
-    """Return what a kernel reaches in a frame in which it is launched so often and takes so many seconds."""
+    """Return what a kernel reaches, given its launches and seconds per frame."""
     n = run["particles"] * launches
     listed = n * run["pairs_per_particle"]
     moved = 4.0 * (n * (3 * cost.vectors + cost.words) + listed * cost.pair_words)

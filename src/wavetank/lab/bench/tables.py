@@ -92,7 +92,7 @@ def comparison_table(old: Figures, new: Figures) -> Table:
 
 
 def load_result(path: Path) -> Figures:
-    """Read a file that `wavetank bench --out` wrote; raise `WavetankError` where it is none."""
+    """Read a file that `wavetank bench --out` wrote; raise `WavetankError` for any other file."""
     try:
         result = json.loads(path.read_text("utf-8"))
         if not isinstance(result["runs"], list) or not isinstance(result["machine"], dict):

@@ -26,7 +26,7 @@ class Figure:
 
     @property
     def passed(self) -> bool | None:
-        """Say whether the value lies within its bounds; None where there are none."""
+        """Return whether the value is within its bounds; None if it has none."""
         if self.low is None and self.high is None:
             return None
         low = -math.inf if self.low is None else self.low

@@ -134,7 +134,7 @@ def settled_error(dim: int, spacing: float, seconds: float, arch: str) -> list[F
 
 
 def _density_error(parts: dict[str, Any], size: tuple[float, ...], spacing: float, seconds: float, arch: str) -> float:
-    """Return the mean density error [%] of half a second, after so many seconds."""
+    """Return the mean density error [%] over half a second that begins at `seconds`."""
     sim = Simulation(Scene(spacing=spacing, tank=Tank(size=size), foam=0.0, **parts), arch)
     sim.advance(seconds)
     errors = []

@@ -20,7 +20,7 @@ from wavetank.simulation.simulation import Simulation
 
 
 def block_and_pool(dim: int) -> Scene:
-    """Return a block of water beside a pool of about half its height, in a tank 1.2 m long."""
+    """Return a block of water next to a pool of about half its height, in a tank 1.2 m long."""
     across, spacing = ((), 0.025) if dim == 2 else ((0.4,), 0.04)
     return Scene(
         spacing=spacing,
@@ -34,7 +34,7 @@ def block_and_pool(dim: int) -> Scene:
 
 
 def energies(scene: Scene, arch: str, seconds: float) -> tuple[list[float], np.ndarray, np.ndarray]:
-    """Return times [s], kinetic and potential energies [J; J/m in 2-D] after each frame of so many `seconds`."""
+    """Return times [s], kinetic and potential energies [J; J/m in 2-D] after each frame of `seconds`."""
     sim = Simulation(scene, arch)
     mass = scene.particle_mass
     times, kinetic, potential = [], [], []

@@ -7,7 +7,7 @@ of Hulme 1982 (10.1017/S0022112082001980, Table 1) gives its course.
 
 Half a period is from the trough to the crest, as decay tests are read in towing tanks (ITTC 7.5-02-07-04.5, "Estimation
 of roll damping"): the second passing of rest comes where the course is flat, and a millimetre decides it
-(notebook/bodies.md, "From trough to crest"). That is given beside it. Each figure is the mean over starts of other
+(notebook/bodies.md, "From trough to crest"). That is given next to it. Each figure is the mean over starts of other
 depths and lifts.
 """
 

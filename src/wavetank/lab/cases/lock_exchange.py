@@ -23,7 +23,7 @@ from wavetank.scene.scene import Scene
 from wavetank.simulation.simulation import Simulation
 
 DEPTH, LENGTH, RATIO, EIGHTH = 0.3, 1.4, 0.8, 8
-TANKS, LONGER = 4, 2.0  # tanks of a full run, each by so many spacings longer than the one before
+TANKS, LONGER = 4, 2.0  # tanks of a full run, spacings by which each is longer than the one before
 UNIT = math.sqrt(9.81 * (1.0 - RATIO) * DEPTH)  # m/s, of which the Froude number is a share
 SOURCE = "Benjamin 1968; Shin et al. 2004; Lowe et al. 2005"
 

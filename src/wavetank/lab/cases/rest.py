@@ -3,9 +3,9 @@
 Reference: hydrostatics; nothing acts on water at rest. `still-tank` has the bounds of water that was never touched from
 the third second on; scenes that splash, from the second minute on. Roughness is the standard deviation of the tops of
 columns two spacings wide, in spacings; it has a bound where the surface is level. Particles count as still below
-0.02 m/s: a spacing of 2.5 cm in a second and a quarter. Waves of a whole tank are meant to last, and are no unrest:
+0.02 m/s: a spacing of 2.5 cm in a second and a quarter. Waves of a whole tank are meant to last and do not count:
 there the bound is on how fast a particle goes past those around it, which a throw does and a wave does not. What is
-driven never rests, and is no faster in the second minute than in the first.
+driven never rests, and is not faster in the second minute than in the first.
 """
 
 import dataclasses
