@@ -233,3 +233,17 @@ def test_a_mirror_reads_and_writes_what_the_device_has():
     assert mirror.read().tolist() == [0.0, 1.0, 2.0, 3.0]
     mirror.write(np.array([0.1, 7.0]))
     assert compiler.download(array).tolist() == [float(np.float32(0.1)), 7.0, 0.0, 0.0]
+
+
+def test_a_kernel_is_told_before_it_is_compiled():
+    @qd.kernel
+    def double(values: qd.types.ndarray(), count: qd.i32):
+        for i in range(count):
+            values[i] *= 2
+
+    told = []
+    array = qd.ndarray(qd.i32, shape=(4,))
+    with compiler.on_compile(lambda number, name: told.append((number, name))):
+        double(array, 4)
+        double(array, 3)
+    assert told == [(1, "double")]

@@ -110,6 +110,7 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Simulate a scene and write video, pictures, particles and figures."""
+    from wavetank.run.compile_status import compile_status
     from wavetank.run.options import RunOptions
     from wavetank.run.record import record
     from wavetank.simulation.cost import large_worlds_allowed
@@ -134,7 +135,9 @@ def run(
         checkpoint_every=checkpoint_every,
     )
     with large_worlds_allowed(allow_large):
-        _finish(record(Simulation(world, arch=arch), order, console), as_json)
+        with compile_status(console):
+            sim = Simulation(world, arch=arch)
+        _finish(record(sim, order, console), as_json)
 
 
 @app.command()

@@ -2,11 +2,12 @@
 
 Everything else writes ``from wavetank.device.compiler import qd`` and calls `start` once before the first array is
 made. The compiler keeps one device program per process, so the back end is chosen once: asking for another one later
-is an error while arrays of the first are alive.
+is an error. Until `start` the compiler is as its makers wrote it: another program in this process may use it by itself.
 """
 
 import contextlib
 import io
+import itertools
 import os
 import pathlib
 import warnings
@@ -27,7 +28,6 @@ with contextlib.redirect_stdout(io.StringIO()), patches.short_frames():
     import quadrants as qd
     from quadrants.lang.util import to_numpy_type
 
-patches.apply_all()
 # A damaged cache of kernels costs time; nobody needs to hear of it.
 warnings.filterwarnings("ignore", module=r"quadrants\.lang\._fast_caching")
 
@@ -36,10 +36,12 @@ __all__ = [
     "LANES",
     "Mirror",
     "available_backends",
+    "borrowed",
     "cache_folder",
     "current_backend",
     "download",
     "lanes",
+    "on_compile",
     "qd",
     "shares_memory",
     "start",
@@ -109,6 +111,14 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
         options["cfg_optimization"] = False
     if threads is not None:
         options["cpu_max_num_threads"] = threads
+    version = ".".join(map(str, qd.__version__))
+    if patches.apply_all(version) and version not in patches.VERSIONS:
+        warnings.warn(
+            f"Quadrants {version} is not one that wavetank's patches are made for ({', '.join(patches.VERSIONS)}): "
+            "kernels work, and start slower.",
+            RuntimeWarning,
+            stacklevel=2,
+        )
     before = _thread_ids()
     sweep_damaged(cache_folder())
     with contextlib.redirect_stdout(io.StringIO()):
@@ -119,6 +129,24 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
     _current = wanted
     _bind_threads(_thread_ids() - before)
     return wanted
+
+
+@contextlib.contextmanager
+def borrowed() -> Iterator[None]:
+    """Have a back end while the context lasts: the one that is running, else the processor's, which is stopped again.
+
+    For those who only measure data before it is known where the water will be computed. No array may outlive it.
+    """
+    global _current
+    if _current is not None:
+        yield
+        return
+    start("cpu")
+    try:
+        yield
+    finally:
+        _current = None
+        qd.reset()
 
 
 def threads() -> int:
@@ -223,6 +251,26 @@ class Mirror:
             self._array.fill(0)
         else:
             self._memory[:] = 0
+
+
+@contextlib.contextmanager
+def on_compile(callback: Callable[[int, str], None]) -> Iterator[None]:
+    """Call ``callback(number, kernel)`` before each kernel that is compiled while the context lasts, in its thread.
+
+    `number` counts from 1 within the context, `kernel` is the name of its function. A kernel is compiled at its first
+    launch, or loaded where an earlier process of this user has compiled it, which takes some hundredths of the time.
+    How many there will be is not known: that depends on what the world comes to. The callback should be quick.
+    """
+    numbers = itertools.count(1)
+
+    def listen(kernel: str) -> None:
+        callback(next(numbers), kernel)
+
+    patches.LISTENERS.append(listen)
+    try:
+        yield
+    finally:
+        patches.LISTENERS.remove(listen)
 
 
 @contextlib.contextmanager

@@ -1,12 +1,13 @@
-"""What is changed inside of the kernel compiler, each change by its name, so that kernels are read and launched sooner.
+"""Patches of the kernel compiler, each with a name, so that kernels are read and launched sooner.
 
-The compiler asks Python's `inspect` for the source of a function each time it inlines it, and for the module of each
-decorated one; wraps every line of it as text, for error messages; asks for the range of a type with each number; and
-reads the same functions again for each kernel, to see whether they have changed. A third of a cold start went there,
-and half a second of a warm one (docs/performance.md). The answers stay the same.
+The compiler asks Python's `inspect` for the source of a function each time it inlines it; wraps every line of it as
+text, for error messages; asks for the range of a type with each number; and reads the same functions again for each
+kernel, to see whether they have changed. A third of a cold start went there, and half a second of a warm one
+(docs/performance.md). The answers stay the same.
 
-These are changes of private parts, written for the `VERSIONS` below. In another version one may find that its part is
-gone: then all works without it, only slower, and `wavetank doctor` says so.
+They replace private parts, and are applied when a back end starts, not before: until then another program in the same
+process has the compiler as it is. They are for the `VERSIONS` below. With another version, or with the environment
+variable `WAVETANK_PATCHES=0`, none is applied: all works without them, only slower, and `wavetank doctor` says so.
 """
 
 import contextlib
@@ -15,6 +16,7 @@ import functools
 import importlib
 import inspect
 import linecache
+import os
 import sys
 import textwrap
 import types
@@ -25,6 +27,7 @@ from wavetank.device.freed_arrays import FreedArrays
 from wavetank.device.launches import NEEDED, keep_prepared_launches
 
 VERSIONS = ("1.3.3", "1.4.0")  # of Quadrants
+SWITCH = "WAVETANK_PATCHES"  # environment variable: 0 applies none
 LANGUAGE = "quadrants.lang"  # the package that all places are in
 
 
@@ -41,7 +44,6 @@ class Patch:
     places: tuple[str, ...]  # what is replaced: module:attribute, below `LANGUAGE`
     needs: tuple[str, ...]  # what has to be there besides
     replacement: Callable[[Any], Any]  # makes it from what was at a place
-    versions: tuple[str, ...] = VERSIONS  # of Quadrants that it is for
     misfit: str | None = None  # why it is not in force
 
     def apply(self) -> None:
@@ -59,12 +61,33 @@ class Patch:
 
 
 PATCHES: list[Patch] = []
+_applied = False
 
 
-def apply_all() -> None:
-    """Apply every patch, once the compiler is imported."""
+def apply_all(version: str) -> str | None:
+    """Apply every patch to Quadrants of this `version`, once; return why none is applied, None where all may be.
+
+    What a single patch misses is told by its `misfit`.
+    """
+    global _applied
+    reason = None
+    if os.environ.get(SWITCH) == "0":
+        reason = f"{SWITCH}=0 turns them off"
+    elif version not in VERSIONS:
+        reason = f"this is Quadrants {version}"
     for patch in PATCHES:
-        patch.apply()
+        if reason:
+            patch.misfit = reason
+        elif not _applied:
+            patch.apply()
+    _applied = _applied or reason is None
+    return reason
+
+
+# --- what is compiled ---
+
+#: Called with the name of each kernel before this process reads it for the first time, to compile it or to load it.
+LISTENERS: list[Callable[[str], None]] = []
 
 
 def _found(place: str) -> tuple[Any, str]:
@@ -124,16 +147,6 @@ def short_frames() -> Iterator[None]:
 def remember_sources(look_up: Any) -> Any:
     """Looks a function's source up once."""
     return functools.cache(look_up)
-
-
-@patch("class bodies", "kernel_impl:_inside_class")
-def tell_class_bodies(_: Any) -> Any:
-    """Tells the body of a class by its names: only there a namespace has a qualified name."""
-
-    def is_in_class_body(level_of_class_stackframe: int) -> bool:
-        return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals
-
-    return is_in_class_body
 
 
 @patch("hashes", "_fast_caching.function_hasher:_hash_function")
@@ -280,6 +293,19 @@ def _cross(a: Any, b: Any) -> Any:
 
 
 # --- launches ---
+
+
+@patch("progress", "kernel:Kernel.materialize")
+def tell_listeners(materialize: Callable[..., None]) -> Callable[..., None]:
+    """Tells listeners of each kernel that is about to be compiled."""
+
+    def tell(self: Any, key: Any, *args: Any, **kwargs: Any) -> None:
+        if LISTENERS and key not in self.materialized_kernels:
+            for listener in tuple(LISTENERS):
+                listener(self.func.__name__)
+        materialize(self, key, *args, **kwargs)
+
+    return tell
 
 
 @patch("stale launches", "kernel:LaunchContextBufferCache.cache")

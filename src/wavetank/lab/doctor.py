@@ -36,6 +36,7 @@ _PACKAGES = {
 
 
 IN_FORCE = "in force"
+PATCH = "patch: "
 
 
 def examine(no_window: str | None = None) -> dict[str, Any]:
@@ -65,7 +66,7 @@ def examine(no_window: str | None = None) -> dict[str, Any]:
     checks.append(_check("--arch gpu", best if best != "cpu" else "not here", "the best graphics processor there is"))
     checks.append(_check("display", "page only" if no_window else "window", no_window or "`wavetank play` opens one"))
     checks += [
-        _check(f"patch: {patch.name}", "does not fit" if patch.misfit else IN_FORCE, _about(patch))
+        _check(f"{PATCH}{patch.name}", "not applied" if patch.misfit else IN_FORCE, _about(patch))
         for patch in patches.PATCHES
     ]
     checks += [_cache("cache of kernels", compiler.cache_folder()), _cache("cache of meshes", cache_folder())]
@@ -84,14 +85,19 @@ _BACKEND_NOTES = {
 def _about(patch: patches.Patch) -> str:
     if patch.misfit is None:
         return patch.sentence
-    return f"{patch.misfit}; made for Quadrants {' and '.join(patch.versions)}: kernels work, and start slower"
+    return f"{patch.misfit}; made for Quadrants {' and '.join(patches.VERSIONS)}: kernels work, and start slower"
 
 
 def told(checks: list[dict[str, str]]) -> list[dict[str, str]]:
-    """Return the findings as a person wants them: those patches of the compiler that are in force as one line."""
-    quiet = [row for row in checks if row["found"] == IN_FORCE]
-    rows = [row for row in checks if row["found"] != IN_FORCE]
-    return [*rows, _check("patches of the compiler", f"{len(quiet)} in force", "all are told with --json")]
+    """Return the findings as a person wants them: the patches of the compiler as one line, or one for each reason."""
+    rows = [row for row in checks if not row["name"].startswith(PATCH)]
+    of_patches = [row for row in checks if row["name"].startswith(PATCH)]
+    reasons = {row["note"] for row in of_patches if row["found"] != IN_FORCE}
+    if len(reasons) == 1 and all(row["found"] != IN_FORCE for row in of_patches):
+        return [*rows, _check("patches of the compiler", "not applied", *reasons)]
+    rows += [row for row in of_patches if row["found"] != IN_FORCE]
+    in_force = sum(row["found"] == IN_FORCE for row in of_patches)
+    return [*rows, _check("patches of the compiler", f"{in_force} in force", "each is listed with --json")]
 
 
 def _cache(name: str, folder: Path) -> dict[str, str]:

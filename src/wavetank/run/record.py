@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+from wavetank.device.compiler import on_compile
 from wavetank.formats.gif import GifWriter, resized
 from wavetank.formats.mp4 import VideoWriter
 from wavetank.formats.plan import Viewpoint
@@ -204,7 +205,11 @@ def _run(work: _ActiveRun, renderer: Renderer | None, sinks: Sequence[Sink], con
         console=console or Console(stderr=True),
         transient=False,
     )
-    with progress:
+
+    def show_compile(number: int, _: str) -> None:
+        progress.update(task, description=f"compiling kernel {number}")
+
+    with progress, on_compile(show_compile):
         total = options.seconds or 1.0
         task = progress.add_task("wavetank", total=total, time=sim.time, fps=0.0, count=sim.count, error=0.0)
         first, shown = 0.0, 0  # s until the first frame was done, compilation included
@@ -220,6 +225,7 @@ def _run(work: _ActiveRun, renderer: Renderer | None, sinks: Sequence[Sink], con
                 speed, shown = shown / (elapsed - first) if elapsed > first else 0.0, shown + 1
                 progress.update(
                     task,
+                    description="wavetank",
                     completed=sim.time - work.start,
                     time=sim.time,
                     fps=speed,

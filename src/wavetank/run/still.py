@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from wavetank.foundation.atomic_write import partial_path
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.version import VERSION
 from wavetank.run.archived import frame_at, is_archive
+from wavetank.run.compile_status import compile_status
 from wavetank.run.signals import StopRequest, stop_on_signal
 from wavetank.scene.scene import Scene
 from wavetank.simulation.frame import Frame
@@ -86,16 +88,19 @@ def render_still(
     supersample, chosen = quality_options(quality, samples)
     style = {**chosen, **options}
     view = Style(**style).kind
-    if scene is None and is_archive(world):
-        frame = frame_at(world, at, arch)
-    else:
-        frame = _simulation_at(world, scene, at, arch or "cpu").frame(view.coloured)
+    console = console or Console(stderr=True)
+    with compile_status(console):
+        if scene is None and is_archive(world):
+            frame = frame_at(world, at, arch)
+        else:
+            frame = _simulation_at(world, scene, at, arch or "cpu").frame(view.coloured)
     renderer = Renderer(width, height, affordable(width, height, supersample))
     camera = _camera_at(frame, eye, target, width / max(height, 1))
     began = time.perf_counter()
     with (
         stop_on_signal(say=STOPS if style["traced"] else "") as stop,
-        Progress(*COLUMNS, console=console or Console(stderr=True), transient=True, disable=not style["traced"]) as bar,
+        nullcontext() if style["traced"] else compile_status(console),
+        Progress(*COLUMNS, console=console, transient=True, disable=not style["traced"]) as bar,
     ):
         watch = Watch(path=path.with_name(path.name + SAMPLES) if style["traced"] else None)
         watch.tell = progress_callback(bar, stop)

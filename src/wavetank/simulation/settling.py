@@ -20,6 +20,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from wavetank.device.compiler import upload
 from wavetank.physics.world import World
 from wavetank.simulation.arrays import by_id, put_by_id
 
@@ -51,7 +52,7 @@ def settle(
     free_way = max(float(np.linalg.norm(fall)), 1e-30)
     length, is_free, mean = np.zeros(count), np.zeros(count, bool), np.inf
     for number in range(MOST_BESIDE_BODIES if near is None else MOST):
-        world.particles.v.fill(0.0)
+        upload(world.particles.v, [])  # all zero; `fill` would read a kernel for each array
         before = by_id(world.particles, count, "x")
         step()
         way = by_id(world.particles, count, "x") - before

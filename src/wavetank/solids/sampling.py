@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wavetank.device.compiler import current_backend, download, qd, start, upload
+from wavetank.device.compiler import borrowed, download, qd, upload
 from wavetank.device.state import integers, scalars, vectors
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3, vec4
 from wavetank.solids.shapes import build
@@ -73,6 +73,5 @@ def nearest_distances(solids: list[Solid], points: np.ndarray, spacing: float) -
 
     Meshes are as fine as for particles of that `spacing` [m]. Without solids everything is 1e9 m away.
     """
-    if current_backend() is None:
-        start("cpu")
-    return nearest_of(build(solids, 0, 0.0, spacing), 0, points)[0]
+    with borrowed():
+        return nearest_of(build(solids, 0, 0.0, spacing), 0, points)[0]

@@ -1,8 +1,10 @@
 """Surfaces of solids as triangles, in their own frames: for those who draw or write meshes."""
 
+from typing import Any
+
 import numpy as np
 
-from wavetank.device.compiler import current_backend, start
+from wavetank.device.compiler import borrowed
 from wavetank.foundation.rotations import turned
 from wavetank.solids.ground.height_field import HeightField
 from wavetank.solids.ground.height_field import surface as ground
@@ -171,8 +173,11 @@ def _triangulated(solid: Solid, spacing: float) -> Surface:
         import pysplashsurf
     except ImportError:
         return _nothing()
-    if current_backend() is None:
-        start("cpu")
+    with borrowed():
+        return _marched(solid, spacing, pysplashsurf)
+
+
+def _marched(solid: Solid, spacing: float, pysplashsurf: Any) -> Surface:
     dim = 2 if not solid.is_spatial and len(next(iter(solid.vectors()), ("", (0.0,) * 3))[1]) == 2 else 3
     ruler = Ruler(solid, dim, spacing)
     lower, upper = ruler.extent()
