@@ -168,12 +168,6 @@ MOST_BRANCHES = 20
 MOST_LEVELS = 5
 #: Functions that are still above; the list only gets shorter.
 TANGLED: set[str] = {
-    "physics/density_constraint.py:correct_positions",
-    "physics/dynamic_viscosity/drag.py:drag_bodies",
-    "physics/dynamic_viscosity/drag.py:find_drag",
-    "physics/friction.py:apply_friction",
-    "physics/near_solids.py:look",
-    "physics/tension.py:attract",
     "simulation/saved.py:_checked_arrays",
     "solids/meshes/grid.py:nearest_triangles",
     "solids/meshes/grid.py:part_faces",

@@ -10,7 +10,7 @@ import pytest
 
 from wavetank.device import compiler, freed_arrays, launches
 from wavetank.device.compiler import qd
-from wavetank.device.state import Coefficients, exchanged, integers, new_particles, remembered
+from wavetank.device.state import Coefficients, integers, interned, new_particles, swapped
 
 
 @dataclasses.dataclass(frozen=True)
@@ -156,16 +156,16 @@ def test_the_same_arrays_and_numbers_are_the_same_object():
     compiler.start("cpu")
     a, b = new_particles(2, 4), new_particles(2, 4)
     known: dict = {}
-    c, d = exchanged(known, a, b, "v")
+    c, d = swapped(known, a, b, "v")
     assert c.v is b.v and d.v is a.v and c.x is a.x and d.x is b.x
     assert a.v is not b.v, "the first two are as they were"
-    e, f = exchanged(known, c, d, "v")
+    e, f = swapped(known, c, d, "v")
     assert e.v is a.v and f.v is b.v
-    g, h = exchanged(known, e, f, "v")
+    g, h = swapped(known, e, f, "v")
     assert g is c and h is d
     numbers = dict.fromkeys((field.name for field in dataclasses.fields(Coefficients)), 0.5)
-    assert remembered(Coefficients(**numbers)) is remembered(Coefficients(**numbers))
-    assert remembered(Coefficients(**{**numbers, "dt": 0.25})).dt == 0.25
+    assert interned(Coefficients(**numbers)) is interned(Coefficients(**numbers))
+    assert interned(Coefficients(**{**numbers, "dt": 0.25})).dt == 0.25
 
 
 @qd.kernel  # not from the cache, which does not see how the compiler reads a product

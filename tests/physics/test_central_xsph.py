@@ -5,19 +5,19 @@ import pytest
 from clouds import Cloud
 
 import wavetank as wt
-from wavetank.physics.central_xsph import apply_central_xsph
-from wavetank.physics.xsph_viscosity import pack_velocities
+from wavetank.physics.terms.central_xsph import apply_central_xsph
+from wavetank.physics.terms.xsph_viscosity import pack_velocities
 from wavetank.simulation.simulation import Simulation
 
 
 def smoothed(cloud: Cloud, multipliers: np.ndarray) -> np.ndarray:
     """Velocities after the pass, float64 [count, dim]."""
     world = cloud.world
-    lam = np.zeros(world.scratch.lam.shape, np.float32)
+    lam = np.zeros(world.temporaries.lam.shape, np.float32)
     lam[: cloud.count] = multipliers
-    world.scratch.lam.from_numpy(lam)
+    world.temporaries.lam.from_numpy(lam)
     packed = world.fluids.array("packed")
-    pack_velocities(packed, world.particles, world.scratch.lam, cloud.count)
+    pack_velocities(packed, world.particles, world.temporaries.lam, cloud.count)
     apply_central_xsph(world.spare, world.particles, packed, world.grid, cloud.c, cloud.count, cloud.method)
     return world.spare.v.to_numpy()[: cloud.count].astype(np.float64)
 

@@ -6,10 +6,10 @@ import pytest
 import wavetank as wt
 from wavetank.device.compiler import download, upload
 from wavetank.physics.coefficients import coefficients
-from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE
-from wavetank.physics.dynamic_viscosity.implicit_viscosity import damper_scale, solve_viscosity
 from wavetank.physics.mixture import blend
-from wavetank.physics.tension import prepare_fluids
+from wavetank.physics.terms.dynamic_viscosity.conjugate_gradients import TOLERANCE
+from wavetank.physics.terms.dynamic_viscosity.implicit_viscosity import damper_scale, solve_viscosity
+from wavetank.physics.terms.tension import prepare_fluids
 from wavetank.simulation.simulation import Simulation
 
 D, DT = 0.05, 1 / 300
@@ -101,8 +101,10 @@ def test_what_is_at_rest_stays_at_rest():
 @pytest.mark.parametrize(("viscosity", "density"), [(3e4, 1000.0), (1e6, 1e-3)])
 def test_what_is_left_below_rounding_is_not_followed(viscosity, density, monkeypatch):
     """Iterations that go on when there is nothing left to gain, or to tell from rounding, bring no energy back."""
-    monkeypatch.setattr("wavetank.physics.dynamic_viscosity.conjugate_gradients.LOOK", 1000)
-    monkeypatch.setattr("wavetank.physics.dynamic_viscosity.implicit_viscosity.iterations", lambda stiffest, most: most)
+    monkeypatch.setattr("wavetank.physics.terms.dynamic_viscosity.conjugate_gradients.LOOK", 1000)
+    monkeypatch.setattr(
+        "wavetank.physics.terms.dynamic_viscosity.implicit_viscosity.iterations", lambda stiffest, most: most
+    )
     for material in (THICK, THIN):
         monkeypatch.setitem(material, "viscosity", viscosity)
         monkeypatch.setitem(material, "density", density)

@@ -7,8 +7,8 @@ import pytest
 from clouds import Cloud
 
 from wavetank.physics.density_constraint import correct_positions, schedule, start_multipliers
-from wavetank.physics.vorticity import confine_vorticity
-from wavetank.physics.xsph_viscosity import apply_xsph
+from wavetank.physics.terms.vorticity import confine_vorticity
+from wavetank.physics.terms.xsph_viscosity import apply_xsph
 
 CASES = [(2, "spiky"), (3, "spiky"), (3, "poly6-spiky"), (2, "cubic"), (3, "wendland")]
 cases = pytest.mark.parametrize(("dim", "kernel"), CASES)
@@ -17,13 +17,13 @@ cases = pytest.mark.parametrize(("dim", "kernel"), CASES)
 def solve(cloud: Cloud) -> None:
     world, count = cloud.world, cloud.count
     start_multipliers(
-        world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, count, cloud.method, 0
+        world.temporaries, world.particles, world.grid, world.solids, world.walls, cloud.c, count, cloud.method, 0
     )
     correct_positions(
         world.spare,
         world.particles,
-        world.scratch,
-        world.scratch.dlam,
+        world.temporaries,
+        world.temporaries.dlam,
         world.grid,
         world.solids,
         world.walls,
@@ -37,7 +37,7 @@ def solve(cloud: Cloud) -> None:
 
 def smooth(cloud: Cloud, turning: int) -> None:
     world, grid = cloud.world, cloud.world.grid
-    apply_xsph(world.spare, world.particles, world.scratch, grid, cloud.c, cloud.count, cloud.method, turning)
+    apply_xsph(world.spare, world.particles, world.temporaries, grid, cloud.c, cloud.count, cloud.method, turning)
 
 
 def multipliers(cloud: Cloud) -> np.ndarray:
@@ -53,7 +53,7 @@ def multipliers(cloud: Cloud) -> np.ndarray:
 def test_density_eq_1(dim, kernel):
     cloud = Cloud(dim, kernel=kernel)
     expected = cloud.scene.rest_density * cloud.mass_over_rest_density() * cloud.w().sum(axis=1)
-    np.testing.assert_allclose(cloud.world.scratch.rho.to_numpy()[: cloud.count], expected, rtol=2e-5)
+    np.testing.assert_allclose(cloud.world.temporaries.rho.to_numpy()[: cloud.count], expected, rtol=2e-5)
 
 
 @cases
@@ -62,7 +62,7 @@ def test_multiplier_eq_5(dim, kernel):
     solve(cloud)
     expected = multipliers(cloud)
     np.testing.assert_allclose(
-        cloud.world.scratch.lam.to_numpy()[: cloud.count], expected, atol=1e-4 * np.abs(expected).max()
+        cloud.world.temporaries.lam.to_numpy()[: cloud.count], expected, atol=1e-4 * np.abs(expected).max()
     )
 
 
@@ -70,7 +70,7 @@ def test_multiplier_eq_5(dim, kernel):
 def test_only_a_share_of_expansion_is_corrected(attraction):
     cloud = Cloud(3, attraction=attraction)
     solve(cloud)
-    lam = cloud.world.scratch.lam.to_numpy()[: cloud.count]
+    lam = cloud.world.temporaries.lam.to_numpy()[: cloud.count]
     newton = multipliers(cloud)
     expected = np.where(newton > 0, attraction * newton, newton)
     assert (newton < 0).any()
@@ -114,7 +114,7 @@ def test_vorticity_eq_9(dim, kernel):
     pad = ((0, 0), (0, 0), (0, 3 - dim))
     expected = cloud.mass_over_rest_density() * np.sum(np.cross(np.pad(v_ij, pad), np.pad(grad_j, pad)), axis=1)
     np.testing.assert_allclose(
-        world.scratch.omega.to_numpy()[: cloud.count], expected, atol=1e-4 * np.abs(expected).max()
+        world.temporaries.omega.to_numpy()[: cloud.count], expected, atol=1e-4 * np.abs(expected).max()
     )
 
 
@@ -123,8 +123,8 @@ def test_vorticity_confinement_eq_10(dim):
     cloud = Cloud(dim, vorticity=2.0, vorticity_coherence=0.0)
     world = cloud.world
     smooth(cloud, 1)
-    omega = world.scratch.omega.to_numpy()[: cloud.count].astype(np.float64)
-    confine_vorticity(world.particles, world.scratch, world.grid, cloud.c, cloud.count, cloud.method)
+    omega = world.temporaries.omega.to_numpy()[: cloud.count].astype(np.float64)
+    confine_vorticity(world.particles, world.temporaries, world.grid, cloud.c, cloud.count, cloud.method)
     size = np.linalg.norm(omega, axis=1)
     pad = ((0, 0), (0, 0), (0, 3 - dim))
     eta = cloud.mass_over_rest_density() * np.sum(
@@ -142,9 +142,9 @@ def test_calm_water_is_not_pushed():
     cloud = Cloud(3, vorticity=2.0, vorticity_coherence=0.01)
     world = cloud.world
     smooth(cloud, 1)
-    size = np.linalg.norm(world.scratch.omega.to_numpy()[: cloud.count], axis=1)
+    size = np.linalg.norm(world.temporaries.omega.to_numpy()[: cloud.count], axis=1)
     c = dataclasses.replace(cloud.c, calm=float(np.median(size)))
-    confine_vorticity(world.particles, world.scratch, world.grid, c, cloud.count, cloud.method)
+    confine_vorticity(world.particles, world.temporaries, world.grid, c, cloud.count, cloud.method)
     pushed = np.any(world.particles.v.to_numpy()[: cloud.count] != cloud.v.astype(np.float32), axis=1)
     assert not pushed[size <= c.calm].any()
     assert pushed[size > 1.5 * c.calm].mean() > 0.8
@@ -163,9 +163,9 @@ def test_solid_rotation_has_twice_its_rate_as_vorticity():
     sim.frame()
     world = sim.world
     c = coefficients(sim.scene, 0.01)
-    apply_xsph(world.spare, world.particles, world.scratch, world.grid, c, sim.count, 2, 1)
+    apply_xsph(world.spare, world.particles, world.temporaries, world.grid, c, sim.count, 2, 1)
     middle = np.argmin(np.linalg.norm(world.particles.x.to_numpy()[: sim.count], axis=1))
-    assert world.scratch.omega.to_numpy()[middle] == pytest.approx([0, 0, 6], rel=0.05, abs=1e-3)
+    assert world.temporaries.omega.to_numpy()[middle] == pytest.approx([0, 0, 6], rel=0.05, abs=1e-3)
 
 
 @pytest.mark.parametrize("turning", [0, 1])
@@ -182,7 +182,7 @@ def test_xsph_eq_11(dim, kernel, turning):
 @pytest.mark.parametrize("turning", [0, 1])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_slow_motion_is_taken_sooner(dim, turning):
-    """Of a velocity difference that is slow, of sqrt(g d), Eq. 11 takes a larger share: physics/xsph_viscosity.py."""
+    """Of a velocity difference that is slow, of sqrt(g d), Eq. 11 takes a larger share: `xsph_viscosity.py`."""
     cloud = Cloud(dim, viscosity=0.2, calming=0.9)
     smooth(cloud, turning)
     v_ij = cloud.v[None, :, :] - cloud.v[:, None, :]

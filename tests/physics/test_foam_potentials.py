@@ -7,11 +7,11 @@ from clouds import Cloud
 from wavetank.device.compiler import qd, upload
 from wavetank.device.state import Air, Births, Coefficients, Grid, Particles, Walls, integers, scalars
 from wavetank.device.sums import blocks_of, sum_up
+from wavetank.physics.clusters import chunks, cluster_count, end_cluster, end_of, first_cluster
 from wavetank.physics.foam.noise import stream, uniform
 from wavetank.physics.foam.pool import new_pool
 from wavetank.physics.foam.potentials import add_potentials, find_normals, limited
 from wavetank.physics.foam.update import air
-from wavetank.physics.teams import end_of, end_team, first_team, teams, turns
 from wavetank.solids.distance import SolidSet
 
 
@@ -27,8 +27,8 @@ def find_surface(
     count: qd.i32,
     method: qd.template(),
 ):
-    for team in range(teams(grid, count)):
-        find_normals(births, team, particles, grid, solids, walls, c, a, count, method)
+    for cluster in range(cluster_count(grid, count)):
+        find_normals(births, cluster, particles, grid, solids, walls, c, a, count, method)
 
 
 @qd.kernel
@@ -47,12 +47,12 @@ def fill_potentials(
     count: qd.i32,
     method: qd.template(),
 ):
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
             sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)
-            add_potentials(sums, team, births, particles, grid, c, a, count, method)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                out[i] = sums[0, i - team * grid.lanes]
+            add_potentials(sums, cluster, births, particles, grid, c, a, count, method)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                out[i] = sums[0, i - cluster * grid.lanes]
 
 
 @qd.kernel

@@ -14,7 +14,7 @@ from wavetank.physics.coefficients import coefficients
 from wavetank.physics.plan import has_grid_pressure
 from wavetank.physics.pressure import grid as pressure_grid
 from wavetank.physics.pressure import multigrid, solids
-from wavetank.physics.pressure.correct import look_at_solids
+from wavetank.physics.pressure.correct import query_solids
 from wavetank.physics.pressure.grid import Level, Workspace, new_pressure_grid
 from wavetank.physics.smoothing import NAMES, kernel_shape, rest_lattice
 from wavetank.scene.fluids import Points
@@ -240,8 +240,8 @@ def test_full_cells_draw_nothing_in(monkeypatch, spread, drawn):
     tank = wt.Tank(size=(40 * d * spread, 1.2))
     sim = Simulation(wt.Scene(spacing=d, tank=tank, fluids=[Points(positions=places)], gravity=(0.0, -1e-3)))
 
-    def read(scratch, particles, *args) -> None:
-        scratch.rho.from_numpy(np.full(scratch.rho.shape[0], 1.0 + error, np.float32))
+    def read(temporaries, particles, *args) -> None:
+        temporaries.rho.from_numpy(np.full(temporaries.rho.shape[0], 1.0 + error, np.float32))
 
     monkeypatch.setattr(step_of_algorithm, "measure_density", read)
     sim.step()
@@ -346,7 +346,7 @@ def test_the_room_that_solids_leave_follows_them():
             sim.step()
         level = sim.world.pressure.finest
         kept = level.open_volume.to_numpy()
-        look_at_solids(sim.world, sim.world.pressure, sim.scene, coefficients(sim.scene, 1.0 / 60.0))
+        query_solids(sim.world, sim.world.pressure, sim.scene, coefficients(sim.scene, 1.0 / 60.0))
         np.testing.assert_array_equal(level.open_volume.to_numpy(), kept)
         return kept
 
@@ -399,7 +399,7 @@ def test_solids_together_leave_the_room_that_their_union_does(count):
         scene = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6, 0.6)), fluids=[water], solids=solids)
         sim = Simulation(scene)
         level, workspace = sim.world.pressure.finest, sim.world.pressure.workspace
-        look_at_solids(sim.world, sim.world.pressure, sim.scene, coefficients(sim.scene, 1.0 / 60.0))
+        query_solids(sim.world, sim.world.pressure, sim.scene, coefficients(sim.scene, 1.0 / 60.0))
         nodes = level.nx * level.ny * level.nz
         return level.open_volume.to_numpy()[:nodes], workspace.thin_distance.to_numpy()[:nodes]
 

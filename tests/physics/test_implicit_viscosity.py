@@ -9,20 +9,20 @@ import wavetank as wt
 from wavetank.device.compiler import download
 from wavetank.physics.coefficients import coefficients
 from wavetank.physics.density_constraint import schedule
-from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE
-from wavetank.physics.dynamic_viscosity.implicit_viscosity import (
+from wavetank.physics.mixture import blend
+from wavetank.physics.planning import has_grid_pressure
+from wavetank.physics.smoothing import TABLE_SIZE, rest_points
+from wavetank.physics.terms.dynamic_viscosity.conjugate_gradients import TOLERANCE
+from wavetank.physics.terms.dynamic_viscosity.implicit_viscosity import (
     CARRIED,
-    carried_share,
     damper_scale,
     drag_table,
     is_viscous,
     iterations,
     solve_viscosity,
+    warm_start_of_thick,
 )
-from wavetank.physics.mixture import blend
-from wavetank.physics.plan import has_grid_pressure
-from wavetank.physics.smoothing import TABLE_SIZE, rest_points
-from wavetank.physics.tension import prepare_fluids
+from wavetank.physics.terms.tension import prepare_fluids
 from wavetank.simulation.simulation import Simulation
 
 D, DT = 0.05, 1 / 300
@@ -167,7 +167,7 @@ def mean_height(steps: int) -> float:
 def test_thick_fluids_do_not_flow_faster_in_longer_steps(monkeypatch):
     """Carried pressure (Goda 1979): twelve steps a frame come as near as a hundred without it, which is first order."""
     carried = mean_height(12)
-    monkeypatch.setattr("wavetank.physics.dynamic_viscosity.implicit_viscosity.CARRIED", 0.0)
+    monkeypatch.setattr("wavetank.physics.terms.dynamic_viscosity.implicit_viscosity.CARRIED", 0.0)
     split, fine = mean_height(12), mean_height(96)
     assert split < 0.8 * fine
     assert carried == pytest.approx(fine, rel=0.12)
@@ -196,7 +196,7 @@ def test_what_presses_is_carried_on_by_thick_fluids_only():
         sim = Simulation(scene)
         sim.step()
         assert has_grid_pressure(sim.world, scene) is (viscosity < 100.0), "thin fluids need no other time steps"
-        shares[viscosity] = carried_share(blend(sim.world.materials, scene), scene)
+        shares[viscosity] = warm_start_of_thick(blend(sim.world.materials, scene), scene)
     assert shares.pop(1000.0) > 0.95 * CARRIED
     assert not any(shares.values())
     weightless = Simulation(wt.Scene.load("honey-2d").changed(gravity=(0, 0)))
@@ -275,7 +275,7 @@ def test_iterations_are_as_many_as_the_worst_mode_needs(stiffest):
 def test_too_many_pairs_are_told_in_one_sentence(monkeypatch):
     sim = Simulation(wt.Scene.load("honey-2d").changed(spacing=0.004))
     monkeypatch.setattr(
-        "wavetank.physics.dynamic_viscosity.implicit_viscosity.MAX_ENTRIES", 8 * sim.world.grid.list.shape[0] - 1
+        "wavetank.physics.terms.dynamic_viscosity.implicit_viscosity.MAX_ENTRIES", 8 * sim.world.grid.list.shape[0] - 1
     )
     with pytest.raises(wt.WavetankError, match="particles of viscous fluids are too many.*use a larger spacing"):
         sim.step()

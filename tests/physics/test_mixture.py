@@ -7,34 +7,42 @@ from clouds import Cloud
 import wavetank as wt
 from wavetank.device.compiler import upload
 from wavetank.foundation.materials import Material
-from wavetank.physics.coefficients import correction_number
+from wavetank.physics.coefficients import correction_of
 from wavetank.physics.density_constraint import correct_positions, start_multipliers
 from wavetank.physics.mixture import blend, pack_multipliers, stiffening
-from wavetank.physics.xsph_viscosity import apply_mixed_xsph, pack_velocities
+from wavetank.physics.terms.xsph_viscosity import apply_mixed_xsph, pack_velocities
 
 
 def mixed_cloud(dim: int, ratio: float = 100.0, **settings) -> tuple[Cloud, np.ndarray]:
     """A cloud whose particles are heavy or light at random, and its inverse masses."""
     cloud = Cloud(dim, **settings)
     weight = np.where(np.random.default_rng(1).random(cloud.count) < 0.5, 1.0, ratio)
-    upload(cloud.world.scratch.weight, weight)
+    upload(cloud.world.temporaries.inverse_mass, weight)
     return cloud, weight
 
 
 def solve(cloud: Cloud, mixed: int, correction: int = 0) -> np.ndarray:
     world = cloud.world
     start_multipliers(
-        world.scratch, world.particles, world.grid, world.solids, world.walls, cloud.c, cloud.count, cloud.method, mixed
+        world.temporaries,
+        world.particles,
+        world.grid,
+        world.solids,
+        world.walls,
+        cloud.c,
+        cloud.count,
+        cloud.method,
+        mixed,
     )
-    changes = world.scratch.dlam
+    changes = world.temporaries.dlam
     correction = correction or 3 * mixed
     if correction > 3:
         changes = world.fluids.array("packed")
-        pack_multipliers(changes, world.scratch, cloud.count)
+        pack_multipliers(changes, world.temporaries, cloud.count)
     correct_positions(
         world.spare,
         world.particles,
-        world.scratch,
+        world.temporaries,
         changes,
         world.grid,
         world.solids,
@@ -59,7 +67,9 @@ def test_multiplier_with_inverse_masses(dim):
     own = np.sum(np.sum(grad, axis=1) ** 2, axis=1)
     squares = w * (own + cloud.c.eps) + np.sum(w[None, :] * np.sum(grad**2, axis=2), axis=1)
     lam = -constraint / squares
-    np.testing.assert_allclose(cloud.world.scratch.lam.to_numpy()[: cloud.count], lam, atol=2e-4 * np.abs(lam).max())
+    np.testing.assert_allclose(
+        cloud.world.temporaries.lam.to_numpy()[: cloud.count], lam, atol=2e-4 * np.abs(lam).max()
+    )
     expected = w[:, None] * np.sum((lam[:, None] + lam[None, :])[..., None] * grad, axis=1)
     np.testing.assert_allclose(moved, expected, atol=5e-4 * np.abs(expected).max())
 
@@ -76,7 +86,7 @@ def test_corrections_keep_momentum_at_any_ratio(dim):
 def test_artificial_pressure_moves_the_lighter_of_two_as_among_its_like(exponent):
     """Eq. 7 is a pressure: what it moves particles by would go with the inverse masses, 100 times as far at 1 : 100."""
     cloud, w = mixed_cloud(3, tensile_strength=0.1, tensile_exponent=exponent)
-    number = correction_number(cloud.scene, 1)
+    number = correction_of(cloud.scene, 1)
     moved = solve(cloud, 1, number) - solve(cloud, 1)
     shape = cloud.w() * cloud.mass_over_rest_density() / cloud.c.density_scale
     s_corr = -cloud.c.tensile * shape**exponent / np.maximum(w[:, None], w[None, :])
@@ -106,7 +116,7 @@ def test_smoothing_keeps_momentum_and_is_eq_11_for_equal_masses(dim):
     cloud, w = mixed_cloud(dim, viscosity=0.5, calming=0.0)
     world = cloud.world
     packed = world.fluids.array("packed")
-    pack_velocities(packed, world.particles, world.scratch.weight, cloud.count)
+    pack_velocities(packed, world.particles, world.temporaries.inverse_mass, cloud.count)
     grid = world.grid
     apply_mixed_xsph(world.spare, world.particles, packed, grid, cloud.c, cloud.count, cloud.method)
     smoothed = world.spare.v.to_numpy()[: cloud.count].astype(np.float64)

@@ -10,7 +10,7 @@ import wavetank as wt
 from wavetank.device.compiler import upload
 from wavetank.physics import neighbors
 from wavetank.physics.coefficients import coefficients
-from wavetank.physics.integrate import forget_predictions
+from wavetank.physics.integrate import reset_predictions
 from wavetank.physics.neighbors import new_grid
 from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.sorting import reorder
@@ -124,7 +124,7 @@ def test_order_does_not_depend_on_the_order_given(shared):
         shuffle = np.random.default_rng(seed).permutation(500)
         upload(world.particles.x, x[shuffle])
         upload(world.particles.id, shuffle)
-        forget_predictions(world.particles, world.grid, c, 500)
+        reset_predictions(world.particles, world.grid, c, 500)
         reorder(world.spare, world.particles, world.grid, 500, shared)
         orders.append(world.spare.id.to_numpy()[:500])
     np.testing.assert_array_equal(*orders)

@@ -12,8 +12,8 @@ import pytest
 from wavetank.device import compiler
 from wavetank.device.compiler import qd
 from wavetank.device.state import Grid, integers
+from wavetank.physics.clusters import chunks, end_cluster, first_cluster
 from wavetank.physics.neighbors import new_grid
-from wavetank.physics.teams import end_team, first_team, turns
 
 PROGRAM = """
 import sys
@@ -39,9 +39,9 @@ PASSES = {
 
 @qd.kernel
 def count_visits(visits: qd.types.ndarray(), grid: Grid, count: qd.i32):
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            qd.atomic_add(visits[team], 1)
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            qd.atomic_add(visits[cluster], 1)
 
 
 @pytest.mark.parametrize("lanes", [8, 1])
@@ -51,8 +51,8 @@ def test_every_team_has_its_turn_once(count, lanes):
     grid = dataclasses.replace(new_grid(2, count, (1.0, 1.0), 0.5, 32), lanes=lanes)
     visits = integers(count + 1)
     count_visits(visits, grid, count)
-    teams = -(-count // lanes)
-    assert compiler.download(visits).tolist() == [1] * teams + [0] * (count + 1 - teams)
+    clusters = -(-count // lanes)
+    assert compiler.download(visits).tolist() == [1] * clusters + [0] * (count + 1 - clusters)
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the names of instructions are those of x86")

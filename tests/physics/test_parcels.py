@@ -7,7 +7,7 @@ from scipy.optimize import least_squares
 import wavetank as wt
 from wavetank.device import compiler
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import Particles, Scratch, new_particles, new_scratch
+from wavetank.device.state import Particles, Temporaries, new_particles, new_temporaries
 from wavetank.physics.pressure.grid import Level, Variant, Workspace, new_pressure_grid
 from wavetank.physics.pressure.liquid import add_footprints
 
@@ -19,7 +19,7 @@ def add(
     grid: Level,
     w: Workspace,
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     spacing: qd.f32,
     count: qd.i32,
     lanes: qd.template(),
@@ -27,19 +27,19 @@ def add(
 ):
     """Add what nodes have of these particles to the sums."""
     qd.loop_config(serialize=True)
-    for team in range((count + lanes - 1) // lanes):
-        add_footprints(grid, w, particles, scratch, spacing, UNIT, team, 0, count, lanes, has)
+    for cluster in range((count + lanes - 1) // lanes):
+        add_footprints(grid, w, particles, temporaries, spacing, UNIT, cluster, 0, count, lanes, has)
 
 
 def shares_of(grid, places, spacing, solids=0, thin=0):
     """What each node has of boxes of that size at `places` [n, 3], [nz, ny, nx]."""
-    particles, scratch = new_particles(3, len(places)), new_scratch(len(places))
+    particles, temporaries = new_particles(3, len(places)), new_temporaries(len(places))
     for component, values in zip((particles.px, particles.py, particles.pz), places.T, strict=True):
         upload(component, np.pad(values, (0, component.shape[0] - len(values))).astype(np.float32))
     level, workspace = grid.finest, grid.workspace
     workspace.sums.fill(0)
     has = Variant(solids=solids, thin_walls=thin, bodies=0, mixed=0, few_nodes=1)
-    add(level, workspace, particles, scratch, spacing, len(places), compiler.lanes(), has)
+    add(level, workspace, particles, temporaries, spacing, len(places), compiler.lanes(), has)
     nodes = level.nx * level.ny * level.nz
     return workspace.sums.to_numpy()[:nodes].reshape(level.nz, level.ny, level.nx) / UNIT
 

@@ -44,7 +44,7 @@ def test_what_a_solid_pushes_along_turns_round_slowly():
         water, walls = wt.Points(positions=[(x, 0.5)]), wt.Union(parts=[left, right])
         sim = wt.Simulation(wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 1.0)), fluids=[water], solids=[walls]))
         sim.advance(1e-2)
-        slopes.append(float(sim.world.scratch.facing.to_numpy()[0, 0]))
+        slopes.append(float(sim.world.temporaries.plane.to_numpy()[0, 0]))
     assert slopes[0] > 0.0 > slopes[1]
     np.testing.assert_allclose(slopes, 0.0, atol=0.1)
 

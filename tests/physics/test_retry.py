@@ -7,7 +7,7 @@ import wavetank as wt
 from wavetank.device.compiler import download
 from wavetank.device.state import LASTING
 from wavetank.physics.retry import Retry
-from wavetank.physics.step import step
+from wavetank.physics.step import Response, step
 
 
 def arrays(sim: wt.Simulation) -> dict[str, np.ndarray]:
@@ -27,7 +27,7 @@ def test_particles_are_again_what_they_were_before_a_step_that_ended_early():
     before, retry = arrays(sim), Retry()
     for _ in range(2):  # arrays have changed hands in between
         retry.keep(sim.world)
-        assert not step(sim.world, sim.scene, 0.01, settle=lambda: None)
+        assert not step(sim.world, sim.scene, 0.01, respond=lambda: Response.RETRY)
         assert any(not np.array_equal(rows, before[name]) for name, rows in arrays(sim).items())
         retry.restore(sim.world)
         for name, rows in arrays(sim).items():

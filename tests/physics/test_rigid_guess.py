@@ -1,4 +1,4 @@
-"""Where conjugate gradients start in what is stiff and turns: `physics/dynamic_viscosity/rigid_guess.py`."""
+"""Where conjugate gradients start in what is stiff and turns: `physics/terms/dynamic_viscosity/rigid_guess.py`."""
 
 import numpy as np
 import pytest
@@ -6,10 +6,10 @@ import pytest
 import wavetank as wt
 from wavetank.device.compiler import download
 from wavetank.physics.coefficients import coefficients
-from wavetank.physics.dynamic_viscosity.implicit_viscosity import solve_viscosity
-from wavetank.physics.dynamic_viscosity.rigid_guess import FORGET
 from wavetank.physics.mixture import blend
-from wavetank.physics.tension import prepare_fluids
+from wavetank.physics.terms.dynamic_viscosity.implicit_viscosity import solve_viscosity
+from wavetank.physics.terms.dynamic_viscosity.rigid_guess import FORGET
+from wavetank.physics.terms.tension import prepare_fluids
 from wavetank.simulation.simulation import Simulation
 
 D, DT = 0.02, 1 / 120

@@ -9,7 +9,7 @@ import wavetank as wt
 from wavetank.foundation.materials import Material
 from wavetank.physics.mixture import blend
 from wavetank.physics.smoothing import rest_points
-from wavetank.physics.tension import adhesion_table, flat_surface, largest_tension, limited_tensions, substeps_for
+from wavetank.physics.terms.tension import adhesion_table, flat_surface, largest_tension, limited_tensions, substeps_for
 from wavetank.simulation.simulation import Simulation
 
 
@@ -46,7 +46,7 @@ def test_without_tension_nothing_moves_and_nothing_is_paid_for():
     start = sim.positions
     sim.advance(0.01)
     np.testing.assert_allclose(sim.positions, start, atol=1e-7)
-    assert set(sim.world.fluids.arrays) == {"packed"}, "what physics/central_xsph.py needs in the open"
+    assert set(sim.world.fluids.arrays) == {"packed"}, "what physics/terms/central_xsph.py needs in the open"
 
 
 def test_any_tension_is_bounded():

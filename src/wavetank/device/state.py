@@ -7,7 +7,7 @@ neighbour lists where there is no neighbour.
 Two sets of the moving arrays exist so that sorting and Jacobi updates can read one and write the other; which is
 which is swapped on the host, nothing is copied.
 
-What kernels take is frozen, and the same arrays and numbers are the same object each time (`exchanged`, `remembered`):
+What kernels take is frozen, and the same arrays and numbers are the same object each time (`swapped`, `interned`):
 the compiler then knows the arguments of a launch, which else cost more than a small kernel (docs/performance.md).
 """
 
@@ -49,23 +49,24 @@ LASTING: tuple[str, ...] = ("x", "v", "a", "id", "dye", "frozen", "material")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Scratch:
-    """What a substep computes and forgets."""
+class Temporaries:
+    """What a substep computes anew."""
 
-    rho: qd.types.ndarray()  # f32 [capacity]: density over rest density
+    rho: qd.types.ndarray()  # f32 [capacity], kg/m^3: density
     lam: qd.types.ndarray()  # f32 [capacity], m^2: multiplier, the sum over the iterations of a substep
     dlam: qd.types.ndarray()  # f32 [capacity], m^2: its change in the last iteration
-    squares: qd.types.ndarray()  # f32 [capacity], 1/m^2: denominator of the multiplier
+    denominator: qd.types.ndarray()  # f32 [capacity], 1/m^2: of the multiplier (Eq. 5)
     omega: qd.types.ndarray()  # vec3 [capacity], 1/s: vorticity
     wall: qd.types.ndarray()  # vec4 [capacity]: (gradient [1/m], share of rho_0) of the solids, where any is near
-    weight: qd.types.ndarray()  # f32 [capacity]: largest rest density of all fluids over its own; 1 where all are equal
-    puddle: qd.types.ndarray()  # f32 [capacity]: how surely it lies in so little water that its cell is hardly filled
+    inverse_mass: qd.types.ndarray()  # f32 [capacity], 1: over that of the heaviest fluid; 1 where all are equal
+    shallow: qd.types.ndarray()  # f32 [capacity]: confidence, 0 to 1, that its cell is hardly filled: a puddle
     # The solids near each particle, see `physics/near_solids.py`; one row in worlds without solids but for the tank.
-    solids: qd.types.ndarray()  # i32 [capacity]: how many there are, even if it had no room
-    seen: qd.types.ndarray()  # vec3 [capacity], m: where their distances were asked for
-    solid: qd.types.ndarray()  # i32 [places * capacity]: their numbers, the first of all particles first
-    facing: qd.types.ndarray()  # vec4 [places * capacity]: outward normal [1] and distance [m] there
-    push: qd.types.ndarray()  # vec3 [places * capacity], m, heaviest particle's mass: what they have moved it by
+    touching: qd.types.ndarray()  # i32 [capacity]: 1 where its path may touch one, else 0
+    solid_count: qd.types.ndarray()  # i32 [capacity]: how many there are, even if it had no room
+    query_point: qd.types.ndarray()  # vec3 [capacity], m: where their distances were measured
+    solid: qd.types.ndarray()  # i32 [slots * capacity]: their numbers, the first of all particles first
+    plane: qd.types.ndarray()  # vec4 [slots * capacity]: outward normal [1] and distance [m] there
+    push: qd.types.ndarray()  # vec3 [slots * capacity], m, heaviest particle's mass: what they have moved it by
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -150,7 +151,7 @@ class Fluids:
     capacity: int
     rows: Any  # vec4 [materials]: inverse mass over the smallest, viscosity [Pa s], tension [N/m], wetting (0 to 1)
     written: np.ndarray | None = None  # what `rows` holds
-    weighed: bool = False  # whether Scratch.weight differs from 1
+    weighed: bool = False  # whether Temporaries.weight differs from 1
     arrays: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     def array(self, name: str, rows: int = 0) -> Any:
@@ -197,8 +198,8 @@ class Coefficients:
     tensile: qd.f32  # m^2, artificial pressure of one iteration over w(dq)^n
     tensile_exponent: qd.f32
     largest_correction: qd.f32  # m, of one iteration
-    held_push: qd.f32  # m: the same for thick fluids at rest, 0 where none are; and how much more for every m/s
-    held_time: qd.f32  # s
+    push_limit: qd.f32  # m: the same for thick fluids at rest, 0 where none are; and how much more for every m/s
+    push_time: qd.f32  # s
     viscosity: qd.f32  # share per substep
     calming: qd.f32  # share per substep of what is slow, over that of the viscosity
     slow: qd.f32  # s^2/m^2: inverse square of the speed below which motion past neighbours is slow
@@ -208,37 +209,35 @@ class Coefficients:
     coherence: qd.f32
     calm: qd.f32  # 1/s, vorticity of water at rest
     speed_limit: qd.f32  # m/s
-    carried: qd.f32  # share of the grid's pressure that is carried on
-    largest_carried: qd.f32  # m/s^2, of what is carried on
+    warm_start: qd.f32  # share of the pressure of the last step that this one begins with
+    largest_warm_start: qd.f32  # m/s^2, at most of it
     wall_density: qd.f32
     wall_gap: qd.f32  # m
-    skin: qd.f32 = 0.0  # m^(dim - 2), see physics/tension.py
+    skin: qd.f32 = 0.0  # m^(dim - 2), see physics/terms/tension.py
     cohesion: qd.f32 = 0.0  # m^(dim - 2), likewise
     fallen: qd.f32 = (
         0.0  # s^2: by this times gravity places are told from where all fell alike, see `physics/pressure/`
     )
 
 
-MOST_REMEMBERED = 512
-_remembered: dict[tuple[Any, ...], Any] = {}
+MOST_INTERNED = 512
+_interned: dict[tuple[Any, ...], Any] = {}
 
 
-def remembered(numbers: Numbers) -> Numbers:
+def interned(numbers: Numbers) -> Numbers:
     """Return the first object that equals `numbers`, which the compiler then knows.
 
     That is a dataclass of numbers and vectors, or a vector; nobody may change it from now on.
     """
     parts = (numbers,) if isinstance(numbers, np.ndarray) else vars(numbers).values()
     key = (type(numbers), *[part.tobytes() if isinstance(part, np.ndarray) else part for part in parts])
-    if len(_remembered) > MOST_REMEMBERED:
-        _remembered.clear()
-    first: Numbers = _remembered.setdefault(key, numbers)
+    if len(_interned) > MOST_INTERNED:
+        _interned.clear()
+    first: Numbers = _interned.setdefault(key, numbers)
     return first
 
 
-def exchanged(
-    known: dict[tuple[Any, ...], Any], a: Particles, b: Particles, *names: str
-) -> tuple[Particles, Particles]:
+def swapped(known: dict[tuple[Any, ...], Any], a: Particles, b: Particles, *names: str) -> tuple[Particles, Particles]:
     """Return `a` and `b` with the arrays of those `names` exchanged; nothing is copied.
 
     What it returns stays `known`: the same arrays are the same object the next time.
@@ -320,41 +319,42 @@ def without_viscosity(particles: Particles) -> Particles:
     return dataclasses.replace(particles, viscous=vectors(particles.x.element_shape[0], 1))
 
 
-def new_scratch(capacity: int) -> Scratch:
-    """Allocate the scratch arrays."""
+def new_temporaries(capacity: int) -> Temporaries:
+    """Allocate the temporaries of a substep, without room for solids but the tank."""
     rows = capacity + MARGIN
-    rho, lam, dlam, squares, weight = (scalars(rows) for _ in range(5))
-    weight.fill(1.0)
-    return Scratch(
-        rho,
-        lam,
-        dlam,
-        squares,
+    rho, lam, dlam, denominator, inverse_mass, shallow = (scalars(rows) for _ in range(6))
+    inverse_mass.fill(1.0)
+    return Temporaries(
+        rho=rho,
+        lam=lam,
+        dlam=dlam,
+        denominator=denominator,
         omega=vectors(3, rows),
         wall=vectors(4, rows),
-        weight=weight,
-        puddle=scalars(rows),
-        solids=integers(1),
-        seen=vectors(3, 1),
-        solid=integers(1),
-        facing=vectors(4, 1),
-        push=vectors(3, 1),
+        inverse_mass=inverse_mass,
+        shallow=shallow,
+        **_solids_near(1, 1),
     )
 
 
-def with_solids(scratch: Scratch, places: int) -> Scratch:
-    """Return scratch arrays with room for so many solids near each particle."""
-    rows = scratch.rho.shape[0]
-    if scratch.solids.shape[0] == rows:
-        return scratch
-    return dataclasses.replace(
-        scratch,
-        solids=integers(rows),
-        seen=vectors(3, rows),
-        solid=integers(places * rows),
-        facing=vectors(4, places * rows),
-        push=vectors(3, places * rows),
-    )
+def with_solids(temporaries: Temporaries, slots: int) -> Temporaries:
+    """Return temporaries with room for `slots` solids near each particle."""
+    rows = temporaries.rho.shape[0]
+    if temporaries.solid_count.shape[0] == rows:
+        return temporaries
+    return dataclasses.replace(temporaries, **_solids_near(rows, slots))
+
+
+def _solids_near(rows: int, slots: int) -> dict[str, Any]:
+    """Allocate what particles know of the solids near them, by the names of the fields."""
+    return {
+        "touching": integers(rows),
+        "solid_count": integers(rows),
+        "query_point": vectors(3, rows),
+        "solid": integers(slots * rows),
+        "plane": vectors(4, slots * rows),
+        "push": vectors(3, slots * rows),
+    }
 
 
 def new_diffuse(dim: int, capacity: int) -> Diffuse:

@@ -1,4 +1,17 @@
-"""Bodies as the water sees them: pieces that it would have filled."""
+"""Rigid bodies as the water sees them: samples of their volume, and the reactions that they feel.
+
+Whatever moves a particle at a solid, its share of the density (Eq. 6 with the wall's gradient), contact and friction,
+moves it by some way within a step. The opposite, times the particle's mass, is what the solid is pushed
+by; times the lever arm about its centre of mass, what it is turned by. Sums are of whole numbers, so that the order in
+which threads come does not matter and runs repeat bit for bit; a body's unit is as fine as the number of particles that
+can press on it allows (`simulation/bodies.py`).
+
+    code      meaning                                                                unit
+    push      way that a particle was moved by, times its mass                       m, heaviest particle's mass
+    reaction  sums for each solid, `PARTS` numbers: push, turn, the grid's push      1/unit
+              and turn, the share of the solid that is under water, how viscous fluids hold it,
+              and what of them it displaces
+"""
 
 import dataclasses
 
@@ -6,6 +19,57 @@ import numpy as np
 
 from wavetank.device.compiler import qd, upload
 from wavetank.device.state import integers, scalars, vectors
+from wavetank.solids.distance import SolidSet, image_near, parts
+
+
+@qd.func
+def of_grid():
+    """Where those of the grid begin."""
+    return 6
+
+
+@qd.func
+def immersion():
+    """Where the share under water is."""
+    return 12
+
+
+@qd.func
+def rubbing():
+    """Where the damper of viscous fluids is: the sum of the shares of particles in the drag table, times a spacing."""
+    return 13
+
+
+@qd.func
+def displacing():
+    """Where the share under water is, times the density of what is around over that of the heaviest fluid."""
+    return 14
+
+
+OF_GRID, IMMERSION, RUBBING, DISPLACING = (number.fn() for number in (of_grid, immersion, rubbing, displacing))
+
+
+@qd.func
+def add_to_body(solids: SolidSet, k, first, at, push):
+    """Add a push [m] and its turn about the centre of mass, over the body's reach [m], to the sums from `first` on."""
+    turn = (image_near(solids, k, at) - solids.center[k]).cross(push) / solids.reach[k]
+    for axis in qd.static(range(3)):
+        at_axis = parts() * k + first + axis
+        qd.atomic_add(solids.reaction[at_axis], qd.cast(qd.round(solids.unit[k] * push[axis]), qd.i32))
+        qd.atomic_add(solids.reaction[at_axis + 3], qd.cast(qd.round(solids.unit[k] * turn[axis]), qd.i32))
+
+
+@qd.func
+def push_back(solids: SolidSet, k, at, push):
+    """Let solid `k` feel the opposite of what pushed a particle at `at`, if it is a body."""
+    if solids.unit[k] > 0.0:
+        add_to_body(solids, k, 0, at, -push)
+
+
+@qd.func
+def add_damper(solids: SolidSet, k, share):
+    """Let body `k` know that a fluid holds it by that share, times a spacing [m]."""
+    qd.atomic_add(solids.reaction[parts() * k + rubbing()], qd.cast(qd.round(solids.unit[k] * share), qd.i32))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

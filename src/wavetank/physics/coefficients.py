@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from wavetank.device.state import Coefficients, remembered
+from wavetank.device.state import Coefficients, interned
 from wavetank.foundation.params import Parameters
-from wavetank.physics.density_constraint import schedule
+from wavetank.physics.density_constraint import Correction, schedule
 from wavetank.physics.mixture import stiffening
 from wavetank.physics.pressure.grid import THRESHOLDS
 from wavetank.physics.smoothing import KERNELS, NAMES, SLOPES, kernel_shape, rest_lattice
@@ -28,9 +28,9 @@ def coefficients(
     dt: float,
     speed_limit: float = math.inf,
     *,
-    carries: float = 0.0,
-    parts: int = 0,
-    held: float = 0.0,
+    warm_start: float = 0.0,
+    pressure_iterations: int = 0,
+    push_limit: float = 0.0,
     iterations: int = 0,
 ) -> Coefficients:
     """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here.
@@ -43,17 +43,17 @@ def coefficients(
     rest = rest_lattice(params.kernel, params.dim, params.support)
     s_0 = rest.squared_gradients / h**2
     w_dq = float(kernel_shape(NAMES[params.kernel][0], np.array(params.tensile_distance))[0])
-    tensile = params.tensile_strength / s_0 / (parts or iterations) / w_dq**params.tensile_exponent
+    tensile = params.tensile_strength / s_0 / (pressure_iterations or iterations) / w_dq**params.tensile_exponent
     # Packings need it that gravity presses; without gravity it would blow them up (notebook/calm.md). It is the
     # same force in steps of any length.
     tensile *= (dt / params.frame_time) ** 2 * min(1.0, math.hypot(*params.gravity) / EARTH)
     viscosity = min(1.0, params.viscosity * REFERENCE_RATE * dt)
     calming = 1.0 - (1.0 - params.calming) ** (dt / params.frame_time)
     # Of what an iteration may move a particle by: as fast as it goes, and as it falls past a neighbour.
-    pace = dt / iterations / held if held > 0.0 else 0.0
+    pace = dt / iterations / push_limit if push_limit > 0.0 else 0.0
     # Without gravity nothing is slow: there is no speed to compare with.
     slow = 1.0 / max(math.hypot(*params.gravity) * params.spacing, 1e-30)
-    return remembered(
+    return interned(
         Coefficients(
             dt=dt,
             gravity_x=gravity[0],
@@ -71,8 +71,8 @@ def coefficients(
             tensile=tensile,
             tensile_exponent=params.tensile_exponent,
             largest_correction=h / iterations,
-            held_push=pace * math.sqrt(2.0 * math.hypot(*params.gravity) * h),
-            held_time=pace,
+            push_limit=pace * math.sqrt(2.0 * math.hypot(*params.gravity) * h),
+            push_time=pace,
             viscosity=viscosity,
             calming=max(0.0, calming - viscosity),
             slow=slow / SLOW**2,
@@ -82,8 +82,8 @@ def coefficients(
             coherence=params.vorticity_coherence,
             calm=CALM * math.sqrt(math.hypot(*params.gravity) / h),
             speed_limit=speed_limit,
-            carried=carries,
-            largest_carried=THRESHOLDS.largest_carried * math.hypot(*params.gravity),
+            warm_start=warm_start,
+            largest_warm_start=THRESHOLDS.largest_warm_start * math.hypot(*params.gravity),
             wall_density=params.wall_density,
             wall_gap=params.wall_gap * params.spacing,
         )
@@ -106,12 +106,16 @@ def relaxations(params: Parameters, density_ratio: float = 1.0, iterations: int 
 @functools.lru_cache(maxsize=256)
 def before_fall(c: Coefficients) -> Coefficients:
     """Return `c` for densities of places before gravity, less what is carried on, moved all of them alike."""
-    return dataclasses.replace(c, fallen=(1.0 - c.carried) * c.dt**2)
+    return dataclasses.replace(c, fallen=(1.0 - c.warm_start) * c.dt**2)
 
 
-def correction_number(params: Parameters, mixed: int) -> int:
-    """Return the place of the correction in `density_constraint.CORRECTIONS`, of fluids that are `mixed` if 1."""
-    return 3 * mixed + (0 if params.tensile_strength == 0.0 else 2 if params.tensile_exponent == 4.0 else 1)
+def correction_of(params: Parameters, mixed: int) -> Correction:
+    """Return which correction of positions the parameters ask for, of fluids of different density where `mixed`."""
+    if params.tensile_strength == 0.0:
+        return Correction.MIXED if mixed else Correction.PLAIN
+    if params.tensile_exponent == 4.0:
+        return Correction.MIXED_QUARTIC if mixed else Correction.QUARTIC
+    return Correction.MIXED_TENSILE if mixed else Correction.TENSILE
 
 
 def method_number(params: Parameters) -> int:

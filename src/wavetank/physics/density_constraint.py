@@ -30,14 +30,17 @@ Chebyshev for Jacobi solvers of constraints: Wang 2015 (10.1145/2816795.2818063)
 multiplier: Moreau and Jean's projected iteration, as in Tonge et al. 2012 (10.1145/2185520.2185601).
 """
 
+import enum
+
 from wavetank.device.compiler import qd
-from wavetank.device.state import Coefficients, Grid, Particles, Scratch, Walls
-from wavetank.physics.boundary import flattened, kept_in_tank, stopped
-from wavetank.physics.near_solids import find_walls, is_clear, press_back
+from wavetank.device.state import Coefficients, Grid, Particles, Temporaries, Walls
+from wavetank.physics.broad_phase import Obstacles
+from wavetank.physics.clusters import chunks, end_cluster, end_of, first_cluster
+from wavetank.physics.contact import clamp_to_tank, flattened
+from wavetank.physics.near_solids import accumulate_reaction, find_walls, is_clear
 from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.smoothing import kernel
-from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.solids.distance import SolidSet, lift, vec4
 
 
@@ -122,7 +125,35 @@ def add_weighted_density(sums: qd.template(), r, square, a, b, c: Coefficients, 
 
 #: By `mixed`; append only, as `smoothing.KERNELS`.
 DENSITIES = (add_density, add_weighted_density)
-#: Those of one fluid and, from 3 on, of fluids of different density. Append only, as `smoothing.KERNELS`.
+
+
+class Correction(enum.IntEnum):
+    """Places of the corrections in CORRECTIONS: of one fluid and, from MIXED on, of fluids of different density."""
+
+    PLAIN = 0  # Eq. 6
+    TENSILE = 1  # Eq. 8: with artificial pressure
+    QUARTIC = 2  # the same with the exponent 4
+    MIXED = 3
+    MIXED_TENSILE = 4
+    MIXED_QUARTIC = 5
+
+    @property
+    def without_pressure(self) -> "Correction":
+        """The correction of the same fluids without artificial pressure."""
+        return Correction.MIXED if self.is_mixed else Correction.PLAIN
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether it is of fluids of different density."""
+        return self >= Correction.MIXED
+
+    @property
+    def needs_masses(self) -> bool:
+        """Whether it reads the inverse masses of pairs."""
+        return self > Correction.MIXED
+
+
+#: By `Correction`; append only, as `smoothing.KERNELS`.
 CORRECTIONS = (
     add_correction,
     add_tensile_correction,
@@ -134,27 +165,27 @@ CORRECTIONS = (
 
 
 @qd.func
-def kept_wall(found: qd.template(), lane, i, near, scratch: Scratch):
+def store_wall(found: qd.template(), lane, i, near, temporaries: Temporaries):
     """Gradient and density that the solids add at particle `i`, from its lane of `found`; kept if `near` any."""
     wall = vec4(found[0, lane], found[1, lane], found[2, lane], 1.0 - found[3, lane])
     if near != 0:
-        scratch.wall[i] = wall
+        temporaries.wall[i] = wall
     return wall
 
 
 @qd.func
-def set_multiplier(i, before, change, scratch: Scratch, c: Coefficients):
+def set_multiplier(i, before, change, temporaries: Temporaries, c: Coefficients):
     """Change the multiplier of particle `i` from what it was `before`; it pushes, and pulls by a share at most."""
     lam = before + change
     if lam > 0.0:
         lam *= c.attraction
-    scratch.dlam[i] = lam - before
-    scratch.lam[i] = lam
+    temporaries.dlam[i] = lam - before
+    temporaries.lam[i] = lam
 
 
 @qd.kernel(fastcache=True)
 def start_multipliers(
-    scratch: Scratch,
+    temporaries: Temporaries,
     particles: Particles,
     grid: Grid,
     solids: SolidSet,
@@ -165,30 +196,32 @@ def start_multipliers(
     mixed: qd.template(),
 ):
     """Find the denominators of all iterations of a substep, and the multipliers of the first (Eq. 1 to 5)."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            dim = qd.static(particles.x[team].n)
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            dim = qd.static(particles.x[cluster].n)
             sums = qd.Matrix.zero(qd.f32, dim + 2, grid.lanes)
-            add_neighbors(sums, qd.static(DENSITIES[mixed]), team, particles, scratch.weight, grid, c, method)
+            add_neighbors(
+                sums, qd.static(DENSITIES[mixed]), cluster, particles, temporaries.inverse_mass, grid, c, method
+            )
             found = qd.Matrix.zero(qd.f32, 4, grid.lanes)
-            near = find_walls(found, team, particles, scratch, solids, walls, c)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                sum = column(sums, i - team * grid.lanes)
-                wall = kept_wall(found, i - team * grid.lanes, i, near, scratch)
+            near = find_walls(found, cluster, particles, temporaries, solids, walls, c)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                sum = column(sums, i - cluster * grid.lanes)
+                wall = store_wall(found, i - cluster * grid.lanes, i, near, temporaries)
                 constraint = c.density_scale * sum[0] + wall.w - 1.0  # Eq. 2
                 own = c.eps
                 for k in qd.static(range(dim)):
                     own += (c.gradient_scale * sum[1 + k] + wall[k]) ** 2
                 if qd.static(mixed):
-                    own *= scratch.weight[i]
+                    own *= temporaries.inverse_mass[i]
                 squares = c.gradient_scale * c.gradient_scale * sum[dim + 1] + own
-                scratch.squares[i] = squares
-                set_multiplier(i, 0.0, -c.relaxation * constraint / squares, scratch, c)  # Eq. 5
+                temporaries.denominator[i] = squares
+                set_multiplier(i, 0.0, -c.relaxation * constraint / squares, temporaries, c)  # Eq. 5
 
 
 @qd.kernel(fastcache=True)
 def solve_multipliers(
-    scratch: Scratch,
+    temporaries: Temporaries,
     particles: Particles,
     grid: Grid,
     solids: SolidSet,
@@ -198,24 +231,62 @@ def solve_multipliers(
     method: qd.template(),
 ):
     """Estimate densities (Eq. 1) and move the multipliers on towards the solution (Eq. 5)."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
             sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)
-            add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
+            add_neighbors(sums, add_weight, cluster, particles, temporaries.inverse_mass, grid, c, method)
             found = qd.Matrix.zero(qd.f32, 4, grid.lanes)
-            near = find_walls(found, team, particles, scratch, solids, walls, c)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                wall = kept_wall(found, i - team * grid.lanes, i, near, scratch)
-                constraint = c.density_scale * sums[0, i - team * grid.lanes] + wall.w - 1.0  # Eq. 2
-                change = -c.relaxation * constraint / scratch.squares[i] + c.momentum * scratch.dlam[i]  # Eq. 5
-                set_multiplier(i, scratch.lam[i], change, scratch, c)
+            near = find_walls(found, cluster, particles, temporaries, solids, walls, c)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                wall = store_wall(found, i - cluster * grid.lanes, i, near, temporaries)
+                constraint = c.density_scale * sums[0, i - cluster * grid.lanes] + wall.w - 1.0  # Eq. 2
+                change = (
+                    -c.relaxation * constraint / temporaries.denominator[i] + c.momentum * temporaries.dlam[i]
+                )  # Eq. 5
+                set_multiplier(i, temporaries.lam[i], change, temporaries, c)
+
+
+@qd.func
+def largest_move(v, c: Coefficients):
+    """Return the way [m] that an iteration may move a particle of the velocity `v`: not past solids marked for it."""
+    most = c.largest_correction
+    if c.push_limit > 0.0:  # thick fluids: see dynamic_viscosity/implicit_viscosity.py
+        most = qd.min(most, c.push_limit + c.push_time * v.norm())
+    return most
+
+
+@qd.func
+def touches_solids(
+    i,
+    before,
+    p,
+    short,
+    particles: Particles,
+    temporaries: Temporaries,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    obstacles: qd.template(),
+):
+    """Return 1 where the path of particle `i` to `p` may touch a solid, else 0; sum up how its density pushes bodies.
+
+    It was at `before`, and the correction is the share `short` of the whole.
+    """
+    touching, near = 0, particles.near[i]
+    if near >> solids.tank_count != 0:
+        touching = 1 - qd.cast(is_clear(i, lift(particles.x[i]), p, temporaries, solids, c), qd.i32)
+        if qd.static(obstacles == Obstacles.TWO_WAY):
+            push, free = temporaries.dlam[i] * short, 1.0 - temporaries.wall[i].w
+            if push != 0.0:
+                accumulate_reaction(i, before, near, free, push, temporaries, solids, walls, c)
+    return touching
 
 
 @qd.kernel(fastcache=True)
 def correct_positions(
     corrected: Particles,
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     changes: qd.types.ndarray(),
     grid: Grid,
     solids: SolidSet,
@@ -224,51 +295,41 @@ def correct_positions(
     count: qd.i32,
     method: qd.template(),
     correction: qd.template(),
-    searched: qd.template(),
+    obstacles: qd.template(),
 ):
-    """Move the predicted positions by the corrections (Eq. 6 or 8, by its number in CORRECTIONS), inside the tank.
+    """Move the predicted positions by the corrections (Eq. 6 or 8, by its `Correction`), inside the tank.
 
-    `changes` are those of the multipliers, `scratch.dlam`, with inverse masses behind where the correction asks for
-    them. Where solids are `searched` they stay out of those as well; with 2, bodies feel it.
+    `changes` are those of the multipliers, `temporaries.dlam`, with inverse masses behind where the correction asks for
+    them. Particles that may touch `obstacles` are marked, for `contact.resolve_contacts`.
     """
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, grid.lanes)
-            add_neighbors(sums, qd.static(CORRECTIONS[correction]), team, particles, changes, grid, c, method)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.x[cluster].n, grid.lanes)
+            add_neighbors(sums, qd.static(CORRECTIONS[correction]), cluster, particles, changes, grid, c, method)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
                 p = predicted(particles, i)
-                dp = c.gradient_scale * column(sums, i - team * grid.lanes)
+                dp = c.gradient_scale * column(sums, i - cluster * grid.lanes)
                 near = particles.near[i]
                 if near != 0:
                     for k in qd.static(range(p.n)):
-                        dp[k] += scratch.dlam[i] * scratch.wall[i][k]
-                if qd.static(correction > 2):
-                    dp *= scratch.weight[i]
-                # Within one substep a particle must not run past the solids that were marked for it.
-                most = c.largest_correction
-                if c.held_push > 0.0:  # thick fluids: see dynamic_viscosity/implicit_viscosity.py
-                    most = qd.min(most, c.held_push + c.held_time * particles.v[i].norm())
-                short = qd.min(1.0, most / qd.max(dp.norm(), 1e-12))
+                        dp[k] += temporaries.dlam[i] * temporaries.wall[i][k]
+                if qd.static(correction >= Correction.MIXED):
+                    dp *= temporaries.inverse_mass[i]
+                short = qd.min(1.0, largest_move(particles.v[i], c) / qd.max(dp.norm(), 1e-12))
                 before = lift(p)
                 p += dp * short
                 if near != 0:
-                    p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
-                    if qd.static(searched):
-                        if near >> solids.tank_count != 0:
-                            mass = 1.0 / scratch.weight[i] if qd.static(searched == 2) else 0.0
-                            x = lift(particles.x[i])
-                            if not is_clear(i, x, lift(p), scratch, solids, c):
-                                p = flattened(stopped(x, lift(p), near, solids, c.wall_gap, mass), p)
-                            if qd.static(searched == 2):
-                                push, free = scratch.dlam[i] * short, 1.0 - scratch.wall[i].w
-                                if push != 0.0:
-                                    press_back(i, before, near, free, push, scratch, solids, walls, c)
+                    p = flattened(clamp_to_tank(lift(p), near, solids, c.wall_gap), p)
+                if qd.static(obstacles):
+                    temporaries.touching[i] = touches_solids(
+                        i, before, lift(p), short, particles, temporaries, solids, walls, c, obstacles
+                    )
                 predict_at(corrected, i, p)
 
 
 @qd.kernel(fastcache=True)
 def measure_density(
-    scratch: Scratch,
+    temporaries: Temporaries,
     particles: Particles,
     grid: Grid,
     solids: SolidSet,
@@ -279,15 +340,15 @@ def measure_density(
     method: qd.template(),
 ):
     """Estimate the densities [kg/m^3] at the positions p (Eq. 1), walls included."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
             sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)
-            add_neighbors(sums, add_weight, team, particles, scratch.weight, grid, c, method)
+            add_neighbors(sums, add_weight, cluster, particles, temporaries.inverse_mass, grid, c, method)
             found = qd.Matrix.zero(qd.f32, 4, grid.lanes)
-            find_walls(found, team, particles, scratch, solids, walls, c)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                rho = c.density_scale * sums[0, i - team * grid.lanes] + (1.0 - found[3, i - team * grid.lanes])
-                scratch.rho[i] = largest_density * rho / scratch.weight[i]
+            find_walls(found, cluster, particles, temporaries, solids, walls, c)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                rho = c.density_scale * sums[0, i - cluster * grid.lanes] + (1.0 - found[3, i - cluster * grid.lanes])
+                temporaries.rho[i] = largest_density * rho / temporaries.inverse_mass[i]
 
 
 def schedule(iterations: int, slowest: float, stiffest: float) -> list[tuple[float, float]]:

@@ -5,29 +5,30 @@ import numpy as np
 from wavetank.foundation.params import Parameters
 from wavetank.physics.coefficients import coefficients, method_number
 from wavetank.physics.density_constraint import measure_density
-from wavetank.physics.integrate import predict
+from wavetank.physics.integrate import find_cells, predict
 from wavetank.physics.mixture import blend
-from wavetank.physics.near_solids import look_at_solids
+from wavetank.physics.near_solids import query_solids
 from wavetank.physics.neighbors import find_neighbors
 from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.sorting import sort_particles
-from wavetank.physics.tension import prepare_fluids
+from wavetank.physics.terms.tension import prepare_fluids
 from wavetank.physics.world import World
 
 
 def update_densities(world: World, params: Parameters) -> None:
     """Measure the densities [kg/m^3] of `world` as it stands. The order of particles changes, the motion does not."""
     c, count, kinds = coefficients(params, 0.0), world.count, blend(world.materials, params)
-    predict(world.particles, world.grid, world.solids, world.fluids.rows, c, count, int(world.has_solids))
+    world.keep_solids()
+    predict(world.particles, world.temporaries, world.grid, world.solids, c, count, int(world.has_solids))
+    find_cells(world.particles, world.grid, c, count)
     sort_particles(world.particles, world.spare, world.grid, count)
     world.swap()
     world.grid = find_neighbors(world.particles, world.grid, c, count)
     prepare_fluids(world, kinds, params, params.frame_time)
     if world.has_solids:
-        world.keep_solids()
-        look_at_solids(world.scratch, world.particles, world.solids, c, count)
+        query_solids(world.temporaries, world.particles, world.solids, c, count)
     measure_density(
-        world.scratch,
+        world.temporaries,
         world.particles,
         world.grid,
         world.solids,

@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import Fluids, Particles, Scratch
+from wavetank.device.state import Fluids, Particles, Temporaries
 from wavetank.foundation.materials import Material, Properties
 from wavetank.foundation.params import Parameters
 
@@ -81,16 +81,16 @@ def fill_table(device: Fluids, fluids: Blend, tensions: dict[int, float]) -> Non
 
 
 @qd.kernel(fastcache=True)
-def weigh(scratch: Scratch, particles: Particles, rows: qd.types.ndarray(), count: qd.i32):
+def weigh(temporaries: Temporaries, particles: Particles, rows: qd.types.ndarray(), count: qd.i32):
     """Write the inverse mass of every particle."""
     for i in range(count):
-        scratch.weight[i] = rows[particles.material[i]][0]
+        temporaries.inverse_mass[i] = rows[particles.material[i]][0]
 
 
 @qd.kernel(fastcache=True)
-def pack_multipliers(packed: qd.types.ndarray(), scratch: Scratch, count: qd.i32):
+def pack_multipliers(packed: qd.types.ndarray(), temporaries: Temporaries, count: qd.i32):
     """Put the changes of multipliers and inverse masses side by side."""
     for i in range(count):
         row = packed[i]
-        row[0], row[1] = scratch.dlam[i], scratch.weight[i]
+        row[0], row[1] = temporaries.dlam[i], temporaries.inverse_mass[i]
         packed[i] = row

@@ -24,8 +24,8 @@ from wavetank.device.periods import NONE, Periods, nearest_along, within_along
 from wavetank.device.state import Coefficients, Grid, Particles, integers, nowhere
 from wavetank.device.sums import blocks_of, many_threads, share_of
 from wavetank.foundation.errors import WavetankError
+from wavetank.physics.clusters import chunks_over, end_of_part, first_of_part, groups
 from wavetank.physics.predicted_positions import predicted
-from wavetank.physics.teams import end_of_part, first_of_part, groups, turns_over
 
 PARTS = 8  # of a pass for each thread: enough to even out what takes longer
 MAX_ENTRIES = 2**31 - 1  # of a device array: the compiler counts them, and computes places in them, with 32 bits
@@ -170,9 +170,7 @@ def list_group(group, particles: Particles, grid: Grid, h2, count):
                 begin, end = span[0], span[1]
                 while begin < end:
                     length = qd.min(end - begin, block)
-                    hits = near_bits(particles, run, begin, length, h2, grid, grid.lanes > 1)
-                    if begin_run > first:
-                        hits &= ~near_bits(particles, earlier, begin, length, h2, grid, grid.lanes > 1)
+                    hits = new_bits(particles, run, earlier, begin_run > first, begin, length, h2, grid)
                     while hits != qd.u32(0):
                         grid.list[group * room + qd.min(n, room - 1)] = begin + qd.math.ffs(hits) - 1
                         hits &= hits - qd.u32(1)
@@ -189,9 +187,9 @@ def list_group(group, particles: Particles, grid: Grid, h2, count):
 def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.i32) -> qd.i32:
     """Write the neighbours of every group and return the largest number found, even if it had no room."""
     most = 0
-    for turn in range(turns_over(groups(count), grid.parts, grid.lanes)):
-        begin = first_of_part(turn, groups(count), grid.parts, grid.lanes)
-        for group in range(begin, end_of_part(turn, groups(count), grid.parts, grid.lanes)):
+    for chunk in range(chunks_over(groups(count), grid.parts, grid.lanes)):
+        begin = first_of_part(chunk, groups(count), grid.parts, grid.lanes)
+        for group in range(begin, end_of_part(chunk, groups(count), grid.parts, grid.lanes)):
             found = list_group(group, particles, grid, c.h * c.h, count)
             if qd.static(grid.lanes > 1):
                 qd.atomic_max(most, found)
@@ -208,7 +206,7 @@ def list_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: qd.
 def places_of(particles: Particles, first, begin, end):
     """Places of the eight particles from `first` on, as columns; those outside of `begin` to `end` - 1 are nowhere."""
     places = qd.Matrix.zero(qd.f32, particles.x[first].n, 8)
-    for k in qd.static(range(8)):
+    for k in range(8):
         p = predicted(particles, first + k)
         inside = first + k >= begin and first + k < end
         for axis in qd.static(range(p.n)):
@@ -233,6 +231,24 @@ def near_bits(particles: Particles, places: qd.template(), begin, length, h2, gr
             nearest = qd.min(nearest, square)
         hits |= qd.cast(nearest < h2, qd.u32) << qd.cast(k, qd.u32)
     return hits & (qd.u32(0xFFFFFFFF) >> qd.cast(32 - length, qd.u32))
+
+
+@qd.func
+def new_bits(
+    particles: Particles, run: qd.template(), earlier: qd.template(), has_earlier, begin, length, h2, grid: Grid
+):
+    """Bits of the particles from `begin` on that are near one of a `run`, and near none of `earlier` if there are any.
+
+    One call of `near_bits` serves both, as each is inlined and compiled.
+    """
+    hits = qd.u32(0xFFFFFFFF)
+    for known in range(2 if has_earlier else 1):
+        places = run
+        if known == 1:
+            places = earlier
+        bits = near_bits(particles, places, begin, length, h2, grid, grid.lanes > 1)
+        hits &= bits if known == 0 else ~bits
+    return hits
 
 
 @qd.func

@@ -1,16 +1,16 @@
 """Sums over the neighbours of every particle, eight particles at a time.
 
-A pass over pairs runs over teams (`teams.py`): particles that follow each other in sorted order and share a neighbour
-list (`neighbors.py`), eight on a processor and one on a graphics card. Each neighbour is read once for the team, and
-the loop over lanes becomes vector instructions: nobody is collected one by one. A team's list holds three times what
-one particle needs, and is walked in half the time (notebook/performance.md). A pass looks like this:
+A pass over pairs runs over clusters (`clusters.py`): particles that follow each other in sorted order and share a
+neighbour list (`neighbors.py`), eight on a processor and one on a graphics card. Each neighbour is read once for the
+cluster, and the loop over lanes becomes vector instructions. A cluster's list is three times as long as a particle's,
+and is walked in half the time (notebook/performance.md). A pass looks like this:
 
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
             sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)
-            add_neighbors(sums, visit, team, particles, data, grid, c, method)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                ... sums[0, i - team * grid.lanes] ...
+            add_neighbors(sums, visit, cluster, particles, data, grid, c, method)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                ... sums[0, i - cluster * grid.lanes] ...
 
 Cluster pair lists for vector units: Páll and Hess 2013, "A flexible algorithm for calculating pair interactions on SIMD
 architectures" (10.1016/j.cpc.2013.06.003).
@@ -22,35 +22,35 @@ import numpy as np
 
 from wavetank.device.compiler import download, qd
 from wavetank.device.state import Coefficients, Grid, Particles, integers
+from wavetank.physics.clusters import chunks, end_cluster, end_of, first_cluster, group_of, place_in_group
 from wavetank.physics.predicted_positions import apart
-from wavetank.physics.teams import end_of, end_team, first_team, group_of, place_in_group, turns
 
 
 @qd.func
 def add_neighbors(
     sums: qd.template(),
     visit: qd.template(),
-    team,
+    cluster,
     particles: Particles,
     data: qd.template(),
     grid: Grid,
     c: Coefficients,
     method: qd.template(),
 ):
-    """Add up what ``visit(sum, r, square, a, b, c, method)`` adds for each neighbour j of each i of a team.
+    """Add up what ``visit(sum, r, square, a, b, c, method)`` adds for each neighbour j of each i of a cluster.
 
-    `sums` has a column for each of the team's particles, r = p_i - p_j [m] has the `square` |r|^2 [m^2], a and b are
+    `sums` has a column for each of the cluster's particles, r = p_i - p_j [m] has the `square` |r|^2 [m^2], a and b are
     what `data` holds of i and j, as vectors. `visit` is called for others than neighbours as well and adds nothing
     where |r| >= h; it is called for the particle itself, with r = 0 and a = b.
     """
-    _add(sums, visit, team, particles, data, data, False, grid, c, method)
+    _add(sums, visit, cluster, particles, data, data, False, grid, c, method)
 
 
 @qd.func
 def add_kept(
     sums: qd.template(),
     visit: qd.template(),
-    team,
+    cluster,
     particles: Particles,
     data: qd.template(),
     kept: qd.template(),
@@ -59,26 +59,26 @@ def add_kept(
     method: qd.template(),
 ):
     """Add up like `add_neighbors`, where `visit` is given what `keep_pairs` kept of a pair instead of its `square`."""
-    _add(sums, visit, team, particles, data, kept, True, grid, c, method)
+    _add(sums, visit, cluster, particles, data, kept, True, grid, c, method)
 
 
 @qd.func
 def keep_pairs(
     kept: qd.template(),
     strength: qd.template(),
-    team,
+    cluster,
     particles: Particles,
     data: qd.template(),
     grid: Grid,
     c: Coefficients,
 ):
-    """Keep ``strength(square, a, b, c)`` of each neighbour j of each i of a team, for several sums by `add_kept`.
+    """Keep ``strength(square, a, b, c)`` of each neighbour j of each i of a cluster, for several sums by `add_kept`.
 
     `kept` has room for `grid.room` numbers of each particle. What follows from a distance takes a root and divisions;
     from the second sum on it takes less to read it.
     """
     lanes = qd.static(grid.lanes)
-    first = team * lanes
+    first = cluster * lanes
     own = _own(data, first, lanes)
     begin = group_of(first) * grid.room
     found = qd.Matrix.zero(qd.f32, 4, lanes)  # what was stored at once might be one of the arrays that are read
@@ -98,7 +98,7 @@ def keep_pairs(
 def _add(
     sums: qd.template(),
     visit: qd.template(),
-    team,
+    cluster,
     particles: Particles,
     data: qd.template(),
     kept: qd.template(),
@@ -109,7 +109,7 @@ def _add(
 ):
     """Add up as `add_kept` does where `is_kept`, else as `add_neighbors`."""
     lanes = qd.static(sums.m)
-    first = team * lanes
+    first = cluster * lanes
     own = _own(data, first, lanes)
     begin = group_of(first) * grid.room
     end = begin + grid.number[group_of(first)]
@@ -143,7 +143,7 @@ def _add(
 
 @qd.func
 def _own(data: qd.template(), first, lanes: qd.template()):
-    """What `data` holds of a team's particles, a column for each."""
+    """What `data` holds of a cluster's particles, a column for each."""
     own = qd.Matrix.zero(qd.f32, qd.static(_width(data)), lanes)
     for lane in range(lanes):
         a = _row(data, first + lane)
@@ -154,7 +154,7 @@ def _own(data: qd.template(), first, lanes: qd.template()):
 
 @qd.func
 def _place(n, first, lanes: qd.template()):
-    """Where what is kept of the entry `n` of a list begins, for the team that begins with particle `first`."""
+    """Where what is kept of the entry `n` of a list begins, for the cluster that begins with particle `first`."""
     place = 8 * n
     if qd.static(lanes == 1):
         place += place_in_group(first)
@@ -176,7 +176,7 @@ def _row(data: qd.template(), i):
 
 @qd.func
 def column(sums: qd.template(), lane):
-    """Sums of one particle of a team, as a vector."""
+    """Sums of one particle of a cluster, as a vector."""
     result = qd.Vector([0.0] * sums.n)
     for k in qd.static(range(sums.n)):
         result[k] = sums[k, lane]
@@ -193,12 +193,12 @@ def add_one(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.te
 @qd.kernel(fastcache=True)
 def write_numbers(number: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32):
     """Write how many neighbours every particle has."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
             sums = qd.Matrix.zero(qd.f32, 1, grid.lanes)
-            add_neighbors(sums, add_one, team, particles, particles.x, grid, c, 0)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                number[i] = qd.cast(sums[0, i - team * grid.lanes], qd.i32) - 1  # without itself
+            add_neighbors(sums, add_one, cluster, particles, particles.x, grid, c, 0)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                number[i] = qd.cast(sums[0, i - cluster * grid.lanes], qd.i32) - 1  # without itself
 
 
 def count_neighbors(particles: Particles, grid: Grid, c: Coefficients, count: int) -> np.ndarray:

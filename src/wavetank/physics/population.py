@@ -79,7 +79,9 @@ def mark_particles(marks: qd.types.ndarray(), particles: Particles, capsule: Cap
 
 
 @qd.kernel(fastcache=True)
-def mark_beyond(marks: qd.types.ndarray(), particles: Particles, lower: vec3, upper: vec3, count: qd.i32) -> qd.i32:
+def mark_outside_box(
+    marks: qd.types.ndarray(), particles: Particles, lower: vec3, upper: vec3, count: qd.i32
+) -> qd.i32:
     """Mark the particles outside of a box with 1, the others with 0; return how many are outside."""
     total = 0
     for i in range(count):
@@ -110,7 +112,7 @@ def freeze_particles(particles: Particles, capsule: Capsule, frozen: qd.i32, cou
 
 
 @qd.kernel(fastcache=True)
-def hold_frozen(particles: Particles, count: qd.i32):
+def hold_ice(particles: Particles, count: qd.i32):
     """Put ice back where it was at the start of the substep."""
     for i in range(count):
         if particles.frozen[i] == 1:
@@ -132,7 +134,7 @@ def forget_forces(particles: Particles, i):
 
 
 @qd.kernel(fastcache=True)
-def stop_frozen(particles: Particles, count: qd.i32):
+def stop_ice(particles: Particles, count: qd.i32):
     """Take the velocity from ice."""
     for i in range(count):
         if particles.frozen[i] == 1:
@@ -184,8 +186,8 @@ def clear_forces(particles: Particles, count: qd.i32):
 
 
 @qd.kernel(fastcache=True)
-def find_taken(
-    taken: qd.types.ndarray(),
+def mark_occupied(
+    occupied: qd.types.ndarray(),
     places: qd.types.ndarray(),
     particles: Particles,
     solids: SolidSet,
@@ -197,15 +199,15 @@ def find_taken(
 ):
     """Mark places that are not `free`; all of them are within `reach` of `middle`."""
     for k in range(number):
-        taken[k] = 0
+        occupied[k] = 0
         for solid in range(free.first, solids.count):
             if signed_distance(solids, solid, lift(places[k])).w < free.wall:
-                taken[k] = 1
+                occupied[k] = 1
     for i in range(count):
         if nearest_image(lift(particles.x[i]) - middle, free.periods).norm() < reach + free.gap:
             for k in range(number):
                 if nearest_image(particles.x[i] - places[k], free.periods).norm() < free.gap:
-                    taken[k] = 1
+                    occupied[k] = 1
 
 
 def inside_capsule(particles: Particles, count: int, capsule: Capsule) -> np.ndarray:
@@ -223,7 +225,7 @@ def inside_box(particles: Particles, marks: Any, lower: np.ndarray, upper: np.nd
 
     `marks` is room for a number of each.
     """
-    if not count or not mark_beyond(marks, particles, lower, upper, count):
+    if not count or not mark_outside_box(marks, particles, lower, upper, count):
         return None
     result: np.ndarray = download(marks)[:count] == 0
     return result
@@ -235,13 +237,13 @@ def free_places(
     """Say which of the places [n, dim] have that `clearance`, bool [n]."""
     if not len(places):
         return np.zeros(0, bool)
-    device, taken = vectors(places.shape[1], len(places)), integers(len(places))
+    device, occupied = vectors(places.shape[1], len(places)), integers(len(places))
     upload(device, places)
     middle = np.zeros(3, np.float32)
     middle[: places.shape[1]] = places.mean(axis=0)
     reach = float(np.linalg.norm(places - places.mean(axis=0), axis=1).max())
-    find_taken(taken, device, particles, solids, clearance, middle, reach, count, len(places))
-    result: np.ndarray = download(taken)[: len(places)] == 0
+    mark_occupied(occupied, device, particles, solids, clearance, middle, reach, count, len(places))
+    result: np.ndarray = download(occupied)[: len(places)] == 0
     return result
 
 

@@ -12,8 +12,8 @@ costs more than they save.
 from wavetank.device.compiler import qd, worth_sharing
 from wavetank.device.state import Grid, Particles
 from wavetank.device.sums import sort_by
+from wavetank.physics.clusters import chunks_over, end_of_part, first_of_part
 from wavetank.physics.predicted_positions import predict_at, predicted
-from wavetank.physics.teams import end_of_part, first_of_part, turns_over
 
 
 @qd.func
@@ -99,9 +99,9 @@ def reorder(sorted_: Particles, particles: Particles, grid: Grid, count: qd.i32,
     sort_by(grid.cell, grid.order, grid.start, grid.fill, grid.blocks, grid.cells, count, shared)
     if qd.static(grid.lanes > 1):
         # In one loop, because each wakes all threads.
-        for turn in range(turns_over(grid.cells, grid.parts, grid.lanes)):
-            begin = qd.min(first_of_part(turn, grid.cells, grid.parts, grid.lanes), grid.cells)
-            end = qd.max(end_of_part(turn, grid.cells, grid.parts, grid.lanes), begin)
+        for chunk in range(chunks_over(grid.cells, grid.parts, grid.lanes)):
+            begin = qd.min(first_of_part(chunk, grid.cells, grid.parts, grid.lanes), grid.cells)
+            end = qd.max(end_of_part(chunk, grid.cells, grid.parts, grid.lanes), begin)
             for cell in range(begin, end):
                 sort_cell(particles, grid, grid.start[cell], grid.start[cell + 1])
             for part in qd.static(range(len(PARTS_OF_PARTICLE))):

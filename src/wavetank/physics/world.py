@@ -10,17 +10,18 @@ from wavetank.device.state import (
     Fluids,
     Grid,
     Particles,
-    Scratch,
+    Temporaries,
     Walls,
-    exchanged,
+    swapped,
     with_solids,
     with_viscosity,
     without_viscosity,
 )
 from wavetank.foundation.materials import Material
 from wavetank.physics.bodies import Pieces
+from wavetank.physics.broad_phase import Obstacles
 from wavetank.physics.foam.pool import Pool
-from wavetank.physics.near_solids import PLACES
+from wavetank.physics.near_solids import MAX_SOLIDS
 from wavetank.physics.pressure.grid import PressureGrid
 from wavetank.solids.distance import SolidSet
 
@@ -31,7 +32,7 @@ class World:
 
     particles: Particles  # as they are
     spare: Particles  # where they are sorted to, and what is read of them is not written yet
-    scratch: Scratch
+    temporaries: Temporaries
     grid: Grid
     solids: SolidSet
     walls: Walls
@@ -43,8 +44,9 @@ class World:
     frozen: int = 0  # particles that are ice
     solids_version: int = 0  # changes with each motion of the solids
     solid_speed: float = 0.0  # m/s: the fastest that any solid moves in this frame
-    known: dict[tuple[Any, ...], Any] = dataclasses.field(default_factory=dict)  # see `exchanged`
+    known: dict[tuple[Any, ...], Any] = dataclasses.field(default_factory=dict)  # see `swapped`
     pieces: Pieces | None = None  # of the bodies, where there are any
+    terms: tuple[Any, ...] = ()  # of the step besides `terms.builtin.TERMS`, each a `terms.term.Term`
     pool: Pool | None = None  # of spray, foam and bubbles; made when the first are
 
     @property
@@ -58,9 +60,11 @@ class World:
         return self.has_solids
 
     @property
-    def searched(self) -> int:
-        """What particles look for besides the walls of the tank: 0 nothing, 1 solids, 2 solids that feel them."""
-        return 0 if not self.has_solids else 2 if self.pieces else 1
+    def obstacles(self) -> Obstacles:
+        """Which solids there are besides the walls of the tank."""
+        if not self.has_solids:
+            return Obstacles.NONE
+        return Obstacles.TWO_WAY if self.pieces else Obstacles.ONE_WAY
 
     @property
     def remembers_viscosity(self) -> bool:
@@ -71,9 +75,9 @@ class World:
         """Let the spare particles be those that count: they have been sorted, or chosen."""
         self.particles, self.spare = self.spare, self.particles
 
-    def exchange(self, *names: str) -> None:
+    def swap_arrays(self, *names: str) -> None:
         """Let the arrays of those `names` be the spare ones, which have been written."""
-        self.particles, self.spare = exchanged(self.known, self.particles, self.spare, *names)
+        self.particles, self.spare = swapped(self.known, self.particles, self.spare, *names)
 
     def adopt(self, particles: Particles) -> None:
         """Take other particles, and make room for all that is known of them where they are sorted to."""
@@ -84,7 +88,7 @@ class World:
     def keep_solids(self) -> None:
         """Make room for the solids near each particle where there are any."""
         if self.has_solids:
-            self.scratch = with_solids(self.scratch, PLACES)
+            self.temporaries = with_solids(self.temporaries, MAX_SOLIDS)
 
     def keep_viscosity(self, is_viscous: bool) -> None:
         """Keep what viscosity does to each particle where fluids are viscous, and forget it where none is any more."""

@@ -16,14 +16,14 @@ from typing_extensions import override
 from wavetank.device.compiler import Mirror, synchronize
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import quaternion_of
-from wavetank.physics.bodies import Pieces, new_pieces
-from wavetank.physics.dynamic_viscosity.implicit_viscosity import hold_on_bodies
+from wavetank.physics.bodies import DISPLACING, IMMERSION, OF_GRID, RUBBING, Pieces, new_pieces
 from wavetank.physics.mixture import blend
 from wavetank.physics.pressure.correct import warm_start_share
 from wavetank.physics.pressure.grid import THRESHOLDS
-from wavetank.physics.reactions import DISPLACING, IMMERSION, OF_GRID, RUBBING
 from wavetank.physics.retry import Retry
+from wavetank.physics.step import Response
 from wavetank.physics.step import step as take_step
+from wavetank.physics.terms.dynamic_viscosity.implicit_viscosity import hold_on_bodies
 from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
@@ -279,25 +279,25 @@ class Bodies(Mapping[str, Body]):
         self._retry.keep(world)
         tries = 1
 
-        def settle() -> bool | None:
+        def respond() -> Response:
             nonlocal tries
             self._read_reactions(world, dt)
             self.coupling.add_late_impulse()
             if tries == MOST_TRIES or not self._iterate(dt, part[1]):
-                return False
+                return Response.UNCHANGED
             # The open volume of the grid stays as it was: the correction is small.
             world.solids_version = self._solids.move_to(*part)
             if world.pressure:
                 world.pressure.solids_version = world.solids_version
             if self.coupling.is_hit:
                 tries += 1
-                return None
-            return True
+                return Response.RETRY
+            return Response.MOVED
 
         while True:
             synchronize()
             self._sums.clear()
-            if take_step(world, scene, dt, fastest, settle):
+            if take_step(world, scene, dt, fastest, respond):
                 break
             self._retry.restore(world)
         self._read_reactions(world, dt)
@@ -315,7 +315,7 @@ class Bodies(Mapping[str, Body]):
         coupling.displaced = np.minimum(1.0, rows[:, DISPLACING] * particle / (wet * cell))
         keeps = (warm_start_share(dt, self._scene.frame_time) * coupling.warm_start_share)[:, None]
         force = keeps * coupling.warm_started_force + rows[:, OF_GRID : OF_GRID + 6] * scale / dt
-        most = THRESHOLDS.largest_carried * float(np.linalg.norm(self._gravity)) * wet
+        most = THRESHOLDS.largest_warm_start * float(np.linalg.norm(self._gravity)) * wet
         share = np.minimum(1.0, most / np.maximum(norms(force[:, :3]), 1e-30))
         coupling.grid_force = force * share[:, None]
         coupling.impulse = rows[:, :6] * scale + force * dt

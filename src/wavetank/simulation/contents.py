@@ -118,7 +118,7 @@ class Contents:
             count=world.count,
             x=world.particles.x,
             v=world.particles.v,
-            rho=world.scratch.rho,
+            rho=world.temporaries.rho,
             id=world.particles.id,
             material=world.particles.material,
             solids=world.solids,

@@ -18,7 +18,7 @@ from wavetank.physics.neighbors import MAX_ENTRIES, list_room
 from wavetank.physics.pressure.grid import OPEN_CELLS, bytes_per_node, count_nodes
 from wavetank.scene.scene import Scene
 
-SCRATCH = 12  # numbers of `Scratch` for each particle
+SCRATCH = 12  # numbers of `Temporaries` for each particle
 PER_PARTICLE = 2.0e-7  # s of a step of one thread, at the least
 PER_STEP = 1.0e-4  # s, however few particles
 LONGEST = 3600.0  # s that a run may be expected to take unless it is told that it may be long

@@ -1,7 +1,7 @@
 """Added-mass coupling of rigid bodies and water: the velocities of all bodies from the impulses of the water.
 
 A step of water sees a body in the motion that it has for the step, as it sees every solid, and answers with an impulse
-P (`physics/reactions.py`). The change of velocity dv that conserves momentum satisfies
+P (`physics/bodies.py`). The change of velocity dv that conserves momentum satisfies
 
     m dv = P(dv) + m g dt + O
 

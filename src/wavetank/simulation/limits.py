@@ -7,7 +7,7 @@ import numpy as np
 
 from wavetank.device.compiler import download
 from wavetank.foundation.errors import NotFiniteError
-from wavetank.physics.plan import capillary_speed, pace_of_solids, steps_in
+from wavetank.physics.planning import capillary_speed, pace_of_solids, steps_in
 from wavetank.physics.time_step import largest_speed
 from wavetank.physics.world import World
 from wavetank.scene.forces import Force

@@ -2,7 +2,7 @@
 
 from wavetank.device import compiler
 from wavetank.device.periods import NONE
-from wavetank.device.state import Fluids, Walls, new_particles, new_scratch, vectors
+from wavetank.device.state import Fluids, Walls, new_particles, new_temporaries, vectors
 from wavetank.physics.bodies import Pieces
 from wavetank.physics.neighbors import list_room, new_grid
 from wavetank.physics.pressure.grid import OPEN_CELLS, new_pressure_grid
@@ -24,7 +24,7 @@ def new_world(scene: Scene, capacity: int, solids: MovingSolids, pieces: Pieces 
         grid=new_grid(dim, capacity, size, h, list_room(dim, scene.support), periods),  # first: it may be refused
         particles=new_particles(dim, capacity),
         spare=new_particles(dim, capacity),
-        scratch=new_scratch(capacity),
+        temporaries=new_temporaries(capacity),
         solids=solids.device,
         walls=walls,
         fluids=Fluids(capacity, rows=vectors(4, len(scene.materials) + 1)),

@@ -14,7 +14,7 @@ from wavetank.foundation.params import LIVE, refuse_assignment
 from wavetank.physics import population
 from wavetank.physics.foam.pool import pool_from, pool_rows
 from wavetank.physics.foam.update import load_kernels, update_foam
-from wavetank.physics.plan import has_grid_pressure
+from wavetank.physics.planning import has_grid_pressure
 from wavetank.physics.time_step import filled_share, whole
 from wavetank.scene.forces import Force
 from wavetank.scene.forces.images import with_images

@@ -212,7 +212,7 @@ class SolidSet:
     center: qd.types.ndarray()  # vec3 [solids], m: centre of mass at the end of the substep
     unit: qd.types.ndarray()  # f32 [solids], 1/m: of the sums in `reaction`; 0 where a solid feels nothing
     grip: qd.types.ndarray()  # f32 [solids]: largest share of sliding that friction takes, less for light bodies
-    reaction: qd.types.ndarray()  # i32 [13 solids]: what the water does to each, see `physics/reactions.py`
+    reaction: qd.types.ndarray()  # i32 [13 solids]: what the water does to each, see `physics/bodies.py`
     grid: qd.types.ndarray()  # i32 vec4 [grids]: number of its first sample, numbers of nodes along x, y, z
     samples: qd.types.ndarray()  # f32: for each grid its cell edge, then the distances at its nodes, x fastest; m
     period: qd.types.ndarray()  # vec3 [solids], m: of the world, as far as a solid is seen at its nearest image

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 
 if TYPE_CHECKING:  # as types, variables mean nothing to mypy
     vec2: TypeAlias = Any
@@ -45,7 +45,7 @@ def vector(*parts: float) -> np.ndarray:
     """Return a vector as a kernel argument: an array that is the same object each time, for the compiler to know."""
     result = np.array(parts, np.float32)
     result.setflags(write=False)
-    return remembered(result)
+    return interned(result)
 
 
 def basis(forward: np.ndarray, up: np.ndarray) -> np.ndarray:
@@ -63,7 +63,7 @@ def lens_at(
 ) -> Lens:
     """Return the lens at `eye` [m] with the `basis` `axes` for a picture of `width` x `height` pixels."""
     right, up, forward = axes
-    return remembered(
+    return interned(
         Lens(
             eye=vector(*eye),
             right=vector(*right),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import current_backend, download, qd, synchronize, upload
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.foundation.errors import WavetankError
 from wavetank.simulation.frame import Frame
 from wavetank.view import legend as legends
@@ -118,7 +118,7 @@ class Renderer:
             upload(self._colors, colors)
             self._colors_name = name
         low, high = limits
-        coloring = remembered(Coloring(colors=self._colors, low=low, scale=1.0 / (high - low)))
+        coloring = interned(Coloring(colors=self._colors, low=low, scale=1.0 / (high - low)))
         absorption, scattering, tint = fluid_optics(None if style.kind.coloured else style.color_by, extent)
         return Shot(
             frame=frame,

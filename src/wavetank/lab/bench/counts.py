@@ -78,7 +78,7 @@ def device_bytes(value: Any) -> int:
 
 
 def water_bytes(sim: Simulation) -> int:
-    """Return the bytes on the device of all that the water needs: particles twice, scratch, cells, lists, pressure."""
+    """Return the bytes on the device of all that water needs: particles twice, temporaries, cells, lists, pressure."""
     world = sim.world
     pressure = (*world.pressure.levels, world.pressure.workspace) if world.pressure else ()
-    return sum(map(device_bytes, (world.particles, world.spare, world.scratch, world.grid, *pressure)))
+    return sum(map(device_bytes, (world.particles, world.spare, world.temporaries, world.grid, *pressure)))

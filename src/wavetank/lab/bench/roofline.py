@@ -29,9 +29,9 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.lab.bench.counts import water_bytes
 from wavetank.lab.bench.machine import load, machine
 from wavetank.lab.bench.scenes import check, measured, sized, timed
+from wavetank.physics.clusters import chunks, end_cluster, end_of, first_cluster
 from wavetank.physics.coefficients import coefficients
 from wavetank.physics.pairs import add_neighbors, count_neighbors
-from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.scene.scene import Scene
 from wavetank.simulation.simulation import Simulation
 
@@ -103,12 +103,12 @@ def add_way(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.te
 @qd.kernel(fastcache=True)
 def walk(total: qd.types.ndarray(), particles: Particles, grid: Grid, c: Coefficients, count: qd.i32):
     """Go once over all neighbour lists."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
             ways = qd.Matrix.zero(qd.f32, 1, grid.lanes)
-            add_neighbors(ways, add_way, team, particles, particles.v, grid, c, 0)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                total[i] = ways[0, i - team * grid.lanes]
+            add_neighbors(ways, add_way, cluster, particles, particles.v, grid, c, 0)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                total[i] = ways[0, i - cluster * grid.lanes]
 
 
 def roofline(

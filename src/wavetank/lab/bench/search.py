@@ -20,7 +20,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.lab.bench.counts import device_bytes
 from wavetank.lab.bench.machine import cores, load, machine
 from wavetank.physics.coefficients import coefficients
-from wavetank.physics.integrate import forget_predictions
+from wavetank.physics.integrate import reset_predictions
 from wavetank.physics.neighbors import find_neighbors, new_grid
 from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.sorting import sort_particles
@@ -111,7 +111,7 @@ def _grid(x: np.ndarray, c: Any, repeats: int) -> tuple[list[float], int, int]:
     for repeat in range(repeats + 1):  # the first one compiles
         compiler.synchronize()
         began = time.perf_counter()
-        forget_predictions(particles, grid, c, count)
+        reset_predictions(particles, grid, c, count)
         sort_particles(particles, spare, grid, count)
         grid = find_neighbors(spare, grid, c, count)
         compiler.synchronize()

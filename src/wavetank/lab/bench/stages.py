@@ -17,20 +17,20 @@ from wavetank.device import compiler
 #: Stages and the modules, or packages of them, whose kernels they are. There is no rest: a kernel that has moved must
 #: not count as something else unnoticed.
 STAGES: dict[str, tuple[str, ...]] = {
-    "contact": ("wavetank.physics.boundary", "wavetank.physics.retry", "wavetank.physics.near_solids"),
+    "contact": (
+        "wavetank.physics.broad_phase",
+        "wavetank.physics.contact",
+        "wavetank.physics.retry",
+        "wavetank.physics.near_solids",
+    ),
     "neighbours": ("wavetank.physics.sorting", "wavetank.physics.neighbors", "wavetank.physics.pairs"),
     "grid": ("wavetank.physics.pressure",),
     "constraint": ("wavetank.physics.density_constraint",),
     "velocities": (
-        "wavetank.physics.central_xsph",
-        "wavetank.physics.dynamic_viscosity",
-        "wavetank.physics.friction",
         "wavetank.physics.integrate",
         "wavetank.physics.mixture",
         "wavetank.physics.population",
-        "wavetank.physics.tension",
-        "wavetank.physics.vorticity",
-        "wavetank.physics.xsph_viscosity",
+        "wavetank.physics.terms",
     ),
     "foam": ("wavetank.physics.foam",),
     "time step": ("wavetank.physics.time_step",),

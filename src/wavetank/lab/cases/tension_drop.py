@@ -3,7 +3,7 @@
 Oscillation of the mode n = 2: omega^2 = n (n - 1) (n + 2) sigma / (rho R^3) = 8 sigma / (rho R^3) for a ball (Rayleigh
 1879, Proc. R. Soc. 29, 71; Lamb, Hydrodynamics, Art. 275), n (n^2 - 1) sigma / (rho R^3) = 6 sigma / (rho R^3) for a
 disc. The period is that between extremes of the difference of the second moments. The tension's factor in
-`physics/tension.py` was measured with this case: the period checks it over resolutions rather than predicts it.
+`physics/terms/tension.py` was measured with this case: the period checks it over resolutions rather than predicts it.
 """
 
 import math

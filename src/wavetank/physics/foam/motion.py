@@ -27,7 +27,8 @@ from wavetank.device.compiler import qd
 from wavetank.device.periods import nearest_image, within
 from wavetank.device.state import Air, Births, Coefficients, Diffuse, Grid, Particles, bubble, foam, spray
 from wavetank.device.sums import sum_up
-from wavetank.physics.boundary import bodies_in_reach, flattened, stopped
+from wavetank.physics.broad_phase import obstacles_in_reach
+from wavetank.physics.contact import end_of_path, flattened
 from wavetank.physics.neighbors import for_each_row_around, near_bits, row_block
 from wavetank.physics.predicted_positions import predicted
 from wavetank.solids.distance import SolidSet, image_near, lift, signed_distance, vec2, vec3
@@ -142,8 +143,8 @@ def move(
             slip = v - medium
             later = medium + slip * a.bubble_keep - 2.0 * pull * a.bubble_gain
             target = x + a.dt * medium + slip * a.bubble_path - 2.0 * pull * a.bubble_bend
-        near = bodies_in_reach(lift(x), lift(target), solids, c.wall_gap) | ((1 << solids.tank_count) - 1)
-        out = stopped(lift(x), lift(target), near, solids, c.wall_gap, 0.0)
+        near = obstacles_in_reach(lift(x), lift(target), solids, c.wall_gap) | ((1 << solids.tank_count) - 1)
+        out = end_of_path(lift(x), lift(target), near, solids, c.wall_gap, 0.0, False)
         if (out - lift(target)).norm_sqr() > 0.0:
             target = flattened(out, x)
             later = (target - x) / a.dt

@@ -25,11 +25,11 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import Air, Births, Coefficients, Grid, Particles, Walls
 from wavetank.device.sums import sum_up
 from wavetank.physics.boundary import wall_density
+from wavetank.physics.clusters import chunks, end_cluster, end_of, first_cluster
 from wavetank.physics.foam.noise import stream, uniform
 from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.smoothing import kernel
-from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.solids.distance import SolidSet
 
 
@@ -80,7 +80,7 @@ def outward_normal(i, sum, particles: Particles, solids: SolidSet, walls: Walls,
 @qd.func
 def find_normals(
     births: Births,
-    team,
+    cluster,
     particles: Particles,
     grid: Grid,
     solids: SolidSet,
@@ -90,17 +90,17 @@ def find_normals(
     count,
     method: qd.template(),
 ):
-    """Set the normals of the surface at a team, except where the water is too slow to matter for a crest."""
-    first = team * grid.lanes
+    """Set the normals of the surface at a cluster, except where the water is too slow to matter for a crest."""
+    first = cluster * grid.lanes
     last = qd.min(first + grid.lanes, count)
-    dim = qd.static(particles.x[team].n)
+    dim = qd.static(particles.x[cluster].n)
     slow = 0.01 * a.speed * a.speed
     fastest = 0.0
     for i in range(first, last):
         fastest = qd.max(fastest, particles.v[i].norm_sqr())
     sums = qd.Matrix.zero(qd.f32, dim, grid.lanes)
     if fastest > slow:
-        add_neighbors(sums, add_slope, team, particles, particles.v, grid, c, method)
+        add_neighbors(sums, add_slope, cluster, particles, particles.v, grid, c, method)
     for i in range(first, last):
         n = particles.x[i] * 0.0
         if particles.v[i].norm_sqr() > slow:
@@ -125,7 +125,7 @@ def is_crest(i, births: Births, particles: Particles):
 @qd.func
 def add_potentials(
     sums: qd.template(),
-    team,
+    cluster,
     births: Births,
     particles: Particles,
     grid: Grid,
@@ -134,8 +134,8 @@ def add_potentials(
     count,
     method: qd.template(),
 ):
-    """Births of a team's particles where one of the most agitated makes one: Phi_k (Phi_ta + 2 Phi_wc), Eq. 8."""
-    first = team * grid.lanes
+    """Births of a cluster's particles where one of the most agitated makes one: Phi_k (Phi_ta + 2 Phi_wc), Eq. 8."""
+    first = cluster * grid.lanes
     last = qd.min(first + grid.lanes, count)
     agitated = False
     crested = False
@@ -146,9 +146,9 @@ def add_potentials(
     trapped = qd.Matrix.zero(qd.f32, 1, grid.lanes)
     crest = qd.Matrix.zero(qd.f32, 1, grid.lanes)
     if agitated:
-        add_neighbors(trapped, add_approach, team, particles, particles.v, grid, c, method)
+        add_neighbors(trapped, add_approach, cluster, particles, particles.v, grid, c, method)
     if crested:
-        add_neighbors(crest, add_bend, team, particles, births.normal, grid, c, method)
+        add_neighbors(crest, add_bend, cluster, particles, births.normal, grid, c, method)
     for i in range(first, last):
         share = energy(i, births, particles, a)
         if share > 0.0:
@@ -177,15 +177,15 @@ def count_births(
 
     Threads share the sums where `shared`.
     """
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            find_normals(births, team, particles, grid, solids, walls, c, a, count, method)
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            find_normals(births, cluster, particles, grid, solids, walls, c, a, count, method)
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
             potentials = qd.Matrix.zero(qd.f32, 1, grid.lanes)
-            add_potentials(potentials, team, births, particles, grid, c, a, count, method)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                expected = room * a.made * potentials[0, i - team * grid.lanes]
+            add_potentials(potentials, cluster, births, particles, grid, c, a, count, method)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                expected = room * a.made * potentials[0, i - cluster * grid.lanes]
                 births.first[i] = qd.cast(expected + uniform(stream(a.seed, frame, particles.id[i]), 0), qd.i32)
     sum_up(births.first, births.blocks, count, shared)
     return births.first[count]

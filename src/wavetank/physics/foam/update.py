@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from wavetank.device.compiler import current_backend
-from wavetank.device.state import Air, remembered
+from wavetank.device.state import Air, interned
 from wavetank.foundation.materials import Material
 from wavetank.foundation.params import SURFACE_TENSION, Parameters
 from wavetank.physics.coefficients import coefficients, method_number
@@ -89,7 +89,7 @@ def air(params: Parameters, water: int, dt: float) -> Air:
     drag = _decay(SPRAY_DRAG * rate, dt)
     pull = BUBBLE_PULL * gravity / (BUBBLE_RISE * speed) if speed > 0.0 else math.inf
     follow, gained = _decay(pull, dt), _decay(pull, interval)
-    return remembered(
+    return interned(
         Air(
             dt=dt,
             interval=interval,

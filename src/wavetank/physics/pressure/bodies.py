@@ -14,8 +14,9 @@ import math
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Particles
-from wavetank.physics.bodies import Pieces
-from wavetank.physics.boundary import fall, flattened
+from wavetank.physics.bodies import Pieces, add_to_body, displacing, immersion, of_grid
+from wavetank.physics.boundary import fall
+from wavetank.physics.contact import flattened
 from wavetank.physics.pressure.grid import (
     Level,
     Workspace,
@@ -28,7 +29,6 @@ from wavetank.physics.pressure.grid import (
     nodes_beyond,
     on_axis,
 )
-from wavetank.physics.reactions import add_to_body, displacing, immersion, of_grid
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, parts, rotate, vec3
 

@@ -21,7 +21,7 @@ steps ago, w / (1 - w) steps late on average. With w = 1/2 that is one step, and
 step before a place to half a step after it, as v = (p - x) / dt is: leapfrog, of second order, and waves keep their
 height. Below, the share (1 - 2 w) / (1 - w) of the damping stays: w is such that a step of any length damps as one of
 the share `damping` of a frame would, and steps shorter than that are not warm-started. It is stable for every omega dt,
-and modes that are much stiffer than a step are stopped at once, as without it. No more than `largest_carried` times
+and modes that are much stiffer than a step are stopped at once, as without it. No more than `largest_warm_start` times
 gravity is kept, so that water that hits a wall does not bounce.
 
 Dispersed particles. The displacement accelerates all particles of a place alike, and bears a drop of brine in water as
@@ -42,9 +42,11 @@ import dataclasses
 import math
 
 from wavetank.device.compiler import download, qd
-from wavetank.device.state import Coefficients, Grid, Particles, Scratch, remembered
+from wavetank.device.state import Coefficients, Grid, Particles, Temporaries, interned
 from wavetank.foundation.params import Parameters
-from wavetank.physics.boundary import fall, flattened, kept_in_tank
+from wavetank.physics.boundary import fall
+from wavetank.physics.clusters import chunks, end_cluster, end_of, first_cluster
+from wavetank.physics.contact import clamp_to_tank, flattened
 from wavetank.physics.mixture import Blend
 from wavetank.physics.pairs import column
 from wavetank.physics.predicted_positions import predict_at, predicted
@@ -70,7 +72,6 @@ from wavetank.physics.pressure.solids import UNIT, find_open_volume, open_area, 
 from wavetank.physics.pressure.source import assemble, source_of
 from wavetank.physics.pressure.thin_walls import may_be_cut_off
 from wavetank.physics.smoothing import rest_lattice
-from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift
 
@@ -157,7 +158,7 @@ def buoyancy_share(grid: Level, s, at: qd.template(), weights: qd.template(), de
 def shares_by(
     grid: Level,
     w: Workspace,
-    scratch: Scratch,
+    temporaries: Temporaries,
     i,
     s,
     at: qd.template(),
@@ -172,7 +173,7 @@ def shares_by(
         liquid += weights[k] * grid.liquid[at[k]]
     share = qd.min(qd.max(1.0 + (depth - d.carried_depth) / d.carried_fade, 0.0), 1.0)
     if qd.static(has.mixed):
-        share *= buoyancy_share(grid, s, at, weights, 1.0 / scratch.weight[i])
+        share *= buoyancy_share(grid, s, at, weights, 1.0 / temporaries.inverse_mass[i])
     return qd.Vector([share, 1.0 - ramp(liquid, grid.limits.shallow_from, grid.limits.shallow_to)])
 
 
@@ -194,7 +195,7 @@ def find_shares_behind_walls(
     grid: Level,
     w: Workspace,
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     first,
     end,
     d: Displacement,
@@ -208,7 +209,7 @@ def find_shares_behind_walls(
             at = corners(grid, qd.floor(s, qd.i32), dim)
             weights = open_hat_weights(grid, w, at, s, dim, 1)
             if weights.sum() > 0.5:
-                own = shares_by(grid, w, scratch, i, s, at, weights, d, has)
+                own = shares_by(grid, w, temporaries, i, s, at, weights, d, has)
                 shares[0, i - first], shares[1, i - first] = own[0], own[1]
 
 
@@ -219,10 +220,10 @@ def displace(particles: Particles, i, dp: qd.template(), solids: SolidSet, c: Co
     dp *= qd.min(1.0, reach / qd.max(dp.norm(), 1e-12))
     p += dp
     a = particles.a[i] + dp / (c.dt * c.dt)
-    particles.a[i] = a * qd.min(1.0, c.largest_carried / qd.max(a.norm(), 1e-12))
+    particles.a[i] = a * qd.min(1.0, c.largest_warm_start / qd.max(a.norm(), 1e-12))
     near = particles.near[i]
     if near != 0:
-        p = flattened(kept_in_tank(lift(p), near, solids, c.wall_gap), p)
+        p = flattened(clamp_to_tank(lift(p), near, solids, c.wall_gap), p)
     predict_at(particles, i, p)
 
 
@@ -231,7 +232,7 @@ def displace_particles(
     grid: Level,
     w: Workspace,
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     cells: Grid,
     solids: SolidSet,
     c: Coefficients,
@@ -243,29 +244,29 @@ def displace_particles(
     qd.loop_config(serialize=bool(has.few_nodes))
     for n in range(grid.nx * grid.ny * grid.nz):
         find_gradients(grid, w, n)
-    for turn in range(turns(cells, count)):
+    for chunk in range(chunks(cells, count)):
         at_rest = -fall(c) / d.stiffness
-        for team in range(first_team(turn, cells, count), end_team(turn, cells, count)):
-            first = team * cells.lanes
+        for cluster in range(first_cluster(chunk, cells, count), end_cluster(chunk, cells, count)):
+            first = cluster * cells.lanes
             dim = qd.static(particles.x[first].n)
             gradients = qd.Matrix.zero(qd.f32, dim, cells.lanes)
             shares = qd.Matrix.zero(qd.f32, 2, cells.lanes)
             for lane in range(cells.lanes):
                 s = in_cells(grid, predicted(particles, first + lane))
                 at = corners(grid, qd.floor(s, qd.i32), dim)
-                own = shares_by(grid, w, scratch, first + lane, s, at, hat_weights(s - qd.floor(s), dim), d, has)
+                own = shares_by(grid, w, temporaries, first + lane, s, at, hat_weights(s - qd.floor(s), dim), d, has)
                 shares[0, lane], shares[1, lane] = own[0], own[1]
                 gradients[0, lane] = gradient_along(grid, w.gradient_x, s, 0, at_rest.x, dim, has)
                 gradients[1, lane] = gradient_along(grid, w.gradient_y, s, 1, at_rest.y, dim, has)
                 if qd.static(dim == 3):
                     gradients[2, lane] = gradient_along(grid, w.gradient_z, s, 2, at_rest.z, dim, has)
             if qd.static(has.thin_walls):
-                end = end_of(team, cells, count)
-                find_shares_behind_walls(shares, grid, w, particles, scratch, first, end, d, has)
-            for i in range(first, end_of(team, cells, count)):
+                end = end_of(cluster, cells, count)
+                find_shares_behind_walls(shares, grid, w, particles, temporaries, first, end, d, has)
+            for i in range(first, end_of(cluster, cells, count)):
                 dp = column(gradients, i - first) * (d.stiffness * shares[0, i - first])
                 displace(particles, i, dp, solids, c, d.reach)
-                scratch.puddle[i] = shares[1, i - first]
+                temporaries.shallow[i] = shares[1, i - first]
 
 
 # --- a correction ---
@@ -274,7 +275,7 @@ def displace_particles(
 def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
     """Move the predicted positions so that the share `grid_pressure` of the mean density errors vanishes.
 
-    `scratch.rho` holds the densities over that of the heaviest fluid there.
+    `temporaries.rho` holds the densities over that of the heaviest fluid there.
     """
     grid = world.pressure
     assert grid is not None, "there is no tank"
@@ -285,14 +286,24 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     source = source_of(finest, params, stiffness, bodies=world.pieces is not None)
     assemble(
-        finest, w, world.particles, world.scratch, world.grid, world.solids, world.walls, c, source, world.count, has
+        finest,
+        w,
+        world.particles,
+        world.temporaries,
+        world.grid,
+        world.solids,
+        world.walls,
+        c,
+        source,
+        world.count,
+        has,
     )
     solve_enclosed(grid, source.per_way, gravity, world.count * params.spacing**params.dim)
     displace_particles(
         finest,
         w,
         world.particles,
-        world.scratch,
+        world.temporaries,
         world.grid,
         world.solids,
         c,
@@ -308,7 +319,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
 
 def variant_of(world: World, *, mixed: int = 0, thin_walls: bool) -> Variant:
     """Return what kernels of the grid are compiled for; some walls may be `thin_walls`."""
-    return remembered(
+    return interned(
         Variant(
             solids=int(world.has_solids),
             thin_walls=int(thin_walls),
@@ -350,7 +361,7 @@ def solve_enclosed(grid: PressureGrid, per_error: float, gravity: tuple[float, f
 
 def displacement_of(params: Parameters, stiffness: float, h: float) -> Displacement:
     """Return the numbers of `displace_particles` with `stiffness` M of the rest lattice and support `h` [m]."""
-    return remembered(
+    return interned(
         Displacement(
             stiffness=stiffness,
             reach=THRESHOLDS.reach * h,

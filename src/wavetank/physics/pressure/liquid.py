@@ -29,7 +29,7 @@ pattern, a third at 7/4 and an eighth at 1.7 (notebook/calm.md, "Tanks of anothe
 """
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import Coefficients, Particles, Scratch
+from wavetank.device.state import Coefficients, Particles, Temporaries
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.pressure.grid import (
     Level,
@@ -144,21 +144,21 @@ def add_footprints(
     grid: Level,
     w: Workspace,
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     spacing,
     unit,
-    team,
+    cluster,
     part,
     count,
     lanes: qd.template(),
     has: Variant,
 ):
-    """Add to the sums of a `part` what nodes have of a team's `lanes` particles, and that times densities.
+    """Add to the sums of a `part` what nodes have of a cluster's `lanes` particles, and that times densities.
 
     Nodes without open volume, and those behind a thin wall, leave theirs to others.
     """
     # All loops over lanes but the last become vectors, which takes half of the time; shares and sums in one would not.
-    first, begin = team * lanes, part * grid.nx * grid.ny * grid.nz
+    first, begin = cluster * lanes, part * grid.nx * grid.ny * grid.nz
     dim = qd.static(particles.x[first].n)
     shares = qd.Matrix.zero(qd.f32, 9, lanes)
     nodes = qd.Matrix.zero(qd.i32, 10, lanes)
@@ -174,14 +174,14 @@ def add_footprints(
             amount = unit * share_of(shares, lane, k, dim)
             amounts[k, lane] = qd.cast(qd.round(amount), qd.i32)
             if qd.static(has.mixed):
-                masses[k, lane] = qd.cast(qd.round(amount / scratch.weight[first + lane]), qd.i32)
+                masses[k, lane] = qd.cast(qd.round(amount / temporaries.inverse_mass[first + lane]), qd.i32)
     for lane in range(qd.min(lanes, count - first)):
         is_cut_off = False
         if qd.static(has.solids):
             is_cut_off = w.near_closed[nodes[9, lane]] > 0.0
             if is_cut_off:
                 s = in_cells(grid, predicted(particles, first + lane))
-                density = 1.0 / scratch.weight[first + lane]
+                density = 1.0 / temporaries.inverse_mass[first + lane]
                 add_to_open_nodes(grid, w, s, spacing, unit, density, begin, dim, has)
         if not is_cut_off:
             for k in qd.static(range(3**dim)):

@@ -13,6 +13,7 @@ trembled. The pressure there is extrapolated instead (`bodies.py`), and what pre
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients
+from wavetank.physics.clusters import chunks_over, end_of_part, first_of_part, part_of
 from wavetank.physics.pressure.grid import (
     Level,
     Variant,
@@ -38,7 +39,6 @@ from wavetank.physics.pressure.thin_walls import (
     mark_near_closed,
     solids_near,
 )
-from wavetank.physics.teams import end_of_part, first_of_part, part_of, turns_over
 from wavetank.solids.distance import SolidSet, image_near, signed_distance, vec3, vec4
 
 UNIT = float(1 << 20)  # fixed-point sums are whole multiples of its inverse
@@ -303,10 +303,10 @@ def find_open_volume(
     for n in range(grid.nx * grid.ny * grid.nz):
         mark_blocked_faces(grid, w, n, has.thin_walls)
         mark_near_closed(grid, w, n, spacing, has.thin_walls)
-    for turn in range(turns_over(grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)):
-        first = first_of_part(turn, grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)
-        for n in range(first, end_of_part(turn, grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)):
-            sum_free_volume(grid, w, n, grid.alone * part_of(turn), unit, dim, has)
+    for chunk in range(chunks_over(grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)):
+        first = first_of_part(chunk, grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)
+        for n in range(first, end_of_part(chunk, grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)):
+            sum_free_volume(grid, w, n, grid.alone * part_of(chunk), unit, dim, has)
     qd.loop_config(serialize=bool(has.few_nodes))
     for row in range(grid.ny * grid.nz):
         smooth_along(w.mean_x, w.uncut_cells, grid, row, 0, grid.limits.hat_beside)

@@ -26,10 +26,12 @@ three steps later.
 import dataclasses
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import Coefficients, Grid, Particles, Scratch, Walls, remembered
+from wavetank.device.state import Coefficients, Grid, Particles, Temporaries, Walls, interned
 from wavetank.foundation.params import Parameters
-from wavetank.physics.boundary import fall, next_near, wall_share
-from wavetank.physics.near_solids import facing_at, known, place_of
+from wavetank.physics.boundary import fall, wall_share
+from wavetank.physics.broad_phase import next_marked
+from wavetank.physics.clusters import chunks_over, cluster_count, end_of_part, first_of_part, part_of
+from wavetank.physics.near_solids import contact_plane, known_solids, slot_index
 from wavetank.physics.predicted_positions import predicted
 from wavetank.physics.pressure.grid import (
     DRAW_RAMP,
@@ -63,7 +65,6 @@ from wavetank.physics.pressure.surface import (
     share_of_grid,
 )
 from wavetank.physics.pressure.thin_walls import is_blocked_between, may_be_cut_off
-from wavetank.physics.teams import end_of_part, first_of_part, part_of, teams, turns_over
 from wavetank.solids.distance import SolidSet, image_near, lift, plane_distance, rotate, to_local, vec3
 
 
@@ -87,7 +88,7 @@ def source_of(grid: Level, params: Parameters, stiffness: float, *, bodies: bool
     """Return the numbers of `assemble`, in a world with `bodies` or without; `stiffness` is M of the rest lattice."""
     h = params.support * params.spacing
     volume = params.spacing**params.dim / (grid.dx * grid.dy * grid.dz) / UNIT
-    return remembered(
+    return interned(
         Source(
             unit=UNIT,
             volume=volume,
@@ -113,7 +114,7 @@ def added_by_solids(
     p,
     driven,
     near,
-    scratch: Scratch,
+    temporaries: Temporaries,
     solids: SolidSet,
     walls: Walls,
     c: Coefficients,
@@ -124,17 +125,17 @@ def added_by_solids(
 ):
     """Relative density that the solids near particle `i` have added on its way from `x` to `p`, in their motion."""
     added, free = 0.0, 1.0
-    k = next_near(near, -1, solids)
+    k = next_marked(near, -1, solids)
     while k < solids.tank_count:
         add_approach(added, free, plane_distance(solids, k, p), p - x, walls, c, boost)
-        k = next_near(near, k, solids)
+        k = next_marked(near, k, solids)
     if qd.static(searched):
         if near >> solids.tank_count != 0:
-            for slot in range(known(scratch, i)):
-                at = place_of(scratch, i, slot)
-                value = facing_at(scratch, at, i, p)
+            for slot in range(known_solids(temporaries, i)):
+                at = slot_index(temporaries, i, slot)
+                value = contact_plane(temporaries, at, i, p)
                 if value.w < qd.max(c.h, limits.reaction_layer * spacing):  # else nothing of it counts
-                    k = scratch.solid[at]
+                    k = temporaries.solid[at]
                     before = image_near(solids, k, x)
                     own = to_local(solids.old_position[k], solids.old_rotation[k], before)
                     moved = solids.position[k] + rotate(solids.rotation[k], own) - before
@@ -195,7 +196,7 @@ def find_errors(
     grid: Level,
     w: Workspace,
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     source: Source,
     first,
     part,
@@ -203,7 +204,7 @@ def find_errors(
     cut: qd.template(),
     thin: qd.template(),
 ):
-    """Find what a team's particles from number `first` on add to a `part`'s sums, and where."""
+    """Find what a cluster's particles from number `first` on add to a `part`'s sums, and where."""
     dim = qd.static(particles.x[first].n)
     for lane in range(lanes):
         s = in_cells(grid, predicted(particles, first + lane))
@@ -212,7 +213,7 @@ def find_errors(
         inside = 0.0
         for k in qd.static(range(2**dim)):
             inside += weights[k] * w.inside[nodes[k]]
-        error = scratch.rho[first + lane] * scratch.weight[first + lane] - 1.0
+        error = temporaries.rho[first + lane] * temporaries.inverse_mass[first + lane] - 1.0
         error += added[0, lane] - grid.limits.void_gain * w.voids[nearest_node(grid, s)]
         error = source.unit * ramp(inside, 0.0, 1.0) * qd.min(qd.max(error, -1.0), 1.0)
         for k in qd.static(range(2**dim)):
@@ -225,19 +226,19 @@ def add_errors(
     grid: Level,
     w: Workspace,
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     solids: SolidSet,
     walls: Walls,
     c: Coefficients,
     source: Source,
-    team,
+    cluster,
     part,
     count,
     lanes: qd.template(),
     has: Variant,
 ):
-    """Add the hat weights of a team's particles times their errors (Eq. 2) to a `part`'s sums."""
-    first = team * lanes
+    """Add the hat weights of a cluster's particles times their errors (Eq. 2) to a `part`'s sums."""
+    first = cluster * lanes
     dim = qd.static(particles.x[first].n)
     at = qd.Matrix.zero(qd.i32, 2**dim, lanes)
     amounts = qd.Matrix.zero(qd.i32, 2**dim, lanes)
@@ -254,7 +255,7 @@ def add_errors(
                 p - fall(c),
                 driven,
                 near,
-                scratch,
+                temporaries,
                 solids,
                 walls,
                 c,
@@ -269,10 +270,10 @@ def add_errors(
             is_cut_off = is_cut_off or may_be_cut_off(grid, w, in_cells(grid, predicted(particles, i)))
     if is_cut_off:
         find_errors(
-            at, amounts, added, grid, w, particles, scratch, source, first, part, lanes, has.solids, has.thin_walls
+            at, amounts, added, grid, w, particles, temporaries, source, first, part, lanes, has.solids, has.thin_walls
         )
     else:
-        find_errors(at, amounts, added, grid, w, particles, scratch, source, first, part, lanes, 0, 0)
+        find_errors(at, amounts, added, grid, w, particles, temporaries, source, first, part, lanes, 0, 0)
     for lane in range(qd.min(lanes, count - first)):
         for k in qd.static(range(2**dim)):
             add_fixed(w.sums, at[k, lane], amounts[k, lane], grid.alone)
@@ -303,7 +304,7 @@ def flow_out(grid: Level, w: Workspace, n, fallen):
     return total
 
 
-# --- the kernel; its loops are tasks of their own, and what they do for a node, a row or a team are functions ---
+# --- the kernel; its loops are tasks of their own, and what they do for a node, a row or a cluster are functions ---
 
 
 @qd.func
@@ -345,7 +346,7 @@ def assemble(
     grid: Level,
     w: Workspace,
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     cells: Grid,
     solids: SolidSet,
     walls: Walls,
@@ -359,18 +360,19 @@ def assemble(
     The sums are 0 before and after. Threads share the particles in parts; where these are alone, each has sums of its
     own and waits for no other.
     """
-    for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
-        begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
-        for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
+    for chunk in range(chunks_over(cluster_count(cells, count), parts_of(grid, cells), cells.lanes)):
+        begin = first_of_part(chunk, cluster_count(cells, count), parts_of(grid, cells), cells.lanes)
+        end = end_of_part(chunk, cluster_count(cells, count), parts_of(grid, cells), cells.lanes)
+        for cluster in range(begin, end):
             add_footprints(
                 grid,
                 w,
                 particles,
-                scratch,
+                temporaries,
                 source.spacing,
                 source.unit,
-                team,
-                grid.alone * part_of(turn),
+                cluster,
+                grid.alone * part_of(chunk),
                 count,
                 qd.static(cells.lanes),
                 has,
@@ -405,20 +407,21 @@ def assemble(
         qd.loop_config(serialize=bool(has.few_nodes))
         for n in range(grid.nx * grid.ny * grid.nz):
             w.depth[n] = level_depth(grid, w, n, vec3(c.gravity_x, c.gravity_y, c.gravity_z))
-    for turn in range(turns_over(teams(cells, count), parts_of(grid, cells), cells.lanes)):
-        begin = first_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)
-        for team in range(begin, end_of_part(turn, teams(cells, count), parts_of(grid, cells), cells.lanes)):
+    for chunk in range(chunks_over(cluster_count(cells, count), parts_of(grid, cells), cells.lanes)):
+        begin = first_of_part(chunk, cluster_count(cells, count), parts_of(grid, cells), cells.lanes)
+        end = end_of_part(chunk, cluster_count(cells, count), parts_of(grid, cells), cells.lanes)
+        for cluster in range(begin, end):
             add_errors(
                 grid,
                 w,
                 particles,
-                scratch,
+                temporaries,
                 solids,
                 walls,
                 c,
                 source,
-                team,
-                grid.alone * part_of(turn),
+                cluster,
+                grid.alone * part_of(chunk),
                 count,
                 qd.static(cells.lanes),
                 has,

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.solids.distance import SolidSet, around, signed_distance
 from wavetank.view.film.grid import Field, Grid, node_at, value_at
 from wavetank.view.lens import vec3, vector
@@ -67,7 +67,7 @@ def grid_around(shot: Shot, reach: float) -> Grid:
     size = upper - lower
     step *= max(1.0, (float(np.prod(size / step)) / MOST_NODES) ** (1.0 / 3.0))
     count = [max(4, 2 * round(float(length) / (2.0 * step))) for length in size]
-    return remembered(
+    return interned(
         Grid(
             lower=vector(*lower),
             upper=vector(*upper),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import download, qd, synchronize, upload
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.view.buffers import Buffers
 from wavetank.view.film import balls, denoise, field, light, paths
 from wavetank.view.film.march import World
@@ -117,7 +117,7 @@ class Tracer:
             world = self._world(now, shutter, moved)
             medium = medium_of(now, world.field.grid)
             photons = self._lit(now, world, medium, number, len(slices))
-            around = remembered(dataclasses.replace(setting, under=under_water(now, self.buffers)))
+            around = interned(dataclasses.replace(setting, under=under_water(now, self.buffers)))
             while done < end:
                 count = min(self._at_once(), end - done)
                 paths.trace(

@@ -3,7 +3,7 @@
 import dataclasses
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.view.lens import vec3, vector
 from wavetank.view.optics.ray_interpolation import APART, GROUP
 from wavetank.view.shot import Shot
@@ -35,7 +35,7 @@ class Optics:
 
 def optics_of(shot: Shot, samples: int = 1, tall: int = 1) -> Optics:
     """Return what the fluid of a picture does to light."""
-    return remembered(
+    return interned(
         Optics(
             absorption=shot.absorption,
             scattering=shot.scattering,

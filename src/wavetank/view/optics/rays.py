@@ -4,7 +4,7 @@ import dataclasses
 from typing import Any
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.view.lens import vec2, vec3, vector
 
 
@@ -18,7 +18,7 @@ class Box:
 
 def box(lower: Any, upper: Any) -> Box:
     """Return the box between two corners [m]."""
-    return remembered(Box(lower=vector(*lower), upper=vector(*upper)))
+    return interned(Box(lower=vector(*lower), upper=vector(*upper)))
 
 
 OPEN = box((-1e6,) * 3, (1e6,) * 3)  # m: walls of no tank

@@ -13,7 +13,7 @@ as much of the colour as their share of the weights.
 import dataclasses
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.cells import Cells, sort
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec3, vector, view_ray
@@ -44,7 +44,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     frame, cells, (normal, offset) = shot.frame, water_of(buffers, shot).cells, shot.plane
     least = 0.22 * full_weight(cells, shot.extent.spacing, frame.dim)
     ice = ICE if frame.frozen_count else 0
-    plane = remembered(Plane(normal=vector(*normal), offset=offset, least=least, ice=ice))
+    plane = interned(Plane(normal=vector(*normal), offset=offset, least=least, ice=ice))
     lay(
         buffers.pixels,
         frame.x,

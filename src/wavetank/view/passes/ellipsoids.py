@@ -21,7 +21,7 @@ Particles deep inside are not drawn: cells whose neighbours are all well filled 
 import dataclasses
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.view.buffers import Buffers
 from wavetank.view.cells import Cells, sort
 from wavetank.view.lens import vec3
@@ -65,7 +65,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
 
 def shape(dim: int, d: float) -> Shape:
     """Return the sizes of the ellipsoids of particles with the spacing `d` [m]."""
-    return remembered(
+    return interned(
         Shape(
             spacing=d,
             reach=REACH * d,

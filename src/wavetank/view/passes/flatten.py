@@ -23,7 +23,7 @@ import dataclasses
 from typing import Any
 
 from wavetank.device.compiler import lanes, qd
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, ray_direction, ray_origin, view_ray
 from wavetank.view.optics.rays import Box, box_interval
@@ -64,7 +64,7 @@ def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
 def even(depth: Any, spare: Any, lens: Lens, walls: Box, sigma: float, d: float) -> None:
     """Smooth `depth` as `lens` sees it, in place; the second round closes the gaps between the first one's taps."""
     strips = strips_of(depth)
-    window = remembered(Window(sigma=sigma, per_narrow=1.0 / (NARROW * d), per_slope=1.0 / (SLOPE * d), taps=TAPS))
+    window = interned(Window(sigma=sigma, per_narrow=1.0 / (NARROW * d), per_slope=1.0 / (SLOPE * d), taps=TAPS))
     straighten(depth, strips, lens, walls, d, lanes())
     for clean in (0, 1):
         blur(spare, depth, strips, lens, window, 0, 1, clean, 0, lanes())

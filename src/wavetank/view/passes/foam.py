@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import Diffuse, remembered
+from wavetank.device.state import Diffuse, interned
 from wavetank.solids.distance import lift
 from wavetank.view.buffers import Buffers, FoamMaps, Pixels
 from wavetank.view.colormaps import rgb_of, to_linear
@@ -133,7 +133,7 @@ def froth_of(shot: Shot, buffers: Buffers, sunk: float, shutter: float) -> Froth
     frame, look, d, flat = shot.frame, shot.look, shot.extent.spacing, shot.frame.dim == 2
     height = buffers.rows / buffers.supersample
     in_sun, in_sky = vector(*(ALBEDO * look.sun)), vector(*(ALBEDO * look.sky))
-    return remembered(
+    return interned(
         Froth(
             size=SIZE[frame.dim] * d,
             deepest=IN_FRONT if flat else DEEPEST * d,

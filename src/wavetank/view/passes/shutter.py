@@ -20,7 +20,7 @@ neither give nor take. Drops have streaks of their own (`streaks.py`), foam its 
 import dataclasses
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.solids.distance import lift
 from wavetank.view.buffers import Buffers, Motion, Pixels
 from wavetank.view.cells import Cells
@@ -66,7 +66,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     water, motion = water_of(buffers, shot), buffers.motion
     surface = water.surface
     grain, samples = max(4, grain_of(shot, buffers.supersample)), buffers.supersample
-    shutter = remembered(
+    shutter = interned(
         Shutter(
             open=float(open_for),
             visible=VISIBLE * shot.extent.spacing,

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.solids.distance import SolidSet, around, grain, signed_distance
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_view, vec2, vec3, vec4, view_ray
@@ -85,7 +85,7 @@ def window(shot: Shot) -> Window:
     wide = np.array([UNBOUNDED, UNBOUNDED, 0.0 if flat else UNBOUNDED])
     inside = box(-wide, wide)
     endless = inside if shot.frame.scene.tank is None else shot.box
-    return remembered(Window(inside=inside, endless=endless, raised=shot.radius if flat else 0.0))
+    return interned(Window(inside=inside, endless=endless, raised=shot.radius if flat else 0.0))
 
 
 @qd.func

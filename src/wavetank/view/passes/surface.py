@@ -20,7 +20,7 @@ import enum
 from typing import Any
 
 from wavetank.device.compiler import qd, threads
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.view.buffers import Buffers
 from wavetank.view.lens import Lens, pixels_between, pixels_per_metre, to_view, vec2, vec3
 from wavetank.view.optics.edge_coverage import rim_key, rim_mark
@@ -73,7 +73,7 @@ def see(shot: Shot, ellipsoids: Ellipsoids, lens: Lens, depth: Any, rim: Any, lo
     Without `lone` particles these are left to the drops.
     """
     count, turns = shot.frame.count, max(threads(), 1)
-    limits = remembered(
+    limits = interned(
         Limits(largest=max(LARGEST * depth.shape[0], 2.0), away=AWAY, lone=int(lone), gap=GAP * shot.extent.spacing)
     )
     splat(

@@ -14,7 +14,7 @@ import dataclasses
 import math
 
 from wavetank.device.compiler import qd, threads
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.view.buffers import Buffers
 from wavetank.view.cells import Cells
 from wavetank.view.lens import (
@@ -57,7 +57,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     add_up(shot, water, water.thickness, shot.lens, float(coarseness(shot)), lone=shot.frame.dim == 2)
     if water.thickness.fluids:
         d, dim, lone = shot.extent.spacing, shot.frame.dim, int(shot.frame.dim == 2)
-        disc = remembered(Disc(radius=WIDE * d, peak=peak(3), coarse=float(fineness(shot)), lone=lone))
+        disc = interned(Disc(radius=WIDE * d, peak=peak(3), coarse=float(fineness(shot)), lone=lone))
         begin(water.thickness.edge, water.surface.depth, shot.lens, shot.walls, fineness(shot))
         part_front(
             water.thickness,
@@ -81,7 +81,7 @@ def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
 def add_up(shot: Shot, water: WaterBuffers, thickness: Thickness, lens: Lens, coarse: float, lone: bool) -> None:
     """Fill maps with the discs of particles; the texel (r, c) holds the pixels from coarse r, c on."""
     frame, cells = shot.frame, water.cells
-    disc = remembered(
+    disc = interned(
         Disc(radius=DISC[frame.dim] * shot.extent.spacing, peak=peak(frame.dim), coarse=coarse, lone=int(lone))
     )
     rows, columns = thickness.water.shape

@@ -54,19 +54,21 @@ import math
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import Coefficients, Grid, Particles, remembered, scalars
+from wavetank.device.state import Coefficients, Grid, Particles, interned, scalars
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.params import Parameters
-from wavetank.physics.dynamic_viscosity.conjugate_gradients import TOLERANCE, Damping, solve
-from wavetank.physics.dynamic_viscosity.drag import Holding, drag_bodies, drag_table, find_drag
-from wavetank.physics.dynamic_viscosity.rigid_guess import FORGET, RIGID, SHEARED, STIFF, rotate_guess
+from wavetank.physics.clusters import chunks, end_cluster, first_cluster
 from wavetank.physics.integrate import accelerate, free_motion
 from wavetank.physics.mixture import Blend
 from wavetank.physics.neighbors import MAX_ENTRIES
 from wavetank.physics.pairs import keep_pairs
+from wavetank.physics.plan import Plan
 from wavetank.physics.predicted_positions import predict_at, predicted
 from wavetank.physics.smoothing import TABLE_SIZE, rest_points
-from wavetank.physics.teams import end_team, first_team, turns
+from wavetank.physics.terms.dynamic_viscosity.conjugate_gradients import TOLERANCE, Damping, solve
+from wavetank.physics.terms.dynamic_viscosity.drag import Holding, drag_bodies, drag_table, find_drag
+from wavetank.physics.terms.dynamic_viscosity.rigid_guess import FORGET, RIGID, SHEARED, STIFF, rotate_guess
+from wavetank.physics.terms.term import Hook, Term
 from wavetank.physics.world import World
 
 ANY = 1e9  # m/s
@@ -120,9 +122,9 @@ def find_dampers(
     count: qd.i32,
 ):
     """Keep the dampers of all pairs."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            keep_pairs(dampers, damper, team, particles, packed, grid, c)
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            keep_pairs(dampers, damper, cluster, particles, packed, grid, c)
 
 
 @qd.kernel(fastcache=True)
@@ -154,7 +156,7 @@ def take_velocities(
 
 
 @dataclasses.dataclass(frozen=True)
-class Carrying:
+class WarmStart:
     """How much of what pressed them thick fluids carry on."""
 
     rate: qd.f32  # 1/(Pa s): `thickness` of the heaviest fluid over its viscosity
@@ -169,7 +171,7 @@ class Carrying:
 
 
 @qd.kernel(fastcache=True)
-def carry_pressure(particles: Particles, rows: qd.types.ndarray(), c: Coefficients, carrying: Carrying, count: qd.i32):
+def keep_pressure(particles: Particles, rows: qd.types.ndarray(), c: Coefficients, w: WarmStart, count: qd.i32):
     """Keep the share of what pressure and solids accelerated thick fluids by that the next prediction begins with.
 
     It is called before velocities are read off. What a push should not give to them is taken by moving where the way
@@ -179,16 +181,16 @@ def carry_pressure(particles: Particles, rows: qd.types.ndarray(), c: Coefficien
         row = rows[particles.material[i]]
         pushed = predicted(particles, i) - free_motion(particles.x[i], particles.v[i], c)
         a = particles.a[i] + pushed / (c.dt * c.dt)
-        thick = carrying.rate * row[0] * row[1]
+        thick = w.rate * row[0] * row[1]
         way = predicted(particles, i) - particles.x[i]
         calm = qd.max(0.0, 1.0 - way.norm_sqr() * c.slow / (c.dt * c.dt))
-        passed = 1.0 - carrying.calm * calm
-        share = 1.0 - (1.0 - carrying.most) * passed
-        share *= thick / (carrying.half + thick)
-        limit = qd.min(carrying.largest, carrying.again / passed * pushed.norm() / (c.dt * c.dt))
-        limit = qd.max(limit, carrying.lasts * calm * particles.a[i].norm())
+        passed = 1.0 - w.calm * calm
+        share = 1.0 - (1.0 - w.most) * passed
+        share *= thick / (w.half + thick)
+        limit = qd.min(w.largest, w.again / passed * pushed.norm() / (c.dt * c.dt))
+        limit = qd.max(limit, w.lasts * calm * particles.a[i].norm())
         particles.a[i] = a * (share * qd.min(1.0, limit / qd.max(a.norm(), 1e-12)))
-        most = (carrying.own * particles.v[i].norm() + carrying.falling) * (carrying.half + thick) / qd.max(thick, 1e-6)
+        most = (w.own * particles.v[i].norm() + w.falling) * (w.half + thick) / qd.max(thick, 1e-6)
         if pushed.norm() > c.dt * most:
             particles.x[i] += pushed * (1.0 - c.dt * most / pushed.norm())
 
@@ -198,7 +200,7 @@ def thickness(viscosity: float, params: Parameters, dt: float) -> float:
     return dt * viscosity * 4.0 * (params.dim + 2) / params.spacing**2  # dt nu 2 B sum f / dim, within a factor of two
 
 
-def usual_thickness(viscosity: float, params: Parameters) -> float:
+def thickness_in_usual_step(viscosity: float, params: Parameters) -> float:
     """Return the `thickness` in a time step as long as calm water takes it."""
     return thickness(viscosity, params, params.frame_time / params.substeps)
 
@@ -208,9 +210,9 @@ def is_viscous(kinds: Blend, params: Parameters, dt: float) -> bool:
     return thickness(kinds.kinematic_viscosity, params, dt) > WORTH
 
 
-def is_thick(kinds: Blend, params: Parameters) -> bool:
+def has_high_viscosity(kinds: Blend, params: Parameters) -> bool:
     """Say whether viscosity rules the motion of any fluid from particle to particle, and gravity presses it."""
-    return usual_thickness(kinds.kinematic_viscosity, params) > THICK and any(params.gravity)
+    return thickness_in_usual_step(kinds.kinematic_viscosity, params) > THICK and any(params.gravity)
 
 
 def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficients, most: int) -> int:
@@ -235,12 +237,12 @@ def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficie
     packed, drag, normal = (fluids.array(name) for name in ("packed", "drag", "normal"))
     dampers = fluids.pairs(grid)
     table = fluids.arrays["drag table"]
-    holding = remembered(
+    holding = interned(
         Holding(
             no_slip=max(params.no_slip, SLIPS),
             most=largest,
             touching=TOUCHING * params.spacing,
-            to_come=(1.0 - c.carried) * c.dt if world.pieces else 0.0,
+            to_come=(1.0 - c.warm_start) * c.dt if world.pieces else 0.0,
         )
     )
     find_drag(packed, drag, normal, particles, fluids.rows, world.solids, table, c, holding, count)
@@ -254,7 +256,9 @@ def solve_viscosity(world: World, kinds: Blend, params: Parameters, c: Coefficie
     number = solve(world, damping, packed, c, rate, iterations(min(stiffest, STIFFEST), most))
     if world.pieces:
         per_damper = params.spacing / min(largest, largest_viscosity(kinds))
-        drag_bodies(packed, normal, particles, world.scratch, world.solids, table, c, holding, rate, per_damper, count)
+        drag_bodies(
+            packed, normal, particles, world.temporaries, world.solids, table, c, holding, rate, per_damper, count
+        )
     take_velocities(particles, packed, normal, c, count)
     return number
 
@@ -276,12 +280,12 @@ def steps_with_bodies(kinds: Blend, params: Parameters, duration: float) -> floa
     return thickness(kinds.kinematic_viscosity, params, duration) / WITH_BODIES
 
 
-def carry_on(world: World, kinds: Blend, params: Parameters, c: Coefficients, *, stirred: bool) -> None:
-    """Let thick fluids carry on a share of what pressed them in this step; where `stirred`, that gives little speed."""
-    rate, gravity = thickness(1.0 / kinds.largest_density, params, c.dt), math.hypot(*params.gravity)
-    own, falling = (PUSHED, PUSHED * math.sqrt(2.0 * gravity * c.h)) if stirred else (0.0, ANY)
-    carrying = remembered(
-        Carrying(
+def store_warm_start(world: World, plan: Plan, params: Parameters, c: Coefficients) -> None:
+    """Store the share of the pressure on thick fluids that the next step begins with, at little speed if stirred."""
+    rate, gravity = thickness(1.0 / plan.kinds.largest_density, params, c.dt), math.hypot(*params.gravity)
+    own, falling = (PUSHED, PUSHED * math.sqrt(2.0 * gravity * c.h)) if plan.stirred_by_solids else (0.0, ANY)
+    carried = interned(
+        WarmStart(
             rate=rate,
             most=CARRIED,
             half=HALF,
@@ -293,20 +297,20 @@ def carry_on(world: World, kinds: Blend, params: Parameters, c: Coefficients, *,
             falling=falling,
         )
     )
-    carry_pressure(world.particles, world.fluids.rows, c, carrying, world.count)
+    keep_pressure(world.particles, world.fluids.rows, c, carried, world.count)
 
 
-def thick_share(kinds: Blend, params: Parameters) -> float:
+def high_viscosity_share(kinds: Blend, params: Parameters) -> float:
     """Return how thick all fluids are, the thinnest of them included: k / (`HALF` + k) of its `thickness` k."""
-    if not is_thick(kinds, params):
+    if not has_high_viscosity(kinds, params):
         return 0.0
-    thick = usual_thickness(min(fluid.viscosity / fluid.density for fluid in kinds.fluids.values()), params)
+    thick = thickness_in_usual_step(min(fluid.viscosity / fluid.density for fluid in kinds.fluids.values()), params)
     return thick / (HALF + thick)
 
 
-def carried_share(kinds: Blend, params: Parameters) -> float:
+def warm_start_of_thick(kinds: Blend, params: Parameters) -> float:
     """Return the share of what presses them in a frame that all fluids carry on, the thinnest of them included."""
-    return CARRIED * thick_share(kinds, params)
+    return CARRIED * high_viscosity_share(kinds, params)
 
 
 def iterations(stiffest: float, most: int) -> int:
@@ -317,3 +321,12 @@ def iterations(stiffest: float, most: int) -> int:
     # Theorem 6.25).
     sigma = (stiffest + 1.0) / (stiffest - 1.0)
     return min(most, math.ceil(math.acosh(1.0 / TOLERANCE) / math.acosh(sigma)))
+
+
+def apply_viscosity(world: World, plan: Plan, params: Parameters, c: Coefficients) -> None:
+    """Solve for the velocities of viscous fluids."""
+    solve_viscosity(world, plan.kinds, params, c, params.viscosity_iterations)
+
+
+VISCOSITY = Term("viscosity", Hook.FORCES, apply_viscosity, lambda plan: plan.has_viscosity)
+WARM_START = Term("warm start", Hook.END_OF_ITERATIONS, store_warm_start, lambda plan: plan.high_viscosity)

@@ -15,10 +15,14 @@ itself, Eq. 9, is summed in the sweep of XSPH (`xsph_viscosity.py`).
 """
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import Coefficients, Grid, Particles, Scratch
+from wavetank.device.state import Coefficients, Grid, Particles, Temporaries
+from wavetank.foundation.params import Parameters
+from wavetank.physics.clusters import chunks, end_cluster, first_cluster
 from wavetank.physics.pairs import add_neighbors, column
+from wavetank.physics.plan import Plan
 from wavetank.physics.smoothing import kernel
-from wavetank.physics.teams import end_team, first_team, turns
+from wavetank.physics.terms.term import Hook, Term
+from wavetank.physics.world import World
 from wavetank.solids.distance import lift, vec3
 
 
@@ -36,23 +40,23 @@ def add_eta(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.te
 
 @qd.kernel(fastcache=True)
 def confine_vorticity(
-    particles: Particles, scratch: Scratch, grid: Grid, c: Coefficients, count: qd.i32, method: qd.template()
+    particles: Particles, temporaries: Temporaries, grid: Grid, c: Coefficients, count: qd.i32, method: qd.template()
 ):
     """Push around every vortex: dv = dt eps_w s (N x omega), N = eta / |eta| (Eq. 10)."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            first = team * grid.lanes
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            first = cluster * grid.lanes
             last = qd.min(first + grid.lanes, count)
             fastest = 0.0
             for i in range(first, last):
-                fastest = qd.max(fastest, scratch.omega[i].norm())
+                fastest = qd.max(fastest, temporaries.omega[i].norm())
             # Calm water, most of a tank, is not asked for its neighbours.
             if c.coherence <= 0.0 or fastest > c.calm:
                 sums = qd.Matrix.zero(qd.f32, 7, grid.lanes)
-                add_neighbors(sums, add_eta, team, particles, scratch.omega, grid, c, method)
+                add_neighbors(sums, add_eta, cluster, particles, temporaries.omega, grid, c, method)
                 for i in range(first, last):
                     sum = column(sums, i - first)
-                    omega = scratch.omega[i]
+                    omega = temporaries.omega[i]
                     for k in qd.static(range(3)):  # without itself
                         sum[3 + k] -= kernel(method, 0.0)[0] * omega[k]
                     sum[6] -= kernel(method, 0.0)[0] * omega.norm()
@@ -71,3 +75,13 @@ def confine_vorticity(
                     for k in qd.static(range(v.n)):
                         v[k] += c.dt * c.vorticity * force[k]
                     particles.v[i] = v
+
+
+def apply_confinement(world: World, plan: Plan, params: Parameters, c: Coefficients) -> None:
+    """Push around vortices by the vorticity that the sweep of XSPH has found."""
+    confine_vorticity(world.particles, world.temporaries, world.grid, c, world.count, plan.method)
+
+
+VORTICITY = Term(
+    "vorticity confinement", Hook.VELOCITIES, apply_confinement, lambda plan: bool(plan.confines_vorticity)
+)

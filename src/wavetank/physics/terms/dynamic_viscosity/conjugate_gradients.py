@@ -30,9 +30,9 @@ import dataclasses
 from typing import Any
 
 from wavetank.device.compiler import current_backend, download, qd
-from wavetank.device.state import Coefficients, Grid, Particles, Scratch
+from wavetank.device.state import Coefficients, Grid, Particles, Temporaries
+from wavetank.physics.clusters import chunks, cluster_count, end_cluster, end_of, first_cluster
 from wavetank.physics.pairs import add_kept, column
-from wavetank.physics.teams import end_of, end_team, first_team, teams, turns
 from wavetank.physics.world import World
 from wavetank.solids.distance import vec3, vec4
 
@@ -58,13 +58,13 @@ class Iterates:
     pulled: qd.types.ndarray()
     direction: qd.types.ndarray()
     slope: qd.types.ndarray()
-    products: qd.types.ndarray()  # vec4 [teams]: of each team
+    products: qd.types.ndarray()  # vec4 [clusters]: of each cluster
     totals: qd.types.ndarray()  # vec4 [2 + slices], see `iterate`
 
 
 @qd.func
 def slices():
-    """Slices of the teams, whose sums are added up in order."""
+    """Slices of the clusters, whose sums are added up in order."""
     return 256
 
 
@@ -88,7 +88,7 @@ def along_walls(pull, normal):
 def start_residual(
     state: Iterates,
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     damping: Damping,
     grid: Grid,
     c: Coefficients,
@@ -96,14 +96,14 @@ def start_residual(
     count: qd.i32,
 ):
     """Set r = b - A x, where b are the velocities as they are and what moving walls add."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, grid.lanes)
-            add_kept(sums, add_damping, team, particles, state.x, damping.pairs, grid, c, 0)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.v[cluster].n, grid.lanes)
+            add_kept(sums, add_damping, cluster, particles, state.x, damping.pairs, grid, c, 0)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
                 v = particles.v[i]
                 own = state.x[i]
-                force = column(sums, i - team * grid.lanes)
+                force = column(sums, i - cluster * grid.lanes)
                 if particles.near[i] != 0:
                     drag = damping.drag[i]
                     wall = vec3(drag.x, drag.y, drag.z) - vec3(own.x, own.y, own.z) * drag.w
@@ -112,7 +112,7 @@ def start_residual(
                         force[k] += wall[k]
                 result = own * 0.0
                 for k in qd.static(range(v.n)):
-                    result[k] = v[k] - own[k] + rate * scratch.weight[i] * force[k]
+                    result[k] = v[k] - own[k] + rate * temporaries.inverse_mass[i] * force[k]
                 state.residual[i] = result * (1.0 - particles.frozen[i])
 
 
@@ -120,22 +120,22 @@ def start_residual(
 def multiply(
     state: Iterates,
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     damping: Damping,
     grid: Grid,
     c: Coefficients,
     rate: qd.f32,
     count: qd.i32,
 ):
-    """Set A r, and each team's share of (r, r), (r, A r) and (x - b, x - b)."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, grid.lanes)
-            add_kept(sums, add_damping, team, particles, state.residual, damping.pairs, grid, c, 0)
+    """Set A r, and each cluster's share of (r, r), (r, A r) and (x - b, x - b)."""
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.v[cluster].n, grid.lanes)
+            add_kept(sums, add_damping, cluster, particles, state.residual, damping.pairs, grid, c, 0)
             product = vec4(0.0, 0.0, 0.0, 0.0)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
                 r = state.residual[i]
-                force = column(sums, i - team * grid.lanes)
+                force = column(sums, i - cluster * grid.lanes)
                 if particles.near[i] != 0:
                     wall = along_walls(vec3(r.x, r.y, r.z) * -damping.drag[i].w, damping.normal[i])
                     for k in qd.static(range(force.n)):
@@ -143,11 +143,11 @@ def multiply(
                 result = r
                 change = 0.0
                 for k in qd.static(range(force.n)):
-                    result[k] = (r[k] - rate * scratch.weight[i] * force[k]) * (1.0 - particles.frozen[i])
+                    result[k] = (r[k] - rate * temporaries.inverse_mass[i] * force[k]) * (1.0 - particles.frozen[i])
                     change += (state.x[i][k] - particles.v[i][k]) ** 2 * (1.0 - particles.frozen[i])
                 state.pulled[i] = result
-                product += vec4(r.dot(r), r.dot(result), change, 0.0) / scratch.weight[i]
-            state.products[team] = product
+                product += vec4(r.dot(r), r.dot(result), change, 0.0) / temporaries.inverse_mass[i]
+            state.products[cluster] = product
 
 
 @qd.kernel(fastcache=True)
@@ -159,10 +159,10 @@ def iterate(state: Iterates, grid: Grid, first: qd.i32, looked: qd.i32, count: q
     """
     qd.loop_config(serialize=not shared)
     for b in range(slices()):
-        size = (teams(grid, count) + slices() - 1) // slices()
+        size = (cluster_count(grid, count) + slices() - 1) // slices()
         total = vec4(0.0, 0.0, 0.0, 0.0)
-        for team in range(b * size, qd.min(b * size + size, teams(grid, count))):
-            total += state.products[team]
+        for cluster in range(b * size, qd.min(b * size + size, cluster_count(grid, count))):
+            total += state.products[cluster]
         state.totals[2 + b] = total
     qd.loop_config(serialize=True)
     for _ in range(1):
@@ -198,13 +198,19 @@ def iterate(state: Iterates, grid: Grid, first: qd.i32, looked: qd.i32, count: q
 
 def solve(world: World, damping: Damping, x: Any, c: Coefficients, rate: float, most: int) -> int:
     """Solve for the velocities `x`, which hold where to start; return the number of iterations, at most `most`."""
-    particles, scratch, grid, fluids, count = world.particles, world.scratch, world.grid, world.fluids, world.count
+    particles, temporaries, grid, fluids, count = (
+        world.particles,
+        world.temporaries,
+        world.grid,
+        world.fluids,
+        world.count,
+    )
     names = ("residual", "pulled", "direction", "slope", "products")
     state = fluids.together(Iterates, x, *map(fluids.array, names), fluids.array("totals", 2 + slices.fn()))
     shared = int(current_backend() != "cpu")
-    start_residual(state, particles, scratch, damping, grid, c, rate, count)
+    start_residual(state, particles, temporaries, damping, grid, c, rate, count)
     for number in range(most):
-        multiply(state, particles, scratch, damping, grid, c, rate, count)
+        multiply(state, particles, temporaries, damping, grid, c, rate, count)
         iterate(state, grid, int(number == 0), int(number % LOOK == 0), count, shared)
         if (number + 1) % LOOK == 0 and number + 1 < most:
             gained, change = map(float, download(state.totals)[1][:2])

@@ -13,10 +13,10 @@ slips. How slow that is (`coefficients.SLOW`) goes with sqrt(g d); waves that ca
 """
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import Coefficients, Grid, Particles, Scratch
+from wavetank.device.state import Coefficients, Grid, Particles, Temporaries
+from wavetank.physics.clusters import chunks, end_cluster, end_of, first_cluster
 from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.smoothing import kernel
-from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.solids.distance import vec3
 
 
@@ -52,7 +52,7 @@ def add_vorticity(sums: qd.template(), r, square, a, b, c: Coefficients, method:
         sums[2] += turn
 
 
-#: By `turning`; append only, as `smoothing.KERNELS`.
+#: By `with_vorticity`; append only, as `smoothing.KERNELS`.
 SUMS = (add_xsph, add_vorticity)
 
 
@@ -72,30 +72,30 @@ def add_mixed_xsph(sums: qd.template(), r, square, a, b, c: Coefficients, method
 def apply_xsph(
     smoothed: Particles,
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     grid: Grid,
     c: Coefficients,
     count: qd.i32,
     method: qd.template(),
-    turning: qd.template(),
+    with_vorticity: qd.template(),
 ):
-    """Smooth the velocities (Eq. 11); where `turning`, estimate the vorticity (Eq. 9)."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            dim = qd.static(particles.v[team].n)
-            sums = qd.Matrix.zero(qd.f32, dim + turning * (2 * dim - 3), grid.lanes)
-            add_neighbors(sums, qd.static(SUMS[turning]), team, particles, particles.v, grid, c, method)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                sum = column(sums, i - team * grid.lanes)
+    """Smooth the velocities (Eq. 11); where `with_vorticity`, estimate the vorticity (Eq. 9)."""
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            dim = qd.static(particles.v[cluster].n)
+            sums = qd.Matrix.zero(qd.f32, dim + with_vorticity * (2 * dim - 3), grid.lanes)
+            add_neighbors(sums, qd.static(SUMS[with_vorticity]), cluster, particles, particles.v, grid, c, method)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                sum = column(sums, i - cluster * grid.lanes)
                 v = particles.v[i]
                 for k in qd.static(range(dim)):
                     v[k] += c.density_scale * sum[k]
                 smoothed.v[i] = v
-                if qd.static(turning):
+                if qd.static(with_vorticity):
                     if qd.static(dim == 3):
-                        scratch.omega[i] = vec3(sum[3], sum[4], sum[5])
+                        temporaries.omega[i] = vec3(sum[3], sum[4], sum[5])
                     else:
-                        scratch.omega[i] = vec3(0.0, 0.0, sum[2])
+                        temporaries.omega[i] = vec3(0.0, 0.0, sum[2])
 
 
 @qd.kernel(fastcache=True)
@@ -121,10 +121,10 @@ def apply_mixed_xsph(
     method: qd.template(),
 ):
     """Smooth the velocities (Eq. 11) of fluids of different density; `packed` holds inverse masses too."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, grid.lanes)
-            add_neighbors(sums, add_mixed_xsph, team, particles, packed, grid, c, method)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                dv = column(sums, i - team * grid.lanes)
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.v[cluster].n, grid.lanes)
+            add_neighbors(sums, add_mixed_xsph, cluster, particles, packed, grid, c, method)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                dv = column(sums, i - cluster * grid.lanes)
                 smoothed.v[i] = particles.v[i] + c.density_scale * dv

@@ -35,17 +35,19 @@ import math
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
-from wavetank.device.state import MARGIN, Coefficients, Grid, Particles, Scratch, remembered, scalars
+from wavetank.device.state import MARGIN, Coefficients, Grid, Particles, Temporaries, interned, scalars
 from wavetank.foundation.materials import Properties
 from wavetank.foundation.params import Parameters
-from wavetank.physics.boundary import is_near
+from wavetank.physics.bodies import push_back
+from wavetank.physics.broad_phase import is_marked
+from wavetank.physics.clusters import chunks, end_cluster, end_of, first_cluster
 from wavetank.physics.integrate import accelerate
 from wavetank.physics.mixture import Blend, fill_table, weigh
 from wavetank.physics.pairs import add_neighbors, column
+from wavetank.physics.plan import Plan
 from wavetank.physics.predicted_positions import predicted
-from wavetank.physics.reactions import push_back
 from wavetank.physics.smoothing import TABLE_SIZE, interpolated, rest_points
-from wavetank.physics.teams import end_of, end_team, first_team, turns
+from wavetank.physics.terms.term import Hook, Term
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3, vec4
 
@@ -192,15 +194,39 @@ def find_surface(
     count: qd.i32,
 ):
     """Find where the surface is and which way it faces: g, without what is noise."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, grid.lanes)
-            add_neighbors(sums, add_gradient, team, particles, tension, grid, c, 0)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                g = column(sums, i - team * grid.lanes)
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.x[cluster].n, grid.lanes)
+            add_neighbors(sums, add_gradient, cluster, particles, tension, grid, c, 0)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                g = column(sums, i - cluster * grid.lanes)
                 size = pull.scale * g.norm()
                 g3 = lift(g) * (pull.scale * qd.max(size - pull.quiet, 0.0) / qd.max(size, 1e-12))
                 surface[i] = vec4(g3.x, g3.y, g3.z, tension[i])
+
+
+@qd.func
+def add_adhesion(
+    force: qd.template(),
+    wetting,
+    i,
+    particles: Particles,
+    solids: SolidSet,
+    table: qd.template(),
+    c: Coefficients,
+    pull: Pull,
+):
+    """Add what solids attract particle `i` by to its `force`, `wetting` times the table; bodies feel the opposite."""
+    p = predicted(particles, i)
+    for k in range(solids.count):
+        if is_marked(particles.near[i], k, solids) == 1:
+            value = signed_distance(solids, k, lift(p))
+            if value.w < c.h:
+                n = vec3(value.x, value.y, value.z)
+                share = wetting * interpolated(table, value.w / c.h)
+                for axis in qd.static(range(p.n)):
+                    force[axis] -= share * n[axis]
+                push_back(solids, k, lift(p), -n * (share * pull.rate * c.dt))
 
 
 @qd.kernel(fastcache=True)
@@ -208,7 +234,7 @@ def attract(
     pulled: qd.types.ndarray(),
     surface: qd.types.ndarray(),
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     rows: qd.types.ndarray(),
     grid: Grid,
     solids: SolidSet,
@@ -218,25 +244,16 @@ def attract(
     count: qd.i32,
 ):
     """Find the velocities after the pull of neighbours and solids."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            sums = qd.Matrix.zero(qd.f32, particles.x[team].n, grid.lanes)
-            add_neighbors(sums, add_pull, team, particles, surface, grid, c, 0)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                p = predicted(particles, i)
-                force = column(sums, i - team * grid.lanes)
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.x[cluster].n, grid.lanes)
+            add_neighbors(sums, add_pull, cluster, particles, surface, grid, c, 0)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                force = column(sums, i - cluster * grid.lanes)
                 if particles.near[i] != 0:
                     wetting = pull.adhesion * surface[i].w * rows[particles.material[i]][3]
-                    for k in range(solids.count):
-                        if is_near(particles.near[i], k, solids) == 1:
-                            value = signed_distance(solids, k, lift(p))
-                            if value.w < c.h:
-                                n = vec3(value.x, value.y, value.z)
-                                share = wetting * interpolated(table, value.w / c.h)
-                                for axis in qd.static(range(p.n)):
-                                    force[axis] -= share * n[axis]
-                                push_back(solids, k, lift(p), -n * (share * pull.rate * c.dt))
-                v = lift(particles.v[i] + force * (pull.rate * scratch.weight[i]))
+                    add_adhesion(force, wetting, i, particles, solids, table, c, pull)
+                v = lift(particles.v[i] + force * (pull.rate * temporaries.inverse_mass[i]))
                 pulled[i] = vec4(v.x, v.y, v.z, 0.0)
 
 
@@ -254,13 +271,13 @@ def prepare_fluids(world: World, kinds: Blend, params: Parameters, dt: float) ->
     """Write what the fluids are to the device, for a step of `dt` [s]; weigh the particles where densities differ."""
     fill_table(world.fluids, kinds, limited_tensions(kinds, params.dim, params.support, params.spacing, dt))
     if kinds.mixed:
-        weigh(world.scratch, world.particles, world.fluids.rows, world.count)
+        weigh(world.temporaries, world.particles, world.fluids.rows, world.count)
     elif world.fluids.weighed:
-        world.scratch.weight.fill(1.0)
+        world.temporaries.inverse_mass.fill(1.0)
     world.fluids.weighed = bool(kinds.mixed)
 
 
-def apply_tension(world: World, kinds: Blend, params: Parameters, c: Coefficients) -> None:
+def apply_tension(world: World, plan: Plan, params: Parameters, c: Coefficients) -> None:
     """Let surfaces and solids pull the fluid for one substep."""
     particles, grid, fluids, count = world.particles, world.grid, world.fluids, world.count
     dim, ratio = params.dim, params.support
@@ -274,10 +291,13 @@ def apply_tension(world: World, kinds: Blend, params: Parameters, c: Coefficient
     flat = flat_surface(dim, ratio)
     adhesion = flat.bond * d ** (dim - 2) / ratio
     stretch = CALIBRATION[dim] * (1.0 - COHESION) * d ** (dim - 2) / flat.stress
-    c = remembered(dataclasses.replace(c, skin=stretch, cohesion=CALIBRATION[dim] * COHESION * adhesion))
-    rate = c.dt / (kinds.largest_density * d**dim)
-    pull = remembered(Pull(scale=flat.gradient_scale, quiet=flat.quiet, rate=rate, adhesion=adhesion))
+    c = interned(dataclasses.replace(c, skin=stretch, cohesion=CALIBRATION[dim] * COHESION * adhesion))
+    rate = c.dt / (plan.kinds.largest_density * d**dim)
+    pull = interned(Pull(scale=flat.gradient_scale, quiet=flat.quiet, rate=rate, adhesion=adhesion))
     find_tensions(tension, particles, fluids.rows, count)
     find_surface(surface, tension, particles, grid, c, pull, count)
-    attract(pulled, surface, particles, world.scratch, fluids.rows, grid, world.solids, table, c, pull, count)
+    attract(pulled, surface, particles, world.temporaries, fluids.rows, grid, world.solids, table, c, pull, count)
     take_pull(particles, pulled, c, count)
+
+
+TENSION = Term("surface tension", Hook.FORCES, apply_tension, lambda plan: plan.has_surface_tension)

@@ -28,8 +28,8 @@ last. A lone particle beside a paddle was accelerated by it for ever.
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles
+from wavetank.physics.clusters import chunks, end_cluster, end_of, first_cluster
 from wavetank.physics.pairs import add_kept, column
-from wavetank.physics.teams import end_of, end_team, first_team, turns
 from wavetank.solids.distance import lift, vec3
 
 STIFF = 5000.0  # largest eigenvalue from which on it is done: of what is less stiff, iterations come to all modes
@@ -112,15 +112,15 @@ def rotate_guess(
 
     Behind those stand the viscosities. Whoever has less than half of the `full` sum of weights of neighbours forgets.
     """
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            sums = qd.Matrix.zero(qd.f32, qd.static(5 if particles.v[team].n == 2 else 10), grid.lanes)
-            add_kept(sums, add_rotation, team, particles, velocities, dampers, grid, c, 0)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, qd.static(5 if particles.v[cluster].n == 2 else 10), grid.lanes)
+            add_kept(sums, add_rotation, cluster, particles, velocities, dampers, grid, c, 0)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
                 turned = particles.viscous[i]
                 own = lift(turned)
                 a = vec3(own.x, own.y, own.z)
-                found = column(sums, i - team * grid.lanes)
+                found = column(sums, i - cluster * grid.lanes)
                 half = 0.5 * c.dt * angular_velocity(found, gate)
                 a += 2.0 / (1.0 + half.norm_sqr()) * half.cross(a + half.cross(a))
                 a *= qd.min(1.0, 2.0 * trace_of(found) / qd.max(velocities[i][3] * full, 1e-20))

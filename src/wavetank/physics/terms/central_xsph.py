@@ -23,10 +23,10 @@ way back is made up for as well. With the friction alone two drops kept 73 % of 
 
 from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles
+from wavetank.physics.clusters import chunks, end_cluster, end_of, first_cluster
 from wavetank.physics.pairs import add_neighbors, column
 from wavetank.physics.smoothing import kernel
-from wavetank.physics.teams import end_of, end_team, first_team, turns
-from wavetank.physics.xsph_viscosity import share_of_pair
+from wavetank.physics.terms.xsph_viscosity import share_of_pair
 
 
 @qd.func
@@ -66,9 +66,9 @@ def apply_central_xsph(
     method: qd.template(),
 ):
     """Smooth the velocities along the lines between neighbours, and make up for the torque of the constraint."""
-    for turn in range(turns(grid, count)):
-        for team in range(first_team(turn, grid, count), end_team(turn, grid, count)):
-            sums = qd.Matrix.zero(qd.f32, particles.v[team].n, grid.lanes)
-            add_neighbors(sums, add_central_xsph, team, particles, packed, grid, c, method)
-            for i in range(team * grid.lanes, end_of(team, grid, count)):
-                smoothed.v[i] = particles.v[i] + column(sums, i - team * grid.lanes)
+    for chunk in range(chunks(grid, count)):
+        for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
+            sums = qd.Matrix.zero(qd.f32, particles.v[cluster].n, grid.lanes)
+            add_neighbors(sums, add_central_xsph, cluster, particles, packed, grid, c, method)
+            for i in range(cluster * grid.lanes, end_of(cluster, grid, count)):
+                smoothed.v[i] = particles.v[i] + column(sums, i - cluster * grid.lanes)

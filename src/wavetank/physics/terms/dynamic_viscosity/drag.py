@@ -11,14 +11,14 @@ import functools
 import numpy as np
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import Coefficients, Particles, Scratch
-from wavetank.physics.boundary import is_near
-from wavetank.physics.dynamic_viscosity.conjugate_gradients import along_walls
-from wavetank.physics.friction import surface_velocity
+from wavetank.device.state import Coefficients, Particles, Temporaries
+from wavetank.physics.bodies import add_damper, push_back
+from wavetank.physics.broad_phase import is_marked
 from wavetank.physics.integrate import free_motion
 from wavetank.physics.predicted_positions import predicted
-from wavetank.physics.reactions import add_damper, push_back
 from wavetank.physics.smoothing import TABLE_SIZE, interpolated, rest_points
+from wavetank.physics.terms.dynamic_viscosity.conjugate_gradients import along_walls
+from wavetank.physics.terms.friction import surface_velocity
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3, vec4
 
 NEAREST = 0.25  # d: closer to a wall than this its drag grows no further
@@ -78,32 +78,63 @@ def find_drag(
     """
     for i in range(count):
         own = lift(particles.v[i])
-        row = vec4(own.x, own.y, own.z, qd.min(rows[particles.material[i]][1], holding.most))
-        packed[i] = row
-        near = particles.near[i]
+        mu = qd.min(rows[particles.material[i]][1], holding.most)
+        packed[i] = vec4(own.x, own.y, own.z, mu)
         pull = vec4(0.0, 0.0, 0.0, 0.0)
         free = vec4(0.0, 0.0, 0.0, 0.0)
-        if near != 0:
-            p = lift(predicted(particles, i))
-            fast = qd.sqrt(vec3(c.gravity_x, c.gravity_y, c.gravity_z).norm() * c.h)
-            walls = 0
-            for k in range(solids.count):
-                if is_near(near, k, solids) == 1:
-                    value = signed_distance(solids, k, p)
-                    if value.w < c.h:
-                        share = interpolated(table, value.w / c.h)
-                        moving = wall_velocity(solids, k, i, p, particles, holding, c)
-                        v = moving * share
-                        pull += vec4(v.x, v.y, v.z, share)
-                        free = vec4(value.x, value.y, value.z, 0.0)
-                        if value.w < holding.touching and (own - moving).dot(vec3(value.x, value.y, value.z)) < -fast:
-                            free[3] = 1.0 / holding.no_slip
-                        walls += 1
-            if walls > 1:  # in a corner the fluid is held in every direction
-                free = vec4(0.0, 0.0, 0.0, 0.0)
-            pull *= holding.no_slip * row.w
+        if particles.near[i] != 0:
+            find_pull(pull, free, i, own, particles, solids, table, c, holding)
+            pull *= holding.no_slip * mu
         drag[i] = pull
         normal[i] = free
+
+
+@qd.func
+def find_pull(
+    pull: qd.template(),
+    free: qd.template(),
+    i,
+    own,
+    particles: Particles,
+    solids: SolidSet,
+    table: qd.template(),
+    c: Coefficients,
+    holding: Holding,
+):
+    """Find the pull (T v_w, T) of the walls on particle `i` of the velocity `own`, and the normal without any.
+
+    In a corner, at two walls, that is 0: there the fluid is held in every direction.
+    """
+    p = lift(predicted(particles, i))
+    fast = qd.sqrt(vec3(c.gravity_x, c.gravity_y, c.gravity_z).norm() * c.h)
+    walls = 0
+    for k in range(solids.count):
+        if is_marked(particles.near[i], k, solids) == 1:
+            value = signed_distance(solids, k, p)
+            if value.w < c.h:
+                share = interpolated(table, value.w / c.h)
+                moving = wall_velocity(solids, k, i, p, particles, holding, c)
+                v = moving * share
+                pull += vec4(v.x, v.y, v.z, share)
+                free = vec4(value.x, value.y, value.z, 0.0)
+                if value.w < holding.touching and (own - moving).dot(vec3(value.x, value.y, value.z)) < -fast:
+                    free[3] = 1.0 / holding.no_slip
+                walls += 1
+    if walls > 1:
+        free = vec4(0.0, 0.0, 0.0, 0.0)
+
+
+@qd.func
+def way_given_back(i, packed: qd.template(), normal: qd.template(), particles: Particles, c: Coefficients):
+    """Return how far [m] a stop at a solid has moved particle `i` that its new velocity takes back, if it struck."""
+    freed = vec3(0.0, 0.0, 0.0)
+    if normal[i].w > 0.0:
+        v = particles.v[i]
+        for axis in qd.static(range(v.n)):
+            v[axis] = packed[i][axis]
+        freed = lift(free_motion(particles.x[i], v, c) - predicted(particles, i))
+        freed -= lift(v - particles.v[i]) * c.dt
+    return freed
 
 
 @qd.kernel(fastcache=True)
@@ -111,7 +142,7 @@ def drag_bodies(
     packed: qd.types.ndarray(),
     normal: qd.types.ndarray(),
     particles: Particles,
-    scratch: Scratch,
+    temporaries: Temporaries,
     solids: SolidSet,
     table: qd.types.ndarray(),
     c: Coefficients,
@@ -128,22 +159,16 @@ def drag_bodies(
     for i in range(count):
         near = particles.near[i]
         if near >> solids.tank_count != 0 and particles.frozen[i] == 0:
-            p = lift(predicted(particles, i))
-            own = vec3(packed[i].x, packed[i].y, packed[i].z)
             mu = holding.no_slip * packed[i].w
             for k in range(solids.tank_count, solids.count):
-                if solids.unit[k] > 0.0 and is_near(near, k, solids) == 1:
+                if solids.unit[k] > 0.0 and is_marked(near, k, solids) == 1:
+                    p = lift(predicted(particles, i))
                     value = signed_distance(solids, k, p)
                     if value.w < c.h:
                         share = mu * interpolated(table, value.w / c.h)
                         moving = wall_velocity(solids, k, i, p, particles, holding, c)
-                        pull = along_walls((moving - own) * share, normal[i])
-                        push_back(solids, k, p, pull * (rate * c.dt))
+                        own = vec3(packed[i].x, packed[i].y, packed[i].z)
+                        push_back(solids, k, p, along_walls((moving - own) * share, normal[i]) * (rate * c.dt))
                         add_damper(solids, k, share * per_damper)
-                        if normal[i].w > 0.0:
-                            v = particles.v[i]
-                            for axis in qd.static(range(v.n)):
-                                v[axis] = packed[i][axis]
-                            freed = lift(free_motion(particles.x[i], v, c) - predicted(particles, i))
-                            freed -= lift(v - particles.v[i]) * c.dt
-                            push_back(solids, k, p, freed / scratch.weight[i])
+                        freed = way_given_back(i, packed, normal, particles, c)
+                        push_back(solids, k, p, freed / temporaries.inverse_mass[i])
