@@ -33,7 +33,7 @@ def launches(sim: Simulation) -> list[Callable[[], object]]:
         lambda: population.copy_chosen(world.spare, water, world.grid, 0),
         lambda: population.dye_particles(water, capsule, 0, 0),
         lambda: population.freeze_particles(water, capsule, 0, 0),
-        lambda: population.hold_frozen(water, 0),
-        lambda: population.stop_frozen(water, 0),
+        lambda: population.hold_ice(water, 0),
+        lambda: population.stop_ice(water, 0),
         sim.load_kernels,
     ]
