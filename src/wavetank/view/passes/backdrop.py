@@ -9,7 +9,7 @@ import dataclasses
 from typing import Final
 
 from wavetank.device.compiler import lanes, qd
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.view.buffers import Buffers, Light, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_view, vec2, vec3, vector, view_ray
 from wavetank.view.look import Look
@@ -79,7 +79,7 @@ def features_of(shot: Shot, buffers: Buffers) -> BackdropFeatures:
     """Return what the backdrop of a picture has."""
     in_space, across = shot.frame.dim == 3, buffers.columns // buffers.supersample
     together = lanes() if in_space else 1
-    return remembered(
+    return interned(
         BackdropFeatures(
             sunlit=in_space,
             tinted=water_of(buffers, shot).sun_thickness.fluids > 0 or shot.dyed,

@@ -16,7 +16,7 @@ outline that stands before it.
 """
 
 from wavetank.device.compiler import qd
-from wavetank.device.state import remembered
+from wavetank.device.state import interned
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, vec4, vector, view_ray
 from wavetank.view.look import Look
@@ -97,7 +97,7 @@ def features_of(shot: Shot, thickness: Thickness, samples: int) -> WaterFeatures
     """Return what the water of a picture has; in the open it is not a volume, and rays meet no solids in it."""
     frame, planar = shot.frame, shot.frame.dim == 2
     volume = not planar and frame.scene.tank is not None
-    return remembered(
+    return interned(
         WaterFeatures(
             planar=planar,
             volume=volume,
