@@ -1,5 +1,6 @@
 """The experiments of `wavetank validate`: what they measure with, and the quick ones against their bounds."""
 
+import datetime
 import json
 import math
 import sys
@@ -218,17 +219,22 @@ def test_command(value, code, monkeypatch, capsys, tmp_path):
     assert (tmp_path / "invented" / "invented.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_known_failures_have_a_date_and_a_reason():
+    for name, entry in KNOWN.items():
+        assert datetime.date.fromisoformat(entry.since) and len(entry.why) > 20, name
+
+
 @pytest.mark.parametrize(
     ("value", "quick", "said"),
     [
-        (1.5, True, "bounds, all of them known: invented: depth (known: the floor is young)"),
+        (1.5, True, "bounds, all of them known: invented: depth (known: the floor is young, since 2026-11-24)"),
         (3.0, True, "bounds: invented: depth."),  # worse than what is known
         (1.5, False, "bounds: invented: depth."),
     ],
 )
 def test_quick_runs_say_which_failures_are_known(value, quick, said, monkeypatch, capsys):
     monkeypatch.setattr(room, "CASES", (invented(value),))
-    monkeypatch.setitem(KNOWN, "invented: depth", Known(0.0, 2.0, "the floor is young"))
+    monkeypatch.setitem(KNOWN, "invented: depth", Known(0.0, 2.0, "2026-11-24", "the floor is young"))
     monkeypatch.setattr(sys, "argv", ["wavetank", "validate", *(["--quick"] if quick else [])])
     with pytest.raises(SystemExit) as leave:
         cli.main()
