@@ -12,7 +12,7 @@ from wavetank.view.lens import Lens, basis, lens_at, ray_direction, vec2, vec3, 
 from wavetank.view.optics.normals import normal_of, rise_at, unevenness
 from wavetank.view.optics.rays import OPEN, box
 from wavetank.view.optics.rays import Box as Walls
-from wavetank.view.optics.water_volume import crossed_about, solid_ahead
+from wavetank.view.optics.water_volume import refract_out_blurred, solid_ahead
 from wavetank.view.renderer import Renderer
 
 D = 0.05
@@ -133,7 +133,7 @@ def test_pixels_that_share_a_bent_ray_are_other_pairs_in_every_second_sample():
 def cross_all(found: qd.types.ndarray(), angles: qd.types.ndarray(), spread: qd.f32, count: qd.i32):
     for k in range(count):
         up = vec3(0.0, 1.0, 0.0)
-        found[k] = crossed_about(vec3(qd.sin(angles[k]), qd.cos(angles[k]), 0.0), up, spread)
+        found[k] = refract_out_blurred(vec3(qd.sin(angles[k]), qd.cos(angles[k]), 0.0), up, spread)
 
 
 def crossing(angles, spread):

@@ -85,7 +85,7 @@ def test_the_inside_of_a_tank_is_left_out_and_its_skin_is_not(make_frame):
 
 def see_all(shot, water):
     """Fill the depth and the outlines of the water, lone particles included."""
-    surface.see(shot, water.ellipsoids, shot.lens, water.surface.depth, water.surface.rim, True)
+    surface.splat_surface(shot, water.ellipsoids, shot.lens, water.surface.depth, water.surface.rim, True)
 
 
 @pytest.mark.parametrize("height", [None, 1.2])

@@ -34,7 +34,7 @@ def smoothed(field, camera=CAMERA, walls=OPEN):
     rows, columns = field.shape
     depth, spare = (qd.ndarray(qd.i32, shape=field.shape) for _ in range(2))
     depth.from_numpy(np.ascontiguousarray(field, np.float32).view(np.int32) & ~1)
-    flatten.even(depth, spare, camera.lens(columns, rows), walls, flatten.SIGMA * D, D)
+    flatten.smooth_depth(depth, spare, camera.lens(columns, rows), walls, flatten.SIGMA * D, D)
     return depth.to_numpy().view(np.float32)
 
 

@@ -24,7 +24,7 @@ from wavetank.view.images import Images
 from wavetank.view.lens import Lens, basis, lens_at, vec3, vector
 from wavetank.view.look import fluid_optics, usual_depth
 from wavetank.view.matter import may_be_dyed
-from wavetank.view.optics.dyes import ICE, lay_ice
+from wavetank.view.optics.dyes import ICE, write_ice
 from wavetank.view.optics.ray_interpolation import GROUP
 from wavetank.view.passes import tonemap
 from wavetank.view.quantities import QUANTITIES, Coloring, usual
@@ -150,9 +150,9 @@ class Renderer:
         if self._seen is None or self._seen.shape[0] < frame.dye.shape[0]:
             self._seen = qd.ndarray(qd.i32, shape=(frame.dye.shape[0],))
         if style.kind.name == "water":
-            lay_ice(frame.material, frame.frozen, self._seen, len(frame.scene.palette()), frame.count)
+            write_ice(frame.material, frame.frozen, self._seen, len(frame.scene.palette()), frame.count)
             return dataclasses.replace(frame, material=self._seen)
-        lay_ice(frame.dye, frame.frozen, self._seen, ICE, frame.count)
+        write_ice(frame.dye, frame.frozen, self._seen, ICE, frame.count)
         return dataclasses.replace(frame, dye=self._seen)
 
     def _begin(self, style: Style, shot: Shot, timings: Timings) -> int:

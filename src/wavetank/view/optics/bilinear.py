@@ -42,7 +42,7 @@ def map_at(map: qd.template(), place, nothing):
 
 
 @qd.func
-def picture_at(picture: qd.template(), place):
+def sample_picture(picture: qd.template(), place):
     """Radiance at a place (column, row), between the four nearest pixels."""
     return map_at(picture, place, vec3(0.0, 0.0, 0.0))
 

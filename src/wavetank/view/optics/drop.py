@@ -17,7 +17,7 @@ from wavetank.view.buffers import Pixels
 from wavetank.view.cells import Cells
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec2, vec3, vec4, view_ray
 from wavetank.view.look import Look
-from wavetank.view.optics.bilinear import margins_inside, picture_at
+from wavetank.view.optics.bilinear import margins_inside, sample_picture
 from wavetank.view.optics.dyes import dyed, swallowed_by
 from wavetank.view.optics.fluid import Optics, dimmed, refracted
 from wavetank.view.optics.hash_noise import bits_of, share_of_bits
@@ -98,7 +98,7 @@ def behind_drop(
         if inside > 0.0:
             i, j = qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)
             if qd.bit_cast(qd.min(first[i, j], solid[i, j]), qd.f32) > z:
-                result += smoothstep(inside) * (picture_at(picture, there) - result)
+                result += smoothstep(inside) * (sample_picture(picture, there) - result)
     return result
 
 

@@ -19,7 +19,9 @@ ICE = 127 << 24 | 0xEAF4FB  # what ice is dyed with
 
 
 @qd.kernel(fastcache=True)
-def lay_ice(own: qd.types.ndarray(), frozen: qd.types.ndarray(), seen: qd.types.ndarray(), ice: qd.i32, count: qd.i32):
+def write_ice(
+    own: qd.types.ndarray(), frozen: qd.types.ndarray(), seen: qd.types.ndarray(), ice: qd.i32, count: qd.i32
+):
     """Write what is seen, dyes or materials: ice is `ice`, whatever its water was."""
     for i in range(count):
         seen[i] = qd.select(frozen[i] == 1, ice, own[i])

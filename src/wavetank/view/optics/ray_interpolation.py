@@ -8,7 +8,7 @@ pixel.
 
 from wavetank.device.compiler import qd
 from wavetank.view.lens import vec2, vec3, vec4
-from wavetank.view.optics.bilinear import picture_at
+from wavetank.view.optics.bilinear import sample_picture
 
 #: A ray that was traced through the water, see `trace_water_volume`, and the surface where it entered.
 TracedRay = qd.types.struct(
@@ -91,6 +91,6 @@ def radiance_between(picture: qd.template(), first, last, share):
     result = first.seen + share * (last.seen - first.seen)
     if first.place[2] > 0.0 and first.place[2] == last.place[2]:
         spot = first.place + share * (last.place - first.place)
-        shown = picture_at(picture, vec2(spot[0], spot[1]))
+        shown = sample_picture(picture, vec2(spot[0], spot[1]))
         result = vec4(shown.x, shown.y, shown.z, result[3])
     return result

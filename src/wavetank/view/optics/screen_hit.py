@@ -2,7 +2,7 @@
 
 from wavetank.device.compiler import qd
 from wavetank.view.lens import Lens, to_pixel, to_view, vec3
-from wavetank.view.optics.bilinear import corners, margins_inside, picture_at, share_of
+from wavetank.view.optics.bilinear import corners, margins_inside, sample_picture, share_of
 from wavetank.view.optics.radiance import smoothstep
 
 
@@ -41,7 +41,7 @@ def seen_at(depth: qd.template(), picture: qd.template(), lens: Lens, at, usual,
                     if shown < 0.97 * c.z:
                         share = 0.0
                 if share > 0.0:
-                    seen = picture_at(picture, there)
+                    seen = sample_picture(picture, there)
             if share > 0.0:
                 result += share * (seen - result)
                 found = vec3(there.x, there.y, share)

@@ -15,7 +15,7 @@ from wavetank.device.compiler import qd
 from wavetank.view.buffers import Pixels
 from wavetank.view.lens import Lens, ray_direction, to_pixel, to_view, vec2, vec3, view_ray
 from wavetank.view.look import Look
-from wavetank.view.optics.bilinear import picture_at, thickness_at
+from wavetank.view.optics.bilinear import sample_picture, thickness_at
 from wavetank.view.optics.drop import behind_drop
 from wavetank.view.optics.dyes import dye_in, swallowed_by
 from wavetank.view.optics.fluid import Optics, above_floor, dimmed, refracted
@@ -180,7 +180,7 @@ def refracted_backdrop(pixels: Pixels, backdrop: Backdrop, lens: Lens, exit, z, 
         r = qd.min(qd.max(qd.cast(there.y, qd.i32), 0), pixels.depth.shape[0] - 1)
         e = qd.min(qd.max(qd.cast(there.x, qd.i32), 0), pixels.depth.shape[1] - 1)
         if qd.bit_cast(pixels.depth[r, e], qd.f32) > z:
-            shown = picture_at(backdrop.behind, there)
+            shown = sample_picture(backdrop.behind, there)
     return shown
 
 

@@ -209,7 +209,7 @@ def faint():
 
 
 @qd.func
-def crossed_about(ahead, n, spread):
+def refract_out_blurred(ahead, n, spread):
     """(direction outside, share that is mirrored) of rays out of the water that spread around one of them.
 
     What Snell and Fresnel say of one is blurred where the square of the cosine outside lies near 0. By the angle it
@@ -480,7 +480,7 @@ def cross_boundary(
         ending.usual = look.below * qd.exp(-0.6 * optics.usual * optics.absorption)
     else:
         ending.goes_on = 1
-        out = crossed_about(path.ahead, piece.normal, uneven)
+        out = refract_out_blurred(path.ahead, piece.normal, uneven)
         if path.ahead.dot(piece.normal) <= 0.0:  # the normal of a bent surface, which is turned away from the ray
             out = vec4(path.ahead.x, path.ahead.y, path.ahead.z, 0.0)
         path.ahead = reflected(path.ahead, -piece.normal)

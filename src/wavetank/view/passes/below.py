@@ -17,7 +17,7 @@ from wavetank.device.compiler import qd
 from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.lens import Lens, ray_direction, ray_origin, to_pixel, to_view, vec3, view_ray
 from wavetank.view.look import Look
-from wavetank.view.optics.bilinear import margins_inside, picture_at
+from wavetank.view.optics.bilinear import margins_inside, sample_picture
 from wavetank.view.optics.fluid import Optics, dimmed, optics_of
 from wavetank.view.optics.radiance import environment, glint, smoothstep
 from wavetank.view.optics.rays import Box, box_interval
@@ -35,7 +35,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     if not under_water(shot, buffers):
         return
     water, pixels = water_of(buffers, shot), buffers.pixels
-    look_up(
+    shade_surface_from_below(
         pixels,
         water.surface,
         water.sunlit,
@@ -52,7 +52,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
 
 
 @qd.kernel(fastcache=True)
-def look_up(
+def shade_surface_from_below(
     pixels: Pixels,
     surface: WaterSurface,
     sunlit: SunlitWater,
@@ -92,7 +92,7 @@ def look_up(
                 at, ahead = origin + out * direction, direction / pace
                 n = normal_above(sun, sunlit.depth, at, optics.spacing)
                 if ahead.dot(n) > 0.0:
-                    radiance = through(pixels.depth, backdrop, lens, look, optics, at, ahead, n)
+                    radiance = radiance_through_surface(pixels.depth, backdrop, lens, look, optics, at, ahead, n)
                     pixels.color[row, column] = dimmed(
                         radiance, out * pace, optics.absorption, optics.scattering, optics.glow
                     )
@@ -100,7 +100,9 @@ def look_up(
 
 
 @qd.func
-def through(depth: qd.template(), backdrop: Backdrop, lens: Lens, look: Look, optics: Optics, at, ahead, n):
+def radiance_through_surface(
+    depth: qd.template(), backdrop: Backdrop, lens: Lens, look: Look, optics: Optics, at, ahead, n
+):
     """Radiance of the surface at `at`: what it lets in from above and mirrors from below."""
     cosi = ahead.dot(n)
     k = 1.0 - 1.7689 * (1.0 - cosi * cosi)
@@ -129,6 +131,6 @@ def through(depth: qd.template(), backdrop: Backdrop, lens: Lens, look: Look, op
             if inside > 0.0:
                 z = qd.bit_cast(depth[qd.cast(there.y, qd.i32), qd.cast(there.x, qd.i32)], qd.f32)
                 if qd.abs(z - c.z) < 0.1 * c.z:
-                    shown += smoothstep(inside) * (picture_at(backdrop.behind, there) - shown)
+                    shown += smoothstep(inside) * (sample_picture(backdrop.behind, there) - shown)
         below = dimmed(shown, more, optics.absorption, optics.scattering, optics.glow)
     return above + mirror * (below - above)

@@ -40,12 +40,12 @@ def prepare(shot: Shot, buffers: Buffers) -> None:
 
 
 def draw(shot: Shot, buffers: Buffers) -> None:
-    """Lay the cut over the picture where it is nearer than what is there."""
+    """Draw the cut over the picture where it is nearer than what is there."""
     frame, cells, (normal, offset) = shot.frame, water_of(buffers, shot).cells, shot.plane
     least = 0.22 * full_weight(cells, shot.extent.spacing, frame.dim)
     ice = ICE if frame.frozen_count else 0
     plane = interned(Plane(normal=vector(*normal), offset=offset, least=least, ice=ice))
-    lay(
+    draw_slice(
         buffers.pixels,
         frame.x,
         frame.v,
@@ -101,7 +101,7 @@ def weight_of_ice(frozen: qd.template(), cells: Cells, at, dim: qd.template()):
 
 
 @qd.kernel(fastcache=True)
-def lay(
+def draw_slice(
     pixels: Pixels,
     x: qd.types.ndarray(),
     v: qd.types.ndarray(),

@@ -39,7 +39,7 @@ TAPS = 6  # pairs of taps at most
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Window:
-    """How far and how much alike what is averaged may be, on the device."""
+    """How far and how much pair_weight what is averaged may be, on the device."""
 
     sigma: qd.f32  # m
     per_narrow: qd.f32  # 1/m
@@ -51,17 +51,17 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     """Smooth the water's depth in place; in a plane nothing looks at its shape."""
     if shot.frame.dim == 3:
         surface, d = water_of(buffers, shot).surface, shot.extent.spacing
-        even(surface.depth, surface.nearest, shot.lens, shot.walls, SIGMA * d, d)
+        smooth_depth(surface.depth, surface.nearest, shot.lens, shot.walls, SIGMA * d, d)
 
 
 def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
     """Smooth the water's depth in the sun's view, likewise."""
     if shot.frame.dim == 3:
         sunlit, d = water_of(buffers, shot).sunlit, shot.extent.spacing
-        even(sunlit.depth, sunlit.spare, shot.water_sun, shot.walls, CAUSTIC_SIGMA * d, d)
+        smooth_depth(sunlit.depth, sunlit.spare, shot.water_sun, shot.walls, CAUSTIC_SIGMA * d, d)
 
 
-def even(depth: Any, spare: Any, lens: Lens, walls: Box, sigma: float, d: float) -> None:
+def smooth_depth(depth: Any, spare: Any, lens: Lens, walls: Box, sigma: float, d: float) -> None:
     """Smooth `depth` as `lens` sees it, in place; the second round closes the gaps between the first one's taps."""
     strips = strips_of(depth)
     window = interned(Window(sigma=sigma, per_narrow=1.0 / (NARROW * d), per_slope=1.0 / (SLOPE * d), taps=TAPS))
@@ -153,7 +153,7 @@ def ratio_of(spread, step):
 
 
 @qd.func
-def alike(bend, apart, grain, window: Window):
+def pair_weight(bend, apart, grain, window: Window):
     """How much a pair of taps counts whose mean is off by `bend`, and which are that far `apart`, in q.
 
     It fades to nothing at the ends of both ranges: what moves across one must not flicker.
@@ -219,7 +219,7 @@ def blur_pixel(depth: qd.template(), lens: Lens, window: Window, row, column, do
             left = qd.bit_cast(depth[row - off * down, column - off * across], qd.f32)
             right = qd.bit_cast(depth[row + off * down, column + off * across], qd.f32)
             bend = 0.5 * (left + right) - q
-            w = gauss * alike(bend, left - right, grain, window)
+            w = gauss * pair_weight(bend, left - right, grain, window)
             total += w * bend
             weight += w
         q += (1.0 - kept / 7.0) * total / weight
@@ -291,7 +291,7 @@ def blur_together(
                         gauss *= ratio
                         ratio *= own[6, lane]
                         bend = 0.5 * (left + right) - own[0, lane]
-                        w = gauss * alike(bend, left - right, own[1, lane], window)
+                        w = gauss * pair_weight(bend, left - right, own[1, lane], window)
                         w = qd.select(qd.cast(2 * turn + k + 1, qd.f32) <= own[7, lane], w, 0.0)
                         total += w * bend
                         weight += w

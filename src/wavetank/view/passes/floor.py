@@ -13,7 +13,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     """Draw the floor where it is nearer than what is there; a 2-D world has none."""
     if shot.frame.dim == 3:
         pixels, look = buffers.pixels, shot.look
-        lay(pixels, strips_of(pixels.depth), shot.lens, look.floor, look.tile, look.paving)
+        intersect_floor(pixels, strips_of(pixels.depth), shot.lens, look.floor, look.tile, look.paving)
 
 
 @qd.func
@@ -90,7 +90,7 @@ def sand(place, grain):
 
 
 @qd.kernel(fastcache=True)
-def lay(pixels: Pixels, strips: Strips, lens: Lens, albedo: vec3, tile: qd.f32, paving: qd.template()):
+def intersect_floor(pixels: Pixels, strips: Strips, lens: Lens, albedo: vec3, tile: qd.f32, paving: qd.template()):
     """Intersect every view ray with y = 0."""
     for task in range(strips.count):
         row, first, last = strip(strips, task, pixels.depth.shape[0], pixels.depth.shape[1])

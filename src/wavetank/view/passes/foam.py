@@ -7,7 +7,7 @@ and smaller discs: none is ever large in the picture, and together they cover th
 depth to the pixels it covers, and the part of it that the sun reaches. Sums of whole numbers do not depend on the order
 of threads, and no sorting by depth is needed: what is added is all of one white stuff. The sums are kept per pixel of
 the picture, not per sample, which is enough for soft things. The same depths on a grid as coarse as the spacing give
-the froth a shape (`shape`): it is thick where it is dense, and lit as such a relief is.
+the froth a shape (`light_relief`): it is thick where it is dense, and lit as such a relief is.
 
     code      symbol   meaning                                                              unit
     tau                optical depth of what lies over a pixel, in 1/4096                   1
@@ -82,13 +82,13 @@ class Froth:
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Lay spray, foam and bubbles over the radiance in `color`, by the depth that the picture shows."""
-    lay(shot, buffers, buffers.pixels.depth, IN_FRONT, 0.0)
+    composite_foam(shot, buffers, buffers.pixels.depth, IN_FRONT, 0.0)
 
 
 def draw_over_water(shot: Shot, buffers: Buffers) -> None:
     """Do the same where the water is not part of the picture's depth but lies in front of it."""
     if shot.frame.foam_count > 0:
-        lay(shot, buffers, water_of(buffers, shot).surface.nearest, 0.25 * shot.extent.spacing, shot.shutter)
+        composite_foam(shot, buffers, water_of(buffers, shot).surface.nearest, 0.25 * shot.extent.spacing, shot.shutter)
 
 
 def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
@@ -96,10 +96,10 @@ def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
     frame, strength = shot.frame, float(shot.look.caustic)
     if frame.dim == 3 and frame.diffuse is not None and frame.foam_count > 0 and strength > 0.0:
         sunlit, d = water_of(buffers, shot).sunlit, shot.extent.spacing
-        take(sunlit, frame.diffuse, shot.water_sun, SIZE[3] * d, strength, frame.foam_count)
+        dim_sunlight(sunlit, frame.diffuse, shot.water_sun, SIZE[3] * d, strength, frame.foam_count)
 
 
-def lay(shot: Shot, buffers: Buffers, depth: Any, sunk: float, shutter: float) -> None:
+def composite_foam(shot: Shot, buffers: Buffers, depth: Any, sunk: float, shutter: float) -> None:
     """Lay spray, foam and bubbles over whatever lies at `depth`; solids hide what is `sunk` [m] behind them.
 
     What moves is smeared as by a `shutter` that is open for so long [s], or by half a frame where that is closed.
@@ -124,7 +124,7 @@ def lay(shot: Shot, buffers: Buffers, depth: Any, sunk: float, shutter: float) -
         frame.dim,
         frame.foam_count,
     )
-    shape(maps, shot.lens, shot.look, rows, columns, frame.dim)
+    light_relief(maps, shot.lens, shot.look, rows, columns, frame.dim)
     blend(pixels, maps, depth, strips_of(maps.sums), froth)
 
 
@@ -171,7 +171,7 @@ def size_and_strength(kind, share, number):
 
 
 @qd.kernel(fastcache=True)
-def take(sunlit: SunlitWater, diffuse: Diffuse, sun: Lens, size: qd.f32, caustic: qd.f32, count: qd.i32):
+def dim_sunlight(sunlit: SunlitWater, diffuse: Diffuse, sun: Lens, size: qd.f32, caustic: qd.f32, count: qd.i32):
     """Spread every particle's optical depth over the texels of the sun's view around it, as smooth as a spline, and
     take from the light that gathers there, as it is shown with the strength `caustic`, what so much froth keeps.
 
@@ -371,7 +371,7 @@ def height_at(maps: FoamMaps, row, column, rows, columns):
 
 
 @qd.kernel(fastcache=True)
-def shape(maps: FoamMaps, lens: Lens, look: Look, rows: qd.i32, columns: qd.i32, dim: qd.template()):
+def light_relief(maps: FoamMaps, lens: Lens, look: Look, rows: qd.i32, columns: qd.i32, dim: qd.template()):
     """Find what share of sun and sky each texel of the relief gets: more where it faces them, less in its dells."""
     for row, column in qd.ndrange(rows, columns):
         sun, sky = 1.0, 1.0

@@ -34,13 +34,13 @@ def draw_on_backdrop(shot: Shot, buffers: Buffers) -> None:
 def fill(shot: Shot, buffers: Buffers, light: Light) -> None:
     """Fill the second component of `light`."""
     reach = max(5.0 * shot.radius, 0.05 * shot.extent.radius)
-    look_around(
+    gather_occlusion(
         light, buffers.pixels, strips_of(light.share), shot.lens, shot.box, reach, shot.look.shade_depth, buffers.probes
     )
 
 
 @qd.kernel(fastcache=True)
-def look_around(
+def gather_occlusion(
     light: Light,
     pixels: Pixels,
     strips: Strips,

@@ -32,7 +32,7 @@ def draw_on_backdrop(shot: Shot, buffers: Buffers) -> None:
 def fill(shot: Shot, buffers: Buffers, light: Light) -> None:
     """Fill the first component of `light` from the sun's depth map; a 2-D world has no shadows."""
     if shot.frame.dim == 2:
-        shine(light)
+        fill_full_sun(light)
     else:
         look = shot.look
         receive(
@@ -50,7 +50,7 @@ def fill(shot: Shot, buffers: Buffers, light: Light) -> None:
 
 
 @qd.kernel(fastcache=True)
-def shine(light: Light):
+def fill_full_sun(light: Light):
     """Full sun everywhere."""
     for row, column in qd.ndrange(light.share.shape[0], light.share.shape[1]):
         light.share[row, column] = vec2(1.0, 1.0)

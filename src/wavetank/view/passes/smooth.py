@@ -10,16 +10,16 @@ from wavetank.view.water_buffers import water_of
 
 def draw(shot: Shot, buffers: Buffers) -> None:
     """Average the light on every pixel in place."""
-    even(shot, buffers, buffers.with_light())
+    smooth_light(shot, buffers, buffers.with_light())
 
 
 def draw_on_backdrop(shot: Shot, buffers: Buffers) -> None:
     """Average the light on what is not water; in a 2-D world it is even."""
     if shot.frame.dim == 3:
-        even(shot, buffers, water_of(buffers, shot).light)
+        smooth_light(shot, buffers, water_of(buffers, shot).light)
 
 
-def even(shot: Shot, buffers: Buffers, light: Light) -> None:
+def smooth_light(shot: Shot, buffers: Buffers, light: Light) -> None:
     """Average `light` in place."""
     strips = strips_of(light.share)
     average(light.rough, light.share, buffers.pixels, strips, shot.lens, shot.radius, 0, 1, light.step)

@@ -58,7 +58,7 @@ def draw_glass(shot: Shot, buffers: Buffers) -> None:
     is_glass = finishes_of(shot) == FINISHES.index("glass")
     if shot.frame.dim == 3 and is_glass.any():
         paints = np.where(is_glass[:, None], traced_colors(shot), np.float32(-1.0))
-        lay_glass(
+        composite_glass(
             buffers.pixels,
             water_of(buffers, shot).surface.nearest,
             buffers.solid_box,
@@ -234,7 +234,7 @@ def trace(
 
 
 @qd.kernel(fastcache=True)
-def lay_glass(
+def composite_glass(
     pixels: Pixels,
     nearest: qd.types.ndarray(),
     box: qd.types.ndarray(),

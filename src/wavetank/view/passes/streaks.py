@@ -42,8 +42,8 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         return
     drops, optics = water.drops(frame), optics_of(shot, buffers.supersample)
     motion = motion_of(shot.shutter, buffers.supersample)
-    bound(seen, sums, drops, water.cells, shot.lens, optics, motion, frame.count)
-    lay(
+    find_box(seen, sums, drops, water.cells, shot.lens, optics, motion, frame.count)
+    composite_streaks(
         buffers.pixels,
         sums,
         water.surface,
@@ -73,7 +73,7 @@ def share_before(x):
 
 
 @qd.kernel(fastcache=True)
-def bound(
+def find_box(
     seen: qd.types.ndarray(),
     sums: FoamMaps,
     drops: Drops,
@@ -119,7 +119,7 @@ def strip_seen(strips: Strips, task, seen: qd.template(), rows, columns):
 
 
 @qd.kernel(fastcache=True)
-def lay(
+def composite_streaks(
     pixels: Pixels,
     sums: FoamMaps,
     surface: WaterSurface,
@@ -149,9 +149,11 @@ def lay(
                 for k in range(6):
                     drop = drop_of(drops, cells, a, k, optics.spacing, motion[0], motion[1])
                     if k == 0:  # what it is torn into shows the same
-                        low, mid, high = lines(pixels, surface, drops, cells, lens, look, optics, a, drop, way)
+                        low, mid, high = radiance_lines(pixels, surface, drops, cells, lens, look, optics, a, drop, way)
                     if drop[3] > 0.0:
-                        add(pixels, sums, surface, drops, cells, lens, look, optics, a, drop, way, low, mid, high)
+                        add_streak(
+                            pixels, sums, surface, drops, cells, lens, look, optics, a, drop, way, low, mid, high
+                        )
     for task in range(strips.count):
         row, first, last = strip_seen(strips, task, seen, rows, columns)
         for column in range(first, last):
@@ -166,7 +168,7 @@ def lay(
 
 
 @qd.func
-def between(row, samples, middle, along, wide, left, right):
+def columns_near(row, samples, middle, along, wide, left, right):
     """First and last pixel of a row that lie within `wide` of the line through `middle` `along` the way."""
     begin, end = left, right
     if qd.abs(along.y) > 0.1:
@@ -178,7 +180,7 @@ def between(row, samples, middle, along, wide, left, right):
 
 
 @qd.func
-def lines(
+def radiance_lines(
     pixels: Pixels,
     surface: WaterSurface,
     drops: Drops,
@@ -215,7 +217,7 @@ def lines(
 
 
 @qd.func
-def add(
+def add_streak(
     pixels: Pixels,
     sums: FoamMaps,
     surface: WaterSurface,
@@ -231,7 +233,7 @@ def add(
     mid,
     high,
 ):
-    """Add a drop to the pixels of the picture that it passes; `low`, `mid` and `high` are what `lines` found."""
+    """Add a drop to the pixels of the picture that it passes; `low`, `mid`, `high` are what `radiance_lines` found."""
     c, r, samples = to_view(lens, vec3(drop[0], drop[1], drop[2])), drop[3], optics.samples
     if c.z > lens.near + 2.0 * r:
         scale = pixels_per_metre(lens, c.z)  # computed pixels per metre
@@ -250,7 +252,7 @@ def add(
         )
         rough, flat = rough_of(wide / samples), long > 0.4 * wide
         for row in range(top, bottom + 1):
-            begin, end = between(row, samples, middle, along, wide + samples, left, right)
+            begin, end = columns_near(row, samples, middle, along, wide + samples, left, right)
             for column in range(begin, end + 1):
                 place = (vec2(column, row) + 0.5) * samples
                 off = place - middle

@@ -57,17 +57,19 @@ def draw(shot: Shot, buffers: Buffers) -> None:
     water = water_of(buffers, shot)
     if shot.hasty:
         water.surface.rim.fill(0)
-    see(shot, water.ellipsoids, shot.lens, water.surface.depth, None if shot.hasty else water.surface.rim, False)
+    splat_surface(
+        shot, water.ellipsoids, shot.lens, water.surface.depth, None if shot.hasty else water.surface.rim, False
+    )
 
 
 def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
     """Fill the depth at which the sun's rays meet the water, likewise."""
     if shot.frame.dim == 3:
         water = water_of(buffers, shot)
-        see(shot, water.ellipsoids, shot.water_sun, water.sunlit.depth, None, False)
+        splat_surface(shot, water.ellipsoids, shot.water_sun, water.sunlit.depth, None, False)
 
 
-def see(shot: Shot, ellipsoids: Ellipsoids, lens: Lens, depth: Any, rim: Any, lone: bool) -> None:
+def splat_surface(shot: Shot, ellipsoids: Ellipsoids, lens: Lens, depth: Any, rim: Any, lone: bool) -> None:
     """Fill `depth` with the water as `lens` sees it, and `rim`, if any, with what its outlines cover in part.
 
     Without `lone` particles these are left to the drops.
