@@ -1,12 +1,13 @@
 """Ten frames of a world that has everything a frame can hold; counts change from one to the next."""
 
+import dataclasses
 import functools
 
 import numpy as np
 
 import wavetank as wt
 from wavetank.foundation.materials import Material
-from wavetank.simulation.instant import Instant
+from wavetank.simulation.state import State
 
 FRAMES = 10
 FPS = 25.0
@@ -35,11 +36,11 @@ def world() -> wt.Scene:
 
 
 @functools.cache
-def instants() -> tuple[Instant, ...]:
+def instants() -> tuple[State, ...]:
     """The frames; the foam is made up, as is a dye."""
     sim, random, found = wt.Simulation(world()), np.random.default_rng(1), []
     for number in range(FRAMES):
-        frame = Instant.of(sim.frame())
+        frame = sim.frame().state()
         count = 3 * number
         foam = {
             "foam_ids": np.arange(count, dtype=np.int32) + 7,
@@ -51,6 +52,6 @@ def instants() -> tuple[Instant, ...]:
         }
         dyes = frame.dyes.copy()
         dyes[:5] = 127 << 24 | 0xFF0000
-        found.append(Instant(**{**vars(frame), **foam, "dyes": dyes}))
+        found.append(dataclasses.replace(frame, arrays=frame.arrays | foam | {"dye": dyes}))
         sim.advance(1.0 / FPS)
     return tuple(found)

@@ -168,7 +168,6 @@ MOST_BRANCHES = 20
 MOST_LEVELS = 5
 #: Functions that are still above; the list only gets shorter.
 TANGLED: set[str] = {
-    "simulation/saved.py:_checked_arrays",
     "solids/meshes/grid.py:nearest_triangles",
     "solids/meshes/grid.py:part_faces",
     "solids/motion.py:_check",

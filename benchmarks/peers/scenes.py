@@ -25,9 +25,10 @@ from wavetank.foundation.rotations import inverse, product, turned
 from wavetank.lab.bench.machine import cores, load, machine
 from wavetank.lab.plots import BLUE, RED, pyplot, tidy
 from wavetank.scene.scene import Scene
-from wavetank.simulation.instant import Instant, Standing
-from wavetank.simulation.shown import Shown
+from wavetank.simulation.frame import FrameBuffer
+from wavetank.simulation.instant import PlacedSolid
 from wavetank.simulation.simulation import Simulation
+from wavetank.simulation.state import State
 
 #: A dam, two that meet around a light ball, two fluids, a motor, and one that buckles.
 SCENES = (
@@ -49,7 +50,7 @@ Say = Callable[[str], None]
 class Watched:
     """One run: an instant every `EVERY` seconds, and what it took."""
 
-    instants: list[Instant]
+    instants: list[State]
     wall: float  # s
 
     @property
@@ -109,16 +110,16 @@ def watch(scene: Scene, seconds: float) -> Watched:
     sim = Simulation(scene)
     sim.step()
     sim.reset()
-    instants, wall = [Instant.of(sim.frame())], 0.0
+    instants, wall = [sim.frame().state()], 0.0
     for number in range(1, round(seconds / EVERY) + 1):
         began = time.perf_counter()
-        sim.advance(number * EVERY - sim.time - sim.ledger.owed)
+        sim.advance(number * EVERY - sim.time - sim.counters.pending_time)
         wall += time.perf_counter() - began
-        instants.append(Instant.of(sim.frame()))
+        instants.append(sim.frame().state())
     return Watched(instants, wall)
 
 
-def instants_of(kept: Any, scene: Scene, start: Instant, bodies: dict[str, int]) -> list[Instant]:
+def instants_of(kept: Any, scene: Scene, start: State, bodies: dict[str, int]) -> list[State]:
     """Return what was kept of their run as instants of the scene that was imported.
 
     Its solids are moved from where they are at the `start` as theirs move; `bodies` are their numbers by our names.
@@ -138,9 +139,9 @@ def instants_of(kept: Any, scene: Scene, start: Instant, bodies: dict[str, int])
         before, now = kept["bodies"][0], kept["bodies"][number]
         standing = tuple(
             _moved(one, before[bodies[one.name]], now[bodies[one.name]]) if one.name in bodies else one
-            for one in start.standing
+            for one in start.placed
         )
-        instants.append(Instant.read(scene, number, float(at), arrays, standing))
+        instants.append(State.read(scene, number, float(at), arrays, standing))
     return instants
 
 
@@ -150,7 +151,7 @@ def _numbers(file: Path) -> dict[str, int]:
     return {f"body {row.get('id', number + 1)}": number for number, row in enumerate(rows)}
 
 
-def _moved(standing: Standing, before: np.ndarray, now: np.ndarray) -> Standing:
+def _moved(standing: PlacedSolid, before: np.ndarray, now: np.ndarray) -> PlacedSolid:
     """Return a solid that was with a body of theirs `before` where this is `now`: place, quaternion (x, y, z, w)."""
     (old, old_turn), (new, new_turn) = ((pose[:3], np.roll(pose[3:], 1)) for pose in (before, now))
     turn = product(new_turn, inverse(old_turn))
@@ -187,7 +188,7 @@ def draw(result: dict[str, Any], scene: Scene, ours: Watched, theirs: Watched, p
     plt = pyplot()
     plot = plt.figure(figsize=(15, 6.4), layout="constrained")
     grid = plot.add_gridspec(2, len(SHOWN) + 1, width_ratios=[*[1.0] * len(SHOWN), 1.15])
-    shown = Shown(scene)
+    shown = FrameBuffer(scene)
     fast = max(float(np.linalg.norm(one.velocities, axis=1).max(initial=0.1)) for one in ours.instants)
     look: dict[str, Any] = {"view": "particles", "color_by": "material"}
     if len({kind for one in ours.instants for kind in np.unique(one.materials)}) == 1:

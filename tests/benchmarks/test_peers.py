@@ -240,7 +240,7 @@ def test_their_bodies_turn_ours(their_scene):
     from wavetank.foundation.rotations import turned
 
     scene = load_splishsplash(their_scene / "Falls.json").scene
-    standing = scenes.watch(scene, 0.05).instants[0].standing[0]
+    standing = scenes.watch(scene, 0.05).instants[0].placed[0]
     start, end = np.array([1, 0.3, 1, 0, 0, 0, 1.0]), np.array([1, 0.8, 1, 0, 0.5**0.5, 0, 0.5**0.5])
     moved = scenes._moved(standing, start, end)
     assert moved.position - standing.position == pytest.approx([0, 0.5, 0])

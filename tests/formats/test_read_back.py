@@ -16,7 +16,7 @@ from wavetank.formats.plan import Plan, Shapes, Viewpoint
 from wavetank.formats.surface import surfaces_of
 from wavetank.foundation.rotations import turned
 from wavetank.run.outputs import Outputs
-from wavetank.simulation.instant import FOAM, PARTS, WATER, colors_of
+from wavetank.simulation.instant import FOAM, PARTICLES, PARTS
 
 VIEW = Viewpoint((2.0, 1.0, 2.0), (0.6, 0.3, 0.3), 0.6)
 NAMES = ("usd", "vtkhdf", "vtp", "h5", "npz", "ply")
@@ -37,7 +37,7 @@ def folder(tmp_path_factory):
 def placed(instant):
     """The vertices of all solids in the world."""
     shapes = Shapes(instant.scene)
-    shapes.learn(instant.standing)
+    shapes.learn(instant.placed)
     return np.concatenate([points for _, points, _ in shapes.placed(instant)])
 
 
@@ -47,11 +47,11 @@ def test_npz_and_hdf5_bring_everything_back(folder):
     for number, (instant, other) in enumerate(zip(instants(), from_hdf5, strict=True)):
         for back in (other, npz.read(folder / f"w-{number:05d}.npz", world())):
             assert (back.time, back.number) == (instant.time, instant.number)
-            for name in (*WATER, *FOAM):
+            for name in (field.name for field in (*PARTICLES, *FOAM)):
                 assert (getattr(back, name) == getattr(instant, name)).all(), name
                 assert getattr(back, name).dtype == getattr(instant, name).dtype
-            assert [one.name for one in back.standing] == ["crate 1", "solid 1"]
-            for one, same in zip(instant.standing, back.standing, strict=True):
+            assert [one.name for one in back.placed] == ["crate 1", "solid 1"]
+            for one, same in zip(instant.placed, back.placed, strict=True):
                 for name in ("position", "rotation", "velocity", "angular_velocity"):
                     assert (getattr(one, name) == getattr(same, name)).all()
         for surface, same in zip(surfaces_of(instant), other.surfaces, strict=True):
@@ -94,14 +94,14 @@ def test_usd_brings_everything_back(folder):
         assert (value(water, "primvars:id", number) == instant.ids).all()
         colors = value(water, "primvars:displayColor", number)
         back = np.where(colors <= 0.0031308, colors * 12.92, 1.055 * np.maximum(colors, 1e-9) ** (1 / 2.4) - 0.055)
-        np.testing.assert_allclose(255.0 * back, colors_of(instant), atol=0.01)
+        np.testing.assert_allclose(255.0 * back, instant.colors, atol=0.01)
         assert value("/World", "wavetank:time", number) == instant.time
         for name, kind in (("spray", 1), ("foam", 2), ("bubbles", 3)):
             own = instant.foam_kinds == kind
             points = value(f"/World/foam/{name}", "points", number).reshape(-1, 3)
             np.testing.assert_allclose(points, instant.foam_positions[own], atol=1e-6)
             assert (value(f"/World/foam/{name}", "ids", number) == instant.foam_ids[own]).all()
-        for one, name in zip(instant.standing, ("crate_1", "solid_1"), strict=True):
+        for one, name in zip(instant.placed, ("crate_1", "solid_1"), strict=True):
             prim = stage.GetPrimAtPath(f"/World/solids/{name}")
             matrix = np.array(cache.GetLocalToWorldTransform(prim))
             points = np.array(UsdGeom.Mesh(prim).GetPointsAttr().Get(number))
@@ -156,7 +156,7 @@ def check_piece(part, instant, poly):
         assert (back["id"] == instant.ids).all()
         assert (back["density"] == instant.densities).all()
         assert (back["material"] == instant.materials).all()
-        assert (back["color"] == colors_of(instant)).all()
+        assert (back["color"] == instant.colors).all()
         assert poly.GetNumberOfVerts() == instant.count
     elif part == "foam":
         np.testing.assert_allclose(back["points"], instant.foam_positions, atol=1e-6)
@@ -207,12 +207,12 @@ def test_trimesh_reads_the_ply_files(folder):
         np.testing.assert_allclose(cloud.vertices, instant.positions, atol=1e-6)
         data = cloud.metadata["_ply_raw"]["vertex"]["data"]
         assert (data["id"] == instant.ids).all()
-        assert (np.stack([data[name] for name in ("red", "green", "blue")], axis=1) == colors_of(instant)).all()
+        assert (np.stack([data[name] for name in ("red", "green", "blue")], axis=1) == instant.colors).all()
         mesh = trimesh.load(folder / f"w-surface-{number:05d}.ply", process=False)
         assert mesh.is_watertight
         assert len(mesh.faces) == sum(len(s.triangles) for s in surfaces_of(instant))
         assert (
-            f"comment solid solid_1 {instant.standing[1].position[0]:.9g}".encode()
+            f"comment solid solid_1 {instant.placed[1].position[0]:.9g}".encode()
             in (folder / f"w-{number:05d}.ply").read_bytes()
         )
 

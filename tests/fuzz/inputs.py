@@ -22,7 +22,7 @@ from wavetank.scene.scene import bundled_levels, bundled_scenes
 from wavetank.session.commands import COMMANDS
 from wavetank.session.recording import Recording, replay
 from wavetank.session.session import Session
-from wavetank.simulation.saved import Header, sealed
+from wavetank.simulation.state_file import Header, sealed
 
 MOST = 3000  # particles of a world that is tried
 RICH = (

@@ -26,7 +26,7 @@ import wavetank as wt
 from wavetank.page.viewers import Viewer, Viewers, _table
 from wavetank.session.recording import Recording, replay
 from wavetank.session.session import Session
-from wavetank.simulation.saved import sealed
+from wavetank.simulation.state_file import sealed
 
 
 def started(text: str) -> wt.Simulation:

@@ -35,7 +35,7 @@ def blob(dim: int, side: int, seed: int = 0) -> Simulation:
 
 def search(sim: Simulation) -> None:
     """Predict nothing and find neighbours where the particles are."""
-    sim._outdated = True
+    sim.particles.outdated = True
     sim.frame()
 
 

@@ -14,7 +14,7 @@ from wavetank.physics.integrate import reset_predictions
 from wavetank.physics.neighbors import new_grid
 from wavetank.physics.pairs import count_neighbors
 from wavetank.physics.sorting import reorder
-from wavetank.simulation import arrays
+from wavetank.simulation import particles as particle_arrays
 from wavetank.simulation.simulation import Simulation
 
 
@@ -107,7 +107,7 @@ def test_same_as_a_tree_for_any_cloud(seed, count, dim, extent):
 
 def test_a_crowd_larger_than_its_list_is_listed_completely(monkeypatch):
     """600 particles in one place: every one has 599 neighbours, far beyond the room of a list at the start."""
-    monkeypatch.setattr(arrays, "CROWD", 600)
+    monkeypatch.setattr(particle_arrays, "CROWD", 600)
     x = np.random.default_rng(0).normal(0, 1e-3, (600, 3)).astype(np.float32)
     sim = Simulation(wt.Scene(spacing=0.1, fluids=[wt.Points(positions=x)]))
     assert all(len(found) == 599 for found in neighbor_sets(sim))
@@ -149,7 +149,7 @@ def test_more_lists_than_an_array_can_hold_are_refused():
 
 
 def test_a_list_that_would_grow_too_long_is_refused_and_kept(monkeypatch):
-    monkeypatch.setattr(arrays, "CROWD", 400)
+    monkeypatch.setattr(particle_arrays, "CROWD", 400)
     sim = Simulation(wt.Scene(spacing=0.1, fluids=[wt.Points(positions=np.zeros((400, 2)))], gravity=(0.0, 0.0)))
     room = sim.world.grid.room
     monkeypatch.setattr(neighbors, "MAX_ENTRIES", 50 * room)

@@ -14,8 +14,8 @@ from wavetank.run.archived import film_archived, frame_at, scene_path
 from wavetank.run.options import RunOptions
 from wavetank.run.record import record
 from wavetank.run.still import render_still
-from wavetank.simulation.instant import FOAM, WATER
-from wavetank.simulation.shown import Shown
+from wavetank.simulation.frame import FrameBuffer
+from wavetank.simulation.instant import FOAM, PARTICLES
 from wavetank.view.renderer import Renderer
 
 SCENE = """
@@ -41,7 +41,7 @@ def frames():
     """What the run saw: arrays and pictures."""
     sim, renderer, found = wt.Simulation(wt.Scene.from_text(SCENE)), Renderer(96, 64), []
     for frame in sim.frames(SECONDS, FPS):
-        arrays = {name: getattr(frame, name).copy() for name in (*WATER, *FOAM)}
+        arrays = {field.name: getattr(frame, field.name).copy() for field in (*PARTICLES, *FOAM)}
         found.append((arrays, renderer.render(frame), renderer.render(frame, view="particles")))
     assert len(found[-1][0]["foam_ids"]) > 0, "there is foam to be shown"
     return found
@@ -135,9 +135,9 @@ def test_a_run_without_frames_goes_on_from_its_checkpoint(tmp_path, frames, monk
 def test_a_state_shown_is_not_the_water_it_came_from(frames):
     """Frames of fewer and of more particles in the same room."""
     scene = wt.Scene.from_text(SCENE)
-    shown = Shown(scene)
-    whole = npz.Instant.read(scene, 1, 0.1, frames[1][0], ())
-    part = npz.Instant.read(scene, 2, 0.2, {name: rows[:7] for name, rows in frames[2][0].items()}, ())
+    shown = FrameBuffer(scene)
+    whole = npz.State.read(scene, 1, 0.1, frames[1][0], ())
+    part = npz.State.read(scene, 2, 0.2, {name: rows[:7] for name, rows in frames[2][0].items()}, ())
     for instant in (part, whole, part):
         frame = shown.frame(instant)
         assert frame.count == instant.count and frame.foam_count == len(instant.foam_ids)

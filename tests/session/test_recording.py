@@ -20,7 +20,7 @@ from wavetank.session.commands import COMMANDS, command_of, table_of
 from wavetank.session.history import History
 from wavetank.session.recording import Recording, replay
 from wavetank.session.session import Session
-from wavetank.simulation.snapshot import Packed
+from wavetank.simulation.state import PackedState
 
 RAY = {"origin": (0.3, 0.2, 5.0), "direction": (0.0, 0.0, -1.0)}
 EXAMPLES = [
@@ -239,14 +239,14 @@ def test_rewind_brings_the_same_water_back():
 
 def test_the_past_fits_into_its_memory():
     snapshot = Session(pool()).sim.snapshot()
-    size = Packed(snapshot).size
+    size = PackedState(snapshot).size
     history = History(memory=5 * size)
     for k in range(20):
         snapshot.ledger.time = 0.1 * k
         history.record(snapshot)
     assert 4 <= len(history.times) <= 5
     assert history.times[-1] == pytest.approx(1.9)
-    unpacked = Packed(snapshot).unpack()
+    unpacked = PackedState(snapshot).unpack()
     for name, array in snapshot.arrays.items():
         np.testing.assert_array_equal(unpacked.arrays[name], array)
 

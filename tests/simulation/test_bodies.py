@@ -7,7 +7,7 @@ import pytest
 import wavetank as wt
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import turned
-from wavetank.simulation import coupling, saved
+from wavetank.simulation import coupling, state_file
 
 pytest.importorskip("rapier3d")
 
@@ -193,7 +193,7 @@ def test_a_state_without_what_came_later_is_read(tmp_path):
     with np.load(tmp_path / "state.npz") as file:
         parts = dict(file)
     parts["bodies_memory"] = np.delete(parts["bodies_memory"], len(coupling.ROWS) - 1, axis=1)
-    np.savez(tmp_path / "older.npz", **saved.sealed(parts))
+    np.savez(tmp_path / "older.npz", **state_file.sealed(parts))
     older = wt.Simulation.restore(tmp_path / "older.npz")
     older.step()
     assert older.bodies["box"].position[1] == pytest.approx(sim.bodies["box"].position[1], abs=0.01)

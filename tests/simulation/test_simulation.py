@@ -288,13 +288,13 @@ def test_a_look_after_growth_changes_nothing():
     for looks in (True, False):
         sim = Simulation(small(dynamic_viscosity=100.0))
         sim.step()
-        sim._make_room(20 * sim.count)
+        sim.particles.enlarge(20 * sim.count)
         if looks:
             assert sim.frame().densities.all()
         sim.advance(0.05)
         found.append(sim.positions)
         sim.dynamic_viscosity = 0.0
-        sim._make_room(40 * sim.count)
+        sim.particles.enlarge(40 * sim.count)
         sim.advance(0.02)
         assert not sim.world.remembers_viscosity
     np.testing.assert_array_equal(*found)

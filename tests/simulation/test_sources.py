@@ -7,7 +7,7 @@ import pytest
 
 import wavetank as wt
 from wavetank.scene.mouths import MOST_IN_A_ROW, mouth_of
-from wavetank.simulation.jets import closing_speed, jet_of, outlines
+from wavetank.simulation.inflow import closing_speed, jet_of, outlines
 
 FLAT = wt.Tank(size=(1.0, 0.8))
 

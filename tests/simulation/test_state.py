@@ -53,7 +53,7 @@ def test_digest_tells_all_that_is_there():
     digests = {sim.digest()}
     for name, value in (("x", 0.3), ("v", 0.3), ("dye", 5), ("frozen", 1), ("material", 1), ("id", 9999)):
         digests.add(changed(sim, name, 2, value))
-    sim.ledger.time += 1e-9
+    sim.counters.time += 1e-9
     digests.add(sim.digest())
     sim.solids.poses[-1] = (sim.solids.poses[-1][0] + 1e-9, sim.solids.poses[-1][1])
     digests.add(sim.digest())

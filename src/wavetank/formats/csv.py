@@ -16,7 +16,7 @@ def write_csv(path: str | Path, frame: Any) -> None:
 
     Water comes first, kind 0 and age 0; then spray, foam and bubbles, kinds 1 to 3, with numbers of their own,
     density 0 and material 0. Solids follow as comments: name, position [m], quaternion (w, x, y, z). Nine digits bring
-    every float32 back exactly. `frame` is a `Frame` or an `Instant`.
+    every float32 back exactly. `frame` is a `Frame` or a `State`.
     """
     axes = "xyz"[: frame.dim]
     header = ",".join(["id", *axes, *(f"v{axis}" for axis in axes), "density", "kind", "age", "material"])
@@ -34,7 +34,7 @@ def write_csv(path: str | Path, frame: Any) -> None:
         )
         file.writelines(
             f"# {'_'.join(one.name.split())},{_numbers(one.position)},{_numbers(one.rotation)}\n"
-            for one in frame.standing
+            for one in frame.placed
         )
 
 

@@ -18,7 +18,8 @@ from wavetank.formats.surface import WaterSurface
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.version import VERSION
 from wavetank.scene.scene import Scene
-from wavetank.simulation.instant import FOAM, WATER, Instant, Standing, solids_by_name
+from wavetank.simulation.instant import FOAM, PARTICLES, Field, PlacedSolid, solids_by_name
+from wavetank.simulation.state import State
 
 SUFFIXES = (".h5", ".hdf5")
 KIND = "series"
@@ -66,7 +67,7 @@ class Hdf5Series:
         file.file.create_dataset("scene", data=np.bytes_(plan.scene.text().encode()), track_times=False)
         for name, kind in (("time", "f8"), ("number", "i8")):
             file.column(f"frames/{name}", kind, each_frame=True)
-        self.water = Table(file, "water", _columns(WATER, plan.scene.dim, ""))
+        self.water = Table(file, "water", _columns(PARTICLES, plan.scene.dim, ""))
         self.foam = Table(file, "foam", _columns(FOAM, plan.scene.dim, "foam_"))
         self.solids = Table(file, "solids", SOLIDS)
         self.surface: tuple[Table, Table] | None = None
@@ -83,13 +84,13 @@ class Hdf5Series:
         if self.file.frames != frames:
             raise WavetankError(f"{path} has {self.file.frames} frames, and {frames} of them are to be kept.")
 
-    def write(self, number: int, instant: Instant) -> None:
+    def write(self, number: int, instant: State) -> None:
         """Append a frame."""
         self.file.append("frames/time", [instant.time])
         self.file.append("frames/number", [instant.number])
-        self.water.append({name: getattr(instant, name) for name in WATER})
-        self.foam.append({name.removeprefix("foam_"): getattr(instant, name) for name in FOAM})
-        standing = instant.standing
+        self.water.append({field.name: getattr(instant, field.name) for field in PARTICLES})
+        self.foam.append({field.name.removeprefix("foam_"): getattr(instant, field.name) for field in FOAM})
+        standing = instant.placed
         self.solids.append(
             {
                 "names": np.array([one.name.encode()[:64] for one in standing], "S64"),
@@ -110,17 +111,15 @@ class Hdf5Series:
         self.file.close()
 
 
-def _columns(names: dict[str, tuple[type, int]], dim: int, prefix: str) -> dict[str, tuple[Any, tuple[int, ...]]]:
-    return {
-        name.removeprefix(prefix): (np.dtype(kind), (dim,) if width else ()) for name, (kind, width) in names.items()
-    }
+def _columns(fields: tuple[Field, ...], dim: int, prefix: str) -> dict[str, tuple[Any, tuple[int, ...]]]:
+    return {field.name.removeprefix(prefix): (np.dtype(field.kind), field.shape(0, dim)[1:]) for field in fields}
 
 
 def _rows(values: list[np.ndarray], width: int) -> np.ndarray:
     return np.array(values, float).reshape(-1, width)
 
 
-def _joined(instant: Instant) -> tuple[dict[str, np.ndarray], np.ndarray]:
+def _joined(instant: State) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """The surfaces of all fluids as one: vertices by column, and corners."""
     surfaces = instant.surfaces
     firsts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
@@ -154,7 +153,7 @@ def _surfaces(file: Any, frame: int, scene: Scene) -> tuple[WaterSurface, ...]:
     return tuple(found)
 
 
-def read(path: str | Path, first: int = 0) -> Iterator[Instant]:
+def read(path: str | Path, first: int = 0) -> Iterator[State]:
     """Yield the frames of a file that was written here, from number `first` on.
 
     Raises `WavetankError` for another file.
@@ -170,11 +169,11 @@ def read(path: str | Path, first: int = 0) -> Iterator[Instant]:
         scene = Scene.from_text(bytes(file["scene"][()]).decode(), str(path), files=False)
     known = solids_by_name(scene)
 
-    def instant(file: Any, frame: int) -> Instant:
+    def instant(file: Any, frame: int) -> State:
         foam = {f"foam_{name}": rows for name, rows in table_rows(file["foam"], frame).items()}
         solids = table_rows(file["solids"], frame)
         standing = tuple(
-            Standing(
+            PlacedSolid(
                 name,
                 known[name],
                 solids["positions"][k],
@@ -187,7 +186,7 @@ def read(path: str | Path, first: int = 0) -> Iterator[Instant]:
         )
         arrays = table_rows(file["water"], frame) | foam
         frames = file["frames"]
-        read = Instant.read(scene, int(frames["number"][frame]), float(frames["time"][frame]), arrays, standing)
+        read = State.read(scene, int(frames["number"][frame]), float(frames["time"][frame]), arrays, standing)
         return dataclasses.replace(read, surfaces=_surfaces(file, frame, scene))
 
     return frames_of(path, instant, COUNTER, first)

@@ -10,7 +10,8 @@ import numpy as np
 from wavetank.foundation.retry import Retry
 from wavetank.foundation.rotations import turned
 from wavetank.scene.scene import Scene
-from wavetank.simulation.instant import Instant, Standing
+from wavetank.simulation.instant import PlacedSolid
+from wavetank.simulation.state import State
 from wavetank.solids.surfaces import Surface, surface_of
 
 
@@ -21,19 +22,19 @@ class Shapes:
         self._dim, self._spacing = scene.dim, scene.spacing
         self._known: dict[str, tuple[Any, Surface]] = {}
 
-    def learn(self, standing: tuple[Standing, ...]) -> None:
+    def learn(self, standing: tuple[PlacedSolid, ...]) -> None:
         """Triangulate the solids that are new."""
         for one in standing:
             if one.name not in self._known or self._known[one.name][0] is not one.solid:
                 self._known[one.name] = (one.solid, surface_of(one.solid, self._dim, self._spacing))
 
-    def own(self, one: Standing) -> Surface:
+    def own(self, one: PlacedSolid) -> Surface:
         """Return the surface of a solid in its own frame; without vertices where it has none."""
         return self._known[one.name][1]
 
-    def placed(self, instant: Instant) -> Iterator[tuple[Standing, np.ndarray, np.ndarray]]:
+    def placed(self, instant: State) -> Iterator[tuple[PlacedSolid, np.ndarray, np.ndarray]]:
         """Yield the solids of an instant that have a surface: vertices in the world [m] and faces."""
-        for one in instant.standing:
+        for one in instant.placed:
             points, faces = self.own(one)
             if len(points):
                 yield one, turned(one.rotation, points) + one.position, faces
@@ -73,7 +74,7 @@ class Series(Protocol):
     files: list[str]
     repeatable: bool  # whether a frame may be written again after it failed; what grows is patient itself
 
-    def write(self, number: int, instant: Instant) -> None:
+    def write(self, number: int, instant: State) -> None:
         """Write frame `number`, which counts from 0; what the instant does not have is not asked for."""
 
     def close(self) -> None:

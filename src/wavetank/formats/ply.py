@@ -10,7 +10,6 @@ import numpy as np
 
 from wavetank.formats.surface import surfaces_of
 from wavetank.foundation.atomic_write import atomic_write
-from wavetank.simulation.instant import colors_of
 
 SUFFIXES = (".ply",)
 KIND = "particles"
@@ -30,11 +29,11 @@ def write_ply(path: str | Path, frame: Any) -> None:
 
     Spray, foam and bubbles, if there are any, are an element of their own, `foam`, with age [s], kind (1 spray, 2 foam,
     3 bubble) and id: who asks for vertices, such as a surface reconstruction, gets the water alone.
-    Solids are comments: name, position [m], quaternion (w, x, y, z). `frame` is a `Frame` or an `Instant`.
+    Solids are comments: name, position [m], quaternion (w, x, y, z). `frame` is a `Frame` or a `State`.
     """
     water = _records(_RECORD, frame.positions, frame.velocities)
     water["density"], water["material"], water["id"] = frame.densities, frame.materials, frame.ids
-    water["red"], water["green"], water["blue"] = colors_of(frame).T
+    water["red"], water["green"], water["blue"] = frame.colors.T
     foam = _records(_FOAM_RECORD, frame.foam_positions, frame.foam_velocities)
     foam["age"], foam["kind"], foam["id"] = frame.foam_ages, frame.foam_kinds, frame.foam_ids
     header = [
@@ -77,7 +76,7 @@ def write_surface(path: str | Path, instant: Any) -> None:
 def _opening(frame: Any) -> list[str]:
     poses = [
         f"comment solid {'_'.join(one.name.split())} " + " ".join(f"{x:.9g}" for x in (*one.position, *one.rotation))
-        for one in frame.standing
+        for one in frame.placed
     ]
     poses = [line.encode("ascii", "replace").decode() for line in poses]
     start = ["ply", "format binary_little_endian 1.0", "comment wavetank, SI units", f"comment time {frame.time!r} s"]

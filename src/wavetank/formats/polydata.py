@@ -6,7 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from wavetank.formats.plan import Plan
-from wavetank.simulation.instant import Instant, colors_of, in_space
+from wavetank.simulation.instant import in_space
+from wavetank.simulation.state import State
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,7 +20,7 @@ class Piece:
     cells: np.ndarray  # int [m, 1] or [m, 3]: numbers of points
 
 
-def pieces_of(plan: Plan, instant: Instant) -> Iterator[tuple[str, Piece]]:
+def pieces_of(plan: Plan, instant: State) -> Iterator[tuple[str, Piece]]:
     """Yield the parts that are asked for: particles, foam, solids, surface; the same ones in every frame."""
     if "particles" in plan.parts:
         yield (
@@ -31,7 +32,7 @@ def pieces_of(plan: Plan, instant: Instant) -> Iterator[tuple[str, Piece]]:
                     "density": instant.densities,
                     "id": instant.ids,
                     "material": instant.materials,
-                    "color": colors_of(instant),
+                    "color": instant.colors,
                 },
             ),
         )
@@ -72,9 +73,9 @@ def _vertices(positions: np.ndarray, data: dict[str, np.ndarray]) -> Piece:
     return Piece(in_space(positions), data, "Vertices", np.arange(len(positions))[:, None])
 
 
-def _solids(plan: Plan, instant: Instant) -> Piece:
+def _solids(plan: Plan, instant: State) -> Piece:
     """All solids as triangles; `solid` counts those of the instant, `velocity` is that of the point."""
-    numbers = {one.name: number for number, one in enumerate(instant.standing)}
+    numbers = {one.name: number for number, one in enumerate(instant.placed)}
     parts = []
     for one, points, faces in plan.shapes.placed(instant):
         velocity = one.velocity + np.cross(one.angular_velocity, points - one.position)

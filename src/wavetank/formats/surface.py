@@ -16,7 +16,7 @@ import numpy as np
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.scene.scene import Scene
-from wavetank.simulation.instant import Instant
+from wavetank.simulation.state import State
 from wavetank.solids.meshes.triangles import volume_within
 
 #: What splashsurf's authors recommend but for the cubes, theirs are 0.5 wide: smoothed, nobody sees a difference, at
@@ -70,7 +70,7 @@ def surfaces_of(instant: Any) -> tuple[WaterSurface, ...]:
     )
 
 
-def with_surfaces(instant: Instant) -> Instant:
+def with_surfaces(instant: State) -> State:
     """Return the instant with the surfaces of its fluids."""
     return dataclasses.replace(instant, surfaces=surfaces_of(instant))
 

@@ -19,7 +19,8 @@ from wavetank.formats.usd_static import build_static, names_of
 from wavetank.foundation.atomic_write import atomic_write, make_folder
 from wavetank.foundation.errors import WavetankError
 from wavetank.scene.scene import Scene
-from wavetank.simulation.instant import Instant, colors_of, in_space
+from wavetank.simulation.instant import in_space
+from wavetank.simulation.state import State
 
 SUFFIXES = (".usda", ".usd")
 KIND = "series"
@@ -62,10 +63,10 @@ class UsdSeries:
         self._solids: dict[str, str] = {}  # prims by the names of solids
         self._have_static = False
 
-    def write(self, number: int, instant: Instant) -> None:
+    def write(self, number: int, instant: State) -> None:
         """Write a frame."""
-        if not self._have_static or any(one.name not in self._solids for one in instant.standing):
-            self._solids = names_of([*self._solids, *(one.name for one in instant.standing)])
+        if not self._have_static or any(one.name not in self._solids for one in instant.placed):
+            self._solids = names_of([*self._solids, *(one.name for one in instant.placed)])
             build_static(self.plan, instant, self._solids, self.folder)
             self._have_static = True
         clip = _Clip(number)
@@ -84,8 +85,8 @@ class UsdSeries:
     def close(self) -> None:
         """Do nothing: every frame is complete."""
 
-    def _put_solids(self, clip: "_Clip", instant: Instant) -> None:
-        present = {one.name: one for one in instant.standing}
+    def _put_solids(self, clip: "_Clip", instant: State) -> None:
+        present = {one.name: one for one in instant.placed}
         for name, prim in self._solids.items():
             one, path = present.get(name), f"/World/solids/{prim}"
             clip.set(path, "visibility", "token", "inherited" if one else "invisible")
@@ -201,7 +202,7 @@ def _extent(points: np.ndarray, margin: float) -> np.ndarray:
     return np.stack([points.min(axis=0) - margin, points.max(axis=0) + margin])
 
 
-def _put_particles(clip: _Clip, instant: Instant) -> None:
+def _put_particles(clip: _Clip, instant: State) -> None:
     path, points = "/World/particles", in_space(instant.positions)
     clip.set(path, "points", "point3f[]", points)
     clip.set(path, "velocities", "vector3f[]", in_space(instant.velocities))
@@ -209,12 +210,12 @@ def _put_particles(clip: _Clip, instant: Instant) -> None:
     clip.set(path, "primvars:id", "int[]", instant.ids)
     clip.set(path, "primvars:material", "int[]", instant.materials)
     clip.set(path, "primvars:density", "float[]", instant.densities)
-    clip.set(path, "primvars:displayColor", "color3f[]", linear_of(colors_of(instant)))
+    clip.set(path, "primvars:displayColor", "color3f[]", linear_of(instant.colors))
     clip.set(path, "widths", "float[]", np.full(len(points), instant.scene.spacing, np.float32))
     clip.set(path, "extent", "float3[]", _extent(points, 0.5 * instant.scene.spacing))
 
 
-def _put_foam(clip: _Clip, instant: Instant) -> None:
+def _put_foam(clip: _Clip, instant: State) -> None:
     for name, kind in KINDS.items():
         own, path = instant.foam_kinds == kind, f"/World/foam/{name}"
         points = in_space(instant.foam_positions[own])
@@ -228,7 +229,7 @@ def _put_foam(clip: _Clip, instant: Instant) -> None:
         clip.set(path, "extent", "float3[]", _extent(points, 0.125 * instant.scene.spacing))
 
 
-def _put_surfaces(clip: _Clip, instant: Instant) -> None:
+def _put_surfaces(clip: _Clip, instant: State) -> None:
     names = names_of([material.name for material in instant.scene.palette()])
     present = {surface.material: surface for surface in instant.surfaces}
     none = np.zeros((0, 3), np.float32)

@@ -11,7 +11,7 @@ import numpy as np
 
 from wavetank.formats.plan import Plan, Viewpoint
 from wavetank.foundation.atomic_write import atomic_write
-from wavetank.simulation.instant import Instant
+from wavetank.simulation.state import State
 
 SOLID = (0.694, 0.361, 0.224)  # linear colour of solids
 APERTURE = 24.0  # mm: height of a film
@@ -61,7 +61,7 @@ def names_of(names: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def build_static(plan: Plan, instant: Instant, solids: dict[str, str], folder: Path) -> None:
+def build_static(plan: Plan, instant: State, solids: dict[str, str], folder: Path) -> None:
     """Write `static.usdc` and `manifest.usda` into `folder`; `solids` are prims by the names of solids."""
     from pxr import Sdf, Usd, UsdGeom
 
@@ -143,11 +143,11 @@ def _linear(color: str) -> list[float]:
     return [share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4 for share in shares]
 
 
-def _solids(stage: Any, plan: Plan, instant: Instant, solids: dict[str, str]) -> None:
+def _solids(stage: Any, plan: Plan, instant: State, solids: dict[str, str]) -> None:
     """Shapes of solids in their own frames, which clips move; one without a surface is an empty mesh."""
     from pxr import Gf, UsdGeom, Vt
 
-    for one in instant.standing:
+    for one in instant.placed:
         points, faces = plan.shapes.own(one)
         mesh = UsdGeom.Mesh.Get(stage, f"/World/solids/{solids[one.name]}")
         mesh.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points, np.float32).reshape(-1, 3)))

@@ -14,7 +14,8 @@ from wavetank.formats.plan import Plan
 from wavetank.formats.polydata import Piece, pieces_of
 from wavetank.foundation.errors import WavetankError
 from wavetank.scene.scene import Scene
-from wavetank.simulation.instant import PARTS, Instant
+from wavetank.simulation.instant import PARTS
+from wavetank.simulation.state import State
 
 SUFFIXES = (".vtkhdf",)
 KIND = "series"
@@ -66,7 +67,7 @@ class VtkHdfSeries:
                 part.append(float(file["VTKHDF/Steps/Values"][step]), piece)
                 part.file.hidden = False
 
-    def write(self, number: int, instant: Instant) -> None:
+    def write(self, number: int, instant: State) -> None:
         """Append a frame."""
         for name, piece in pieces_of(self.plan, instant):
             self._part(name, piece).append(instant.time, piece)

@@ -9,7 +9,8 @@ import numpy as np
 from wavetank.formats.plan import Plan
 from wavetank.formats.polydata import Piece, pieces_of
 from wavetank.foundation.atomic_write import atomic_write
-from wavetank.simulation.instant import PARTS, Instant
+from wavetank.simulation.instant import PARTS
+from wavetank.simulation.state import State
 
 SUFFIXES = (".vtp",)
 KIND = "series"
@@ -31,7 +32,7 @@ class VtpSeries:
                 entries = json.loads(series.read_text("utf-8"))["files"][: plan.kept]
                 self._lists[name] = dict(enumerate(entries))
 
-    def write(self, number: int, instant: Instant) -> None:
+    def write(self, number: int, instant: State) -> None:
         """Write a frame."""
         for name, piece in pieces_of(self.plan, instant):
             part = "" if name == "particles" else name

@@ -11,7 +11,7 @@ from wavetank.scene.scene import bundled_levels
 from wavetank.session.game import Game
 from wavetank.session.scores import keep_score, key_of, scores
 from wavetank.session.session import Session
-from wavetank.simulation.jets import outlines
+from wavetank.simulation.inflow import outlines
 
 WEIGHT_ARROW = 0.2  # of the picture's height: length of the arrow of the heaviest body's weight
 LONGEST_ARROW = 2.0  # of that

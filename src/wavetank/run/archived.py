@@ -15,10 +15,9 @@ from wavetank.run.export import open_source
 from wavetank.run.folder import SCENE, RunFolder
 from wavetank.run.signals import stop_on_signal
 from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
-from wavetank.simulation.frame import Frame
-from wavetank.simulation.instant import Instant
-from wavetank.simulation.shown import Shown
+from wavetank.simulation.frame import Frame, FrameBuffer
 from wavetank.simulation.simulation import Simulation
+from wavetank.simulation.state import State
 from wavetank.view.renderer import Renderer, affordable
 from wavetank.view.style import quality_options
 
@@ -47,7 +46,7 @@ def frame_at(world: str, at: float | None, arch: str = "") -> Frame:
         source = open_source(Path(world), arch)
         last = at is None
         found = deque(source.frames, 1)[-1] if last else min(source.frames, key=lambda one: abs(one.time - at))
-        return Shown(source.scene, arch or "cpu").frame(found)
+        return FrameBuffer(source.scene, arch or "cpu").frame(found)
     folder = RunFolder.open(world)
     run = folder.run
     done = len(folder.stats()) - 1  # number of the last frame that was finished
@@ -59,7 +58,7 @@ def frame_at(world: str, at: float | None, arch: str = "") -> Frame:
             "name a time between them."
         )
     if folder.has_instants():
-        return Shown(folder.scene, arch or run.arch).frame(folder.instant_at(at))
+        return FrameBuffer(folder.scene, arch or run.arch).frame(folder.instant_at(at))
     number, sim, done = round((at - run.start) * run.fps), None, -1
     if (folder.path / FOLDER / FILE).exists():
         kept = load_run(folder.path, arch)
@@ -131,10 +130,10 @@ def film_archived(
 
 
 def _shown(scene: Scene, frames: Any, arch: str) -> Iterator[Frame]:
-    shown: Shown | None = None
+    shown: FrameBuffer | None = None
     for one in frames:
-        if isinstance(one, Instant):
-            shown = shown or Shown(scene, arch or "cpu")
+        if isinstance(one, State):
+            shown = shown or FrameBuffer(scene, arch or "cpu")
             yield shown.frame(one)
         else:
             yield one

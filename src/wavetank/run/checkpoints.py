@@ -1,6 +1,6 @@
 """Checkpoints of a run: complete states on disk, from which `wavetank resume` continues to the same bits.
 
-A run's folder has them in `states/`: `NUMBER.npz`, the states (`simulation/saved.py`) after that many frames, the last
+A run's folder has them in `states/`: `NUMBER.npz`, states (`simulation/state_file.py`) after that many frames, the last
 two; `film-NUMBER.mp4`, the segments of a video that end there; and `run.json`, which names both states with their
 SHA-256, the options of the run and the figures so far. `run.json` is replaced atomically after the state is on disk:
 whenever the process ends, it names complete states.

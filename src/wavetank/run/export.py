@@ -18,8 +18,8 @@ from wavetank.run.outputs import Outputs
 from wavetank.run.record import viewpoint_of
 from wavetank.scene.scene import Scene
 from wavetank.session.recording import Recording, replay
-from wavetank.simulation.instant import Instant
 from wavetank.simulation.simulation import Simulation
+from wavetank.simulation.state import State
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Source:
     """Frames to export."""
 
     scene: Scene
-    frames: Iterable[Any]  # of `Frame` or `Instant`
+    frames: Iterable[Any]  # of `Frame` or `State`
     fps: float  # frames per second of water
     name: str  # prefix of file names
     folder: Path  # default folder of the files
@@ -137,7 +137,7 @@ def _from_recording(path: Path, arch: str) -> Source:
 
 
 def _from_hdf5(path: Path) -> Source:
-    instants: Iterator[Instant] = hdf5.read(path)
+    instants: Iterator[State] = hdf5.read(path)
     first = next(instants, None)
     if first is None:
         raise WavetankError(f"{path} holds no frame.")

@@ -26,7 +26,7 @@ from wavetank.foundation.input_limits import explain_errors, parse_toml, printab
 from wavetank.foundation.model import Model
 from wavetank.foundation.version import VERSION
 from wavetank.scene.scene import Scene
-from wavetank.simulation.instant import Instant
+from wavetank.simulation.state import State
 
 FILE, SCENE, STATS, SUMMARY = "run.toml", "scene.toml", "stats.jsonl", "stats.json"
 TABLE = "stats.csv"
@@ -135,13 +135,13 @@ class RunFolder:
         whole = not self.run.only or {"particles", "foam", "solids"} <= {*self.run.only}
         return whole and (self._has_tables() or any(self._archives()))
 
-    def instants(self) -> Iterator[Instant]:
+    def instants(self) -> Iterator[State]:
         """Yield the written frames."""
         if self._has_tables():
             return hdf5.read(self._hdf5())
         return (npz.read(path, self.scene) for path in self._archives())
 
-    def instant_at(self, time: float) -> Instant:
+    def instant_at(self, time: float) -> State:
         """Return the written frame nearest to a time of the water [s]; raises `WavetankError` without any."""
         between, archives = self.run.every / self.run.fps, self._archives()
         number = max(0, round((time - self.run.start) / between))

@@ -13,7 +13,8 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.retry import Retry
 from wavetank.run.background import BackgroundWriter
 from wavetank.scene.scene import Scene
-from wavetank.simulation.instant import PARTS, Instant
+from wavetank.simulation.instant import PARTS
+from wavetank.simulation.state import State
 
 MEASURED_FRAMES, LARGE = 10, 1_000_000_000  # frames that predict the size of all; bytes worth a warning
 USUAL = ("particles", "foam", "solids")
@@ -90,14 +91,14 @@ class Outputs:
         return self._background.waited if self._background else 0.0
 
     def write(self, number: int, frame: Any) -> None:
-        """Queue a `Frame` or an `Instant` as number `number`; wait while the queue is full.
+        """Queue a `Frame` or a `State` as number `number`; wait while the queue is full.
 
         Raises the error of an earlier frame.
         """
         if self._background is None:
             return
-        instant = Instant.of(frame)
-        self.shapes.learn(instant.standing)
+        instant = frame.state()
+        self.shapes.learn(instant.placed)
         self._background.put(lambda: self._write(number, instant), instant.size)
         if number + 1 == MEASURED_FRAMES < self._frames:
             self.drain()
@@ -105,7 +106,7 @@ class Outputs:
             if expected > LARGE:
                 self._tell(f"all frames will take about {expected / 1e9:.1f} GB; --every 2 halves that.")
 
-    def _write(self, number: int, instant: Instant) -> None:
+    def _write(self, number: int, instant: State) -> None:
         if self._needs_surface:
             instant = with_surfaces(instant)
         instant = instant.only(self.parts)
@@ -154,7 +155,7 @@ class _EachFrame:
             self._writers.append(("surface", module.write_surface))
         self.files = [str(plan.path(f"-#####{suffix}", part)) for part, _ in self._writers]
 
-    def write(self, number: int, instant: Instant) -> None:
+    def write(self, number: int, instant: State) -> None:
         """Write a frame."""
         for part, write in self._writers:
             write(self.plan.path(f"-{number:05d}{self.module.SUFFIXES[0]}", part), instant)

@@ -21,7 +21,7 @@ class Filled(Fluid):
     """Fluid at rest that fills the shape of a solid, closely packed, with as many particles as its volume asks for.
 
     What solids, the tank and fluids before take of it is left out. The particles are packed when a simulation starts
-    (`simulation/filling.py`); before that they are those of a lattice.
+    (`simulation/packing.py`); before that they are those of a lattice.
     """
 
     shape: Literal["filled"] = "filled"

@@ -2,7 +2,7 @@
 
 import bisect
 
-from wavetank.simulation.snapshot import Packed, Snapshot
+from wavetank.simulation.state import PackedState, State
 
 EVERY = 0.1  # s of water between two instants
 MEMORY = 256 * 2**20  # bytes of the ring
@@ -14,19 +14,19 @@ class History:
 
     def __init__(self, memory: int = MEMORY) -> None:
         self.memory = memory
-        self.instants: list[Packed] = []
+        self.instants: list[PackedState] = []
         self.times: list[float] = []
-        self.bookmarks: dict[str, Packed] = {}
+        self.bookmarks: dict[str, PackedState] = {}
         self._size = 0
 
     def is_due(self, time: float) -> bool:
         """Return whether the instant at `time` [s], the latest so far, is due to be recorded."""
         return not self.times or time >= self.times[-1] + EVERY - 1e-9
 
-    def record(self, snapshot: Snapshot) -> None:
+    def record(self, snapshot: State) -> None:
         """Record an instant; later ones are dropped, and the oldest where memory is exceeded."""
         self.forget_from(snapshot.time)
-        packed = Packed(snapshot)
+        packed = snapshot.pack()
         self.instants.append(packed)
         self.times.append(snapshot.time)
         self._size += packed.size
@@ -40,13 +40,13 @@ class History:
         self._size -= sum(packed.size for packed in self.instants[first:])
         del self.instants[first:], self.times[first:]
 
-    def before(self, time: float) -> Snapshot | None:
+    def before(self, time: float) -> State | None:
         """Return the last instant not after `time` [s], else the first one; None without any."""
         if not self.instants:
             return None
         return self.instants[max(0, bisect.bisect_right(self.times, time + 1e-9) - 1)].unpack()
 
-    def last_finite(self) -> Snapshot | None:
+    def last_finite(self) -> State | None:
         """Return the last instant without non-finite values; later ones are dropped."""
         while self.instants:
             instant = self.instants[-1].unpack()

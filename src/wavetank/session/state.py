@@ -21,7 +21,7 @@ from wavetank.session.tools.solids import TOOL_SOLID, move_towards
 from wavetank.session.warm_up import launches
 from wavetank.simulation.cost import cost_of
 from wavetank.simulation.simulation import Simulation
-from wavetank.simulation.snapshot import Snapshot
+from wavetank.simulation.state import State
 from wavetank.solids.shapes import moved
 from wavetank.view.camera import Camera
 
@@ -119,7 +119,7 @@ class SessionState:
         """Return `sim`, or the given simulation with the contents of `sim`."""
         if self.own is None:
             return sim
-        self.own.become(sim)
+        self.own.replace_state(sim)
         return self.own
 
     def _store_for_undo(self, coming: int) -> None:
@@ -214,7 +214,7 @@ class SessionState:
             self.end_tool(name)
         self.moving = {}
 
-    def restore(self, snapshot: Snapshot) -> None:
+    def restore(self, snapshot: State) -> None:
         """Go back to an instant of the history; solids of tools are removed."""
         self.end_all_tools()
         self.sim.resume(snapshot)
@@ -242,7 +242,7 @@ class SessionState:
     def current_scene(self) -> Scene:
         """Return the current world as a scene: water as points, solids at their poses; without solids of tools."""
         sim, frame = self.sim, self.sim.frame()
-        held = sim.solids.courses.held
+        held = sim.solids.motions.held
         pairs = list(zip(sim.solids.members, sim.solids.names, sim.solids.poses, strict=True))[sim.solids.tank_count :]
         solids = [
             moved(solid, *pose).model_copy(update={"name": name} | ({"motion": None} if name in held else {}))

@@ -33,7 +33,7 @@ from wavetank.simulation.coupling import DENSITY, Coupling, norms
 from wavetank.simulation.engine import import_engine, isometry, keep_in_plane, poses_of, shapes_of, velocities_of
 from wavetank.simulation.joints import Joints, joint_reaction, put_joints
 from wavetank.simulation.mass_properties import AFLOAT, grip, mass_properties
-from wavetank.simulation.moving_solids import MovingSolids
+from wavetank.simulation.solids import Solids
 from wavetank.solids.distance import PARTS
 from wavetank.solids.mass import Inertia, Ruler
 from wavetank.solids.motion import Pose
@@ -56,7 +56,7 @@ class Bodies(Mapping[str, Body]):
     Raises `WavetankError` for an unknown name, and where there are bodies but no engine is installed.
     """
 
-    def __init__(self, scene: Scene, solids: MovingSolids, density: float = 0.0) -> None:
+    def __init__(self, scene: Scene, solids: Solids, density: float = 0.0) -> None:
         """Place the bodies among `solids`, in fluids of at most `density` [kg/m^3]; that of the scene's fluids if 0."""
         self._scene, self._solids, self._dim = scene, solids, scene.dim
         self.members: list[Body] = []
@@ -71,7 +71,7 @@ class Bodies(Mapping[str, Body]):
         self._engine_masses = np.zeros((0, 2))  # kg, kg m^2: added mass and inertia that the engine has
         self._density = density
         self._frozen = False
-        solids.feeling, solids.passing = {}, None
+        solids.bodies, solids.passing = {}, None
         numbers = [number for number, solid in enumerate(solids.members) if solid.is_body]
         if not numbers:
             return
@@ -87,7 +87,7 @@ class Bodies(Mapping[str, Body]):
         self._bind_world()
         self._find_mass_properties(numbers)
         far, added = scene.support * scene.spacing, AFLOAT * self.coupling.full_added_mass
-        solids.feel(
+        solids.set_bodies(
             {
                 body.number: (body.dry.center, body.unit, grip(self._dim, body.dry, body.wet, added[body.row], far))
                 for body in self.members
@@ -385,7 +385,7 @@ class Bodies(Mapping[str, Body]):
 
     # --- states ---
 
-    def renewed(self, scene: Scene, solids: MovingSolids, density: float = 0.0) -> "Bodies":
+    def renewed(self, scene: Scene, solids: Solids, density: float = 0.0) -> "Bodies":
         """Return the bodies of `solids`; those that exist already keep their motion. `density` is as in `__init__`."""
         bodies = Bodies(scene, solids, density or self._density)
         memories: Any = self.coupling.to_rows() if self.members else []

@@ -1,7 +1,7 @@
-"""What a viewer or an exporter may see of a world: one instant of it.
+"""An instant of a world on the device, for pictures: borrowed from a simulation, or uploaded from a `State`.
 
-The arrays live on the device and are borrowed, not copied: a frame is valid until the simulation moves on. The host
-copies are made when they are first asked for, ordered by particle id, and stay valid.
+The device arrays of a simulation's frame are not copied: they are valid until the simulation moves on. Host copies are
+made when they are first asked for, ordered by particle id, and stay valid.
 """
 
 import dataclasses
@@ -10,18 +10,22 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
-from wavetank.device.compiler import download
-from wavetank.device.state import Diffuse
+from wavetank.device import compiler
+from wavetank.device.compiler import download, upload
+from wavetank.device.state import MARGIN, Diffuse, integers, new_diffuse, scalars, vectors
 from wavetank.foundation.errors import NotFiniteError
 from wavetank.scene.scene import Scene
-from wavetank.simulation.instant import Standing
+from wavetank.simulation.instant import FOAM, PARTICLES, Field, Instant, PlacedSolid, non_finite_rows
+from wavetank.simulation.solids import Solids, solids_of
+from wavetank.simulation.state import State
 from wavetank.solids.distance import SolidSet
 
 
 @dataclasses.dataclass
-class Frame:
-    """One instant of a world."""
+class Frame(Instant):
+    """One instant of a world on the device."""
 
     scene: Scene
     number: int  # frames since the start
@@ -38,121 +42,103 @@ class Frame:
     frozen_count: int = 0  # of them
     diffuse: Diffuse | None = None  # spray, foam and bubbles in device arrays, packed at the front
     foam_count: int = 0  # of them
-    stand: Callable[[], tuple[Standing, ...]] = tuple  # asks where the solids stand
-
-    @property
-    def dim(self) -> int:
-        """Number of dimensions of the world, 2 or 3."""
-        return self.scene.dim
+    read_placed: Callable[[], tuple[PlacedSolid, ...]] = tuple  # reads `placed` of the simulation
 
     @functools.cached_property
-    def positions(self) -> np.ndarray:
-        """Positions [m], float32 [count, dim], ordered by particle id."""
-        return self._by_id(self.x)
-
-    @functools.cached_property
-    def velocities(self) -> np.ndarray:
-        """Velocities [m/s], float32 [count, dim], ordered by particle id."""
-        return self._by_id(self.v)
+    def placed(self) -> tuple[PlacedSolid, ...]:
+        """The solids at their poses, without the walls of the tank."""
+        return self.read_placed()
 
     def check_finite(self) -> None:
-        """Raise `NotFiniteError` where a place or a velocity is no number."""
-        bad = ~(np.isfinite(self.positions) & np.isfinite(self.velocities)).all(axis=1)
+        """Raise `NotFiniteError` where a position or a velocity is not finite."""
+        bad = non_finite_rows(self.positions, self.velocities)
         if bad.any():
             row = int(np.argmax(bad))
             raise NotFiniteError(
                 f"particle {self.ids[row]} at {self.positions[row].tolist()} m has the velocity "
-                f"{self.velocities[row].tolist()} m/s at t = {self.time:.6g} s and is no number that water can go on "
-                f"from, as are {int(bad.sum()) - 1:,} others; try shorter steps (substeps) or weaker forces."
+                f"{self.velocities[row].tolist()} m/s at t = {self.time:.6g} s, which is not finite; neither are "
+                f"{int(bad.sum()) - 1:,} others. Try shorter steps (substeps) or weaker forces."
             )
 
-    @functools.cached_property
-    def densities(self) -> np.ndarray:
-        """Densities [kg/m^3], float32 [count], ordered by particle id."""
-        return self._by_id(self.rho)
-
-    @functools.cached_property
-    def ids(self) -> np.ndarray:
-        """Ids of the particles, int32 [count], rising; those of removed particles are missing."""
-        return self._by_id(self.id)
-
-    @functools.cached_property
-    def dyes(self) -> np.ndarray:
-        """Dyes, int32 [count], ordered by particle id; 0 is clear water."""
-        return self._by_id(self.dye)
+    def state(self) -> State:
+        """Return a copy of this instant on the host, which stays valid, for writers that work beside the simulation."""
+        return State(
+            scene=self.scene,
+            number=self.number,
+            time=self.time,
+            arrays={field.column: getattr(self, field.name) for field in PARTICLES}
+            | {field.name: getattr(self, field.name) for field in FOAM},
+            placed=self.placed,
+        )
 
     @functools.cached_property
     def _order(self) -> np.ndarray:
         return np.argsort(download(self.id)[: self.count], kind="stable")
 
-    @functools.cached_property
-    def materials(self) -> np.ndarray:
-        """Number of the material of each particle, see `Scene.palette`, int32 [count], ordered by particle id."""
-        return self._by_id(self.material)
+    @override
+    def _by_id(self, column: str) -> np.ndarray:
+        ordered: np.ndarray = download(getattr(self, column))[: self.count][self._order]
+        return ordered
 
-    @property
-    def rest_densities(self) -> np.ndarray:
-        """Density [kg/m^3] that each particle keeps, float64 [count], ordered by particle id."""
-        return np.array([fluid.density for fluid in self.scene.properties()])[self.materials]
-
-    @property
-    def fluids_present(self) -> dict[str, str]:
-        """Names of the materials that are there and their colours ``#rrggbb``."""
-        palette = self.scene.palette()
-        return {palette[number].name: str(palette[number].color) for number in np.unique(self.materials)}
-
-    @property
-    def weber_numbers(self) -> np.ndarray:
-        """Weber number We = rho_0 v^2 d / sigma of each particle, float32 [count], ordered by particle id."""
-        ratio = (self.velocities / np.float32(self.scene.foaming_speed)) ** 2
-        return np.float32(self.scene.foam_threshold) * ratio.sum(axis=1)
-
-    @property
-    def foaming(self) -> np.ndarray:
-        """Whether each particle counts as foam by the report's rule, We >= foam_threshold, bool [count]."""
-        return self.weber_numbers >= np.float32(self.scene.foam_threshold)
-
-    @functools.cached_property
-    def foam_positions(self) -> np.ndarray:
-        """Positions [m] of spray, foam and bubbles, float32 [foam_count, dim], in the order of their birth."""
-        return self._of_foam("x", np.zeros((0, self.dim), np.float32))
-
-    @functools.cached_property
-    def foam_velocities(self) -> np.ndarray:
-        """Their velocities [m/s], float32 [foam_count, dim]."""
-        return self._of_foam("v", np.zeros((0, self.dim), np.float32))
-
-    @functools.cached_property
-    def foam_kinds(self) -> np.ndarray:
-        """What they are, int32 [foam_count]: places in `state.KINDS`, 1 spray, 2 foam, 3 bubble."""
-        return self._of_foam("kind", np.zeros(0, np.int32))
-
-    @functools.cached_property
-    def foam_ages(self) -> np.ndarray:
-        """Time since their birth [s], float32 [foam_count]."""
-        return self._of_foam("age", np.zeros(0, np.float32))
-
-    @functools.cached_property
-    def foam_lives(self) -> np.ndarray:
-        """Ages [s] at which they end, float32 [foam_count]."""
-        return self._of_foam("life", np.zeros(0, np.float32))
-
-    @functools.cached_property
-    def foam_ids(self) -> np.ndarray:
-        """Numbers of their births, int32 [foam_count]: the same particle has the same number in every frame."""
-        return self._of_foam("id", np.zeros(0, np.int32))
-
-    @functools.cached_property
-    def standing(self) -> tuple[Standing, ...]:
-        """The solids but for the walls of the tank, where they stand."""
-        return self.stand()
-
-    def _of_foam(self, name: str, nothing: np.ndarray) -> np.ndarray:
+    @override
+    def _of_foam(self, field: Field) -> np.ndarray:
         if self.diffuse is None:
-            return nothing
-        host: np.ndarray = download(getattr(self.diffuse, name))[: self.foam_count].copy()
+            return field.zeros(0, self.dim)
+        host: np.ndarray = download(getattr(self.diffuse, field.column))[: self.foam_count].copy()
         return host
 
-    def _by_id(self, array: Any) -> np.ndarray:
-        ordered: np.ndarray = download(array)[: self.count][self._order]
-        return ordered
+
+class FrameBuffer:
+    """Device arrays that hold one `State` at a time, for pictures of instants without their simulation."""
+
+    def __init__(self, scene: Scene, arch: str = "cpu") -> None:
+        compiler.start(arch)
+        self.scene, self.arch = scene, compiler.current_backend()
+        self._capacity, self._foam_capacity = -1, -1
+        self._solids: Solids | None = None
+        self._names: list[str] = []
+
+    def frame(self, state: State) -> Frame:
+        """Upload a state and return its frame, valid until the next one is asked for."""
+        foam_count = len(state.foam_ids)
+        self._allocate(state.count, foam_count)
+        for field in PARTICLES:
+            upload(self._water[field.column], getattr(state, field.name))
+        for field in FOAM:
+            upload(getattr(self._foam, field.column), getattr(state, field.name))
+        return Frame(
+            scene=self.scene,
+            number=state.number,
+            time=state.time,
+            count=state.count,
+            solids=self._place(state).device,
+            diffuse=self._foam,
+            foam_count=foam_count,
+            read_placed=lambda: state.placed,
+            **self._water,
+        )
+
+    def _allocate(self, count: int, foam: int) -> None:
+        dim = self.scene.dim
+        if count > self._capacity:
+            rows, self._capacity = count + MARGIN, count
+            x, v, rho = vectors(dim, rows), vectors(dim, rows), scalars(rows)
+            ids, dye, material = (integers(rows) for _ in range(3))
+            self._water = {"x": x, "v": v, "rho": rho, "id": ids, "dye": dye, "material": material}
+        if foam > self._foam_capacity:
+            self._foam, self._foam_capacity = new_diffuse(dim, foam), foam
+
+    def _place(self, state: State) -> Solids:
+        """Return the solids of a state on the device, at their poses."""
+        names = [one.name for one in state.placed]
+        if self._solids is None or names != self._names:
+            walls = self.scene.tank.walls() if self.scene.tank else []
+            self._solids = solids_of(self.scene, walls, [one.solid for one in state.placed])
+            self._names = names
+        solids = self._solids
+        solids.targets.clear()
+        for number, one in enumerate(state.placed, solids.tank_count):
+            solids.targets[number] = (np.asarray(one.position, float), np.asarray(one.rotation, float))
+        solids.arrive()
+        solids.move_to(0.0, 0.0)
+        return solids

@@ -1,7 +1,12 @@
-"""One instant of a world on the host: plain arrays that stay valid, for writers that work beside the simulation."""
+"""What an instant of a world consists of, wherever its arrays are: on the device (`Frame`) or on the host (`State`).
+
+Particles are read by id, foam in the order of its births. `COLUMNS` and `FOAM` declare each array once: checks of
+files, states in memory, exports and uploads go by these tables.
+"""
 
 import dataclasses
-from collections.abc import Collection, Mapping
+import functools
+from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
@@ -9,30 +14,61 @@ import numpy as np
 from wavetank.scene.scene import Scene
 from wavetank.solids.solid import Solid
 
-#: What an instant consists of, as `--only` names it; the surface is made of the particles.
+#: Parts of an instant, as `--only` names them; the surface is made of the particles.
 PARTS = ("particles", "foam", "solids", "surface")
-#: name -> type and numbers a row (0: one number, no axis; -1: as many as the world has dimensions)
-WATER: dict[str, tuple[type, int]] = {
-    "ids": (np.int32, 0),
-    "positions": (np.float32, -1),
-    "velocities": (np.float32, -1),
-    "densities": (np.float32, 0),
-    "materials": (np.int32, 0),
-    "dyes": (np.int32, 0),
-}
-FOAM: dict[str, tuple[type, int]] = {
-    "foam_ids": (np.int32, 0),
-    "foam_positions": (np.float32, -1),
-    "foam_velocities": (np.float32, -1),
-    "foam_kinds": (np.int32, 0),
-    "foam_ages": (np.float32, 0),
-    "foam_lives": (np.float32, 0),
-}
+DEFAULT_COLOR = "#2f7fd0"
 
 
 @dataclasses.dataclass(frozen=True)
-class Standing:
-    """A solid where it stands."""
+class Field:
+    """An array of an instant: one row for each particle, or for each drop of foam."""
+
+    name: str  # of the host array that users and exports see
+    column: str  # of the array on the device; columns of particles have this name in saved states
+    kind: type  # of its numbers
+    is_vector: bool = False  # whether a row has a number for each dimension of the world
+    is_exported: bool = True
+
+    def shape(self, rows: int, dim: int) -> tuple[int, ...]:
+        """Return the shape of this array in a world of `dim` dimensions."""
+        return (rows, dim) if self.is_vector else (rows,)
+
+    def zeros(self, rows: int, dim: int) -> np.ndarray:
+        """Return this array filled with zeros."""
+        return np.zeros(self.shape(rows, dim), self.kind)
+
+
+#: Columns of particles by their names on the device; see `device/state.py` for those that are saved.
+COLUMNS = {
+    field.column: field
+    for field in (
+        Field("ids", "id", np.int32),
+        Field("positions", "x", np.float32, is_vector=True),  # m
+        Field("velocities", "v", np.float32, is_vector=True),  # m/s
+        Field("densities", "rho", np.float32),  # kg/m^3
+        Field("materials", "material", np.int32),
+        Field("dyes", "dye", np.int32),
+        Field("pressure_accelerations", "a", np.float32, is_vector=True, is_exported=False),  # m/s^2
+        Field("viscous_accelerations", "viscous", np.float32, is_vector=True, is_exported=False),  # m/s^2
+        Field("frozen", "frozen", np.int32, is_exported=False),
+    )
+}
+#: Particles as pictures and exports have them.
+PARTICLES = tuple(field for field in COLUMNS.values() if field.is_exported)
+#: Spray, foam and bubbles, in exports and in saved states.
+FOAM = (
+    Field("foam_ids", "id", np.int32),
+    Field("foam_positions", "x", np.float32, is_vector=True),  # m
+    Field("foam_velocities", "v", np.float32, is_vector=True),  # m/s
+    Field("foam_kinds", "kind", np.int32),
+    Field("foam_ages", "age", np.float32),  # s
+    Field("foam_lives", "life", np.float32),  # s
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class PlacedSolid:
+    """A solid at its pose."""
 
     name: str
     solid: Solid
@@ -42,98 +78,118 @@ class Standing:
     angular_velocity: np.ndarray  # rad/s, float64 [3], likewise
 
 
-@dataclasses.dataclass(frozen=True)
-class Instant:
-    """Particles by id, spray, foam and bubbles in the order of their births, solids; see `Frame` for each array."""
+class Instant(ABC):
+    """Particles, foam and solids of a world at one time, as host arrays."""
 
     scene: Scene
-    number: int  # frames of the simulation since the start
+    number: int  # frames since the start
     time: float  # s of water since the start
-    ids: np.ndarray
-    positions: np.ndarray
-    velocities: np.ndarray
-    densities: np.ndarray
-    materials: np.ndarray
-    dyes: np.ndarray
-    foam_ids: np.ndarray
-    foam_positions: np.ndarray
-    foam_velocities: np.ndarray
-    foam_kinds: np.ndarray
-    foam_ages: np.ndarray
-    foam_lives: np.ndarray
-    standing: tuple[Standing, ...] = ()
-    surfaces: tuple[Any, ...] = ()  # of the fluids, see `formats/surface.py`
 
-    @classmethod
-    def of(cls, frame: Any) -> "Instant":
-        """Return a frame's instant, or an instant itself."""
-        if isinstance(frame, cls):
-            return frame
-        arrays = {name: getattr(frame, name) for name in (*WATER, *FOAM)}
-        return cls(scene=frame.scene, number=frame.number, time=frame.time, standing=frame.standing, **arrays)
+    @abstractmethod
+    def _by_id(self, column: str) -> np.ndarray:
+        """Return an array of the particles on the host, ordered by id."""
 
-    @classmethod
-    def read(
-        cls, scene: Scene, number: int, time: float, arrays: Mapping[str, np.ndarray], standing: tuple[Standing, ...]
-    ) -> "Instant":
-        """Return an instant from what a file holds; what the file does not hold is empty or 0.
-
-        Raises `ValueError` for arrays that are none of particles of this scene.
-        """
-        count, foam = len(arrays.get("positions", ())), len(arrays.get("foam_positions", ()))
-        whole: dict[str, Any] = {}
-        for names, rows in ((WATER, count), (FOAM, foam)):
-            for name, (kind, width) in names.items():
-                shape = (rows, scene.dim) if width else (rows,)
-                value: np.ndarray = np.asarray(arrays.get(name, np.zeros(shape, kind)))
-                value = value.astype(kind) if value.shape == shape or value.size else np.zeros(shape, kind)
-                if value.shape != shape or not np.isfinite(value).all():
-                    raise ValueError(f"{name} are {list(value.shape)}, or not finite; {list(shape)} are needed")
-                whole[name] = value
-        if count and "ids" not in arrays:
-            whole["ids"] = np.arange(count, dtype=np.int32)
-        materials = whole["materials"]
-        if count and not 0 <= materials.min() <= materials.max() < len(scene.palette()):
-            raise ValueError(f"materials go from {materials.min()} to {materials.max()}; it has {len(scene.palette())}")
-        poses = [getattr(one, name) for one in standing for name in ("position", "rotation")]
-        if not (np.isfinite(time) and all(np.isfinite(pose).all() for pose in poses)):
-            raise ValueError("a time or a pose is not finite")
-        return cls(scene=scene, number=number, time=time, standing=standing, **whole)
+    @abstractmethod
+    def _of_foam(self, field: Field) -> np.ndarray:
+        """Return an array of the foam on the host."""
 
     @property
     def dim(self) -> int:
         """Number of dimensions of the world, 2 or 3."""
         return self.scene.dim
 
-    @property
-    def count(self) -> int:
-        """Number of particles."""
-        return len(self.ids)
+    @functools.cached_property
+    def positions(self) -> np.ndarray:
+        """Positions [m], float32 [count, dim], ordered by particle id."""
+        return self._by_id("x")
+
+    @functools.cached_property
+    def velocities(self) -> np.ndarray:
+        """Velocities [m/s], float32 [count, dim], ordered by particle id."""
+        return self._by_id("v")
+
+    @functools.cached_property
+    def densities(self) -> np.ndarray:
+        """Densities [kg/m^3], float32 [count], ordered by particle id."""
+        return self._by_id("rho")
+
+    @functools.cached_property
+    def ids(self) -> np.ndarray:
+        """Ids of the particles, int32 [count], rising; those of removed particles are missing."""
+        return self._by_id("id")
+
+    @functools.cached_property
+    def dyes(self) -> np.ndarray:
+        """Dyes, int32 [count], ordered by particle id; 0 is clear water, see `Particles.dye`."""
+        return self._by_id("dye")
+
+    @functools.cached_property
+    def materials(self) -> np.ndarray:
+        """Number of the material of each particle, see `Scene.palette`, int32 [count], ordered by particle id."""
+        return self._by_id("material")
 
     @property
-    def size(self) -> int:
-        """Bytes taken."""
-        return sum(getattr(self, name).nbytes for name in (*WATER, *FOAM)) + 256 * len(self.standing)
+    def rest_densities(self) -> np.ndarray:
+        """Rest density [kg/m^3] of each particle, float64 [count], ordered by particle id."""
+        return np.array([fluid.density for fluid in self.scene.properties()])[self.materials]
 
-    def only(self, parts: Collection[str]) -> "Instant":
-        """Return this without the particles, the foam or the solids that are not among `parts`, of `PARTS`."""
-        gone = [*([] if "particles" in parts else WATER), *([] if "foam" in parts else FOAM)]
-        empty = {name: getattr(self, name)[:0] for name in gone}
-        return dataclasses.replace(self, **empty, standing=self.standing if "solids" in parts else ())
+    @property
+    def fluids_present(self) -> dict[str, str]:
+        """Names of the materials that particles have, and their colours ``#rrggbb``."""
+        palette = self.scene.palette()
+        return {palette[number].name: str(palette[number].color) for number in np.unique(self.materials)}
 
+    @property
+    def colors(self) -> np.ndarray:
+        """Colour of each particle, uint8 [count, 3], sRGB: that of its material, mixed with its dye by its strength."""
+        palette = [material.color or DEFAULT_COLOR for material in self.scene.palette()]
+        table = np.array([[int(text[k : k + 2], 16) for k in (1, 3, 5)] for text in palette], np.float32)
+        dye = self.dyes.astype(np.int64)
+        share = ((dye >> 24) & 0x7F)[:, None].astype(np.float32) / 127.0
+        tint = np.stack([(dye >> 16) & 0xFF, (dye >> 8) & 0xFF, dye & 0xFF], axis=1).astype(np.float32)
+        mixed = table[self.materials] * (1.0 - share) + tint * share
+        return np.round(mixed).astype(np.uint8)
 
-def colors_of(instant: Any) -> np.ndarray:
-    """Return the colour of each particle, uint8 [count, 3], sRGB: that of its material, and of its dye by its strength.
+    @property
+    def weber_numbers(self) -> np.ndarray:
+        """Weber number We = rho_0 v^2 d / sigma of each particle, float32 [count], ordered by particle id."""
+        ratio = (self.velocities / np.float32(self.scene.foaming_speed)) ** 2
+        return np.float32(self.scene.foam_threshold) * ratio.sum(axis=1)
 
-    `instant` is an `Instant` or a `Frame`.
-    """
-    palette = [material.color or "#2f7fd0" for material in instant.scene.palette()]
-    table = np.array([[int(text[k : k + 2], 16) for k in (1, 3, 5)] for text in palette], np.float32)
-    dye = instant.dyes.astype(np.int64)
-    share = ((dye >> 24) & 0x7F)[:, None].astype(np.float32) / 127.0
-    tint = np.stack([(dye >> 16) & 0xFF, (dye >> 8) & 0xFF, dye & 0xFF], axis=1).astype(np.float32)
-    mixed = table[instant.materials] * (1.0 - share) + tint * share
-    return np.round(mixed).astype(np.uint8)
+    @property
+    def foaming(self) -> np.ndarray:
+        """Whether each particle counts as foam by the report's rule, We >= foam_threshold, bool [count]."""
+        return self.weber_numbers >= np.float32(self.scene.foam_threshold)
+
+    @functools.cached_property
+    def foam_ids(self) -> np.ndarray:
+        """Numbers of the births of foam, int32 [n]: a drop has the same number in every frame."""
+        return self._of_foam(FOAM[0])
+
+    @functools.cached_property
+    def foam_positions(self) -> np.ndarray:
+        """Positions [m] of spray, foam and bubbles, float32 [n, dim], in the order of their births."""
+        return self._of_foam(FOAM[1])
+
+    @functools.cached_property
+    def foam_velocities(self) -> np.ndarray:
+        """Their velocities [m/s], float32 [n, dim]."""
+        return self._of_foam(FOAM[2])
+
+    @functools.cached_property
+    def foam_kinds(self) -> np.ndarray:
+        """Their kinds, int32 [n]: index in `state.KINDS`, 1 spray, 2 foam, 3 bubble."""
+        return self._of_foam(FOAM[3])
+
+    @functools.cached_property
+    def foam_ages(self) -> np.ndarray:
+        """Time since their births [s], float32 [n]."""
+        return self._of_foam(FOAM[4])
+
+    @functools.cached_property
+    def foam_lives(self) -> np.ndarray:
+        """Ages [s] at which they vanish, float32 [n]."""
+        return self._of_foam(FOAM[5])
 
 
 def in_space(rows: np.ndarray) -> np.ndarray:
@@ -152,3 +208,8 @@ def solids_by_name(scene: Scene) -> dict[str, Solid]:
             name, number = f"solid {number}", number + 1
         found[name] = solid
     return found
+
+
+def non_finite_rows(*arrays: Any) -> np.ndarray:
+    """Return which rows of these arrays [n, ...] have a number that is not finite, bool [n]."""
+    return np.logical_or.reduce([~np.isfinite(rows.reshape(len(rows), -1)).all(axis=1) for rows in arrays])

@@ -19,7 +19,7 @@ from wavetank.foundation.rotations import inverse, product, turned
 from wavetank.foundation.tracks import track, varies
 from wavetank.scene.joints import BallJoint, Hinge, Joint, Rope, Slider, Spring, Weld
 from wavetank.simulation.body import Body
-from wavetank.simulation.moving_solids import MovingSolids
+from wavetank.simulation.solids import Solids
 from wavetank.solids.motion import Pose
 
 SETTLED = 4.744  # critically damped: 5 % are left after this many times the inverse of the frequency
@@ -266,7 +266,7 @@ class Joints(dict[str, LiveJoint]):
 
 
 def put_joints(
-    engine: Any, world: Callable[[], Any], handles: Sequence[Any], solids: MovingSolids, joints: Sequence[Joint]
+    engine: Any, world: Callable[[], Any], handles: Sequence[Any], solids: Solids, joints: Sequence[Joint]
 ) -> Joints:
     """Create `joints` in the `world` of the `engine` and return them by name; `handles` are those of the solids."""
     result = Joints()
@@ -279,7 +279,7 @@ def put_joints(
 
 
 def _put(
-    engine: Any, world: Callable[[], Any], handles: Sequence[Any], solids: MovingSolids, named: tuple[str, Joint]
+    engine: Any, world: Callable[[], Any], handles: Sequence[Any], solids: Solids, named: tuple[str, Joint]
 ) -> LiveJoint:
     name, joint = named
     first = solids.find(joint.first)

@@ -1,89 +1,256 @@
-"""A running world: the public face of the solver."""
+"""A running world: `Simulation`, composed of parameters, particles, solids, bodies and sources."""
 
 import contextlib
+import dataclasses
+import inspect
 import math
 import time
 from collections.abc import Iterator, Sequence
-from typing import Any
+from copy import deepcopy
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 
 from wavetank.device import compiler
+from wavetank.device.state import KINDS
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors, printable
 from wavetank.foundation.params import LIVE, refuse_assignment
-from wavetank.physics import population
-from wavetank.physics.foam.pool import pool_from, pool_rows
+from wavetank.physics import measure, population
 from wavetank.physics.foam.update import load_kernels, update_foam
 from wavetank.physics.planning import has_grid_pressure
 from wavetank.physics.time_step import filled_share, whole
+from wavetank.physics.world import World
 from wavetank.scene.forces import Force
 from wavetank.scene.forces.images import with_images
-from wavetank.scene.scene import MAX_PARTICLES, Scene
-from wavetank.scene.schedule import changes_gravity, gravity_at
+from wavetank.scene.scene import Scene
 from wavetank.simulation import limits
-from wavetank.simulation.arrays import check_newcomers
 from wavetank.simulation.bodies import Bodies
 from wavetank.simulation.cost import check_cost, check_frames, check_time
-from wavetank.simulation.filling import fill
+from wavetank.simulation.coupling import density_in
 from wavetank.simulation.frame import Frame
+from wavetank.simulation.initial import cull, relax
+from wavetank.simulation.instant import PlacedSolid
 from wavetank.simulation.joints import Joints
-from wavetank.simulation.ledger import Ledger
-from wavetank.simulation.moving_solids import solids_of
-from wavetank.simulation.new_world import new_world
-from wavetank.simulation.settling import settle
+from wavetank.simulation.packing import pack
+from wavetank.simulation.parameters import LiveParameters
+from wavetank.simulation.particles import ParticleSystem
+from wavetank.simulation.solids import Solids, restored_solids, solids_of
 from wavetank.simulation.sources import Sources, check_places
-from wavetank.simulation.states import States
+from wavetank.simulation.state import Continuation, Counters, State
+from wavetank.simulation.state_file import read_state, write_state
 from wavetank.solids.solid import Solid
 
-NEAR = 0.99  # of what water keeps from walls: what is nearer than that to a solid at the start is led out of it
+NEAR = 0.99  # of the distance that water keeps from walls: particles that start closer to a solid are led out of it
 
 
-class Simulation(States):
-    """Water that moves. See `Scene` for what it is made of."""
+class Simulation:
+    """A running world of a scene.
 
-    gravity_by_hand: tuple[float, ...] | None  # m/s^2, in place of what changes by itself
-    notes: list[str]  # what a person should know, one sentence each; whoever shows them takes them away
+    Live parameters are attributes too: `sim.viscosity = 0.1` is `sim.parameters.viscosity = 0.1`.
+    """
+
+    scene: Scene  # as it is now: live parameters and solids change
+    arch: str | None  # back end
+    parameters: LiveParameters
+    particles: ParticleSystem
+    solids: Solids
+    bodies: Bodies
+    sources: Sources
+    counters: Counters
+    forces: list[Force]  # that act in every frame; scripts may append their own
+    pushed: list[Force]  # that act in the next frame only
+    notes: list[str]  # for people, one sentence each; who shows them removes them
+    time_steps: int  # of the last frame
+    seconds_per_frame: float  # s that the last frame took to compute
 
     def __init__(self, scene: Scene, arch: str = "cpu") -> None:
+        """Start a scene on a back end: cpu, gpu (the best there is), cuda, vulkan, metal or amdgpu.
+
+        Raises `WavetankError` for a back end that is not there, and for a scene that cannot run or needs too much
+        memory.
+        """
         compiler.start(arch)
         self.arch = compiler.current_backend()
-        self.scene = Scene.checked(scene).model_copy(deep=True)
+        self.counters = Counters()
+        self._set_scene(Scene.checked(scene).model_copy(deep=True))
         self.reset()
+
+    def _set_scene(self, scene: Scene) -> None:
+        self.scene, self.parameters = scene, LiveParameters(scene, self.counters)
+        self.particles = ParticleSystem(scene, self.counters)
 
     def reset(self) -> None:
         """Put everything back to the start of the scene."""
-        check_cost(self.scene)
-        start, scene = fill(self.scene, lambda scene: type(self)(scene, self.arch or "cpu")), self.scene
+        scene = self.scene
+        check_cost(scene)
+        start = pack(scene, lambda scene: type(self)(scene, self.arch or "cpu"))
         self.solids = solids_of(scene, self._walls(), scene.solids)
-        self.sources, self.notes = Sources(scene), []
-        self.gravity_by_hand = None
-        self.forces: list[Force] = [*self.scene.forces]  # these act in every frame
-        self.pushed: list[Force] = []  # these in the next one only
-        self.seconds_per_frame = math.nan  # that the last frame took to compute
-        self.time_steps = 1  # of the last frame
+        self.notes = []
+        self.sources = Sources(scene, self.notes)
+        self.parameters.release_gravity()
+        self.forces, self.pushed = [*scene.forces], []
+        self.seconds_per_frame, self.time_steps = math.nan, 1
         has_bodies = any(solid.is_body for solid in scene.solids)
-        if self._begin(start, clear=has_bodies) and not self._settle() and not has_bodies:
+        if self._begin(start, clear=has_bodies) and not self._relax() and not has_bodies:
             self._begin(start, clear=True)
-        check_places(self)
+        check_places(self.particles, scene.frame_time)
 
     def _begin(self, start: Scene, *, clear: bool) -> bool:
-        """Put the water of `start` where solids leave it room, see `find_free_places`; say whether any of them does."""
+        """Place the water of `start` outside of solids (see `cull`); return whether solids may displace any of it."""
         positions, velocities = start.particles()
-        self.ledger, self.bodies = Ledger(), Bodies(self.scene, self.solids)
-        self._fill(len(positions))
-        free = self.solids.find_free_places(start, positions, self.world.particles, clear=clear)
+        self.counters.assign(Counters())
+        self.bodies = Bodies(self.scene, self.solids)
+        self.particles.allocate(len(positions), self.solids, self.bodies.pieces)
+        free = cull(start, positions, self.solids, self.world, clear=clear)
         self.add(positions[free], velocities[free], materials=start.kinds()[free])
         box = positions[free] if free.any() else np.zeros((1, self.scene.dim))
-        self.ledger.start_box = (box.min(axis=0), box.max(axis=0))
+        self.counters.start_box = (box.min(axis=0), box.max(axis=0))
         return bool(free.any()) and (bool(self.bodies) or self.solids.reaches_into(start))
-
-    def _fill(self, capacity: int) -> None:
-        """Make an empty world with room for `capacity` particles."""
-        self.world = new_world(self.scene, capacity, self.solids, self.bodies.pieces)
-        self.ledger.capacity, self._outdated = capacity, True
 
     def _walls(self) -> list[Solid]:
         return self.scene.tank.walls() if self.scene.tank else []
+
+    def replace_state(self, other: Self) -> None:
+        """Become the world of `other`, which must not be used any more; who holds this object holds that world."""
+        self.__dict__.clear()
+        self.__dict__.update(other.__dict__)
+
+    def __repr__(self) -> str:
+        bodies = f", {len(self.bodies)} bod{'y' if len(self.bodies) == 1 else 'ies'}" if self.bodies else ""
+        title = self.scene.title or "without title"
+        return (
+            f"<Simulation {title!r}: t = {self.time:.3f} s, {self.count:,} particles of {self.scene.spacing:g} m in "
+            f"{self.scene.dim}-D{bodies}, on {self.arch}>"
+        )
+
+    # --- what there is ---
+
+    @property
+    def world(self) -> World:
+        """All arrays on the device that a step reads and writes."""
+        return self.particles.world
+
+    @property
+    def time(self) -> float:
+        """Seconds of water since the start [s]."""
+        return self.counters.time
+
+    @property
+    def frame_number(self) -> int:
+        """Frames since the start."""
+        return self.counters.frame_number
+
+    @property
+    def count(self) -> int:
+        """Number of particles."""
+        return self.particles.world.count
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Positions [m], float32 [count, dim], ordered by particle id. Writable."""
+        return self.frame().positions
+
+    @positions.setter
+    def positions(self, values: Any) -> None:
+        self.particles.set_positions(values)
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """Velocities [m/s], float32 [count, dim], ordered by particle id. Writable."""
+        return self.frame().velocities
+
+    @velocities.setter
+    def velocities(self, values: Any) -> None:
+        self.particles.set_velocities(values)
+
+    @property
+    def densities(self) -> np.ndarray:
+        """Densities [kg/m^3], float32 [count], ordered by particle id; walls count as water of rest density."""
+        return self.frame().densities
+
+    @property
+    def foam_positions(self) -> np.ndarray:
+        """Positions [m] of spray, foam and bubbles, float32 [n, dim], in the order of their births."""
+        return self.frame().foam_positions
+
+    @property
+    def foam_kinds(self) -> np.ndarray:
+        """Their kinds, int32 [n]: 1 spray, 2 foam, 3 bubble."""
+        return self.frame().foam_kinds
+
+    @property
+    def foam_ages(self) -> np.ndarray:
+        """Time since their births [s], float32 [n]."""
+        return self.frame().foam_ages
+
+    @property
+    def joints(self) -> Joints:
+        """Joints by name, with their positions and motors: see `LiveJoint`."""
+        return self.bodies.joints
+
+    def frame(self, measured: bool = True) -> Frame:
+        """Return this instant for pictures and exports; valid until the water moves on.
+
+        Without `measured` its densities are those of an earlier moment, and no time is spent on them.
+        """
+        if measured:
+            self.particles.measure()
+        world = self.world
+        return Frame(
+            scene=self.scene,
+            number=self.frame_number,
+            time=self.time,
+            count=world.count,
+            x=world.particles.x,
+            v=world.particles.v,
+            rho=world.temporaries.rho,
+            id=world.particles.id,
+            material=world.particles.material,
+            solids=world.solids,
+            diffuse=world.pool.now if world.pool else None,
+            foam_count=world.pool.count if world.pool else 0,
+            frozen=world.particles.frozen,
+            frozen_count=world.frozen,
+            dye=world.particles.dye,
+            read_placed=self._placed_solids,
+        )
+
+    def _placed_solids(self) -> tuple[PlacedSolid, ...]:
+        """Return the solids at their poses, without the walls of the tank."""
+        solids, bodies = self.solids, {body.number: body for body in self.bodies.values()}
+        found = []
+        for number in range(solids.tank_count, len(solids.members)):
+            (position, rotation), body = solids.poses[number], bodies.get(number)
+            velocity, spin = np.split(np.zeros(6) if body is None else self.bodies.coupling.velocity[body.row], 2)
+            if body is not None:
+                velocity = velocity + np.cross(spin, position - body.center)
+            pose = (position.copy(), rotation.copy(), velocity.copy(), spin.copy())
+            found.append(PlacedSolid(solids.names[number], solids.members[number], *pose))
+        return tuple(found)
+
+    def stats(self) -> dict[str, float]:
+        """Measure this instant; see `physics.measure.statistics` and `Bodies.figures` for the keys.
+
+        Foam is in numbers of particles.
+        """
+        frame = self.frame()
+        numbers = measure.neighbor_numbers(self.world, self.scene)
+        figures = measure.statistics(
+            frame.positions, frame.velocities, frame.densities, numbers, self.scene, frame.rest_densities
+        )
+        return {
+            "time": self.time,
+            "frame": self.frame_number,
+            **figures,
+            **{KINDS[kind]: int(np.sum(frame.foam_kinds == kind)) for kind in (1, 2, 3)},
+            "foaming": int(frame.foaming.sum()),
+            **(self.sources.figures() if self.sources else {}),
+            **self.bodies.figures(),
+            "substeps": self.time_steps,
+            "milliseconds_per_frame": 1e3 * self.seconds_per_frame,
+        }
 
     # --- time ---
 
@@ -94,23 +261,23 @@ class Simulation(States):
     def advance(self, seconds: float) -> None:
         """Advance by `seconds` of water, in equal frames no longer than `scene.frame_time`.
 
-        What is shorter than a fifth of a usual time step is kept and taken with the next call: a position-based step
-        turns the density error of the steps before into velocity, and a much shorter one into much velocity.
+        What is shorter than a fifth of a usual time step is kept for the next call: a position-based step turns the
+        density error of the steps before into velocity, and a much shorter one into much velocity.
         """
         if not (math.isfinite(seconds) and seconds >= 0):
             raise WavetankError(f"seconds = {seconds} is not allowed; it must be a finite number of at least 0.")
-        frame, ledger = self.scene.frame_time, self.ledger
+        frame, counters = self.scene.frame_time, self.counters
         check_time(self.count, self.scene, seconds, f"advance({seconds:g})")
-        ledger.owed += seconds
-        if ledger.owed < 0.2 * frame / self.scene.substeps:
+        counters.pending_time += seconds
+        if counters.pending_time < 0.2 * frame / self.scene.substeps:
             return
-        count = max(1, math.ceil(ledger.owed / frame - 1e-3))
-        duration, ledger.owed = ledger.owed / count, 0.0
+        count = max(1, math.ceil(counters.pending_time / frame - 1e-3))
+        duration, counters.pending_time = counters.pending_time / count, 0.0
         for _ in range(count):
             self._advance_frame(duration)
 
     def load_kernels(self) -> None:
-        """Load what a splash needs before there is one: a tenth of a second for each kernel, of water that stands."""
+        """Load the kernels that a splash needs before there is one: each takes a tenth of a second."""
         load_kernels(self.world, self.scene)
 
     def full_steps_time(self, duration: float) -> float:
@@ -124,11 +291,11 @@ class Simulation(States):
             yield frame
 
     def numbered_frames(self, seconds: float, fps: float, start: float, done: int = -1) -> Iterator[tuple[int, Frame]]:
-        """Yield such frames from the time `start` [s] on with their numbers, but for those up to number `done`."""
+        """Yield the frames after number `done` with their numbers, counted from the time `start` [s]."""
         check_frames(self.count, self.scene, seconds, fps)
         for number in range(done + 1, round(seconds * fps) + 1):
             if number:
-                self.advance(max(0.0, start + number / fps - self.time - self.ledger.owed))
+                self.advance(max(0.0, start + number / fps - self.time - self.counters.pending_time))
             yield number, self.frame()
 
     def push(self, force: Force) -> None:
@@ -146,44 +313,44 @@ class Simulation(States):
         for part in range(parts):
             start, dt = self.time + duration * part / parts, duration / parts
             shares = part / parts, (part + 1) / parts
-            scene = self._scene_at(start + 0.5 * dt)
-            self._take_step(scene, self._acting_at(start + 0.5 * dt), start, dt, shares, limit)
+            scene = self.parameters.at(start + 0.5 * dt)
+            self._take_step(scene, self._forces_at(start + 0.5 * dt), start, dt, shares, limit)
         self.solids.passing = None
         self.solids.move_to(0.0, 1.0)
-        update_foam(self.world, self._scene_at(self.time + 0.5 * duration), duration, self.frame_number)
-        self._let_out()  # after the foam, which looks for water in the cells of the last step
+        update_foam(self.world, self.parameters.at(self.time + 0.5 * duration), duration, self.frame_number)
+        self.particles.remove_escaped()  # after the foam, which looks for water in the cells of the last step
         self.pushed = []
         self.solids.arrive()
         if self.sources:
-            self.sources.act(self, self.time, duration)
+            self.sources.act(self.particles, self.time, duration, self.scene.frame_time / parts)
         compiler.synchronize()
         self.seconds_per_frame = time.perf_counter() - began
-        self.ledger.time += duration
-        self.ledger.frame_number += 1
-        self._outdated = True
+        self.counters.time += duration
+        self.counters.frame_number += 1
+        self.particles.outdated = True
 
     def _take_step(
-        self, scene: Scene, acting: Sequence[Force], start: float, dt: float, shares: tuple[float, float], limit: float
+        self, scene: Scene, forces: Sequence[Force], start: float, dt: float, shares: tuple[float, float], limit: float
     ) -> None:
-        """Let bodies, solids and water take a step of `dt` [s] from `start` [s] on, those `shares` of a frame."""
+        """Step bodies, solids and water by `dt` [s] from `start` [s] on, between these `shares` of a frame."""
         if self.bodies:
-            self.bodies.apply_forces(acting, dt, start)
+            self.bodies.apply_forces(forces, dt, start)
             self.bodies.advance(scene.gravity, dt, shares[1], limit, start + dt + self.scene.start_time)
         self.world.solids_version = self.solids.move_to(*shares)
         if self.count:
-            for force in with_images(acting, scene.tank):
+            for force in with_images(forces, scene.tank):
                 force.apply(self.world.particles, self.count, dt, start)
             self.bodies.step(self.world, scene, dt, limit, shares)
 
-    def _settle(self) -> bool:
-        """Let the water around solids find the pressure that it would have had before the start; say if it stands."""
-        scene, duration = self._scene_at(0.0), self.scene.frame_time
+    def _relax(self) -> bool:
+        """Relax the water around solids to hydrostatic pressure; return whether it is at rest."""
+        scene, duration = self.parameters.at(0.0), self.scene.frame_time
         if not (any(scene.gravity) and has_grid_pressure(self.world, scene)):
             return False
         dt, limit = duration / whole(self._steps_in(duration)), self._speed_limit(duration)
         fall = np.array(scene.gravity, np.float32) * np.float32(dt) ** 2
         with self.bodies.frozen() if self.bodies else contextlib.nullcontext():
-            stands = settle(
+            at_rest = relax(
                 self.world,
                 lambda: self._take_step(scene, (), 0.0, dt, (0.0, 1.0), limit),
                 fall,
@@ -192,85 +359,55 @@ class Simulation(States):
             )
         self.solids.passing = None
         self.solids.move_to(0.0, 1.0)
-        return stands
+        return at_rest
 
     def _too_near(self, places: np.ndarray) -> np.ndarray:
-        return self.solids.nearer(places, NEAR * self.scene.wall_gap * self.scene.spacing)
+        return self.solids.closer_than(places, NEAR * self.scene.wall_gap * self.scene.spacing)
 
-    def _let_out(self) -> None:
-        """Take what has crossed an open side of the tank out of the world."""
-        if self.scene.tank is not None and self.scene.tank.open:
-            box = [
-                np.array([*corner, far][:3])
-                for corner, far in zip(self.scene.tank.open_box(), (-1.0, 1.0), strict=True)
-            ]
-            marks = self.world.grid.cell  # is found anew in the next step
-            keep = population.inside_box(self.world.particles, marks, box[0], box[1], self.count)
-            if keep is not None:
-                self._keep(keep)
-
-    @property
-    def _acting(self) -> tuple[Force, ...]:
-        """The forces of the next frame."""
-        return (*self.forces, *self.pushed)
-
-    def _acting_at(self, time: float) -> tuple[Force, ...]:
-        """The same with their numbers at `time` [s] of the water."""
-        return tuple(force.at(time + self.scene.start_time) for force in self._acting)
-
-    def _scene_at(self, time: float) -> Scene:
-        """The scene with gravity as it is at `time` [s] of the water."""
-        if not changes_gravity(self.scene):
-            return self.scene
-        now = self.gravity_by_hand or gravity_at(self.scene, time)
-        return self.scene.model_copy(update={"gravity": now})
+    def _forces_at(self, time: float) -> tuple[Force, ...]:
+        """Return the forces of the next frame with their values at `time` [s] of the water."""
+        return tuple(force.at(time + self.scene.start_time) for force in (*self.forces, *self.pushed))
 
     def _steps_in(self, duration: float) -> float:
         middle = self.time + 0.5 * duration
-        scene, acting = self._scene_at(middle), self._acting_at(middle)
-        return limits.count_steps(self.world, scene, self.solids, self.ledger, acting, duration)
+        scene, forces = self.parameters.at(middle), self._forces_at(middle)
+        return limits.count_steps(self.world, scene, self.solids, self.counters, forces, duration)
 
     def _speed_limit(self, duration: float) -> float:
         middle = self.time + 0.5 * duration
-        scene, acting = self._scene_at(middle), self._acting_at(middle)
-        return limits.find_speed_limit(self.world, scene, self.solids, self.ledger, acting, duration)
+        scene, forces = self.parameters.at(middle), self._forces_at(middle)
+        return limits.find_speed_limit(self.world, scene, self.solids, self.counters, forces, duration)
 
     # --- solids ---
 
     def move(self, name: str, position: Sequence[float] | None = None, rotation: Any = None) -> None:
-        """Set the pose that the solid `name` reaches at the end of the next frame; its velocity follows.
+        """Set the pose that the solid `name` reaches at the end of the next frame; see `Solids.move`.
 
-        `position` [m] is that of the solid's frame (the centre of a box), `rotation` a quaternion (w, x, y, z) or an
-        angle about z [rad]; None keeps what is. A solid without a name is called "solid 1" and so on.
+        A solid without a name is called "solid 1" and so on.
         """
-        self.solids.aim(name, position, rotation, self.scene.dim)
-
-    @property
-    def joints(self) -> Joints:
-        """Joints by name, with where they are and what their motors do: see `LiveJoint`."""
-        return self.bodies.joints
+        self.solids.move(name, position, rotation)
 
     def hold(self, name: str, held: bool = True) -> None:
-        """Let the body `name` stay where it is, or is moved to by `move`; with `held` = False let it go."""
+        """Hold the body `name` at its pose, or where `move` moves it; with `held` = False let it go."""
         body = self.bodies[name]
         body.solid = self.solids.members[body.number] = body.solid.model_copy(update={"held": held})
         self.scene.assign("solids", self.solids.members[self.solids.tank_count :])
 
     def release(self, name: str, within: float = 0.5) -> None:
-        """Give the solid `name` that `move` has taken back to its own motion, which it joins within so long [s].
+        """Let the solid `name` that `move` took return to its own motion `within` [s].
 
         "gravity" gives gravity back to its expressions and to the tilt of the tank. Raises `WavetankError` for a solid
         without a motion.
         """
         if name == "gravity" and name not in self.solids.names:
-            self.gravity_by_hand = None
+            self.parameters.release_gravity()
         else:
             self.solids.release(name, self.time, within)
 
     def add_solid(self, solid: Solid, grow: float = 0.0) -> str:
-        """Put a solid into the world and return its name.
+        """Add a solid and return its name; with `grow` [s] it grows to its size within that time, and displaces water.
 
-        With `grow` [s] it swells to its size within that time and pushes the water where it appears aside.
+        Raises `WavetankError` and changes nothing where it cannot be built.
         """
         before = self.scene.solids
         self.scene.assign("solids", [*before, solid])
@@ -285,7 +422,7 @@ class Simulation(States):
         return name
 
     def remove_solid(self, name: str) -> None:
-        """Take the solid `name` out of the world; the water closes behind it."""
+        """Remove the solid `name`; water fills its place."""
         number = self.solids.find(name) - self.solids.tank_count
         if number < 0:
             raise WavetankError(f"{name!r} is a wall of the tank, which stays; only other solids can be removed.")
@@ -296,103 +433,140 @@ class Simulation(States):
         self._renew_solids()
 
     def _renew_solids(self, density: float = 0.0) -> None:
+        """Update bodies and device arrays to the present solids, in fluids of `density` [kg/m^3] (0: as before)."""
         self.bodies = self.bodies.renewed(self.scene, self.solids, density)
-        self.world.pieces = self.bodies.pieces
-        self.world.solids, self.world.has_friction = self.solids.device, self.solids.has_friction
-        self._outdated = True
+        self.particles.set_solids(self.solids, self.bodies.pieces)
 
-    # --- particles that come and go ---
+    # --- particles that come, go and change ---
 
     def add(self, positions: Any, velocities: Any = None, dyes: Any = None, materials: Any = None) -> np.ndarray:
         """Add particles at `positions` [m], shape [n, dim], with `velocities` [m/s] and return their new ids, [n].
 
-        `materials` are numbers in `Scene.palette`, [n]; that of the scene's first fluid where None.
-        Where there is room is for the caller to know: see `free_places`. Raises `WavetankError` for wrong shapes.
+        `materials` are numbers in `Scene.palette`, [n]; that of the scene's first fluid where None. Particles may
+        overlap others: see `free_places`. Raises `WavetankError` for wrong shapes.
         """
-        ledger, new = self.ledger, check_newcomers(self.scene, positions, velocities, dyes, materials)
-        number = len(new.x)
-        count = self.count + number
-        if count > MAX_PARTICLES:
-            raise WavetankError(f"{count:,} particles are more than the {MAX_PARTICLES:,} that are allowed.")
-        if count > ledger.capacity:
-            # Half as much again, so that a hose does not make a new world in every frame.
-            self._make_room(max(count, ledger.capacity * 3 // 2))
-        if number:
-            population.append(self.world.particles, self.count, new.x, new.v, new.dye, new.material, ledger.next_id)
-            self.world.materials |= self.scene.materials_of(new.material)
-        ids = np.arange(ledger.next_id, ledger.next_id + number)
-        self.world.count, ledger.next_id, self._outdated = count, ledger.next_id + number, True
-        ledger.fastest_start = max(ledger.fastest_start, new.fastest)
-        return ids
+        return self.particles.add(positions, velocities, dyes, materials)
 
     def remove(self, ids: Any) -> int:
-        """Remove the particles with these ids and return how many there were; the others keep theirs."""
-        gone = np.isin(compiler.download(self.world.particles.id)[: self.count], np.asarray(ids))
-        return self._keep(~gone)
+        """Remove the particles with these ids and return their number; the others keep their ids."""
+        return self.particles.remove(ids)
 
     def remove_inside(self, start: Any, end: Any, radius: float) -> int:
-        """Remove the particles within `radius` [m] of the segment between two points [dim]; return how many.
+        """Remove the particles within `radius` [m] of the segment between two points [dim]; return their number.
 
-        Raises `WavetankError` for what is none.
+        Raises `WavetankError` for points of other shapes.
         """
-        capsule = self._capsule(start, end, radius)
-        return self._keep(~population.inside_capsule(self.world.particles, self.count, capsule))
+        return self.particles.remove_inside(start, end, radius)
 
     def free_places(self, places: np.ndarray, gap: float, wall: float) -> np.ndarray:
-        """Say which `places` [n, dim] keep the distances `gap` [m] to all particles and `wall` to all solids."""
-        clearance = population.Clearance(gap, wall, periods=self.world.grid.periods)
-        return population.free_places(places, self.world.particles, self.world.solids, self.count, clearance)
-
-    def _capsule(self, start: Any, end: Any, radius: Any) -> population.Capsule:
-        return population.capsule_of(start, end, radius, self.world.grid.periods)
+        """Return which `places` [n, dim] are `gap` [m] from all particles and `wall` [m] from all solids, bool [n]."""
+        return self.particles.free_places(places, gap, wall)
 
     def paint_inside(self, start: Any, end: Any, radius: float, dye: int) -> None:
-        """Dye the particles in that capsule; 0 washes them."""
-        if self.count:
-            population.dye_particles(self.world.particles, self._capsule(start, end, radius), dye, self.count)
+        """Dye the particles within `radius` [m] of a segment; 0 removes their dye."""
+        self.particles.paint_inside(start, end, radius, dye)
 
     def freeze_inside(self, start: Any, end: Any, radius: float, frozen: bool = True) -> None:
-        """Turn the particles in that capsule to ice that keeps its place, or back to water."""
-        if self.count:
-            capsule = self._capsule(start, end, radius)
-            self.world.frozen = int(population.freeze_particles(self.world.particles, capsule, int(frozen), self.count))
+        """Turn the particles within `radius` [m] of a segment to ice that keeps its place, or back to water."""
+        self.particles.freeze_inside(start, end, radius, frozen)
 
-    def _keep(self, keep: np.ndarray) -> int:
-        removed = int(len(keep) - keep.sum())
-        if removed:
-            self.world.frozen = population.keep_only(self.world.particles, self.world.spare, self.world.grid, keep)
-            self.world.particles, self.world.spare = self.world.spare, self.world.particles
-            self.world.count -= removed
-            self._outdated = True
-        return removed
+    # --- states ---
 
-    def _make_room(self, capacity: int) -> None:
-        """Move to a world with room for more particles."""
-        before = self.world
-        self._fill(capacity)
-        self.world.adopt(population.at_capacity(before.particles, self.scene.dim, capacity))
-        self.world.count, self.world.frozen, self.world.materials = before.count, before.frozen, before.materials
-        if before.pool is not None:
-            rows = pool_rows(before.pool, self.scene.dim)
-            self.world.pool = pool_from(rows, before.pool.born, before.pool.capacity, self.scene.dim, capacity)
+    def snapshot(self) -> State:
+        """Return this instant on the host, for `resume`."""
+        pool = self.world.pool
+        return State(
+            scene=self.parameters.fixed(),
+            number=self.frame_number,
+            time=self.time,
+            arrays=self.particles.state_arrays() | self.bodies.state_arrays(),
+            continuation=Continuation(
+                counters=self.counters.copy(),
+                foam_born=pool.born if pool else -1,
+                foam_capacity=pool.capacity if pool else 0,
+                solids=self.solids.state(),
+                sources=self.sources.plain(),
+            ),
+        )
 
-    # --- parameters ---
+    def resume(self, state: State) -> None:
+        """Go back (or on) to a state of `snapshot`; parameters and forces stay as they are now."""
+        more, now = state.resumable, self.counters.copy()
+        self.scene.assign("solids", state.scene.solids)
+        self.solids = restored_solids(self.scene, self._walls(), more.solids, state.scene.solids)
+        if more.counters.capacity > now.capacity:
+            self.particles.allocate(more.counters.capacity, self.solids, self.bodies.pieces)
+        self._renew_solids(density_in(state.arrays))
+        capacity, next_id = self.counters.capacity, max(more.counters.next_id, now.next_id)
+        self.counters.assign(dataclasses.replace(more.counters, capacity=capacity, next_id=next_id))
+        self.pushed = []
+        self.particles.restore(state)
+        self.bodies.restore(state.arrays)
+        self.sources = Sources(self.scene, self.notes)
+        self.sources.read(more.sources)
+
+    def clone(self) -> Self:
+        """Return another world that continues from here to the same bits, with the same forces and parameters."""
+        empty = self.scene.model_copy(update={"fluids": [], "solids": []})
+        copy = type(self)(empty, self.arch or "cpu")
+        scene = self.scene.model_copy(deep=True)
+        copy.scene = copy.particles.scene = scene
+        copy.parameters = LiveParameters(scene, copy.counters)
+        copy.resume(dataclasses.replace(self.snapshot(), scene=scene))
+        copy.forces, copy.pushed = deepcopy((self.forces, self.pushed))
+        copy.parameters.take_over(self.parameters)
+        return copy
+
+    def digest(self) -> str:
+        """Return the hex SHA-256 of all that decides the future, to the last bit: see `State.digest`.
+
+        Equal digests continue to equal digests, on the same back end. Forces that a script added are not part of it.
+        """
+        return self.snapshot().digest()
+
+    def save(self, path: str | Path, *, lasting: bool = False) -> None:
+        """Write the whole state to an .npz file, replaced in one move; `restore` continues from it exactly.
+
+        A `lasting` one is on the disk before this returns. Raises `WavetankError` for water with non-finite numbers.
+        """
+        write_state(path, self.snapshot(), lasting=lasting)
+
+    @classmethod
+    def restore(cls, path: str | Path, arch: str = "cpu") -> Self:
+        """Continue from a file that `save` wrote, bit for bit on the same back end.
+
+        Raises `WavetankError` for any other file, one that is damaged, and one that needs too much memory.
+        """
+        state = read_state(path)
+        with explain_errors(printable(path), "state"):
+            check_cost(state.scene, state.resumable.counters.capacity)
+            self = cls(state.scene, arch)
+            self.resume(state)
+            self.bodies.check_poses(state.resumable.solids.poses)
+        return self
+
+    # --- live parameters as attributes ---
 
     def __getattr__(self, name: str) -> Any:
-        """Read a parameter of the scene."""
         if name in LIVE:
-            return getattr(self._scene_at(self.time) if name == "gravity" else self.scene, name)
+            return getattr(self.parameters, name)
         raise AttributeError(f"'Simulation' object has no attribute {name!r}")
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Set an attribute; a live parameter is checked and holds from the next substep on."""
-        if name == "gravity" and changes_gravity(self.scene):
-            trial = self.scene.model_copy(update={"gravity_track": None})
-            trial.assign(name, value)
-            self.gravity_by_hand = trial.gravity
-        elif name in LIVE:
-            self.scene.assign(name, value)
-        else:
-            if name not in self.__dict__ and not hasattr(type(self), name):
-                refuse_assignment(name)
+        if name in self.__dict__ or _is_declared(type(self), name):
             super().__setattr__(name, value)
+        elif name in LIVE:
+            setattr(self.parameters, name, value)
+        else:
+            refuse_assignment(name)
+            raise WavetankError(
+                f"a simulation has no attribute {name!r}; dir(sim) lists what it has, its live parameters among them."
+            )
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *LIVE})
+
+
+def _is_declared(cls: type, name: str) -> bool:
+    """Return whether a class declares an attribute, or it is private."""
+    return name.startswith("_") or hasattr(cls, name) or any(name in inspect.get_annotations(c) for c in cls.__mro__)

@@ -1,76 +1,78 @@
-"""Emitters and drains at work, at the end of every frame: drains first, as what they took may come out again.
+"""Emitters and drains of a running world, which act at the end of every frame: drains first, as they may feed emitters.
 
-Each place in a mouth lets a particle out whenever the volume of a row has passed, neighbours by turns. Where it is at
-the end of the frame follows from when it left: it has flown freely since. Flow is right to a particle, whatever the
-frames are. What finds no room, because water stands in the mouth, is owed and comes as soon as there is.
-`jets.py` has what leaves a mouth.
+Each place of an inlet emits a particle whenever the volume of a row has passed, neighbors alternately. Its position at
+the end of the frame follows from the time when it left: it has flown freely since. The flow is exact to a particle for
+any length of frames. Particles without free space, because water stands in the inlet, are pending and come as soon as
+there is. `inflow.py` computes what leaves an inlet.
 """
 
 import dataclasses
 import math
-from typing import Any, Protocol
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from wavetank.device.compiler import download
 from wavetank.foundation.errors import WavetankError
-from wavetank.physics.world import World
 from wavetank.scene.drains import Drain
 from wavetank.scene.emitters import Emitter
 from wavetank.scene.forces import Attract, Force
 from wavetank.scene.gauges import Gauge
 from wavetank.scene.scene import Scene
-from wavetank.simulation.jets import flown, jet_of, particles_due, row
+from wavetank.simulation.inflow import flown, jet_of, particles_due, row
+from wavetank.simulation.particles import ParticleSystem
 
-GAP = 0.8  # d: room that new particles have from others
-PRESSED = 0.45  # d: the same for those that water under pressure has kept waiting, more than a row
-PATIENCE = 0.5  # s: flow of so long is owed at most; the rest is given up, and said
+GAP = 0.8  # d: distance of new particles from others, at least
+PRESSED = 0.45  # d: the same where more than a row is pending because of water under pressure
+LONGEST_PENDING = 0.5  # s: flow of this time can be pending; the rest is withheld, with a note
 MOST_DUE = 5_000_000  # particles of an emitter in a frame
-SPARSE = 50.0  # d: a mouth whose particles come farther apart is refused
-REACH = 4.0  # radii: how far the suction of a drain is felt
-
-
-class Water(Protocol):
-    """What sources need of a running world; `Simulation` has it."""
-
-    scene: Scene
-    world: World
-    notes: list[str]
-    time_steps: int
-
-    @property
-    def count(self) -> int:
-        """Number of particles."""
-
-    def add(self, positions: Any, velocities: Any = None, dyes: Any = None, materials: Any = None) -> np.ndarray:
-        """Add particles; return their ids."""
-
-    def remove(self, ids: Any) -> int:
-        """Remove the particles with these ids; return how many there were."""
-
-    def remove_inside(self, start: np.ndarray, end: np.ndarray, radius: float) -> int:
-        """Remove the particles within `radius` [m] of a segment; return how many."""
-
-    def free_places(self, places: np.ndarray, gap: float, wall: float) -> np.ndarray:
-        """Say which places keep these distances [m] to particles and solids."""
+SPARSE = 50.0  # d: inlets with particles farther apart are refused
+REACH = 4.0  # radii: range of the suction of a drain
 
 
 @dataclasses.dataclass
 class Source:
-    """What is known of one emitter or drain besides the scene."""
+    """An emitter or a drain of a running world, in `sim.sources`."""
 
-    phase: float = 0.0  # of a row, or particles of a drain
-    owed: int = 0  # particles that found no room yet
-    total: int = 0  # particles that came, or went
-    withheld: int = 0  # particles that were given up
-    flows: bool = False  # whether an emitter lets water out
-    store: int = 0  # particles that a drain took and no emitter has let out again
+    name: str  # of the scene, or "emitter 1", "drain 1" and so on
+    on: bool = True  # writable: whether it acts when the scene lets it
+    rate: float = 0.0  # m^3/s, in 2-D m^2/s: flow in the last frame
+    phase: float = 0.0  # of a row; of a drain: fraction of the next particle
+    pending: int = 0  # particles that found no free space yet
+    total: int = 0  # particles that it emitted or removed
+    withheld: int = 0  # particles that an emitter could not emit
+    flows: bool = False  # whether an emitter emits now
+    store: int = 0  # particles that a drain removed and no emitter has emitted again
+
+    def plain(self) -> dict[str, Any]:
+        """Return what a saved state has of this."""
+        stored = {key: getattr(self, name) for name, key in STORED.items()}
+        return stored if self.on else {**stored, "on": False}
+
+    def read(self, plain: Mapping[str, Any]) -> None:
+        """Restore what `plain` returned."""
+        for name, key in STORED.items():
+            setattr(self, name, plain.get(key, getattr(self, name)))
+        self.on = bool(plain.get("on", True))
+
+
+#: Attributes of a source that decide how it continues, and their keys in saved states.
+STORED = {
+    "phase": "phase",
+    "pending": "owed",
+    "total": "total",
+    "withheld": "withheld",
+    "flows": "flows",
+    "store": "store",
+}
 
 
 def rows_due(way: float, more: float, pitch: float) -> tuple[np.ndarray, float]:
-    """Return how far [m] each of the rows is that leave while the jet goes `more` [m], and how far the next one is.
+    """Return how far [m] the rows are that leave while a jet moves by `more` [m], and the distance of the next one.
 
-    `way` is what this returned last.
+    `way` is the distance that this returned last.
     """
     way += more
     rows = int(way / pitch)
@@ -78,39 +80,62 @@ def rows_due(way: float, more: float, pitch: float) -> tuple[np.ndarray, float]:
     return way + pitch * np.arange(rows), way
 
 
-class Sources:
-    """The emitters and drains of a world."""
+class Sources(Mapping[str, Source]):
+    """The emitters and drains of a world by name. Raises `WavetankError` for an unknown name."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.emitters = [Source() for _ in scene.emitters]
-        self.drains = [Source() for _ in scene.drains]
-        self.said: set[str] = set()  # notes that were given
+    def __init__(self, scene: Scene, notes: list[str]) -> None:
+        """Begin as the scene says; sentences for people are appended to `notes`."""
+        self.emitters = _named_sources("emitter", scene.emitters)
+        self.drains = _named_sources("drain", scene.drains)
+        self.notes = notes
+        self._said: set[str] = set()  # notes that were given
 
-    def __bool__(self) -> bool:
-        return bool(self.emitters or self.drains)
+    @override
+    def __getitem__(self, name: str) -> Source:
+        for source in (*self.emitters, *self.drains):
+            if source.name == name:
+                return source
+        raise WavetankError(f"there is no emitter or drain named {name!r}; there are: {', '.join(self) or 'none'}.")
+
+    @override
+    def __contains__(self, name: object) -> bool:
+        return any(source.name == name for source in (*self.emitters, *self.drains))
+
+    @override
+    def __iter__(self) -> Iterator[str]:
+        return iter([source.name for source in (*self.emitters, *self.drains)])
+
+    @override
+    def __len__(self) -> int:
+        return len(self.emitters) + len(self.drains)
 
     def forces(self, scene: Scene, time: float, duration: float) -> list[Force]:
-        """Return what drains pull and jets push with in a frame that begins at `time` [s]."""
+        """Return the suction of drains and the jets in inlets for a frame of `duration` [s] from `time` [s] on."""
         begin, found = time + scene.start_time, list[Force]()
         clock = begin + 0.5 * duration
-        for drain in (drain.at(clock) for drain in scene.drains):
-            if drain.suction and acts(drain, begin, duration):
+        for drain, source in zip((drain.at(clock) for drain in scene.drains), self.drains, strict=True):
+            if drain.suction and source.on and acts(drain, begin, duration):
                 found.append(suction_of(drain))
         for emitter, source in zip(scene.emitters, self.emitters, strict=True):
-            if source.flows and emitter.mesh is None and acts(emitter, begin, duration):
+            if source.flows and source.on and emitter.mesh is None and acts(emitter, begin, duration):
                 found.append(jet_of(scene, emitter.at(clock), clock))
         return found
 
-    def act(self, sim: Water, time: float, duration: float) -> None:
-        """Let water go and come, at the end of a frame of `duration` [s] that began at `time` [s]."""
-        begin = time + sim.scene.start_time
+    def act(self, particles: ParticleSystem, time: float, duration: float, dt: float) -> None:
+        """Remove and add particles at the end of a frame of `duration` [s] from `time` [s] on, in steps of `dt` [s]."""
+        scene, begin = particles.scene, time + particles.scene.start_time
+        before = [source.total for source in (*self.drains, *self.emitters)]
         for number, source in enumerate(self.drains):
-            self._drain(sim, sim.scene.drains[number], source, begin, begin + duration)
+            if source.on:
+                self._drain(particles, scene.drains[number], source, begin, begin + duration)
         for number, source in enumerate(self.emitters):
-            self._emit(sim, number, source, begin, begin + duration)
+            if source.on:
+                self._emit(particles, number, source, (begin, begin + duration), dt)
+        for source, total in zip((*self.drains, *self.emitters), before, strict=True):
+            source.rate = (source.total - total) * scene.spacing**scene.dim / duration
 
     def figures(self) -> dict[str, int]:
-        """Return how many particles came, went and found no room, for `Simulation.stats`."""
+        """Return numbers of particles emitted, drained and withheld, for `Simulation.stats`."""
         return {
             "emitted": sum(source.total for source in self.emitters),
             "drained": sum(source.total for source in self.drains),
@@ -118,46 +143,50 @@ class Sources:
         }
 
     def plain(self) -> dict[str, Any]:
-        """Return what a file holds of this."""
+        """Return what a saved state has of this; nothing without emitters and drains."""
+        if not self:
+            return {}
         return {
-            "emitters": [dataclasses.asdict(source) for source in self.emitters],
-            "drains": [dataclasses.asdict(source) for source in self.drains],
+            "emitters": [source.plain() for source in self.emitters],
+            "drains": [source.plain() for source in self.drains],
         }
 
     def read(self, plain: dict[str, Any]) -> None:
-        """Take what `plain` wrote; what is missing begins anew."""
+        """Restore what `plain` returned; sources that it lacks begin as new ones."""
         for name in ("emitters", "drains"):
-            for source, numbers in zip(getattr(self, name), plain.get(name, []), strict=False):
-                source.__dict__.update(numbers)
+            for source, stored in zip(getattr(self, name), plain.get(name, []), strict=False):
+                source.read(stored)
 
     # --- drains ---
 
-    def _drain(self, sim: Water, drain: Drain, source: Source, begin: float, end: float) -> None:
+    def _drain(self, particles: ParticleSystem, drain: Drain, source: Source, begin: float, end: float) -> None:
         drain = drain.at(0.5 * (begin + end))
         first, last = span(drain, begin, end)
-        if last <= first or not sim.count:
+        if last <= first or not particles.count:
             return
-        scene, most = sim.scene, sim.count
+        scene, most = particles.scene, particles.count
         if drain.flow is not None:
             unit = 1.0 if scene.dim == 2 else 1e-3
             source.phase += drain.flow * unit * (last - first) / scene.spacing**scene.dim
             most = int(source.phase)
         if drain.level is not None:
-            most = min(most, max(0, -missing(sim, drain, drain.level)))
-        taken = take(sim, drain, most) if most else 0
+            most = min(most, max(0, -missing(particles, drain, drain.level)))
+        taken = take(particles, drain, most) if most else 0
         source.total += taken
         source.store += taken
-        if drain.flow is not None:  # what was not there to be taken is not made up for
+        if drain.flow is not None:  # particles that were not there are not removed later
             source.phase = min(source.phase - taken, 1.0)
 
     # --- emitters ---
 
-    def _emit(self, sim: Water, number: int, source: Source, begin: float, end: float) -> None:
-        emitter = sim.scene.emitters[number]
+    def _emit(
+        self, particles: ParticleSystem, number: int, source: Source, frame: tuple[float, float], dt: float
+    ) -> None:
+        emitter, (begin, end) = particles.scene.emitters[number], frame
         first, last = span(emitter, begin, end)
         if last <= first:
             return
-        scene, spacing = sim.scene, sim.scene.spacing
+        scene, spacing = particles.scene, particles.scene.spacing
         now = emitter.at(0.5 * (first + last))
         mouth = now.mouth(spacing)
         volume = len(mouth) * spacing**scene.dim
@@ -171,75 +200,83 @@ class Sources:
                 "allowed: lower its speed or flow, or make the spacing larger."
             )
         due, source.phase = particles_due(mouth, source.phase, rows)
-        keep = self._allowed(sim, now, len(due.place), source)
+        keep = self._allowed(particles, now, len(due.place), source)
         if keep < len(due.place):
-            due, source.owed, source.flows = due.first(keep), 0, keep > 0
-        x, v = flown(scene, emitter, mouth, due.aged(end - last, (last - first) / rows), end, _step(sim))
-        patience = max(len(mouth), math.ceil(now.rate(mouth) * PATIENCE / spacing**scene.dim))
-        gap = PRESSED if source.owed > len(mouth) else GAP
-        came = self._put(sim, now, x, v, gap) if len(x) else 0
-        source.owed += len(x) - came
-        if source.owed:  # in the mouth, wherever there is room by now
-            x, v = flown(scene, emitter, mouth, row(mouth), end, _step(sim))
-            late = self._put(sim, now, x, v, gap, source.owed)
-            source.owed -= late
+            due, source.pending, source.flows = due.first(keep), 0, keep > 0
+        x, v = flown(scene, emitter, mouth, due.aged(end - last, (last - first) / rows), end, dt)
+        most_pending = max(len(mouth), math.ceil(now.rate(mouth) * LONGEST_PENDING / spacing**scene.dim))
+        gap = PRESSED if source.pending > len(mouth) else GAP
+        came = self._put(particles, now, x, v, gap) if len(x) else 0
+        source.pending += len(x) - came
+        if source.pending:  # in the inlet, wherever there is free space by now
+            x, v = flown(scene, emitter, mouth, row(mouth), end, dt)
+            late = self._put(particles, now, x, v, gap, source.pending)
+            source.pending -= late
             came += late
-        if source.owed > patience:
-            source.withheld += source.owed - patience
-            source.owed = patience
-            self._say(sim, f"{_name(emitter, number)} is blocked by water or a solid: less comes out than it should.")
+        if source.pending > most_pending:
+            source.withheld += source.pending - most_pending
+            source.pending = most_pending
+            self._note(f"{_name(emitter, number)} is blocked by water or a solid: less comes out than it should.")
         source.total += came
         if emitter.feed:
             self._fed(scene, emitter).store -= came
 
-    def _allowed(self, sim: Water, emitter: Emitter, due: int, source: Source) -> int:
-        """Return how many of the particles that are due may come, by what feeds them, the level and the room."""
+    def _allowed(self, particles: ParticleSystem, emitter: Emitter, due: int, source: Source) -> int:
+        """Return how many of the `due` particles may come, by the drain that feeds them, the level and the capacity."""
         allowed = due
         if emitter.feed:
-            allowed = min(allowed, self._fed(sim.scene, emitter).store - source.owed)
+            allowed = min(allowed, self._fed(particles.scene, emitter).store - source.pending)
         if emitter.level is not None and due:
-            allowed = min(allowed, missing(sim, emitter, emitter.level))
-        most = sim.scene.most_particles
-        if most is not None and sim.scene.when_full == "stop" and sim.count + allowed > most:
-            fit = max(0, most - sim.count)
+            allowed = min(allowed, missing(particles, emitter, emitter.level))
+        most = particles.scene.most_particles
+        if most is not None and particles.scene.when_full == "stop" and particles.count + allowed > most:
+            fit = max(0, most - particles.count)
             source.withheld += allowed - fit
             allowed = fit
-            self._say(sim, f"There are {sim.count:,} particles and most_particles = {most:,}: emitters wait for room.")
+            self._note(
+                f"There are {particles.count:,} particles and most_particles = {most:,}: emitters wait for room."
+            )
         return max(0, allowed)
 
     def _put(
-        self, sim: Water, emitter: Emitter, x: np.ndarray, v: np.ndarray, gap: float, most: int | None = None
+        self,
+        particles: ParticleSystem,
+        emitter: Emitter,
+        x: np.ndarray,
+        v: np.ndarray,
+        gap: float,
+        most: int | None = None,
     ) -> int:
-        """Add the particles that have room, at most so many, and return how many; the world's oldest may go for it."""
-        scene = sim.scene
-        free = np.flatnonzero(sim.free_places(x, gap * scene.spacing, scene.wall_gap * scene.spacing))[:most]
+        """Add the particles with free space, `most` at most, and return their number; the oldest may be recycled."""
+        scene = particles.scene
+        free = np.flatnonzero(particles.free_places(x, gap * scene.spacing, scene.wall_gap * scene.spacing))[:most]
         if not len(free):
             return 0
-        full = 0 if scene.most_particles is None else sim.count + len(free) - scene.most_particles
+        full = 0 if scene.most_particles is None else particles.count + len(free) - scene.most_particles
         if full > 0 and scene.when_full == "recycle":
-            ids = download(sim.world.particles.id)[: sim.count]
-            sim.remove(np.sort(ids)[:full])
+            ids = download(particles.world.particles.id)[: particles.count]
+            particles.remove(np.sort(ids)[:full])
         names = [None, *(material.name for material in scene.materials)]
         kinds = np.full(len(free), names.index(emitter.material), np.int32)
-        sim.add(x[free], v[free], np.full(len(free), emitter.dye_number, np.int32), kinds)
+        particles.add(x[free], v[free], np.full(len(free), emitter.dye_number, np.int32), kinds)
         return len(free)
 
     def _fed(self, scene: Scene, emitter: Emitter) -> Source:
         return self.drains[[drain.name for drain in scene.drains].index(emitter.feed)]
 
-    def _say(self, sim: Water, sentence: str) -> None:
-        if sentence.split(":")[-1] not in self.said:
-            self.said.add(sentence.split(":")[-1])
-            sim.notes.append(sentence)
+    def _note(self, sentence: str) -> None:
+        if sentence.split(":")[-1] not in self._said:
+            self._said.add(sentence.split(":")[-1])
+            self.notes.append(sentence)
 
 
-def check_places(sim: Water) -> None:
-    """Raise `WavetankError` where an emitter begins inside of a solid or outside of the tank."""
-    scene = sim.scene
+def check_places(particles: ParticleSystem, dt: float) -> None:
+    """Raise `WavetankError` where an emitter starts inside of a solid or outside of the tank."""
+    scene = particles.scene
     for number, emitter in enumerate(scene.emitters):
         now = emitter.at(scene.start_time)
         mouth = now.mouth(scene.spacing)
-        x, _ = flown(scene, emitter, mouth, row(mouth), scene.start_time, _step(sim))
+        x, _ = flown(scene, emitter, mouth, row(mouth), scene.start_time, dt)
         if mouth.pitch > SPARSE * scene.spacing:
             raise WavetankError(
                 f"emitters[{number}] has a mouth so small that its particles are {mouth.pitch:.3g} m apart; make it "
@@ -248,7 +285,7 @@ def check_places(sim: Water) -> None:
         lower, upper = scene.tank.box() if scene.tank else (-np.inf, np.inf)
         x = scene.tank.within(x) if scene.tank else x
         inside = np.all((x >= lower) & (x <= upper), axis=1)
-        if not (sim.free_places(x, 0.0, scene.wall_gap * scene.spacing) & inside).any():
+        if not (particles.free_places(x, 0.0, scene.wall_gap * scene.spacing) & inside).any():
             raise WavetankError(
                 f"emitters[{number}] is inside of a solid or outside of the tank, and nothing can come out; move its "
                 "position to where there is room, or turn its direction."
@@ -256,52 +293,52 @@ def check_places(sim: Water) -> None:
 
 
 def acts(source: Emitter | Drain, begin: float, duration: float) -> bool:
-    """Say whether an emitter or a drain acts in a frame that begins when the scene's clock shows `begin` [s]."""
+    """Return whether an emitter or a drain acts in a frame that begins at `begin` [s] of the scene's clock."""
     first, last = span(source, begin, begin + duration)
     return last > first
 
 
 def span(source: Emitter | Drain, begin: float, end: float) -> tuple[float, float]:
-    """Return the part of the time from `begin` to `end` [s] in which this acts; of no length where it does not."""
+    """Return the part of the time from `begin` to `end` [s] in which a source acts; empty where it does not."""
     stop = math.inf if source.duration is None else source.start + source.duration
     first = min(max(begin, source.start), end)
     return first, max(first, min(end, stop))
 
 
-def take(sim: Water, drain: Drain, most: int | None = None) -> int:
-    """Remove the particles that a drain takes, at most so many, and return how many."""
-    if drain.shape == "sphere" and (most is None or most >= sim.count):
+def take(particles: ParticleSystem, drain: Drain, most: int | None = None) -> int:
+    """Remove the particles inside a drain, `most` at most, and return their number."""
+    if drain.shape == "sphere" and (most is None or most >= particles.count):
         assert drain.center is not None
         assert drain.radius is not None
         center = np.array([*drain.center, 0.0][:3], float)
-        return sim.remove_inside(center, center, drain.radius)
-    most = sim.count if most is None else most
-    x = download(sim.world.particles.x)[: sim.count].astype(np.float64)
+        return particles.remove_inside(center, center, drain.radius)
+    most = particles.count if most is None else most
+    x = download(particles.world.particles.x)[: particles.count].astype(np.float64)
     middle = drain.middle()
-    if sim.scene.tank and middle is not None:
-        x = sim.scene.tank.beside(x, middle)
-    depth = drain.depths(x, sim.scene.spacing)
+    if particles.scene.tank and middle is not None:
+        x = particles.scene.tank.beside(x, middle)
+    depth = drain.depths(x, particles.scene.spacing)
     chosen = np.flatnonzero(np.isfinite(depth))
     if not len(chosen) or most <= 0:
         return 0
-    ids = download(sim.world.particles.id)[: sim.count]
+    ids = download(particles.world.particles.id)[: particles.count]
     if len(chosen) > most:
         order = np.lexsort((ids[chosen], depth[chosen]))
         chosen = chosen[order[:most]]
-    return sim.remove(ids[chosen])
+    return particles.remove(ids[chosen])
 
 
 def suction_of(drain: Drain) -> Attract:
-    """Return the pull of a drain."""
+    """Return the suction of a drain as a force."""
     assert drain.center is not None
     assert drain.radius is not None
     return Attract(center=drain.center, radius=REACH * drain.radius, strength=drain.suction, drag=0.0)
 
 
-def missing(sim: Water, source: Emitter | Drain, level: float) -> int:
-    """Return how many particles are missing to the level [m]; what is too much is negative."""
-    scene, gauge = sim.scene, source.gauge
-    x = download(sim.world.particles.x)[: sim.count].astype(np.float64)
+def missing(particles: ParticleSystem, source: Emitter | Drain, level: float) -> int:
+    """Return how many particles are missing to a level [m]; negative where there are too many."""
+    scene, gauge = particles.scene, source.gauge
+    x = download(particles.world.particles.x)[: particles.count].astype(np.float64)
     if gauge is None:
         lower, upper = scene.tank.box() if scene.tank else (np.zeros(scene.dim), np.ones(scene.dim))
         gauge = Gauge.parse({"lower": lower.tolist(), "upper": upper.tolist()})
@@ -309,9 +346,8 @@ def missing(sim: Water, source: Emitter | Drain, level: float) -> int:
     return math.floor(lack + 0.5)
 
 
-def _step(sim: Water) -> float:
-    """Return the length of a time step [s], as far as the last frame tells."""
-    return sim.scene.frame_time / max(sim.time_steps, 1)
+def _named_sources(kind: str, sources: Sequence[Emitter | Drain]) -> list[Source]:
+    return [Source(source.name or f"{kind} {number}") for number, source in enumerate(sources, 1)]
 
 
 def _name(emitter: Emitter, number: int) -> str:

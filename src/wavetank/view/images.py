@@ -12,8 +12,8 @@ import numpy as np
 
 from wavetank.scene.tank import Tank
 from wavetank.simulation.frame import Frame
-from wavetank.simulation.instant import Standing
-from wavetank.simulation.moving_solids import MovingSolids
+from wavetank.simulation.instant import PlacedSolid
+from wavetank.simulation.solids import Solids
 from wavetank.solids.seams import is_short
 from wavetank.solids.shapes import Difference, HalfSpace, moved
 from wavetank.solids.solid import ENDLESS, Solid
@@ -37,14 +37,14 @@ class Images:
 
     def __init__(self) -> None:
         self._of: tuple[object, ...] = ()
-        self._shown: tuple[MovingSolids, tuple[Standing, ...]] | None = None
+        self._shown: tuple[Solids, tuple[PlacedSolid, ...]] | None = None
 
     def within(self, frame: Frame) -> Frame:
         """Return the frame with its solids as they are seen; itself where none is at a seam."""
         tank = frame.scene.tank
         if tank is None or not tank.rings:
             return frame
-        standing = frame.stand()
+        standing = frame.placed
         key = tank, tuple((id(one.solid), one.position.tobytes(), one.rotation.tobytes()) for one in standing)
         if key != self._of:
             self._of, self._shown = key, _placed(frame, tank, standing)
@@ -52,24 +52,26 @@ class Images:
             return frame
         solids, shown = self._shown
         scene = frame.scene.model_copy(update={"solids": [one.solid for one in shown]})
-        return dataclasses.replace(frame, scene=scene, solids=solids.device, stand=lambda: shown)
+        return dataclasses.replace(frame, scene=scene, solids=solids.device, read_placed=lambda: shown)
 
 
 def _placed(
-    frame: Frame, tank: Tank, standing: tuple[Standing, ...]
-) -> tuple[MovingSolids, tuple[Standing, ...]] | None:
+    frame: Frame, tank: Tank, standing: tuple[PlacedSolid, ...]
+) -> tuple[Solids, tuple[PlacedSolid, ...]] | None:
     """Return all solids where they stand, cut at the seams, with their images; None where none is at a seam."""
     crossing = [_crossed(one, tank) for one in standing]
     if not any(crossing):
         return None
-    shown, others = list[Standing](), list[Standing]()
+    shown, others = list[PlacedSolid](), list[PlacedSolid]()
     for one, axes in zip(standing, crossing, strict=True):
         first, *ways = _ways(one, tank, axes, frame.scene.spacing)
         shown.append(_cut(one, tank, first, axes) if axes else one)
         others += [_cut(one, tank, way, axes) for way in ways]
     shown += others
     scene = frame.scene
-    solids = MovingSolids(tank.walls(), [one.solid for one in shown], scene.friction, scene.spacing, scene.start_time)
+    solids = Solids(
+        tank.walls(), [one.solid for one in shown], scene.dim, scene.friction, scene.spacing, scene.start_time
+    )
     for number, one in enumerate(shown, solids.tank_count):
         solids.targets[number] = one.position, one.rotation
     solids.arrive()
@@ -77,7 +79,7 @@ def _placed(
     return solids, tuple(shown)
 
 
-def _crossed(one: Standing, tank: Tank) -> list[int]:
+def _crossed(one: PlacedSolid, tank: Tank) -> list[int]:
     """Return the axes at whose seam a solid may stand; none for one without an end."""
     reach, (lower, upper) = one.solid.reach(), tank.box()
     if reach >= 0.1 * ENDLESS:
@@ -85,7 +87,7 @@ def _crossed(one: Standing, tank: Tank) -> list[int]:
     return [k for k in tank.rings if one.position[k] - reach < lower[k] or one.position[k] + reach > upper[k]]
 
 
-def _ways(one: Standing, tank: Tank, axes: list[int], spacing: float) -> list[np.ndarray]:
+def _ways(one: PlacedSolid, tank: Tank, axes: list[int], spacing: float) -> list[np.ndarray]:
     """Return how far it is [m], [3], from a solid to its images that reach into the tank, first that of its middle.
 
     A solid that has moved on for long may be whole lengths of the tank away.
@@ -101,7 +103,7 @@ def _ways(one: Standing, tank: Tank, axes: list[int], spacing: float) -> list[np
     return [np.array(way) for way in itertools.product(*steps)]
 
 
-def _cut(one: Standing, tank: Tank, way: np.ndarray, axes: list[int]) -> Standing:
+def _cut(one: PlacedSolid, tank: Tank, way: np.ndarray, axes: list[int]) -> PlacedSolid:
     """Return a solid moved by a `way` [m], without what is beyond the seams along some axes."""
     dim = len(tank.size)
     place = one.position + way

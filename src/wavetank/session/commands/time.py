@@ -8,7 +8,6 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.session.commands.command import Command
 from wavetank.session.history import BOOKMARKS
 from wavetank.session.state import SessionState
-from wavetank.simulation.snapshot import Packed
 
 
 class Pause(Command):
@@ -93,7 +92,7 @@ class Bookmark(Command):
         if self.action == "set":
             if len(bookmarks) >= BOOKMARKS and self.name not in bookmarks:
                 raise WavetankError(f"there are {BOOKMARKS} bookmarks already; delete one first.")
-            bookmarks[self.name] = Packed(state.sim.snapshot())
+            bookmarks[self.name] = state.sim.snapshot().pack()
             return
         if self.name not in bookmarks:
             raise WavetankError(f"there is no bookmark {self.name!r}; there are: {', '.join(bookmarks) or 'none'}.")

@@ -27,5 +27,5 @@ class Drain(Tool):
     def hold(self, hand: Hand, duration: float) -> None:
         place, radius = hand.pick_again().point, hand.radius(self.radius)
         sink = Sink(center=hand.flat(place), radius=0.5 * radius, suction=9.81 * self.suction)
-        take(hand.sim, sink)
+        take(hand.sim.particles, sink)
         hand.sim.push(suction_of(sink))

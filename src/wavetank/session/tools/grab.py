@@ -56,5 +56,5 @@ class Grab(Tool):
 
     @override
     def end(self, hand: Hand) -> None:
-        if self._held in hand.sim.solids.names and hand.sim.solids.moves_itself(self._held):
+        if self._held in hand.sim.solids.names and hand.sim.solids.has_motion(self._held):
             hand.sim.release(self._held)

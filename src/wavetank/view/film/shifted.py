@@ -24,7 +24,7 @@ def shifted(frame: Frame, by: float) -> Frame:
 
 def _solids(frame: Frame, by: float) -> SolidSet:
     """Return the solids then: bodies by their velocities, and what has a motion where that says, unless it is held."""
-    solids, standing = frame.solids, frame.standing
+    solids, standing = frame.solids, frame.placed
     poses = {k: _pose(frame, one, by) for k, one in enumerate(standing, solids.tank_count) if k < solids.count}
     if all(
         np.array_equal(poses[k][0], one.position) and np.array_equal(poses[k][1], one.rotation)

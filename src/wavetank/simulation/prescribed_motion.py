@@ -1,4 +1,4 @@
-"""Solids that move by themselves: which of them a hand holds, and which are on their way back."""
+"""Solids with a prescribed motion: which follow it, which are held by a hand, and which return to it."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from wavetank.solids.solid import Solid
 
 @dataclasses.dataclass(frozen=True)
 class Return:
-    """A way back from a hand to the motion."""
+    """A solid on its way back from a hand to its motion."""
 
     time: float  # s, when it was let go
     within: float  # s
@@ -23,54 +23,54 @@ class Return:
     rotation: tuple[float, ...]
 
 
-class Courses:
-    """Poses over time of the solids that have a motion, by name. The rest knows nothing of them."""
+class PrescribedMotions:
+    """Poses over time of the solids that have a motion, by name."""
 
     def __init__(self, members: Sequence[Solid], names: Sequence[str], start: float) -> None:
-        self.start = start  # s: what the clock of the motions shows when the water starts
+        self.start = start  # s: time of the motions when the water starts
         self.held: set[str] = set()
         self.returning: dict[str, Return] = {}
-        self.began, self.duration = 0.0, 0.0  # of the present frame [s]
+        self.frame_start, self.duration = 0.0, 0.0  # of the present frame [s]
         self._paths: dict[str, tuple[Path, Pose]] = {}
         for solid, name in zip(members, names, strict=True):
             self.add(solid, name)
 
     def add(self, solid: Solid, name: str) -> None:
-        """Let a solid follow its motion, if it has one."""
+        """Add the motion of a solid, if it has one."""
         if solid.motion is not None:
             self._paths[name] = (solid.motion.path(), (solid.origin, solid.quaternion))
 
     def forget(self, name: str) -> None:
-        """Forget a solid that is gone."""
+        """Remove a solid."""
         self._paths.pop(name, None)
         self.returning.pop(name, None)
         self.held.discard(name)
 
     def begin_frame(self, time: float, duration: float) -> None:
-        """Take note of a frame that begins at `time` [s]."""
-        self.began, self.duration = time, duration
+        """Start a frame of `duration` [s] at `time` [s]."""
+        self.frame_start, self.duration = time, duration
         self.returning = {name: back for name, back in self.returning.items() if time < back.time + back.within}
 
     def has(self, name: str) -> bool:
-        """Say whether a solid has a motion."""
+        """Return whether a solid has a motion."""
         return name in self._paths
 
     def follows(self, name: str) -> bool:
-        """Say whether a solid goes where its motion says."""
+        """Return whether a solid follows its motion now."""
         return name in self._paths and name not in self.held
 
     def names(self) -> list[str]:
-        """Name the solids that go where their motions say."""
+        """Return the names of the solids that follow their motions now."""
         return [name for name in self._paths if name not in self.held]
 
     def hold(self, name: str) -> None:
-        """Take a solid from its motion."""
+        """Hold a solid: it no longer follows its motion."""
         if name in self._paths:
             self.held.add(name)
             self.returning.pop(name, None)
 
     def release(self, name: str, time: float, within: float, pose: Pose) -> None:
-        """Give a solid that is held back to its motion, `within` [s] from `pose`; raises `WavetankError`."""
+        """Let a held solid return to its motion from `pose` `within` [s]; raises `WavetankError` where it has none."""
         if name not in self._paths:
             known = ", ".join(sorted(self._paths)) or "none"
             raise WavetankError(f"{name!r} has no motion of its own to go back to; solids with one: {known}.")
@@ -80,7 +80,7 @@ class Courses:
                 self.returning[name] = Return(time, within, tuple(pose[0].tolist()), tuple(pose[1].tolist()))
 
     def pose(self, name: str, time: float) -> Pose:
-        """Return where a solid that follows its motion is at `time` [s] of the water."""
+        """Return the pose of a solid that follows its motion at `time` [s] of the water."""
         path, rest = self._paths[name]
         place, turn = path.pose(time + self.start, rest)
         back = self.returning.get(name)
@@ -91,12 +91,12 @@ class Courses:
         return place, turn
 
     def plain(self) -> dict[str, Any]:
-        """Return what a file holds of this."""
+        """Return what a saved state has of this."""
         returning = {name: dataclasses.asdict(back) for name, back in self.returning.items()}
         return {"held": sorted(self.held), "returning": returning}
 
     def read(self, plain: dict[str, Any]) -> None:
-        """Take what `plain` wrote."""
+        """Restore what `plain` returned."""
         self.held = set(plain.get("held", []))
         self.returning = {
             name: Return(back["time"], back["within"], tuple(back["position"]), tuple(back["rotation"]))

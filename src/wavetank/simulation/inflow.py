@@ -1,4 +1,4 @@
-"""Jets: which particles leave a mouth in a frame, where they are at its end, and what holds them in the mouth.
+"""Inflow: which particles leave an inlet in a frame, where they are at its end, and the jet force in the inlet.
 
 code     symbol   meaning                                                       unit
 phase             share of a row that has passed since the last whole one       1
@@ -20,27 +20,27 @@ from wavetank.scene.mouths import Mouth, frame_of
 from wavetank.scene.scene import Scene
 from wavetank.scene.schedule import gravity_at
 
-HELD = 2.5  # d: so far from the mouth a jet is held at its speed
+HELD = 2.5  # d: distance from the inlet up to which a jet is held at its speed
 
 
 @dataclasses.dataclass(frozen=True)
 class Due:
-    """Particles that leave a mouth, those that left first in front."""
+    """Particles that leave an inlet, in the order in which they left."""
 
-    place: np.ndarray  # int [n]: where in the mouth
+    place: np.ndarray  # int [n]: index of the place in the inlet
     age: np.ndarray  # since they left: in rows, or in seconds
 
     def first(self, number: int) -> "Due":
-        """Return those that left first."""
+        """Return the first `number` of them."""
         return Due(self.place[:number], self.age[:number])
 
     def aged(self, since: float, interval: float) -> "Due":
-        """Return the same with ages in seconds, where rows take an `interval` [s] each and all ended `since` [s]."""
+        """Return them with ages in seconds: rows take an `interval` [s] each, and the last ended `since` [s] ago."""
         return Due(self.place, since + interval * self.age)
 
 
 def particles_due(mouth: Mouth, phase: float, rows: float) -> tuple[Due, float]:
-    """Return the particles that leave while so many `rows` pass a mouth, with ages in rows, and the next phase."""
+    """Return the particles that leave while `rows` pass an inlet, with ages in rows, and the next phase."""
     after = phase + rows
     whole = np.floor(after - mouth.phases).astype(int)
     number = whole - np.floor(phase - mouth.phases).astype(int)
@@ -52,16 +52,16 @@ def particles_due(mouth: Mouth, phase: float, rows: float) -> tuple[Due, float]:
 
 
 def row(mouth: Mouth) -> Due:
-    """Return a particle in each place, just out."""
+    """Return a particle in each place that leaves now."""
     return Due(np.arange(len(mouth)), np.zeros(len(mouth)))
 
 
 def flown(
     scene: Scene, emitter: Emitter, mouth: Mouth, due: Due, end: float, dt: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions and velocities, [n, dim], of particles that left at their ages [s] before the clock shows `end`.
+    """Return positions [m] and velocities [m/s], [n, dim], at `end` [s] of particles with these ages [s].
 
-    They have flown freely since; `dt` [s] is the length of a time step.
+    They have flown freely since they left; `dt` [s] is the length of a time step.
     """
     x, v = np.zeros((len(due.place), 3)), np.zeros((len(due.place), 3))
     g = np.zeros(3)
@@ -78,18 +78,18 @@ def flown(
             ways = np.tile(unit_vector(then.direction), (len(places), 1))
         carried = (middle - earlier) / dt if left > dt else np.zeros(3)
         own = speed * ways + carried
-        # What has left as a whole is half out of the mouth in front of it, and has fallen since its middle came out.
+        # A particle that has left is half a pitch ahead of the inlet, and has fallen since its center passed it.
         fallen = age + min(
             0.5 * mouth.pitch / speed, 0.5 * math.sqrt(mouth.pitch / max(float(np.linalg.norm(g)), 1e-9))
         )
         x[chosen] = middle + mouth.places[places] @ axes + 0.5 * mouth.pitch * ways + own * age + 0.5 * g * fallen**2
-        # Velocities of a step are those of its middle: x goes on by v + g dt, v included, in the next one.
+        # Velocities are those at the middle of a step: the next one moves x by (v + g dt) dt.
         v[chosen] = own + g * (fallen - 0.5 * dt)
     return x[:, : scene.dim].astype(np.float32), v[:, : scene.dim].astype(np.float32)
 
 
 def placed(emitter: Emitter, dim: int, clock: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middle of the mouth [m] and its frame at a time of the scene's clock [s]."""
+    """Return center [m] and frame of an inlet at a time of the scene's clock [s]."""
     rest = np.zeros(3)
     rest[:dim] = emitter.middle
     axes = np.eye(3)
@@ -106,7 +106,7 @@ def placed(emitter: Emitter, dim: int, clock: float) -> tuple[np.ndarray, np.nda
 
 
 def jet_of(scene: Scene, emitter: Emitter, clock: float) -> Jet:
-    """Return what holds the speed of a jet in the mouth when the scene's clock shows `clock` [s]."""
+    """Return the force that holds the speed of a jet in its inlet at `clock` [s] of the scene."""
     mouth, dim = emitter.mouth(scene.spacing), scene.dim
     middle, axes = placed(emitter, dim, clock)
     g = np.zeros(3)
@@ -126,11 +126,10 @@ def jet_of(scene: Scene, emitter: Emitter, clock: float) -> Jet:
 
 
 def closing_speed(jets: Iterable[Jet]) -> float:
-    """Return the largest speed [m/s] at which any two jets run into each other; 0 where none do.
+    """Return the largest relative speed [m/s] of two jets that meet; 0 where none do.
 
-    Particles that each go half a spacing in a step lie upon each other after it where they come from two sides, and the
-    constraint then throws them apart faster than they came. Two jets meet where their straight ways come as close as
-    their mouths are large.
+    Particles that move half a spacing in a step towards each other overlap after it, and the constraint separates them
+    faster than they came. Two jets meet where their straight paths come as close as their inlets are large.
     """
     mouths = [jet.opening for jet in jets]
     fastest = 0.0
@@ -150,7 +149,7 @@ def closing_speed(jets: Iterable[Jet]) -> float:
 
 
 def outlines(scene: Scene, time: float) -> list[tuple[str, np.ndarray]]:
-    """Return the mouths of emitters and of drains in walls at `time` [s], each a closed line of points [n, 3] [m]."""
+    """Return outlines of inlets and of outlets in walls at `time` [s], each a closed line of points [n, 3] [m]."""
     found, clock, turn = list[tuple[str, np.ndarray]](), time + scene.start_time, np.linspace(0.0, math.tau, 25)
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)], float)

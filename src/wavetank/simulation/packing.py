@@ -41,11 +41,16 @@ LEAST_ROOM = 0.5  # of the volume, that has a place for particles
 SLACK = 0.02  # d: how far a shape may reach beyond the tank by rounding
 
 
-class Water(Protocol):
+class Packed(Protocol):
     """What packing needs of a simulation."""
 
-    world: World
-    positions: np.ndarray
+    @property
+    def world(self) -> World:
+        """Its arrays on the device."""
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Positions [m] by id, [count, dim]."""
 
     def step(self) -> None:
         """Advance by a frame."""
@@ -54,7 +59,7 @@ class Water(Protocol):
         """Measure this instant."""
 
 
-def fill(scene: Scene, simulate: Callable[[Scene], Water]) -> Scene:
+def pack(scene: Scene, simulate: Callable[[Scene], Packed]) -> Scene:
     """Return `scene` with its `Filled` fluids packed; `simulate` makes a running world of a scene.
 
     Raises `WavetankError` for shapes that are open, too thin for the spacing or reach out of the tank.
@@ -69,7 +74,7 @@ def fill(scene: Scene, simulate: Callable[[Scene], Water]) -> Scene:
     return scene.model_copy(update={"fluids": fluids})
 
 
-def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulate: Callable[[Scene], Water]) -> Filled:
+def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulate: Callable[[Scene], Packed]) -> Filled:
     obstacles = [*scene.solids, *(_as_solid(other) for other in before if not isinstance(other, Points))]
     measured = _measure(name, fluid, scene, obstacles)
     number = round(measured.volume / scene.spacing**scene.dim)

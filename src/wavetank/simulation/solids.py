@@ -1,22 +1,21 @@
-"""The solids of a running world: their names, where they are, where they are going, and their way to the device."""
+"""Solids of a running world: names, poses, targets, growth, and their arrays on the device."""
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from wavetank.device.compiler import synchronize, upload
 from wavetank.device.periods import NONE, Periods
-from wavetank.device.state import Particles
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import interpolate, matrix_of, turned, unit_quaternion
-from wavetank.physics.population import Clearance, free_places
 from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene
-from wavetank.simulation.carving import outside
-from wavetank.simulation.courses import Courses
+from wavetank.simulation.prescribed_motion import PrescribedMotions
+from wavetank.simulation.state import SolidsState
 from wavetank.solids import shapes
 from wavetank.solids.motion import Pose
 from wavetank.solids.placing import Placing
@@ -24,44 +23,113 @@ from wavetank.solids.sampling import nearest_of
 from wavetank.solids.seams import seen_periods
 from wavetank.solids.solid import Solid
 
-SMALLEST = 0.02  # size at which a growing solid starts, of its full size
-PARTS = 4  # of a frame, in which the speed of a solid on a course is looked at
-Rows = tuple[np.ndarray, np.ndarray]  # places [n, 3] and rotations [n, 4]
+SMALLEST = 0.02  # initial size of a growing solid over its full size
+PARTS = 4  # of a frame, in which the speed of a solid with a prescribed motion is sampled
+Rows = tuple[np.ndarray, np.ndarray]  # positions [n, 3] and rotations [n, 4]
 _versions = itertools.count(1)
 
 
-class MovingSolids:
-    """Solids by name; the first `tank_count` are the walls of the tank."""
+class LiveSolid:
+    """A solid of a running world by name, in `sim.solids`."""
+
+    def __init__(self, solids: "Solids", name: str) -> None:
+        self.name, self._solids = name, solids
+
+    def __repr__(self) -> str:
+        return f"<solid {self.name!r} at {self.position.tolist()}>"
+
+    @property
+    def solid(self) -> Solid:
+        """The shape and its properties, as the scene has them."""
+        return self._solids.members[self._number]
+
+    @property
+    def position(self) -> np.ndarray:
+        """Position of its frame [m], shape [dim]."""
+        return self._solids.poses[self._number][0][: self._solids.dim].copy()
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Rotation of its frame as a unit quaternion (w, x, y, z)."""
+        return self._solids.poses[self._number][1].copy()
+
+    @property
+    def has_motion(self) -> bool:
+        """Whether it has a prescribed motion, held or not."""
+        return self._solids.has_motion(self.name)
+
+    def move(self, position: Sequence[float] | None = None, rotation: Any = None) -> None:
+        """Set the pose that it reaches at the end of the next frame; see `Solids.move`."""
+        self._solids.move(self.name, position, rotation)
+
+    @property
+    def _number(self) -> int:
+        return self._solids.find(self.name)
+
+
+class Solids(Mapping[str, LiveSolid]):
+    """The solids of a world by name: `sim.solids["cup"].position`; walls of the tank are not among them.
+
+    In arrays and lists by number the first `tank_count` are the walls of the tank. Raises `WavetankError` for an
+    unknown name.
+    """
 
     def __init__(
         self,
         walls: Sequence[Solid],
         others: Sequence[Solid],
+        dim: int,
         friction: float,
         spacing: float,
         start: float = 0.0,
         periods: Periods = NONE,
     ) -> None:
-        self.tank_count, self.friction, self.spacing, self.periods = len(walls), friction, spacing, periods
+        """Place solids in a world with particles `spacing` [m] apart whose motions have time `start` [s] at first."""
+        self.tank_count, self.dim, self.friction, self.spacing, self.periods = (
+            len(walls),
+            dim,
+            friction,
+            spacing,
+            periods,
+        )
         self.members = [*walls, *others]
         self.names: list[str] = []
         for solid in self.members:
             self.names.append(self._free_name(solid.name))
         self.poses: list[Pose] = [(solid.origin, solid.quaternion) for solid in self.members]
-        self.courses = Courses(self.members, self.names, start)
-        for name in self.courses.names():
-            self.poses[self.names.index(name)] = self.courses.pose(name, 0.0)
-        self.starts = list(self.poses)  # where they began
+        self.motions = PrescribedMotions(self.members, self.names, start)
+        for name in self.motions.names():
+            self.poses[self.names.index(name)] = self.motions.pose(name, 0.0)
+        self.starts = list(self.poses)  # at the start
         self.targets: dict[int, Pose] = {}  # at the end of the next frame
         self.growing: dict[int, tuple[float, float]] = {}  # age and time to grow [s]
-        self.passing: tuple[np.ndarray, Rows, Rows] | None = None  # bodies: numbers, begin and end of a time step
-        self.feeling: dict[int, tuple[np.ndarray, float, float]] = {}  # of bodies, see `feel`
+        self.passing: tuple[np.ndarray, Rows, Rows] | None = (
+            None  # bodies: numbers, poses at start and end of a time step
+        )
+        self.bodies: dict[int, tuple[np.ndarray, float, float]] = {}  # by number, see `set_bodies`
         self.version = 0  # of what is on the device
-        self._stand, self._tank = b"", np.zeros((0, 4))  # how the tank stands, and its planes then
+        self._tank_pose, self._tank = b"", np.zeros((0, 4))  # pose of the tank, and its planes there
         self.rebuild()
 
+    @override
+    def __getitem__(self, name: str) -> LiveSolid:
+        self.find(name)
+        return LiveSolid(self, name)
+
+    @override
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    @override
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names[self.tank_count :])
+
+    @override
+    def __len__(self) -> int:
+        return len(self.names) - self.tank_count
+
     def rebuild(self, members: list[Solid] | None = None) -> None:
-        """Put all on the device anew, at rest where they are; with `members`, these from now on.
+        """Build the arrays on the device again, with solids at rest at their poses; `members` replace them, if given.
 
         Raises `WavetankError` and changes nothing where one of them cannot be built.
         """
@@ -76,27 +144,27 @@ class MovingSolids:
         self._resize()
         self._upload(0.0, 0.0)
 
-    def feel(self, feeling: dict[int, tuple[np.ndarray, float, float]]) -> None:
-        """Let bodies feel what the water does to them.
+    def set_bodies(self, bodies: dict[int, tuple[np.ndarray, float, float]]) -> None:
+        """Set which solids are bodies, on which the impulses of the water are summed.
 
         By number: centre of mass [m], `SolidSet.unit` [1/m] and `SolidSet.grip`.
         """
-        self.feeling = feeling
-        self._middles = np.array([*feeling], int), np.array([center for center, *_ in feeling.values()])
+        self.bodies = bodies
+        self._middles = np.array([*bodies], int), np.array([center for center, *_ in bodies.values()])
         units, grips = np.zeros(len(self.members), np.float32), np.ones(len(self.members), np.float32)
-        for number, (_, unit, grip) in feeling.items():
+        for number, (_, unit, grip) in bodies.items():
             units[number], grips[number] = unit, grip
         upload(self.device.unit, units)
         upload(self.device.grip, grips)
         self._upload(0.0, 0.0)
 
     def add(self, solid: Solid, grow: float) -> str:
-        """Add a solid that swells to its size within `grow` [s]; return its name.
+        """Add a solid that grows to its size within `grow` [s]; return its name.
 
         Raises `WavetankError` and changes nothing where it cannot be built.
         """
         name, number = self._free_name(solid.name), len(self.members)
-        self.courses.add(solid, name)
+        self.motions.add(solid, name)
         columns: tuple[tuple[list[Any], Any], ...] = (
             (self.names, name),
             (self.poses, (solid.origin, solid.quaternion)),
@@ -109,7 +177,7 @@ class MovingSolids:
         try:
             self.rebuild([*self.members, solid])
         except BaseException:
-            self.courses.forget(name)
+            self.motions.forget(name)
             self.growing.pop(number, None)
             for column, _ in columns:
                 del column[number:]
@@ -117,46 +185,28 @@ class MovingSolids:
         return name
 
     def remove(self, number: int) -> None:
-        """Take a solid away."""
+        """Remove a solid by its number."""
 
         def without(numbered: dict[int, Any]) -> dict[int, Any]:
             return {k - (k > number): value for k, value in numbered.items() if k != number}
 
-        self.courses.forget(self.names[number])
+        self.motions.forget(self.names[number])
         for column in (self.members, self.names, self.poses, self.starts):
             del column[number]
-        self.targets, self.growing, self.feeling = without(self.targets), without(self.growing), {}
+        self.targets, self.growing, self.bodies = without(self.targets), without(self.growing), {}
         self.rebuild()
 
-    def find_free_places(self, scene: Scene, places: np.ndarray, particles: Particles, *, clear: bool) -> np.ndarray:
-        """Say which `places` [n, dim] of a scene's fluids are outside of solids, bool [n]; those of `Points` stay.
-
-        Either what is as far from all as water stays, `clear`, or as much as there is room for, some of it nearer.
-        Raises `WavetankError` where none is.
-        """
-        if not self.reaches_into(scene):
-            return np.ones(len(places), bool)
-        if clear:
-            clearance = Clearance(0.0, scene.wall_gap * scene.spacing, self.tank_count)
-            free = free_places(places, particles, self.device, 0, clearance)
-        else:
-            free = outside(scene, places, self.device, self.tank_count)
-        free |= scene.has_own_place()
-        if not free.any():
-            raise WavetankError("the fluids of this scene are inside of its solids; move them, or make them larger.")
-        return free
-
-    def nearer(self, places: np.ndarray, way: float) -> np.ndarray:
-        """Say which `places` [n, dim] are nearer than `way` [m] to a solid, or in it, bool [n]."""
-        return nearest_of(self.device, self.tank_count, places)[0] < way
+    def closer_than(self, places: np.ndarray, distance: float) -> np.ndarray:
+        """Return which `places` [n, dim] [m] are closer than `distance` [m] to a solid, or inside, bool [n]."""
+        return nearest_of(self.device, self.tank_count, places)[0] < distance
 
     def reaches_into(self, scene: Scene) -> bool:
-        """Say whether a solid may reach into fluids of a scene that are filled by rows."""
+        """Return whether a solid may overlap fluids of a scene that start as a lattice."""
         boxes = [fluid.bounds() for fluid in scene.fluids if not isinstance(fluid, Points)]
         return any(self._touches(number, *box) for number in range(self.tank_count, len(self.members)) for box in boxes)
 
     def _touches(self, number: int, lower: np.ndarray, upper: np.ndarray) -> bool:
-        """Say whether the ball around a solid reaches into a box [m]."""
+        """Return whether the bounding ball of a solid overlaps a box [m]."""
         center = self.poses[number][0][: len(lower)]
         return bool(np.linalg.norm(center - np.clip(center, lower, upper)) < self.members[number].reach())
 
@@ -167,10 +217,15 @@ class MovingSolids:
             raise WavetankError(f"there is no solid named {name!r}; named solids: {known}.")
         return self.names.index(name)
 
-    def aim(self, name: str, position: Sequence[float] | None, rotation: Any, dim: int) -> None:
-        """Set the pose that a solid reaches at the end of the next frame; None keeps what is."""
+    def move(self, name: str, position: Sequence[float] | None = None, rotation: Any = None) -> None:
+        """Set the pose that a solid reaches at the end of the next frame; its velocity follows.
+
+        `position` [m] is that of the solid's frame (the centre of a box), `rotation` a quaternion (w, x, y, z) or an
+        angle about z [rad]; None keeps the present one. Raises `WavetankError` for an unknown name or other numbers.
+        """
+        dim = self.dim
         number = self.find(name)
-        self.courses.hold(name)
+        self.motions.hold(name)
         old_position, old_rotation = self.targets.get(number, self.poses[number])
         point = np.array(old_position, float)
         if position is not None:
@@ -181,31 +236,31 @@ class MovingSolids:
         self.targets[number] = (point, old_rotation if rotation is None else unit_quaternion(rotation))
 
     def follow(self, time: float, duration: float) -> None:
-        """Let the solids that move by themselves aim at where they are after the frame of `duration` [s]."""
-        courses = self.courses
-        courses.begin_frame(time, duration)
-        for name in courses.names():
-            number, target = self.names.index(name), courses.pose(name, time + duration)
+        """Set the targets of solids with a prescribed motion for a frame of `duration` [s] from `time` [s] on."""
+        motions = self.motions
+        motions.begin_frame(time, duration)
+        for name in motions.names():
+            number, target = self.names.index(name), motions.pose(name, time + duration)
             if number in self.targets or not _equal(self.poses[number], target):
                 self.targets[number] = target
 
-    def moves_itself(self, name: str) -> bool:
-        """Say whether a solid has a motion, be it held or not."""
-        return self.courses.has(name)
+    def has_motion(self, name: str) -> bool:
+        """Return whether a solid has a prescribed motion, held or not."""
+        return self.motions.has(name)
 
     def release(self, name: str, time: float, within: float) -> None:
-        """Give a solid back to its motion."""
+        """Let a solid return to its motion `within` [s]; raises `WavetankError` where it has none."""
         number = self.find(name)
-        self.courses.release(name, time, within, self.targets.get(number, self.poses[number]))
+        self.motions.release(name, time, within, self.targets.get(number, self.poses[number]))
 
     def largest_speed(self, duration: float, tank_size: Sequence[float] | None) -> float:
-        """Return the largest speed [m/s] at which any solid moves through the tank in a frame of `duration` [s]."""
+        """Return the largest speed [m/s] of any point of a solid within the tank in a frame of `duration` [s]."""
         fastest = 0.0
         for number in self.targets:
             reach = self.reaches[number]
-            if tank_size is not None:  # what is endless is felt as far as the tank is large
+            if tank_size is not None:  # an infinite solid counts as far as the tank reaches
                 reach = min(reach, float(np.linalg.norm(tank_size)))
-            parts = PARTS if self.courses.follows(self.names[number]) else 1
+            parts = PARTS if self.motions.follows(self.names[number]) else 1
             between = [self.between(number, part / parts) for part in range(1, parts)]
             poses = [self.poses[number], *between, self.targets[number]]
             for (old_position, old_rotation), (position, rotation) in itertools.pairwise(poses):
@@ -217,9 +272,9 @@ class MovingSolids:
         return fastest
 
     def move_to(self, begin: float, end: float) -> int:
-        """Put the poses at the shares `begin` and `end` of the frame on the device, and return the version of those.
+        """Upload the poses at the shares `begin` and `end` of the frame; return their version.
 
-        No two versions of any world's solids have the same number.
+        Versions are unique among all worlds.
         """
         if not self.targets and self.passing is None:
             return self.version
@@ -230,15 +285,15 @@ class MovingSolids:
         return self.version
 
     def arrive(self) -> None:
-        """End a frame: what was aimed at is where the solids are."""
+        """End a frame: the targets are the poses."""
         for number, target in self.targets.items():
             self.poses[number] = target
-        # A body that is not moved any more is free.
-        self.targets = {number: target for number, target in self.targets.items() if number not in self.feeling}
-        self.courses.duration = 0.0
+        # A body without a target is free again.
+        self.targets = {number: target for number, target in self.targets.items() if number not in self.bodies}
+        self.motions.duration = 0.0
 
     def grow(self, duration: float) -> None:
-        """Let new solids swell for `duration` [s]."""
+        """Grow new solids for `duration` [s]."""
         if self.growing:
             self.growing = {k: (age + duration, time) for k, (age, time) in self.growing.items()}
             self._resize()
@@ -262,20 +317,30 @@ class MovingSolids:
         synchronize()
         self._placing.write(old_at, old_turn, at, turn, centers, planes, sweep)
 
+    def state(self) -> SolidsState:
+        """Return names, poses, targets, growth and motions, as `restored_solids` takes them."""
+        return SolidsState(
+            names=[*self.names],
+            poses=[*self.poses],
+            targets={**self.targets},
+            growing={**self.growing},
+            motions=self.motions.plain(),
+        )
+
     def between(self, number: int, share: float) -> Pose:
-        """Return where a solid is after a share of the present frame: on its course, or on the straight way."""
+        """Return the pose of a solid after a share of the frame: by its motion, or between pose and target."""
         (place, turn), (goal, goal_turn) = self.poses[number], self.targets.get(number, self.poses[number])
         if (
-            self.courses.duration
+            self.motions.duration
             and 0.0 < share < 1.0
             and number in self.targets
-            and self.courses.follows(self.names[number])
+            and self.motions.follows(self.names[number])
         ):
-            return self.courses.pose(self.names[number], self.courses.began + share * self.courses.duration)
+            return self.motions.pose(self.names[number], self.motions.frame_start + share * self.motions.duration)
         return place + share * (goal - place), interpolate(turn, goal_turn, share)
 
     def _instant(self, share: float, last: int) -> Rows:
-        """Return all poses at a `share` of the frame; those of bodies at the begin of a time step, or its `last`."""
+        """Return all poses at a `share` of the frame; those of bodies at the start or the end (`last`) of a step."""
         places, turns = ([pose[part] for pose in self.poses] for part in range(2))
         for number in self.targets:
             places[number], turns[number] = self.between(number, share)
@@ -286,24 +351,24 @@ class MovingSolids:
         return at, turn
 
     def _centers(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Return where the centres of mass are at these poses, [n, 3]."""
+        """Return the centres of mass [m] at these poses, [n, 3]."""
         centers = positions.copy()
-        if self.feeling:
+        if self.bodies:
             numbers, own = self._middles
             centers[numbers] += (matrix_of(rotations[numbers]) @ own[..., None])[..., 0]
         return centers
 
     def _planes(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Return (normal, offset) of the tank's walls at these poses, [tank_count, 4]: the distance is n x + b."""
+        """Return (normal n, offset b) of the tank's walls at these poses, [tank_count, 4]: distances are n x + b."""
         stand = positions[: self.tank_count].tobytes() + rotations[: self.tank_count].tobytes()
-        if stand == self._stand:  # as in most steps
+        if stand == self._tank_pose:  # as in most steps
             return self._tank
         planes = np.zeros((self.tank_count, 4))
         for k, wall in enumerate(self.walls):
             normal = turned(rotations[k], turned(wall.turn, np.array([0.0, 1.0, 0.0])))
             point = positions[k] + turned(rotations[k], wall.offset)
             planes[k] = *normal, -normal @ point
-        self._stand, self._tank = stand, planes
+        self._tank_pose, self._tank = stand, planes
         return planes
 
     def _free_name(self, name: str) -> str:
@@ -314,10 +379,20 @@ class MovingSolids:
         return name
 
 
-def solids_of(scene: Scene, walls: Sequence[Solid], others: Sequence[Solid]) -> MovingSolids:
-    """Return these solids, the walls of the tank first, in the world of `scene`."""
+def solids_of(scene: Scene, walls: Sequence[Solid], others: Sequence[Solid]) -> Solids:
+    """Return the solids `walls` of the tank and `others` in the world of `scene`."""
     periods = scene.tank.periods() if scene.tank else NONE
-    return MovingSolids(walls, others, scene.friction, scene.spacing, scene.start_time, periods)
+    return Solids(walls, others, scene.dim, scene.friction, scene.spacing, scene.start_time, periods)
+
+
+def restored_solids(scene: Scene, walls: Sequence[Solid], state: SolidsState, others: Sequence[Solid]) -> Solids:
+    """Return the solids of a state at their poses."""
+    solids = solids_of(scene, walls, others)
+    solids.names, solids.poses = [*state.names], [*state.poses]
+    solids.targets, solids.growing = {**state.targets}, {**state.growing}
+    solids.motions.read(state.motions)
+    solids.rebuild()
+    return solids
 
 
 def _equal(a: Pose, b: Pose) -> bool:

@@ -1,0 +1,68 @@
+"""Live parameters of a running world, and its gravity over time."""
+
+from typing import TYPE_CHECKING, Any
+
+from wavetank.foundation.params import LIVE, PARAMETERS, Parameters, refuse_assignment
+from wavetank.scene.scene import Scene
+from wavetank.scene.schedule import changes_gravity, gravity_at, with_gravity
+from wavetank.simulation.state import Counters
+
+if TYPE_CHECKING:
+    Declared = Parameters  # what editors complete, and types are checked by
+else:
+    Declared = object
+
+
+class LiveParameters(Declared):
+    """The parameters of a scene by name: all can be read, those that are live can be set while the water moves.
+
+    A value that is set is checked, raises `WavetankError` where it is not allowed, and holds from the next substep on.
+    """
+
+    def __init__(self, scene: Scene, counters: Counters) -> None:
+        vars(self).update(_scene=scene, _counters=counters, _gravity=None)
+
+    def at(self, time: float) -> Scene:
+        """Return the scene with gravity as it is at `time` [s] of the water."""
+        scene: Scene = self._scene
+        if not changes_gravity(scene):
+            return scene
+        return scene.model_copy(update={"gravity": self._gravity or gravity_at(scene, time)})
+
+    def fixed(self) -> Scene:
+        """Return a copy of the scene that has gravity as it was set, where expressions or a tilt gave it before."""
+        scene: Scene = self._scene
+        return scene.model_copy() if self._gravity is None else with_gravity(scene, self._gravity)
+
+    def release_gravity(self) -> None:
+        """Give gravity back to its expressions and to the tilt of the tank."""
+        vars(self)["_gravity"] = None
+
+    def take_over(self, other: "LiveParameters") -> None:
+        """Set gravity where it was set in `other`."""
+        vars(self)["_gravity"] = other._gravity
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "gravity":
+            return self.at(self._counters.time).gravity
+        if name in Parameters.model_fields:
+            return getattr(self._scene, name)
+        raise AttributeError(f"there is no parameter {name!r}")
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name not in LIVE:
+            refuse_assignment(name)
+            raise AttributeError(f"there is no parameter {name!r}; dir() of this object lists them")
+        if name == "gravity" and changes_gravity(self._scene):
+            trial = self._scene.model_copy(update={"gravity_track": None})
+            trial.assign(name, value)
+            vars(self)["_gravity"] = trial.gravity
+        else:
+            self._scene.assign(name, value)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *Parameters.model_fields})
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{p.name}={getattr(self, p.name)!r}" for p in PARAMETERS if p.live)
+        return f"<live parameters {values}>"
