@@ -3,19 +3,18 @@
 from PIL import Image
 
 import wavetank as wt
-from wavetank.device.compiler import qd
-from wavetank.device.state import Particles
-from wavetank.scene.forces import Force, Vortex
 
 
-@qd.kernel(fastcache=True)
-def lift_up(particles: Particles, x: qd.f32, width: qd.f32, strength: qd.f32, dt: qd.f32, count: qd.i32):
+@wt.qd.kernel(fastcache=True)
+def lift_up(
+    particles: wt.Particles, x: wt.qd.f32, width: wt.qd.f32, strength: wt.qd.f32, dt: wt.qd.f32, count: wt.qd.i32
+):
     for i in range(count):
         q = (particles.x[i][0] - x) / width
-        particles.v[i][1] += dt * strength * qd.exp(-q * q)
+        particles.v[i][1] += dt * strength * wt.qd.exp(-q * q)
 
 
-class Geyser(Force):
+class Geyser(wt.Force):
     """Lifts the water at one place."""
 
     x: float
@@ -35,7 +34,7 @@ class Geyser(Force):
 
 sim = wt.Simulation(wt.Scene.load("still-tank-2d").changed(spacing=0.02))
 sim.forces.append(Geyser(x=0.25))
-sim.forces.append(Vortex(center=(0.7, 0.2), radius=0.2, speed=1.0, axis=(0, 0, 1)))
+sim.forces.append(wt.Vortex(center=(0.7, 0.2), radius=0.2, speed=1.0, axis=(0, 0, 1)))
 sim.advance(0.5)
 Image.fromarray(wt.render(sim, width=480, height=720)).save("geyser.png")
 print(f"the highest drop is at {sim.positions[:, 1].max():.2f} m: geyser.png")

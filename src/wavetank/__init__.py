@@ -29,10 +29,13 @@ from wavetank.solids.motion import Keyframe, Motion, sampled
 from wavetank.solids.shapes import Box, Capsule, Cylinder, Difference, HalfSpace, Intersection, Sphere, Union
 
 if TYPE_CHECKING:
+    from wavetank.device.compiler import qd
+    from wavetank.device.state import Particles
     from wavetank.formats.dualsphysics import load_dualsphysics
     from wavetank.formats.robots import load_mjcf, load_robot, load_urdf
     from wavetank.formats.splishsplash import load_splishsplash
     from wavetank.page.notebook.show import show
+    from wavetank.scene.forces import Attract, Burst, Drag, Force, Sway, Vortex, Wind
     from wavetank.session import commands
     from wavetank.session.recording import Recording, replay
     from wavetank.session.session import Session
@@ -45,17 +48,21 @@ __version__ = VERSION
 __all__ = [
     "PARAMETERS",
     "PRESETS",
+    "Attract",
     "Ball",
     "BallJoint",
     "Block",
     "Box",
+    "Burst",
     "Camera",
     "Capsule",
     "Cylinder",
     "Difference",
+    "Drag",
     "Drain",
     "Emitter",
     "Filled",
+    "Force",
     "Gauge",
     "HalfSpace",
     "HeightField",
@@ -65,6 +72,7 @@ __all__ = [
     "Material",
     "Mesh",
     "Motion",
+    "Particles",
     "Points",
     "Polygon",
     "Recording",
@@ -75,10 +83,13 @@ __all__ = [
     "Slider",
     "Sphere",
     "Spring",
+    "Sway",
     "Tank",
     "Union",
+    "Vortex",
     "WavetankError",
     "Weld",
+    "Wind",
     "__version__",
     "bundled_scenes",
     "commands",
@@ -87,6 +98,7 @@ __all__ = [
     "load_robot",
     "load_splishsplash",
     "load_urdf",
+    "qd",
     "render",
     "replay",
     "sampled",
@@ -95,6 +107,9 @@ __all__ = [
 
 #: what needs the kernels' sources is imported when it is first used: data alone should load fast
 LATER = {
+    **dict.fromkeys(("Attract", "Burst", "Drag", "Force", "Sway", "Vortex", "Wind"), "wavetank.scene.forces"),
+    "Particles": "wavetank.device.state",
+    "qd": "wavetank.device.compiler",
     "Camera": "wavetank.view.camera",
     "Recording": "wavetank.session.recording",
     "Session": "wavetank.session.session",

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import wavetank as wt
+from wavetank.device.state import LASTING
+from wavetank.physics.foam.pool import ROWS
+from wavetank.simulation.instant import COLUMNS, FOAM
 from wavetank.simulation.simulation import Simulation
 
 
@@ -424,3 +427,37 @@ def test_a_solid_that_cannot_be_built_changes_nothing(body):
             sim.add_solid(wide, grow)
     assert (sim.digest(), sim.solids.names, len(sim.solids.reaches)) == (before, names, len(names))
     sim.step()
+
+
+def test_a_simulation_is_composed_of_parts():
+    """Live parameters by both faces, solids by name, and one sentence for an attribute that is not there."""
+    scene = wt.Scene(
+        spacing=0.1,
+        tank=wt.Tank(size=(1, 1)),
+        fluids=[wt.Block(lower=(0, 0), upper=(0.5, 0.5))],
+        solids=[wt.Box(name="gate", center=(0.8, 0.5), size=(0.1, 0.2))],
+    )
+    sim = wt.Simulation(scene)
+    sim.parameters.viscosity = 0.2
+    assert sim.viscosity == sim.scene.viscosity == 0.2 and {"viscosity", "solids"} <= set(dir(sim))
+    sim.viscosity = 0.3
+    assert sim.parameters.viscosity == 0.3 and sim.parameters.spacing == 0.1 and "spacing" in dir(sim.parameters)
+    with pytest.raises(wt.WavetankError, match="spacing cannot change while the water runs"):
+        sim.parameters.spacing = 0.2
+    with pytest.raises(wt.WavetankError, match="viscosity = -1"):
+        sim.parameters.viscosity = -1.0
+    with pytest.raises(wt.WavetankError, match="a simulation has no attribute 'foo'"):
+        sim.foo = 3
+    with pytest.raises(AttributeError, match="'foo'"):
+        sim.parameters.foo = 3
+    assert list(sim.solids) == ["gate"] and len(sim.solids) == 1 and sim.solids["gate"].solid.name == "gate"
+    sim.solids["gate"].move(position=(0.7, 0.5))
+    sim.step()
+    assert sim.solids["gate"].position == pytest.approx((0.7, 0.5))
+    with pytest.raises(wt.WavetankError, match="there is no solid named 'door'; named solids: gate"):
+        sim.solids["door"]
+
+
+def test_every_saved_array_is_declared_once():
+    assert set(LASTING) <= set(COLUMNS)
+    assert {field.name: field.column for field in FOAM} == ROWS

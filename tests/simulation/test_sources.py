@@ -340,3 +340,24 @@ def test_a_drain_at_a_seam_takes_from_both_sides(drain):
     sides = [(np.count_nonzero(p[:, 0] < 0.08), np.count_nonzero(p[:, 0] > 0.92)) for p in (before, x)]
     assert sides[1][0] < sides[0][0] - 8
     assert sides[1][1] < sides[0][1] - 8
+
+
+def test_a_source_is_turned_off_and_stays_off_in_a_state(tmp_path):
+    sim = world(jet(name="tap", speed=1.0))
+    sim.advance(0.2)
+    tap = sim.sources["tap"]
+    assert tap.rate == pytest.approx(1.0 * 0.15, rel=0.5) and tap.total == sim.count > 0
+    before = sim.digest()
+    tap.on = False
+    assert sim.digest() != before, "it decides how the world continues"
+    sim.save(tmp_path / "off.npz")
+    again = wt.Simulation.restore(tmp_path / "off.npz")
+    for world_ in (sim, again):
+        count = world_.count
+        world_.advance(0.1)
+        assert world_.count == count and world_.sources["tap"].rate == 0.0
+    again.sources["tap"].on = True
+    again.advance(0.1)
+    assert again.count > count
+    with pytest.raises(wt.WavetankError, match="no emitter or drain named 'sink'; there are: tap"):
+        sim.sources["sink"]

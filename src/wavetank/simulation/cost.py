@@ -1,7 +1,7 @@
-"""What a world will take, in Python's integers, before any of it is made: particles, cells, nodes, bytes, seconds.
+"""The cost of a world, computed before it is created: particles, grid nodes, bytes of memory, seconds.
 
 Bytes are counted from the declarations of `device/state.py`; seconds are a lower bound by what one thread of a fast
-processor needs for a particle and a step, so that what is refused by it is really long.
+processor needs for a particle and a step, so that only what is really long is refused.
 """
 
 import contextlib
@@ -21,14 +21,14 @@ from wavetank.scene.scene import Scene
 SCRATCH = 12  # numbers of `Temporaries` for each particle
 PER_PARTICLE = 2.0e-7  # s of a step of one thread, at the least
 PER_STEP = 1.0e-4  # s, however few particles
-LONGEST = 3600.0  # s that a run may be expected to take unless it is told that it may be long
+LONGEST = 3600.0  # s: largest expected time of a run without `large_worlds_allowed`
 SHARE = 0.9  # of free memory
 _allowed = False
 
 
 @contextlib.contextmanager
 def large_worlds_allowed(allowed: bool = True) -> Iterator[None]:
-    """Let what needs more memory than is free, or more than an hour, begin all the same."""
+    """Allow worlds that need more memory than is free, and runs of more than an hour, within this context."""
     global _allowed
     before, _allowed = _allowed, allowed
     try:
@@ -39,34 +39,34 @@ def large_worlds_allowed(allowed: bool = True) -> Iterator[None]:
 
 @dataclasses.dataclass(frozen=True)
 class Cost:
-    """What a world needs."""
+    """Size of a world and the memory that it needs."""
 
     particles: int
     nodes: int  # of the tank's grid
     bytes: int
 
     def sentence(self) -> str:
-        """Say it."""
+        """Return it as a sentence for people."""
         return (
             f"{self.particles:,} particles and {self.nodes:,} cells of the tank need {in_words(self.bytes)} of memory"
         )
 
 
 def cost_of(scene: Scene, capacity: int | None = None) -> Cost:
-    """Return what a world of this scene needs, with room for `capacity` particles, by its fluids where None."""
+    """Return the cost of a world of `scene` for `capacity` particles; where None, as many as its fluids have."""
     dim = scene.dim
     estimate = sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
     particles = int(min(estimate, 1e18)) if capacity is None else capacity
     own = 2 * (4 * dim + 5) + SCRATCH + 2 + 1 + -(-list_room(dim, scene.support) // 8)
     cells = 2 * max(4 * particles, 4096)
-    host = 6 * dim if capacity is None else 2 * dim  # places in double precision while they are chosen
+    host = 6 * dim if capacity is None else 2 * dim  # positions in double precision while they are chosen
     h = scene.support * scene.spacing
     nodes = count_nodes(scene.tank.beyond(OPEN_CELLS * h), h, scene.tank.periods().axes) if scene.tank else 0
     return Cost(particles, nodes, 4 * (particles * (own + host) + cells) + nodes * bytes_per_node())
 
 
 def check_cost(scene: Scene, capacity: int | None = None) -> None:
-    """Raise `WavetankError` with the numbers for a world that cannot be, or needs more memory than is free."""
+    """Raise `WavetankError` for a world with too many cells, or that needs more memory than is free."""
     cost = cost_of(scene, capacity)
     if cost.nodes * 16 > MAX_ENTRIES:
         raise WavetankError(
@@ -83,7 +83,7 @@ def check_cost(scene: Scene, capacity: int | None = None) -> None:
 
 @functools.cache
 def processors() -> int:
-    """Return how many processors the machine has; the system takes as long to say it as a kernel to launch."""
+    """Return the number of processors; asking the system takes as long as a kernel launch, so it is cached."""
     return os.cpu_count() or 1
 
 
@@ -95,7 +95,7 @@ def expected_seconds(particles: int, scene: Scene, seconds: float) -> float:
 
 
 def check_time(particles: int, scene: Scene, seconds: float, what: str) -> None:
-    """Raise `WavetankError` for a time of water [s] that will take more than an hour, unless that is allowed."""
+    """Raise `WavetankError` for `seconds` of water that take more than an hour, unless that is allowed."""
     expected = expected_seconds(particles, scene, seconds)
     if expected > LONGEST and not _allowed:
         raise WavetankError(
@@ -105,7 +105,7 @@ def check_time(particles: int, scene: Scene, seconds: float, what: str) -> None:
 
 
 def check_frames(particles: int, scene: Scene, seconds: float, fps: float) -> None:
-    """Raise `WavetankError` for a time [s] and frames a second that are no numbers, or will take more than an hour."""
+    """Raise `WavetankError` for a time [s] or rate [1/s] that is not finite, and for what takes more than an hour."""
     if not (math.isfinite(fps) and fps > 0):
         raise WavetankError(f"fps = {fps} is not allowed; it must be a positive number.")
     if not (math.isfinite(seconds) and seconds >= 0):

@@ -1,16 +1,16 @@
-"""Packs particles into the shapes that a scene wants filled: closely, at rest, outside of all that is in the way.
+"""Packing: particles at rest, with even density, in the `Filled` shapes of a scene, outside of obstacles.
 
-A shape has as many particles as its volume asks for, V / d^dim, where V is what solids, the tank and fluids before
-leave of it. They start on a lattice that leaves so many of them room, the deepest ones first, and are packed by the
-solver itself: the shape turned inside out is a container whose walls count as water, and in it, without gravity and
-with all motion taken away after each step, density errors are removed until they are even. What lies along the surface
-of the shape then lies as water at rest lies along a wall, half a spacing from it, with no gaps and nothing squeezed.
+A shape gets V / d^dim particles, where V is its volume without solids, outside of the tank and of earlier fluids. They
+start on the lattice with the deepest places, and are packed by the solver itself: the inverted shape is a container
+whose walls count as water; in it, without gravity and with velocities reset after each step, density errors are removed
+until they are even. Particles along the surface of the shape then lie as water at rest along a wall: half a spacing
+from it, without gaps and without compression.
 
 Packing particles by their own density errors: Colagrossi et al. 2012, "Particle packing algorithm for SPH schemes"
 (10.1016/j.cpc.2012.02.032); where we differ: corrections of positions (Eq. 6) instead of forces.
 
     code      meaning                                                unit
-    s         signed distance to what is to be filled, less than 0 inside   m
+    s         signed distance to the volume to fill, negative inside        m
     cell      edge of the lattice on which the volume is measured    m
 """
 
@@ -33,12 +33,12 @@ from wavetank.solids.shapes import Box, Difference, Sphere
 from wavetank.solids.solid import ENDLESS, Solid
 
 STEPS, MOST_STEPS = 30, 120  # frames of packing, at most
-EVEN = 0.004  # largest mean of the density errors above 0 at which it ends
-FINE, COARSE = 4, 2  # lattice points per spacing that measure a volume; fewer of them where there would be
+EVEN = 0.004  # mean of the positive density errors at which packing ends
+FINE, COARSE = 4, 2  # lattice points per spacing that measure a volume; COARSE where FINE gives more than MOST_POINTS
 MOST_POINTS = 40_000_000
-DEEP = 0.3  # d: particles have their place where the shape is so deep, and half a spacing around
-LEAST_ROOM = 0.5  # of the volume, that has a place for particles
-SLACK = 0.02  # d: how far a shape may reach beyond the tank by rounding
+DEEP = 0.3  # d: places for particles are where the shape is this deep, and half a spacing around
+LEAST_VOLUME = 0.5  # share of the volume that must have places for particles
+SLACK = 0.02  # d: by how much a shape may reach beyond the tank by rounding
 
 
 class Packed(Protocol):
@@ -60,7 +60,7 @@ class Packed(Protocol):
 
 
 def pack(scene: Scene, simulate: Callable[[Scene], Packed]) -> Scene:
-    """Return `scene` with its `Filled` fluids packed; `simulate` makes a running world of a scene.
+    """Return `scene` with its `Filled` fluids packed; `simulate` starts a world of a scene.
 
     Raises `WavetankError` for shapes that are open, too thin for the spacing or reach out of the tank.
     """
@@ -81,7 +81,7 @@ def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulat
     places = measured.places(number)
     if len(places) < number:
         raise WavetankError(
-            f"{name} has no room for its {number:,} particles; use a smaller spacing or a larger shape."
+            f"{name} has not enough places for its {number:,} particles; use a smaller spacing or a larger shape."
         )
     container = _inside_out(fluid.inside, scene.dim)
     fixed = {
@@ -125,18 +125,18 @@ def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulat
 
 @dataclasses.dataclass(frozen=True)
 class Measured:
-    """What is to be filled, on a lattice some times finer than that of the particles."""
+    """The volume to fill, on a lattice `finer` times as fine as that of the particles."""
 
-    volume: float  # m^dim, of what has a place for particles
+    volume: float  # m^dim: with places for particles
     points: np.ndarray  # [nx, ny, (nz,) dim], m
-    s: np.ndarray  # the same without the last axis
+    s: np.ndarray  # m [nx, ny, (nz)]: signed distance, negative inside
     finer: int
 
     def places(self, number: int) -> np.ndarray:
-        """Return the deepest places, [number or fewer, dim] [m], of a lattice of particles within this one.
+        """Return `number` places [m], [number or fewer, dim], the deepest of a lattice of particles within this one.
 
-        Of these it is the one whose places lie deepest: on another one some may begin in walls, which push them out on
-        whichever side is nearer, and there they would be lost.
+        It is the lattice whose places lie deepest: on others some may start inside walls, which push them out to the
+        nearer side, where they would be lost.
         """
         best, least = np.zeros((0, self.points.shape[-1])), np.inf
         for first in itertools.product(range(self.finer), repeat=self.s.ndim):
@@ -150,7 +150,7 @@ class Measured:
 
 
 def _measure(name: str, fluid: Filled, scene: Scene, obstacles: list[Solid]) -> Measured:
-    """Measure what is to be filled; raises `WavetankError` where that is nothing, or outside of the tank."""
+    """Measure the volume to fill; raises `WavetankError` where it is empty, too thin, or outside of the tank."""
     lower, upper = fluid.bounds()
     d, dim = scene.spacing, scene.dim
     few = np.prod((upper - lower) / d + 1.0) * FINE**dim <= MOST_POINTS
@@ -166,30 +166,30 @@ def _measure(name: str, fluid: Filled, scene: Scene, obstacles: list[Solid]) -> 
             )
     s = np.maximum(own, _to_others(points, scene, obstacles))
     counts = np.floor((upper - lower) / (d / finest) + 1e-6).astype(int) + 2
-    room = np.clip(0.5 - s * finest / d, 0.0, 1.0).reshape(counts)
+    inside = np.clip(0.5 - s * finest / d, 0.0, 1.0).reshape(counts)
     deep = (s < -DEEP * d).reshape(counts)
     wide = int(np.ceil(0.5 * finest))
     for axis in range(dim):
         padded = np.pad(deep, [(wide, wide) if k == axis else (0, 0) for k in range(dim)])
         deep = np.logical_or.reduce([np.take(padded, range(k, k + counts[axis]), axis) for k in range(2 * wide + 1)])
     cell = (d / finest) ** dim
-    whole, held = float(room.sum()) * cell, float(room[deep].sum()) * cell
-    if held < LEAST_ROOM * max(whole, 1e-30):
+    whole, held = float(inside.sum()) * cell, float(inside[deep].sum()) * cell
+    if held < LEAST_VOLUME * max(whole, 1e-30):
         raise WavetankError(
             f"{name}: its shape is too thin for spacing = {d:g} m, or nothing of it is outside of solids and fluids: "
-            f"{held:.3g} of {whole:.3g} m^{dim} have room for particles; use a smaller spacing or a larger shape."
+            f"{held:.3g} of {whole:.3g} m^{dim} have places for particles; use a smaller spacing or a larger shape."
         )
     return Measured(held, points.reshape(*counts, dim), s.reshape(counts), finest)
 
 
 def _to_others(points: np.ndarray, scene: Scene, obstacles: list[Solid]) -> np.ndarray:
-    """Return how deep points [n, dim] are in what is in the way [m], less than 0 outside of it."""
+    """Return how deep points [n, dim] [m] are in obstacles or behind walls [m], negative outside of these."""
     s = -nearest_distances(obstacles, points, scene.spacing) if obstacles else np.full(len(points), -np.inf)
     return s if scene.tank is None else np.maximum(s, -_to_tank(points, scene))
 
 
 def _to_tank(points: np.ndarray, scene: Scene) -> np.ndarray:
-    """Return the distance of points [n, dim] to the walls of the tank [m], less than 0 outside."""
+    """Return the distance of points [n, dim] to the walls of the tank [m], negative outside."""
     assert scene.tank is not None
     lower, upper = scene.tank.box()
     distances: np.ndarray = np.minimum(points - lower, upper - points).min(axis=1)
@@ -197,7 +197,7 @@ def _to_tank(points: np.ndarray, scene: Scene) -> np.ndarray:
 
 
 def _inside_out(solid: Solid, dim: int) -> Solid:
-    """Return all but `solid` as a solid."""
+    """Return the complement of `solid`."""
     if hasattr(solid, "invert"):
         return solid.model_copy(update={"invert": not solid.invert})
     return Difference(parts=[Box(center=(0.0,) * dim, size=(ENDLESS,) * dim), solid])

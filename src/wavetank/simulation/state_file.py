@@ -79,6 +79,7 @@ class _Source(_Part):
     withheld: Annotated[int, Limits(ge=0, le=2**53)]
     flows: bool
     store: Annotated[int, Limits(ge=-(2**53), le=2**53)]
+    on: bool = True
 
 
 class _Sources(_Part):
