@@ -128,7 +128,7 @@ class Unreadable:
 def test_a_broken_write_leaves_the_old_file(tmp_path, frame, suffix):
     path = tmp_path / f"a{suffix}"
     path.write_text("old")
-    frame.densities = Unreadable()
+    frame.arrays["rho"] = Unreadable()
     with pytest.raises(RuntimeError, match="lost"):
         exporter_for(path).write(path, frame)
     assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
