@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from wavetank.session.recording import Recording, replay
     from wavetank.session.session import Session
     from wavetank.simulation.simulation import Simulation
+    from wavetank.simulation.term import Term
     from wavetank.view.camera import Camera
     from wavetank.view.renderer import render
 
@@ -85,6 +86,7 @@ __all__ = [
     "Spring",
     "Sway",
     "Tank",
+    "Term",
     "Union",
     "Vortex",
     "WavetankError",
@@ -114,6 +116,7 @@ LATER = {
     "Recording": "wavetank.session.recording",
     "Session": "wavetank.session.session",
     "Simulation": "wavetank.simulation.simulation",
+    "Term": "wavetank.simulation.term",
     "commands": "wavetank.session.commands",
     "load_dualsphysics": "wavetank.formats.dualsphysics",
     "load_splishsplash": "wavetank.formats.splishsplash",

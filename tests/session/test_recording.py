@@ -1,5 +1,6 @@
 """What was played can be played again, to the last bit; time goes back, and every command has one meaning."""
 
+import dataclasses
 import json
 import os
 import re
@@ -242,8 +243,7 @@ def test_the_past_fits_into_its_memory():
     size = PackedState(snapshot).size
     history = History(memory=5 * size)
     for k in range(20):
-        snapshot.ledger.time = 0.1 * k
-        history.record(snapshot)
+        history.record(dataclasses.replace(snapshot, time=0.1 * k))
     assert 4 <= len(history.times) <= 5
     assert history.times[-1] == pytest.approx(1.9)
     unpacked = PackedState(snapshot).unpack()

@@ -101,6 +101,7 @@ class SessionState:
         give_back()
         if self.own is not None:
             sim.forces += [force for force in self.own.forces if force not in self.own.scene.forces]
+            sim.terms += self.own.terms
         self._enter(scene, self._adopted(sim))
 
     def _enter(self, scene: Scene, sim: Simulation) -> None:

@@ -5,7 +5,7 @@ import dataclasses
 import inspect
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, Self
@@ -40,6 +40,7 @@ from wavetank.simulation.solids import Solids, restored_solids, solids_of
 from wavetank.simulation.sources import Sources, check_places
 from wavetank.simulation.state import Continuation, Counters, State
 from wavetank.simulation.state_file import read_state, write_state
+from wavetank.simulation.term import Term
 from wavetank.solids.solid import Solid
 
 NEAR = 0.99  # of the distance that water keeps from walls: particles that start closer to a solid are led out of it
@@ -61,12 +62,15 @@ class Simulation:
     counters: Counters
     forces: list[Force]  # that act in every frame; scripts may append their own
     pushed: list[Force]  # that act in the next frame only
+    terms: list[Term]  # of a script, that act at the end of every time step
     notes: list[str]  # for people, one sentence each; who shows them removes them
     time_steps: int  # of the last frame
     seconds_per_frame: float  # s that the last frame took to compute
 
-    def __init__(self, scene: Scene, arch: str = "cpu") -> None:
+    def __init__(self, scene: Scene, arch: str = "cpu", terms: Iterable[Term] = ()) -> None:
         """Start a scene on a back end: cpu, gpu (the best there is), cuda, vulkan, metal or amdgpu.
+
+        `terms` of a script act at the end of every time step, after the start.
 
         Raises `WavetankError` for a back end that is not there, and for a scene that cannot run or needs too much
         memory.
@@ -75,7 +79,9 @@ class Simulation:
         self.arch = compiler.current_backend()
         self.counters = Counters()
         self._set_scene(Scene.checked(scene).model_copy(deep=True))
+        self.terms = []
         self.reset()
+        self.terms += terms
 
     def _set_scene(self, scene: Scene) -> None:
         self.scene, self.parameters = scene, LiveParameters(scene, self.counters)
@@ -341,6 +347,8 @@ class Simulation:
             for force in with_images(forces, scene.tank):
                 force.apply(self.world.particles, self.count, dt, start)
             self.bodies.step(self.world, scene, dt, limit, shares)
+            for term in self.terms:
+                term.apply(self.world, scene, dt)
 
     def _relax(self) -> bool:
         """Relax the water around solids to hydrostatic pressure; return whether it is at rest."""
@@ -513,14 +521,15 @@ class Simulation:
         copy.scene = copy.particles.scene = scene
         copy.parameters = LiveParameters(scene, copy.counters)
         copy.resume(dataclasses.replace(self.snapshot(), scene=scene))
-        copy.forces, copy.pushed = deepcopy((self.forces, self.pushed))
+        copy.forces, copy.pushed, copy.terms = deepcopy((self.forces, self.pushed, self.terms))
         copy.parameters.take_over(self.parameters)
         return copy
 
     def digest(self) -> str:
         """Return the hex SHA-256 of all that decides the future, to the last bit: see `State.digest`.
 
-        Equal digests continue to equal digests, on the same back end. Forces that a script added are not part of it.
+        Equal digests continue to equal digests, on the same back end. Forces and terms that a script added are not part
+        of it.
         """
         return self.snapshot().digest()
 
