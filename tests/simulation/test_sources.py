@@ -7,7 +7,7 @@ import pytest
 
 import wavetank as wt
 from wavetank.scene.mouths import MOST_IN_A_ROW, mouth_of
-from wavetank.simulation.inflow import closing_speed, jet_of, outlines
+from wavetank.simulation.inflow import closing_speed, jet_force, outlines
 
 FLAT = wt.Tank(size=(1.0, 0.8))
 
@@ -294,7 +294,7 @@ def test_jets_that_pass_or_part_take_no_shorter_steps():
     def closing(*places) -> float:
         jets = [wt.Emitter(position=at, direction=ahead, radius=0.1, speed=2.0) for at, ahead in places]
         scene = wt.Scene(spacing=0.05, emitters=jets)
-        return closing_speed(jet_of(scene, jet, 0.0) for jet in jets)
+        return closing_speed(jet_force(scene, jet, 0.0) for jet in jets)
 
     assert closing(((-1, 0, 0), (1, 0, 0)), ((1, 0, 0), (-1, 0, 0))) == pytest.approx(4.0)
     assert closing(((-1, 0, 0), (1, -1, 0)), ((1, 0, 0), (-1, -1, 0))) == pytest.approx(2.0 * math.sqrt(2.0))

@@ -279,13 +279,13 @@ class Coupling:
 
     def _turned(self, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return matrices of the rotations [n, 4] and the tensors turned by them, [n, 3, 3]."""
-        stand = rotations.tobytes()
-        if stand not in self._turned_tensors:  # a step alternates between those of its start and its end
+        key = rotations.tobytes()
+        if key not in self._turned_tensors:  # a step alternates between those of its start and its end
             if len(self._turned_tensors) > 1:
                 self._turned_tensors.clear()
             turn = matrix_of(rotations)
-            self._turned_tensors[stand] = turn, turn @ self.tensors @ turn.transpose(0, 2, 1)
-        return self._turned_tensors[stand]
+            self._turned_tensors[key] = turn, turn @ self.tensors @ turn.transpose(0, 2, 1)
+        return self._turned_tensors[key]
 
     def momentum_of(self, rotations: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the momentum [n, 6] of bodies with a velocity [n, 6]."""

@@ -24,40 +24,40 @@ HELD = 2.5  # d: distance from the inlet up to which a jet is held at its speed
 
 
 @dataclasses.dataclass(frozen=True)
-class Due:
+class Emission:
     """Particles that leave an inlet, in the order in which they left."""
 
     place: np.ndarray  # int [n]: index of the place in the inlet
     age: np.ndarray  # since they left: in rows, or in seconds
 
-    def first(self, number: int) -> "Due":
+    def first(self, number: int) -> "Emission":
         """Return the first `number` of them."""
-        return Due(self.place[:number], self.age[:number])
+        return Emission(self.place[:number], self.age[:number])
 
-    def aged(self, since: float, interval: float) -> "Due":
+    def aged(self, since: float, interval: float) -> "Emission":
         """Return them with ages in seconds: rows take an `interval` [s] each, and the last ended `since` [s] ago."""
-        return Due(self.place, since + interval * self.age)
+        return Emission(self.place, since + interval * self.age)
 
 
-def particles_due(mouth: Mouth, phase: float, rows: float) -> tuple[Due, float]:
+def particles_due(inlet: Mouth, phase: float, rows: float) -> tuple[Emission, float]:
     """Return the particles that leave while `rows` pass an inlet, with ages in rows, and the next phase."""
     after = phase + rows
-    whole = np.floor(after - mouth.phases).astype(int)
-    number = whole - np.floor(phase - mouth.phases).astype(int)
-    place = np.repeat(np.arange(len(mouth)), number)
+    whole = np.floor(after - inlet.phases).astype(int)
+    number = whole - np.floor(phase - inlet.phases).astype(int)
+    place = np.repeat(np.arange(len(inlet)), number)
     earlier = np.arange(len(place)) - np.repeat(np.cumsum(number) - number, number)
-    age = after - mouth.phases[place] - (whole[place] - earlier)
+    age = after - inlet.phases[place] - (whole[place] - earlier)
     order = np.lexsort((place, -age))
-    return Due(place[order], age[order]), after - math.floor(after)
+    return Emission(place[order], age[order]), after - math.floor(after)
 
 
-def row(mouth: Mouth) -> Due:
+def one_row(inlet: Mouth) -> Emission:
     """Return a particle in each place that leaves now."""
-    return Due(np.arange(len(mouth)), np.zeros(len(mouth)))
+    return Emission(np.arange(len(inlet)), np.zeros(len(inlet)))
 
 
-def flown(
-    scene: Scene, emitter: Emitter, mouth: Mouth, due: Due, end: float, dt: float
+def fly_freely(
+    scene: Scene, emitter: Emitter, inlet: Mouth, due: Emission, end: float, dt: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return positions [m] and velocities [m/s], [n, dim], at `end` [s] of particles with these ages [s].
 
@@ -70,25 +70,25 @@ def flown(
         chosen = due.age == age
         left, places = end - age, due.place[chosen]
         then = emitter.at(left)
-        speed = max(then.pace(mouth), 1e-3 * mouth.pitch / dt)
-        middle, axes = placed(then, scene.dim, left)
-        earlier, _ = placed(then, scene.dim, max(0.0, left - dt)) if then.motion else (middle, axes)
-        ways = mouth.ways[places] @ axes
+        speed = max(then.pace(inlet), 1e-3 * inlet.pitch / dt)
+        middle, axes = inlet_frame(then, scene.dim, left)
+        earlier, _ = inlet_frame(then, scene.dim, max(0.0, left - dt)) if then.motion else (middle, axes)
+        ways = inlet.ways[places] @ axes
         if then.mesh is not None and then.direction is not None:
             ways = np.tile(unit_vector(then.direction), (len(places), 1))
         carried = (middle - earlier) / dt if left > dt else np.zeros(3)
         own = speed * ways + carried
         # A particle that has left is half a pitch ahead of the inlet, and has fallen since its center passed it.
         fallen = age + min(
-            0.5 * mouth.pitch / speed, 0.5 * math.sqrt(mouth.pitch / max(float(np.linalg.norm(g)), 1e-9))
+            0.5 * inlet.pitch / speed, 0.5 * math.sqrt(inlet.pitch / max(float(np.linalg.norm(g)), 1e-9))
         )
-        x[chosen] = middle + mouth.places[places] @ axes + 0.5 * mouth.pitch * ways + own * age + 0.5 * g * fallen**2
+        x[chosen] = middle + inlet.places[places] @ axes + 0.5 * inlet.pitch * ways + own * age + 0.5 * g * fallen**2
         # Velocities are those at the middle of a step: the next one moves x by (v + g dt) dt.
         v[chosen] = own + g * (fallen - 0.5 * dt)
     return x[:, : scene.dim].astype(np.float32), v[:, : scene.dim].astype(np.float32)
 
 
-def placed(emitter: Emitter, dim: int, clock: float) -> tuple[np.ndarray, np.ndarray]:
+def inlet_frame(emitter: Emitter, dim: int, clock: float) -> tuple[np.ndarray, np.ndarray]:
     """Return center [m] and frame of an inlet at a time of the scene's clock [s]."""
     rest = np.zeros(3)
     rest[:dim] = emitter.middle
@@ -105,13 +105,13 @@ def placed(emitter: Emitter, dim: int, clock: float) -> tuple[np.ndarray, np.nda
     return rest, axes
 
 
-def jet_of(scene: Scene, emitter: Emitter, clock: float) -> Jet:
+def jet_force(scene: Scene, emitter: Emitter, clock: float) -> Jet:
     """Return the force that holds the speed of a jet in its inlet at `clock` [s] of the scene."""
-    mouth, dim = emitter.mouth(scene.spacing), scene.dim
-    middle, axes = placed(emitter, dim, clock)
+    inlet, dim = emitter.mouth(scene.spacing), scene.dim
+    middle, axes = inlet_frame(emitter, dim, clock)
     g = np.zeros(3)
     g[:dim] = gravity_at(scene, clock - scene.start_time)
-    half = (mouth.half[0] + 0.5 * scene.spacing, mouth.half[1] + 0.5 * scene.spacing)
+    half = (inlet.half[0] + 0.5 * scene.spacing, inlet.half[1] + 0.5 * scene.spacing)
     return Jet(
         opening=opening_of(
             middle,
@@ -119,7 +119,7 @@ def jet_of(scene: Scene, emitter: Emitter, clock: float) -> Jet:
             half,
             is_round=int(emitter.shape in ("disc", "ring")),
             length=HELD * scene.spacing,
-            speed=emitter.pace(mouth) * math.cos(emitter.spread),
+            speed=emitter.pace(inlet) * math.cos(emitter.spread),
             fall=float(g @ axes[2]),
         )
     )
@@ -154,7 +154,7 @@ def outlines(scene: Scene, time: float) -> list[tuple[str, np.ndarray]]:
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)], float)
     for emitter in (emitter.at(clock) for emitter in scene.emitters if emitter.mesh is None):
-        middle, axes = placed(emitter, scene.dim, clock)
+        middle, axes = inlet_frame(emitter, scene.dim, clock)
         edge = circle if emitter.shape in ("disc", "ring") else corners
         found.append(("emitter", middle + (edge * emitter.mouth(scene.spacing).half) @ axes[:2]))
     for drain in (drain.at(clock) for drain in scene.drains if drain.shape == "mouth"):

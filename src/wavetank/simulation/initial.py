@@ -118,8 +118,8 @@ def relax(
         if number + 1 >= FEWEST and ((mean < CALM and not lively) or mean > CALMER * last):
             break
     if near is None or mean >= CALM:
-        led = False if near is None else near(start_x)
-        stands = np.where(led, 1.0, np.clip(2.0 - length / (STANDING * free_fall), 0.0, 1.0))[:, None]
-        put_by_id(world.particles, count, "x", start_x + stands * (by_id(world.particles, count, "x") - start_x))
+        too_near = False if near is None else near(start_x)
+        share = np.where(too_near, 1.0, np.clip(2.0 - length / (STANDING * free_fall), 0.0, 1.0))[:, None]
+        put_by_id(world.particles, count, "x", start_x + share * (by_id(world.particles, count, "x") - start_x))
     put_by_id(world.particles, count, "v", start_v)
     return bool(mean < RUNS and 2 * np.count_nonzero(is_free) < count)

@@ -360,15 +360,15 @@ class Solids(Mapping[str, LiveSolid]):
 
     def _planes(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         """Return (normal n, offset b) of the tank's walls at these poses, [tank_count, 4]: distances are n x + b."""
-        stand = positions[: self.tank_count].tobytes() + rotations[: self.tank_count].tobytes()
-        if stand == self._tank_pose:  # as in most steps
+        pose = positions[: self.tank_count].tobytes() + rotations[: self.tank_count].tobytes()
+        if pose == self._tank_pose:  # as in most steps
             return self._tank
         planes = np.zeros((self.tank_count, 4))
         for k, wall in enumerate(self.walls):
             normal = turned(rotations[k], turned(wall.turn, np.array([0.0, 1.0, 0.0])))
             point = positions[k] + turned(rotations[k], wall.offset)
             planes[k] = *normal, -normal @ point
-        self._tank_pose, self._tank = stand, planes
+        self._tank_pose, self._tank = pose, planes
         return planes
 
     def _free_name(self, name: str) -> str:

@@ -21,7 +21,7 @@ from wavetank.scene.emitters import Emitter
 from wavetank.scene.forces import Attract, Force
 from wavetank.scene.gauges import Gauge
 from wavetank.scene.scene import Scene
-from wavetank.simulation.inflow import flown, jet_of, particles_due, row
+from wavetank.simulation.inflow import fly_freely, jet_force, one_row, particles_due
 from wavetank.simulation.particles import ParticleSystem
 
 GAP = 0.8  # d: distance of new particles from others, at least
@@ -118,7 +118,7 @@ class Sources(Mapping[str, Source]):
                 found.append(suction_of(drain))
         for emitter, source in zip(scene.emitters, self.emitters, strict=True):
             if source.flows and source.on and emitter.mesh is None and acts(emitter, begin, duration):
-                found.append(jet_of(scene, emitter.at(clock), clock))
+                found.append(jet_force(scene, emitter.at(clock), clock))
         return found
 
     def act(self, particles: ParticleSystem, time: float, duration: float, dt: float) -> None:
@@ -170,8 +170,8 @@ class Sources(Mapping[str, Source]):
             source.phase += drain.flow * unit * (last - first) / scene.spacing**scene.dim
             most = int(source.phase)
         if drain.level is not None:
-            most = min(most, max(0, -missing(particles, drain, drain.level)))
-        taken = take(particles, drain, most) if most else 0
+            most = min(most, max(0, -missing_particles(particles, drain, drain.level)))
+        taken = drain_particles(particles, drain, most) if most else 0
         source.total += taken
         source.store += taken
         if drain.flow is not None:  # particles that were not there are not removed later
@@ -188,28 +188,28 @@ class Sources(Mapping[str, Source]):
             return
         scene, spacing = particles.scene, particles.scene.spacing
         now = emitter.at(0.5 * (first + last))
-        mouth = now.mouth(spacing)
-        volume = len(mouth) * spacing**scene.dim
-        rows = now.rate(mouth) * (last - first) / volume
+        inlet = now.mouth(spacing)
+        volume = len(inlet) * spacing**scene.dim
+        rows = now.rate(inlet) * (last - first) / volume
         source.flows = rows > 0.0
         if not source.flows:
             return
-        if rows * len(mouth) > MOST_DUE:
+        if rows * len(inlet) > MOST_DUE:
             raise WavetankError(
-                f"emitters[{number}] lets out {rows * len(mouth):,.3g} particles in a frame; at most {MOST_DUE:,} are "
+                f"emitters[{number}] lets out {rows * len(inlet):,.3g} particles in a frame; at most {MOST_DUE:,} are "
                 "allowed: lower its speed or flow, or make the spacing larger."
             )
-        due, source.phase = particles_due(mouth, source.phase, rows)
+        due, source.phase = particles_due(inlet, source.phase, rows)
         keep = self._allowed(particles, now, len(due.place), source)
         if keep < len(due.place):
             due, source.pending, source.flows = due.first(keep), 0, keep > 0
-        x, v = flown(scene, emitter, mouth, due.aged(end - last, (last - first) / rows), end, dt)
-        most_pending = max(len(mouth), math.ceil(now.rate(mouth) * LONGEST_PENDING / spacing**scene.dim))
-        gap = PRESSED if source.pending > len(mouth) else GAP
+        x, v = fly_freely(scene, emitter, inlet, due.aged(end - last, (last - first) / rows), end, dt)
+        most_pending = max(len(inlet), math.ceil(now.rate(inlet) * LONGEST_PENDING / spacing**scene.dim))
+        gap = PRESSED if source.pending > len(inlet) else GAP
         came = self._put(particles, now, x, v, gap) if len(x) else 0
         source.pending += len(x) - came
         if source.pending:  # in the inlet, wherever there is free space by now
-            x, v = flown(scene, emitter, mouth, row(mouth), end, dt)
+            x, v = fly_freely(scene, emitter, inlet, one_row(inlet), end, dt)
             late = self._put(particles, now, x, v, gap, source.pending)
             source.pending -= late
             came += late
@@ -227,7 +227,7 @@ class Sources(Mapping[str, Source]):
         if emitter.feed:
             allowed = min(allowed, self._fed(particles.scene, emitter).store - source.pending)
         if emitter.level is not None and due:
-            allowed = min(allowed, missing(particles, emitter, emitter.level))
+            allowed = min(allowed, missing_particles(particles, emitter, emitter.level))
         most = particles.scene.most_particles
         if most is not None and particles.scene.when_full == "stop" and particles.count + allowed > most:
             fit = max(0, most - particles.count)
@@ -275,11 +275,11 @@ def check_places(particles: ParticleSystem, dt: float) -> None:
     scene = particles.scene
     for number, emitter in enumerate(scene.emitters):
         now = emitter.at(scene.start_time)
-        mouth = now.mouth(scene.spacing)
-        x, _ = flown(scene, emitter, mouth, row(mouth), scene.start_time, dt)
-        if mouth.pitch > SPARSE * scene.spacing:
+        inlet = now.mouth(scene.spacing)
+        x, _ = fly_freely(scene, emitter, inlet, one_row(inlet), scene.start_time, dt)
+        if inlet.pitch > SPARSE * scene.spacing:
             raise WavetankError(
-                f"emitters[{number}] has a mouth so small that its particles are {mouth.pitch:.3g} m apart; make it "
+                f"emitters[{number}] has an inlet so small that its particles are {inlet.pitch:.3g} m apart; make it "
                 f"larger, not much less than spacing = {scene.spacing:g} m, or the spacing smaller."
             )
         lower, upper = scene.tank.box() if scene.tank else (-np.inf, np.inf)
@@ -305,7 +305,7 @@ def span(source: Emitter | Drain, begin: float, end: float) -> tuple[float, floa
     return first, max(first, min(end, stop))
 
 
-def take(particles: ParticleSystem, drain: Drain, most: int | None = None) -> int:
+def drain_particles(particles: ParticleSystem, drain: Drain, most: int | None = None) -> int:
     """Remove the particles inside a drain, `most` at most, and return their number."""
     if drain.shape == "sphere" and (most is None or most >= particles.count):
         assert drain.center is not None
@@ -335,7 +335,7 @@ def suction_of(drain: Drain) -> Attract:
     return Attract(center=drain.center, radius=REACH * drain.radius, strength=drain.suction, drag=0.0)
 
 
-def missing(particles: ParticleSystem, source: Emitter | Drain, level: float) -> int:
+def missing_particles(particles: ParticleSystem, source: Emitter | Drain, level: float) -> int:
     """Return how many particles are missing to a level [m]; negative where there are too many."""
     scene, gauge = particles.scene, source.gauge
     x = download(particles.world.particles.x)[: particles.count].astype(np.float64)

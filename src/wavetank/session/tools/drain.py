@@ -7,7 +7,7 @@ from typing_extensions import override
 from wavetank.scene.drains import Drain as Sink
 from wavetank.session.tools.hand import Hand
 from wavetank.session.tools.tool import Tool, option
-from wavetank.simulation.sources import suction_of, take
+from wavetank.simulation.sources import drain_particles, suction_of
 
 
 class Drain(Tool):
@@ -27,5 +27,5 @@ class Drain(Tool):
     def hold(self, hand: Hand, duration: float) -> None:
         place, radius = hand.pick_again().point, hand.radius(self.radius)
         sink = Sink(center=hand.flat(place), radius=0.5 * radius, suction=9.81 * self.suction)
-        take(hand.sim.particles, sink)
+        drain_particles(hand.sim.particles, sink)
         hand.sim.push(suction_of(sink))
