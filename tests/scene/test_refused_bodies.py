@@ -47,7 +47,7 @@ def test_an_aim_that_asks_for_no_body():
 
 def test_a_mouth_that_lets_nothing_out():
     tap = wt.Emitter(position=(0.5, 0.6, 0.5), direction=(0, -1, 0), radius=0.001, speed=1)
-    with pytest.raises(WavetankError, match=r"emitters\[0\] has a mouth so small"):
+    with pytest.raises(WavetankError, match=r"emitters\[0\] has an inlet so small"):
         wt.Simulation(pool(emitters=[tap]))
 
 
