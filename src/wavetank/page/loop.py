@@ -14,6 +14,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from wavetank.device.compiler import on_compile
 from wavetank.foundation.input_limits import one_line
 from wavetank.page.about import figures, status, world
 from wavetank.page.hud import Hud
@@ -68,6 +69,9 @@ class Audience(Protocol):
     def send_report(self, report: Report, notes: list[str]) -> None:
         """Show the status, and messages."""
 
+    def send_progress(self, kernel: int) -> None:
+        """Show that a kernel is being compiled, number `kernel` since the start."""
+
 
 class Loop:
     """Runs a session, makes its pictures and reports its status, until `stop`."""
@@ -80,7 +84,7 @@ class Loop:
         self._calls: queue.SimpleQueue[tuple[Callable[[], Any], concurrent.futures.Future[Any]]] = queue.SimpleQueue()
         self._stopped = threading.Event()
         self._painted, self._painted_at, self._sharp = -1, 0.0, False
-        self._next_status = self._next_figures = 0.0
+        self._next_status = self._next_figures = self._next_progress = 0.0
         self._figures: dict[str, float] = {}
         self._measured, self._measured_at = 0, (-1, 0)  # how often; frame and particles of the last one
 
@@ -101,9 +105,10 @@ class Loop:
 
     def run(self) -> None:
         """Run until `stop`."""
-        while not self._stopped.is_set():
-            self.turn_or_pause()
-            self.session.rest(REST, asleep=not self.audience.has_viewers)
+        with on_compile(self.report_kernel):
+            while not self._stopped.is_set():
+                self.turn_or_pause()
+                self.session.rest(REST, asleep=not self.audience.has_viewers)
         self.session.drain()  # commands of the last frame belong to the recording
 
     def turn_or_pause(self) -> None:
@@ -116,6 +121,13 @@ class Loop:
             self.session.paused, self.session.steps_left = True, 0
             self.session.note(f"The water is paused: {type(error).__name__}, {one_line(error)}; restart the scene.")
             self._stopped.wait(REST)
+
+    def report_kernel(self, number: int, name: str) -> None:
+        """Tell viewers of a kernel that is compiled, number `number`, at most every `STATUS_EVERY`."""
+        now = time.perf_counter()
+        if now >= self._next_progress:
+            self._next_progress = now + STATUS_EVERY
+            self.audience.send_progress(number)
 
     def stop(self) -> None:
         """End `run`, from any thread."""

@@ -201,6 +201,10 @@ class PageServer:
             self._sent = message
             self._in_server(lambda: self.viewers.broadcast(plain))
 
+    def send_progress(self, kernel: int) -> None:
+        """Send all viewers the number of the kernel that is being compiled."""
+        self._in_server(lambda: self.viewers.broadcast({"type": "compiling", "number": kernel}))
+
     # --- the server's thread ---
 
     def _serve(self) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from wavetank.device.compiler import on_compile
 from wavetank.foundation.errors import WavetankError
 from wavetank.page.about import hello_message
 from wavetank.page.aim import aim
@@ -127,15 +128,16 @@ class Show:
     # --- the task ---
 
     async def _play(self) -> None:
-        while not self._stopped:
-            self.loop.turn_or_pause()
-            self._save_sometimes()
-            wait = self.session.time_to_rest(REST, asleep=not self.has_viewers)
-            self._woken.clear()
-            await asyncio.sleep(YIELD_TIME)
-            if wait > YIELD_TIME and not self._woken.is_set():
-                with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(self._woken.wait(), wait - YIELD_TIME)
+        with on_compile(self.loop.report_kernel):
+            while not self._stopped:
+                self.loop.turn_or_pause()
+                self._save_sometimes()
+                wait = self.session.time_to_rest(REST, asleep=not self.has_viewers)
+                self._woken.clear()
+                await asyncio.sleep(YIELD_TIME)
+                if wait > YIELD_TIME and not self._woken.is_set():
+                    with contextlib.suppress(TimeoutError):
+                        await asyncio.wait_for(self._woken.wait(), wait - YIELD_TIME)
 
     def _wake(self) -> None:
         self._woken.set()
@@ -222,6 +224,10 @@ class Show:
         if message != self._sent:
             self._sent = message
             self.channel.send({"type": "status", **message})
+
+    def send_progress(self, kernel: int) -> None:
+        """Send the number of the kernel that is being compiled."""
+        self.channel.send({"type": "compiling", "number": kernel})
 
     def _aim(self, viewer: Viewer, tool: str, u: float, v: float, reach: float) -> None:
         viewer.post({"type": "aim", **aim(self.session, tool, u, v, reach, self.loop.painter.wanted)})

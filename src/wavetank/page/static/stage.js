@@ -1,6 +1,6 @@
 // The picture and its pointers: one pointer uses the tool; other buttons, the wheel or two fingers move the camera.
 
-import { find, note } from "./make.js";
+import { find, note, say } from "./make.js";
 import { on, pending, send } from "./link.js";
 import { hand } from "./tools.js";
 import { hover, leave } from "./aim.js";
@@ -30,16 +30,18 @@ on("refused", (ours) => {
 on("open", () => { tellSize(); });
 on("restarted", () => note("wavetank was restarted: the previous session is lost."));
 
-// A scene that is made for the first time is compiled; until then no picture comes and nothing is told.
-const WAIT = 1500; // ms without a word after which the page says why
-let heard = performance.now(), waitsFor = "";
+// Kernels are compiled at their first use; until then no picture and no status comes.
+const WAIT = 1500; // ms without a message after which the page says why
+let heard = performance.now(), waitsFor = "", kernel = 0;
+on("compiling", ({ number }) => { kernel = number; });
+const compiling = (what) => `${what}${kernel ? ` (kernel ${kernel})` : ""}`;
 on("hello", () => { heard = performance.now(); waitsFor = "first"; });
 on("status", () => { heard = performance.now(); waitsFor = waitsFor === "scene" ? "" : waitsFor; busy.hidden = true; });
 on("picture", () => { waitsFor = ""; heard = performance.now(); });
 setInterval(() => {
   if (performance.now() - heard < WAIT || !pending()) return;
-  if (veil.classList.contains("gone")) busy.hidden = false;
-  else if (waitsFor === "first") find("veil-text").textContent = "Compiling, once: the next start takes seconds.";
+  if (veil.classList.contains("gone")) { say(busy, compiling("Compiling for this kind of water, once …")); busy.hidden = false; }
+  else if (waitsFor === "first") say(find("veil-text"), compiling("Compiling, once: the next start takes seconds."));
 }, 300);
 on("hello", (world) => { dim = world.dim; });
 on("status", ({ world }) => { if (world) ({ dim } = world); });

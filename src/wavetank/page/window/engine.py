@@ -6,6 +6,7 @@ Commands go in, pictures and figures come out.
 import dataclasses
 import queue
 import threading
+import time
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from wavetank.session.pace import share_interpreter
 from wavetank.session.session import Session
 
 FIGURES_EVERY = 0.2  # s between two measurements, at least
+SLOW_START = 1.5  # s without a picture after which compiling is mentioned
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,6 +42,7 @@ class Engine:
         self.shown = Shown(**vars(self.loop.report()))
         self.notes: queue.SimpleQueue[str] = queue.SimpleQueue()
         self.failure: BaseException | None = None
+        self._started, self._said = time.perf_counter(), False
         self.size = self.painter.asked  # px of the place for the picture; the front sets it
         self.detail = "auto"
         self._thread = threading.Thread(target=self._run, name="wavetank water", daemon=True)
@@ -71,6 +74,12 @@ class Engine:
         for sentence in notes:
             self.notes.put(sentence)
         self.shown = dataclasses.replace(self.shown, **vars(report))
+
+    def send_progress(self, kernel: int) -> None:
+        """Say once that kernels are being compiled, where that takes long."""
+        if self.shown.image is None and time.perf_counter() - self._started > SLOW_START and not self._said:
+            self._said = True
+            self.notes.put("Compiling, once: the next start takes seconds.")
 
     def _run(self) -> None:
         try:

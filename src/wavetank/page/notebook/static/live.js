@@ -312,6 +312,7 @@ function render({ model, el }) {
     if (message.type === "picture") paint(buffers[0]);
     else if (message.type === "hello") build(message);
     else if (message.type === "status") showStatus(message);
+    else if (message.type === "compiling") said.textContent = `Compiling, once (kernel ${message.number}) …`;
     else if (message.type === "note") note(message.text);
     else if (message.type === "aim") answer(message);
     else if (message.type === "fit") showFit(message);
