@@ -288,6 +288,6 @@ def test_neighbours_are_searched_for_only_where_densities_are_seen():
 
     with compiler.watched(around):
         render(sim, 32, 18)
-        assert "lay" in names and "list_neighbors" not in names
+        assert "light_backdrop" in names and "list_neighbors" not in names
         render(sim, 32, 18, view="particles", color_by="density")
         assert "list_neighbors" in names
