@@ -167,16 +167,7 @@ BRANCHES = (*BLOCKS, ast.IfExp, ast.BoolOp, ast.comprehension)
 MOST_BRANCHES = 20
 MOST_LEVELS = 5
 #: Functions that are still above; the list only gets shorter.
-TANGLED: set[str] = {
-    "solids/meshes/grid.py:nearest_triangles",
-    "solids/meshes/grid.py:part_faces",
-    "solids/motion.py:_check",
-    "view/film/field.py:add_ellipsoids",
-    "view/film/field.py:add_shares",
-    "view/film/light.py:shine",
-    "view/film/march.py:first_water",
-    "view/film/paths.py:follow",
-}
+TANGLED: set[str] = set()
 
 
 def levels(node: ast.AST, above: int = 0) -> int:

@@ -73,7 +73,7 @@ def test_a_function_is_refused_and_can_be_sampled():
     ("motion", "complaint"),
     [
         ([{"time": 1, "position": [0, 0]}, {"time": 0.5, "position": [1, 0]}], "keyframe 1 is at time = 0.5 s"),
-        ([{"time": 1, "position": [0, 0]}, {"time": 2}], "every keyframe must have a position"),
+        ([{"time": 1, "position": [0, 0]}, {"time": 2}], "either every keyframe or none must have a position"),
         ([{"time": 0}], "need a position or a rotation"),
         ([], "either keyframes"),
         ({"rotation": "1/(t-3)"}, "divides by zero at t = 3 s"),

@@ -79,7 +79,7 @@ def clear_medium(*absorption):
 def mean_radiance(shot, renderer, medium, samples=256):
     tracer = Tracer(renderer.buffers)
     world = tracer._world(shot, 0.0, 0.0)
-    photons = tracer._lit(shot, world, medium, 0, 1)
+    photons = tracer._trace_photons(shot, world, medium, 0, 1)
     setting = dataclasses.replace(tracer.setting(shot, 0.0, None), brightest=1e9)
     paths.trace(tracer.film, world, photons, shot.lens, shot.look, medium, setting, 0, samples, samples // 2)
     return download(tracer.film.mean)
@@ -173,8 +173,8 @@ def test_what_is_not_clear_has_its_color_under_even_light(clarity):
     tracer = Tracer(renderer.buffers)
     medium = medium_of(shot, tracer._world(shot, 0.0, 0.0).field.grid)
     if clarity == "cloudy":  # ten free ways deep
-        murk = download(medium.murk)
-        upload(medium.murk, (murk * 7.0 / murk[:, 3:].max()).astype(np.float32))
+        murk = download(medium.turbidity)
+        upload(medium.turbidity, (murk * 7.0 / murk[:, 3:].max()).astype(np.float32))
     mirror = ((ETA - 1.0) / (ETA + 1.0)) ** 2
     seen = mean_radiance(shot, renderer, medium).mean(axis=(0, 1))
     np.testing.assert_allclose(seen, mirror + (1.0 - mirror) * color_of_stuff(), atol=0.05)
@@ -186,8 +186,8 @@ def test_light_that_is_scattered_is_neither_lost_nor_made():
     shot = dataclasses.replace(shot, look=in_white(shot.look))
     tracer = Tracer(renderer.buffers)
     medium = medium_of(shot, tracer._world(shot, 0.0, 0.0).field.grid)
-    murk = download(medium.murk)
-    upload(medium.murk, np.repeat(1.0 * (murk[:, 3:] > 0.0), 4, axis=1).astype(np.float32))
+    murk = download(medium.turbidity)
+    upload(medium.turbidity, np.repeat(1.0 * (murk[:, 3:] > 0.0), 4, axis=1).astype(np.float32))
     assert 0.95 < mean_radiance(shot, renderer, medium).mean() < 1.002
 
 
@@ -335,7 +335,7 @@ def test_the_sun_s_light_in_a_tank_is_neither_lost_nor_made():
     tracer = Tracer(renderer.buffers)
     world = tracer._world(shot, 0.0, 0.0)
     clear = clear_medium()
-    photons = tracer._lit(shot, world, clear, 0, 1)
+    photons = tracer._trace_photons(shot, world, clear, 0, 1)
     arrived = download(photons.floor)[..., 1].sum() / light.UNIT * float(photons.corner[1]) ** 2
     height = math.sin(math.radians(80.0))
     top, side = 1.0 * 0.6 * height, 1.0 * 0.8 * math.cos(math.radians(80.0))  # m^2 across the sun's rays

@@ -73,15 +73,7 @@ class Motion(Model):
         if not any(self.axis):
             raise WavetankError(f"motion: axis = {self.axis} has no direction; give a vector of any length but zero.")
         if self.keyframes:
-            check_times([key.time for key in self.keyframes], "motion")
-            for name in ("position", "rotation"):
-                given = [getattr(key, name) for key in self.keyframes]
-                if any(value is None for value in given) and any(value is not None for value in given):
-                    raise WavetankError(f"motion: every keyframe must have a {name}, or none.")
-                if len({len(value) if isinstance(value, list) else 0 for value in given}) > 1:
-                    raise WavetankError(f"motion: every keyframe must have a {name} of the same number of components.")
-            if all(key.position is None and key.rotation is None for key in self.keyframes):
-                raise WavetankError("motion: keyframes need a position or a rotation.")
+            self._check_keyframes()
             self._check_loop()
         for name in ("position", "rotation"):
             if getattr(self, name) is not None:
@@ -89,6 +81,17 @@ class Motion(Model):
         path = self.path()
         for number in range(round(TRIED * TRIES) + 1 if _size(self.rotation) else 0):
             path.rotation(number / TRIES)
+
+    def _check_keyframes(self) -> None:
+        check_times([key.time for key in self.keyframes], "motion")
+        for name in ("position", "rotation"):
+            given = [getattr(key, name) for key in self.keyframes]
+            if any(value is None for value in given) and any(value is not None for value in given):
+                raise WavetankError(f"motion: either every keyframe or none must have a {name}.")
+            if len({_size(value) for value in given}) > 1:
+                raise WavetankError(f"motion: every keyframe must have a {name} of the same number of components.")
+        if all(key.position is None and key.rotation is None for key in self.keyframes):
+            raise WavetankError("motion: keyframes need a position or a rotation.")
 
     def _check_loop(self) -> None:
         if self.after != "loop":

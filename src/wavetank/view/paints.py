@@ -1,5 +1,7 @@
 """What colours solids have in a picture."""
 
+import enum
+
 import numpy as np
 
 from wavetank.view.colormaps import rgb_of, to_linear
@@ -8,21 +10,28 @@ from wavetank.view.shot import Shot
 SHINE, LIT = np.array((0.3, 1.0, 1.6), np.float32), 0.6  # linear RGB of what shines, and how much of it is that
 
 
-FINISHES = ("matte", "metal", "glass")
+class Finish(enum.IntEnum):
+    """The finish of a solid. Append only: the compiler's cache does not see the numbers."""
+
+    MATTE = 0
+    METAL = 1
+    GLASS = 2
+
+
 CLEAR = np.array((0.93, 0.96, 0.95), np.float32)  # what glass without a colour lets through
 
 
 def colors_of(shot: Shot) -> np.ndarray:
     """Return the albedo of every solid, walls of the tank included, float32 [n, 3], linear RGB; -1 for glass."""
     colors = traced_colors(shot)
-    colors[finishes_of(shot) == FINISHES.index("glass")] = -1.0
+    colors[finishes_of(shot) == Finish.GLASS] = -1.0
     return colors
 
 
 def finishes_of(shot: Shot) -> np.ndarray:
-    """Return the place of every solid's finish in `FINISHES`, int32 [n]."""
+    """Return the `Finish` of every solid, walls of the tank included, int32 [n]."""
     solids = shot.frame.solids
-    own = [FINISHES.index(solid.finish) for solid in shot.frame.scene.solids]
+    own = [Finish[solid.finish.upper()] for solid in shot.frame.scene.solids]
     return np.array([*[0] * solids.tank_count, *own, *[0] * solids.count], np.int32)[: solids.count]
 
 

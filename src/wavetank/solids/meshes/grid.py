@@ -26,7 +26,16 @@ import numpy as np
 from wavetank.device.compiler import download, qd, upload
 from wavetank.foundation.errors import WavetankError
 from wavetank.solids.distance import vec3
-from wavetank.solids.meshes.tree import Tree, box_square, is_needle, leaving, next_node, plant, triangle_square
+from wavetank.solids.meshes.tree import (
+    Tree,
+    box_square,
+    first_triangle,
+    following_node,
+    is_needle,
+    leaving,
+    plant,
+    triangle_square,
+)
 
 CELLS = (4, 3, 2)  # per particle spacing: the first that makes a grid of at most FINE_NODES, else the last
 FINE_NODES = 2_000_000
@@ -72,9 +81,9 @@ def measure(
     corners = (points / cell + 0.5 * (counts - 1))[faces].astype(np.float32)
     tree = plant(corners[:, ::-1] if hollow else corners, 0.5 * walls if walls else 0.0)
     if walls is None:
-        part_faces(tree, THINNEST, len(faces))
+        thicken_walls(tree, THINNEST, len(faces))
     outer, inner = (qd.ndarray(qd.f32, shape=(nx * ny * nz,)) for _ in range(2))
-    nearest_triangles(tree, outer, inner, float(download(tree.swell).max()), exact, NEARLY, nx, ny, nz)
+    measure_distances(tree, outer, inner, float(download(tree.swell).max()), exact, NEARLY, nx, ny, nz)
     # What is on the side of the faces, and behind them; in a hollow it is the inside that faces look at.
     before, behind = (-download(inner), -download(outer)) if hollow else (download(outer), download(inner))
     distances = before
@@ -119,38 +128,39 @@ def _check_closed(torn: np.ndarray, cells: int, name: str) -> None:
 
 
 @qd.kernel(fastcache=True)
-def part_faces(tree: Tree, thinnest: qd.f32, count: qd.i32):
-    """Swell the triangles behind which the solid is thinner than `thinnest`, so that it gets that thickness."""
+def thicken_walls(tree: Tree, thinnest: qd.f32, count: qd.i32):
+    """Swell the triangles behind which the solid is thinner than `thinnest` [cells], so that it gets that thickness."""
     for t in range(count):
         a, b, c = tree.a[t], tree.b[t], tree.c[t]
         n = (b - a).cross(c - a)
         if not is_needle(n, a, b, c):  # its neighbours say how thick the solid is there
-            origin, way = (a + b + c) / 3.0, -thinnest * n.normalized()
-            low, high = qd.min(origin, origin + way) - 1e-3, qd.max(origin, origin + way) + 1e-3
-            first = 1.0
-            node = 1
-            while node > 0:
-                lower, upper = tree.lower[node], tree.upper[node]
-                below = node < tree.leaves
-                if (upper - low).min() >= 0.0 and (high - lower).min() >= 0.0:
-                    if not below:
-                        for k in range(4 * (node - tree.leaves), 4 * (node - tree.leaves) + 4):  # LEAF
-                            hit = leaving(origin, way, tree.a[k], tree.b[k], tree.c[k])
-                            if hit > -1e-3 and hit < first:
-                                first = qd.max(hit, 0.0)
-                else:
-                    below = False
-                if below:
-                    node = 2 * node
-                else:
-                    node = next_node(node)
-                    if node == 1:
-                        node = 0
+            first = first_leaving(tree, (a + b + c) / 3.0, -thinnest * n.normalized())
             tree.swell[t] = 0.5 * thinnest * (1.0 - first)
 
 
+@qd.func
+def first_leaving(tree: Tree, origin, way):
+    """Where a ray first leaves through the back of a triangle, in lengths of `way`, from 0 to 1."""
+    low, high = qd.min(origin, origin + way) - 1e-3, qd.max(origin, origin + way) + 1e-3
+    first = 1.0
+    node = 1
+    while node > 0:
+        lower, upper = tree.lower[node], tree.upper[node]
+        below = node < tree.leaves
+        if (upper - low).min() >= 0.0 and (high - lower).min() >= 0.0:
+            if not below:
+                for k in range(first_triangle(tree, node), first_triangle(tree, node + 1)):
+                    hit = leaving(origin, way, tree.a[k], tree.b[k], tree.c[k])
+                    if hit > -1e-3 and hit < first:
+                        first = qd.max(hit, 0.0)
+        else:
+            below = False
+        node = following_node(node, below)
+    return first
+
+
 @qd.kernel(fastcache=True)
-def nearest_triangles(
+def measure_distances(
     tree: Tree,
     outer: qd.types.ndarray(),
     inner: qd.types.ndarray(),
@@ -164,36 +174,56 @@ def nearest_triangles(
     """Distance [cells] at every node, were it outside and were it inside; no triangle swells by more than `most`."""
     for line in range(ny * nz):
         y, z = qd.cast(line % ny, qd.f32), qd.cast(line // ny, qd.f32)
-        nearest, reaching = 0, 0  # triangles that answered at the node before; the answer here is seldom far from them
+        found = any_guess()
         for x in range(nx):
-            p = vec3(qd.cast(x, qd.f32), y, z)
-            u = qd.sqrt(triangle_square(p, tree.a[nearest], tree.b[nearest], tree.c[nearest]))
-            best = qd.sqrt(triangle_square(p, tree.a[reaching], tree.b[reaching], tree.c[reaching]))
-            best -= tree.swell[reaching]
-            node = 1
-            while node > 0:
-                below = node < tree.leaves
-                limit = qd.min(best, exact + nearly * (best - exact)) + most
-                if box_square(p, tree.lower[node], tree.upper[node]) < limit * limit:
-                    if not below:
-                        for k in range(4 * (node - tree.leaves), 4 * (node - tree.leaves) + 4):  # LEAF
-                            distance = qd.sqrt(triangle_square(p, tree.a[k], tree.b[k], tree.c[k]))
-                            if distance - tree.swell[k] < best:
-                                best = distance - tree.swell[k]
-                                reaching = k
-                            if distance < u:
-                                u = distance
-                                nearest = k
-                else:
-                    below = False
-                if below:
-                    node = 2 * node
-                else:
-                    node = next_node(node)
-                    if node == 1:
-                        node = 0
-            outer[x + nx * line] = qd.min(best, exact + nearly * (best - exact))
-            inner[x + nx * line] = -u - tree.swell[nearest]
+            find_nearest(found, tree, vec3(qd.cast(x, qd.f32), y, z), most, exact, nearly)
+            outer[x + nx * line] = limited(found.swollen, exact, nearly)
+            inner[x + nx * line] = -found.distance - tree.swell[found.triangle]
+
+
+@qd.dataclass
+class Nearest:
+    """The triangles nearest to a node; those of the node before are a good first guess."""
+
+    distance: qd.f32  # cells: to the nearest triangle
+    swollen: qd.f32  # cells: to the nearest one when they have swollen
+    triangle: qd.i32
+    swollen_triangle: qd.i32
+
+
+@qd.func
+def any_guess():
+    """A first guess where no node before is known."""
+    return Nearest(distance=0.0, swollen=0.0, triangle=0, swollen_triangle=0)
+
+
+@qd.func
+def limited(distance, exact, nearly):
+    """A distance that grows by a share `nearly` only beyond `exact` [cells]."""
+    return qd.min(distance, exact + nearly * (distance - exact))
+
+
+@qd.func
+def find_nearest(found: qd.template(), tree: Tree, p, most, exact, nearly):
+    """Find the triangles nearest to the point `p`; what lies beyond `exact` [cells] may be found inexactly."""
+    one, two = found.triangle, found.swollen_triangle
+    found.distance = qd.sqrt(triangle_square(p, tree.a[one], tree.b[one], tree.c[one]))
+    found.swollen = qd.sqrt(triangle_square(p, tree.a[two], tree.b[two], tree.c[two])) - tree.swell[two]
+    node = 1
+    while node > 0:
+        below = node < tree.leaves
+        limit = limited(found.swollen, exact, nearly) + most
+        if box_square(p, tree.lower[node], tree.upper[node]) < limit * limit:
+            if not below:
+                for k in range(first_triangle(tree, node), first_triangle(tree, node + 1)):
+                    distance = qd.sqrt(triangle_square(p, tree.a[k], tree.b[k], tree.c[k]))
+                    if distance - tree.swell[k] < found.swollen:
+                        found.swollen, found.swollen_triangle = distance - tree.swell[k], k
+                    if distance < found.distance:
+                        found.distance, found.triangle = distance, k
+        else:
+            below = False
+        node = following_node(node, below)
 
 
 @qd.func

@@ -82,6 +82,23 @@ def next_node(node):
 
 
 @qd.func
+def following_node(node, below):
+    """The node of a walk after this one: its first child where the walk goes `below`; 0 after the last."""
+    following = 2 * node
+    if not below:
+        following = next_node(node)
+        if following == 1:
+            following = 0
+    return following
+
+
+@qd.func
+def first_triangle(tree: Tree, leaf):
+    """Number of the first triangle of a leaf."""
+    return 4 * (leaf - tree.leaves)  # LEAF
+
+
+@qd.func
 def box_square(p, lower, upper):
     """Square of the distance from a point to a box."""
     way = qd.max(lower - p, p - upper, 0.0)

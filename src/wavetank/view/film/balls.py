@@ -1,10 +1,11 @@
 """Lone drops, spray and foam as balls: found on the host, sorted into the cells that they touch."""
 
+import dataclasses
+
 import numpy as np
 
 from wavetank.device.compiler import download, qd, upload
 from wavetank.view.film.grid import Grid
-from wavetank.view.film.motes import Motes
 from wavetank.view.lens import vec4
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import WaterBuffers
@@ -16,7 +17,17 @@ FROTH = {1: (6, 0.05, 0.5), 2: (24, 0.055, 0.62), 3: (8, 0.05, 0.5)}
 MOST = 3_000_000
 
 
-def motes_of(shot: Shot, water: WaterBuffers, grid: Grid, moved: float) -> tuple[Motes, np.ndarray]:
+@dataclasses.dataclass(frozen=True, eq=False)
+class Balls:
+    """Balls by the cells of the grid that they touch, on the device."""
+
+    start: qd.types.ndarray()  # i32 [cells + 1]: first entry of each cell in `list`
+    list: qd.types.ndarray()  # i32: numbers of balls
+    ball: qd.types.ndarray()  # vec4 [balls], m: middle and radius
+    kind: qd.types.ndarray()  # i32 [balls]: 0 water, 1 white froth
+
+
+def balls_of(shot: Shot, water: WaterBuffers, grid: Grid, moved: float) -> tuple[Balls, np.ndarray]:
     """Return the balls of an instant, `moved` [s] after the frame's, and for every cell whether any touches it."""
     balls, kinds = [_drops(shot, water)], []
     kinds.append(np.zeros(len(balls[0]), np.int32))
@@ -41,13 +52,13 @@ def motes_of(shot: Shot, water: WaterBuffers, grid: Grid, moved: float) -> tuple
     order = np.argsort(key, kind="stable")
     start = np.zeros(cells + 1, np.int32)
     start[1:] = np.cumsum(np.bincount(key, minlength=cells))
-    motes = Motes(
+    sorted_balls = Balls(
         start=_array(start, qd.i32),
         list=_array(owner[order].astype(np.int32), qd.i32),
         ball=_array(ball, vec4),
         kind=_array(kind, qd.i32),
     )
-    return motes, (np.diff(start) > 0).astype(np.int32)
+    return sorted_balls, (np.diff(start) > 0).astype(np.int32)
 
 
 def _array(values: np.ndarray, kind: object) -> object:

@@ -17,7 +17,7 @@ from wavetank.view.film.paths import Film
 from wavetank.view.lens import vec3
 
 LEVELS = 5
-PATIENCE = 2.5  # standard deviations by which neighbours may differ
+TOLERANCE = 2.5  # standard deviations by which neighbours may differ
 
 
 def clean(film: Film, spare: tuple[Any, Any, Any]) -> Any:
@@ -26,7 +26,7 @@ def clean(film: Film, spare: tuple[Any, Any, Any]) -> Any:
     estimate(noise, film)
     given.copy_from(film.mean)
     for level in range(LEVELS):
-        average(taken, noise, given, film, 1 << level, level % 2, PATIENCE)
+        average(taken, noise, given, film, 1 << level, level % 2, TOLERANCE)
         given, taken = taken, given
     return given
 
@@ -61,7 +61,7 @@ def average(
     film: Film,
     step: qd.i32,
     turn: qd.i32,
-    patience: qd.f32,
+    tolerance: qd.f32,
 ):
     """Average every pixel with those up to two steps away, as far as they show the same.
 
@@ -73,7 +73,7 @@ def average(
         own = noise[row, column][turn]
         guide, form = film.albedo[row, column], film.shape[row, column]
         total, weight, rest = vec3(0.0, 0.0, 0.0), 0.0, 0.0
-        scale = 1.0 / (patience * qd.sqrt(own) + 2e-4)
+        scale = 1.0 / (tolerance * qd.sqrt(own) + 2e-4)
         for k in range(25):
             i, j = k % 5 - 2, k // 5 - 2
             y, x = row + j * step, column + i * step

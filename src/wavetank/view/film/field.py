@@ -40,7 +40,7 @@ MARGIN = 4  # nodes of air in the open and above
 
 
 @dataclasses.dataclass(eq=False)
-class FieldRoom:
+class FieldArrays:
     """What building a field needs, for one grid; on the device."""
 
     grid: Grid
@@ -49,7 +49,7 @@ class FieldRoom:
     two: Any  # f32 [nodes]
     level: Any  # f32 [nodes], m
     skip: Any  # i32 [cells]
-    near: Any  # i32 [cells]: 1 where there are motes
+    near: Any  # i32 [cells]: 1 where there are balls
 
 
 def grid_around(shot: Shot, reach: float) -> Grid:
@@ -82,12 +82,12 @@ def grid_around(shot: Shot, reach: float) -> Grid:
     )
 
 
-def room_for(grid: Grid) -> FieldRoom:
+def allocate(grid: Grid) -> FieldArrays:
     """Allocate what a field on that grid needs."""
     nodes = grid.nx * grid.ny * grid.nz
     real = [qd.ndarray(qd.f32, shape=(nodes,)) for _ in range(3)]
     cells = [qd.ndarray(qd.i32, shape=(nodes // 8,)) for _ in range(2)]
-    return FieldRoom(grid, qd.ndarray(qd.i32, shape=(nodes,)), *real, *cells)
+    return FieldArrays(grid, qd.ndarray(qd.i32, shape=(nodes,)), *real, *cells)
 
 
 def rest_sum() -> float:
@@ -95,40 +95,40 @@ def rest_sum() -> float:
     return REACH**3 * 4.0 * math.pi * 16.0 / 315.0
 
 
-def build(room: FieldRoom, water: WaterBuffers, shot: Shot) -> Field:
+def build(arrays: FieldArrays, water: WaterBuffers, shot: Shot) -> Field:
     """Fill the field of the particles that `water` has sorted and fitted ellipsoids to."""
-    grid, count, d = room.grid, shot.frame.count, shot.extent.spacing
-    room.sums.fill(0)
-    add_shares(room.sums, water.cells.x, grid, REACH * d, UNIT / rest_sum(), count)
+    grid, count, d = arrays.grid, shot.frame.count, shot.extent.spacing
+    arrays.sums.fill(0)
+    add_shares(arrays.sums, water.cells.x, grid, REACH * d, UNIT / rest_sum(), count)
     solids = shot.frame.solids
-    to_shares(room.one, room.sums, solids, grid, REACH * d, 1.0 / UNIT)
-    given, taken = room.one, room.two
+    to_shares(arrays.one, arrays.sums, solids, grid, REACH * d, 1.0 / UNIT)
+    given, taken = arrays.one, arrays.two
     if solids.count > solids.tank_count:
-        go_on_in_solids(taken, given, solids, grid, 0.6 * d)
+        extend_into_solids(taken, given, solids, grid, 0.6 * d)
         given, taken = taken, given
     for _ in range(SMOOTH):
         for axis in range(3):
             blur(taken, given, grid, axis)
             given, taken = taken, given
-    room.level.copy_from(given)
+    arrays.level.copy_from(given)
     for _ in range(WIDE):
         for axis in range(3):
             blur(taken, given, grid, axis)
             given, taken = taken, given
-    room.sums.fill(-(1 << 30))
-    add_ellipsoids(room.sums, water.ellipsoids, grid, UNIT / float(grid.step[0]), count)
+    arrays.sums.fill(-(1 << 30))
+    add_ellipsoids(arrays.sums, water.ellipsoids, grid, UNIT / float(grid.step[0]), count)
     # Standard deviation of the whole blur along an axis: the slope of what a plane becomes.
     wide = math.sqrt((REACH * d) ** 2 / 11.0 + SMOOTH * float(np.max(grid.step)) ** 2)
-    join(room.level, room.sums, given, grid, math.sqrt(2.0 * math.pi) * wide, DRAWN * d, float(grid.step[0]) / UNIT)
-    mark(room.skip, room.level, room.near, grid)
+    join(arrays.level, arrays.sums, given, grid, math.sqrt(2.0 * math.pi) * wide, DRAWN * d, float(grid.step[0]) / UNIT)
+    mark_cells(arrays.skip, arrays.level, arrays.near, grid)
     for axis in range(3):
-        spread(room.near, room.skip, grid, axis)
-        room.skip, room.near = room.near, room.skip
-    return Field(grid=grid, level=room.level, skip=room.skip)
+        measure_skip(arrays.near, arrays.skip, grid, axis)
+        arrays.skip, arrays.near = arrays.near, arrays.skip
+    return Field(grid=grid, level=arrays.level, skip=arrays.skip)
 
 
 @qd.func
-def folded(i, count, walled):
+def mirrored_index(i, count, walled):
     """Index of what lies behind a pane: its mirror image; -1 in the open."""
     result = i
     if i < 0:
@@ -146,17 +146,16 @@ def add_shares(sums: qd.types.ndarray(), x: qd.types.ndarray(), grid: Grid, reac
         first = qd.cast(qd.floor((p - reach - grid.lower) / grid.step - 0.5), qd.i32)
         last = qd.cast(qd.ceil((p + reach - grid.lower) / grid.step - 0.5), qd.i32)
         for k in range(first.z, last.z + 1):
-            kk = folded(k, grid.nz, grid.walled)
+            kk = mirrored_index(k, grid.nz, grid.walled)
             for j in range(first.y, last.y + 1):
-                jj = qd.select(j >= grid.ny, -1, folded(j, grid.ny, grid.walled))
+                jj = qd.select(j >= grid.ny, -1, mirrored_index(j, grid.ny, grid.walled))
                 if kk >= 0 and jj >= 0:
                     for i in range(first.x, last.x + 1):
-                        ii = folded(i, grid.nx, grid.walled)
-                        if ii >= 0:
-                            r = grid.lower + (vec3(i, j, k) + 0.5) * grid.step - p
-                            q = 1.0 - r.dot(r) / (reach * reach)
-                            if q > 0.0:
-                                qd.atomic_add(sums[node_at(grid, ii, jj, kk)], qd.cast(unit * q * q * q + 0.5, qd.i32))
+                        ii = mirrored_index(i, grid.nx, grid.walled)
+                        r = grid.lower + (vec3(i, j, k) + 0.5) * grid.step - p
+                        q = 1.0 - r.dot(r) / (reach * reach)
+                        if ii >= 0 and q > 0.0:
+                            qd.atomic_add(sums[node_at(grid, ii, jj, kk)], qd.cast(unit * q * q * q + 0.5, qd.i32))
 
 
 @qd.func
@@ -196,8 +195,10 @@ def to_shares(
 
 
 @qd.kernel(fastcache=True)
-def go_on_in_solids(share: qd.types.ndarray(), before: qd.types.ndarray(), solids: SolidSet, grid: Grid, keep: qd.f32):
-    """Let the water go on in solids, and as near to them as `keep`, as it is at that distance."""
+def extend_into_solids(
+    share: qd.types.ndarray(), before: qd.types.ndarray(), solids: SolidSet, grid: Grid, keep: qd.f32
+):
+    """Extend the water into solids: nearer than `keep` [m] to them, and inside, it is as at that distance."""
     for n in range(grid.nx * grid.ny * grid.nz):
         x = grid.lower + (vec3(n % grid.nx, n // grid.nx % grid.ny, n // (grid.nx * grid.ny)) + 0.5) * grid.step
         wall = nearest_wall(solids, x, keep)
@@ -236,14 +237,8 @@ def add_ellipsoids(sums: qd.types.ndarray(), ellipsoids: Ellipsoids, grid: Grid,
         size = ellipsoids.size[a]
         if size > 0.0 and ellipsoids.lone[a] == 0:
             c = ellipsoids.center[a]
-            m, o = ellipsoids.axes[a], ellipsoids.mixed[a]
-            # The inverse of B^2 by its cofactors.
-            p, q, s = m.y * m.z - o.z * o.z, o.y * o.z - o.x * m.z, o.x * o.z - o.y * m.y
-            whole = m.x * p + o.x * q + o.y * s
-            if whole > 0.0:
-                per = 1.0 / whole
-                one = per * vec3(p, m.x * m.z - o.y * o.y, m.x * m.y - o.x * o.x)
-                two = per * vec3(q, s, o.x * o.y - m.x * o.z)
+            diagonal, others, determinant = inverse_of(ellipsoids.axes[a], ellipsoids.mixed[a])
+            if determinant > 0.0:
                 reach = size + 2.0 * grid.step.max()
                 first = qd.cast(qd.ceil((c - reach - grid.lower) / grid.step - 0.5), qd.i32)
                 last = qd.cast(qd.floor((c + reach - grid.lower) / grid.step - 0.5), qd.i32)
@@ -251,15 +246,41 @@ def add_ellipsoids(sums: qd.types.ndarray(), ellipsoids: Ellipsoids, grid: Grid,
                     for j in range(qd.max(first.y, 0), qd.min(last.y, grid.ny - 1) + 1):
                         for i in range(qd.max(first.x, 0), qd.min(last.x, grid.nx - 1) + 1):
                             r = grid.lower + (vec3(i, j, k) + 0.5) * grid.step - c
-                            g = one * r + vec3(
-                                two.x * r.y + two.y * r.z, two.x * r.x + two.z * r.z, two.y * r.x + two.z * r.y
-                            )
-                            far = qd.sqrt(qd.max(r.dot(g), 0.0))
-                            depth = (1.0 - far) * far / qd.max(g.norm(), 1e-12)
-                            if far < 0.05:
-                                depth = 0.5 * size
+                            depth = depth_in_ellipsoid(diagonal, others, r, size)
                             if depth > -2.5 * grid.step.max():
                                 qd.atomic_max(sums[node_at(grid, i, j, k)], qd.cast(depth * unit, qd.i32))
+
+
+@qd.func
+def inverse_of(m, o):
+    """Inverse of a symmetric matrix by its cofactors, and its determinant: without a positive one there is none.
+
+    `m` is its diagonal, `o` its elements xy, xz, yz; so is the inverse.
+    """
+    p, q, s = m.y * m.z - o.z * o.z, o.y * o.z - o.x * m.z, o.x * o.z - o.y * m.y
+    determinant = m.x * p + o.x * q + o.y * s
+    diagonal, others = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+    if determinant > 0.0:
+        per = 1.0 / determinant
+        diagonal = per * vec3(p, m.x * m.z - o.y * o.y, m.x * m.y - o.x * o.x)
+        others = per * vec3(q, s, o.x * o.y - m.x * o.z)
+    return diagonal, others, determinant
+
+
+@qd.func
+def depth_in_ellipsoid(diagonal, others, r, size):
+    """Approximate depth [m] at `r` from the middle of an ellipsoid r^T A r = 1, of which `size` is the largest radius.
+
+    `diagonal` and `others` are those of the matrix A, as in `inverse_of`.
+    """
+    g = diagonal * r + vec3(
+        others.x * r.y + others.y * r.z, others.x * r.x + others.z * r.z, others.y * r.x + others.z * r.y
+    )
+    far = qd.sqrt(qd.max(r.dot(g), 0.0))
+    depth = (1.0 - far) * far / qd.max(g.norm(), 1e-12)
+    if far < 0.05:
+        depth = 0.5 * size
+    return depth
 
 
 @qd.kernel(fastcache=True)
@@ -282,8 +303,8 @@ def join(
 
 
 @qd.kernel(fastcache=True)
-def mark(skip: qd.types.ndarray(), level: qd.types.ndarray(), near: qd.types.ndarray(), grid: Grid):
-    """Write 0 for cells that hold a surface, by the nodes that count in them, or motes; 99 for others."""
+def mark_cells(skip: qd.types.ndarray(), level: qd.types.ndarray(), near: qd.types.ndarray(), grid: Grid):
+    """Write 0 for cells that hold a surface, by the nodes that count in them, or balls; 99 for others."""
     for c in range(grid.nx // 2 * (grid.ny // 2) * (grid.nz // 2)):
         x, y, z = c % (grid.nx // 2), c // (grid.nx // 2) % (grid.ny // 2), c // (grid.nx // 2 * (grid.ny // 2))
         low, high = 1e9, -1e9
@@ -297,7 +318,7 @@ def mark(skip: qd.types.ndarray(), level: qd.types.ndarray(), near: qd.types.nda
 
 
 @qd.kernel(fastcache=True)
-def spread(skip: qd.types.ndarray(), before: qd.types.ndarray(), grid: Grid, axis: qd.i32):
+def measure_skip(skip: qd.types.ndarray(), before: qd.types.ndarray(), grid: Grid, axis: qd.i32):
     """Let cells know the distance to the nearest marked one along one more axis, up to 12."""
     for c in range(grid.nx // 2 * (grid.ny // 2) * (grid.nz // 2)):
         mx, my, mz = grid.nx // 2, grid.ny // 2, grid.nz // 2

@@ -15,15 +15,16 @@ import dataclasses
 
 from wavetank.device.compiler import qd
 from wavetank.view.film.grid import Field, Grid, outward_at, value_at
-from wavetank.view.film.march import World, first_hit, past
-from wavetank.view.film.medium import Medium, absorbed_at, through_water
-from wavetank.view.film.murk import albedo_of, any_way, color_of, is_matte, murk_at
-from wavetank.view.film.sampling import pair, towards
+from wavetank.view.film.march import Hit, World, cross_water, first_hit, past
+from wavetank.view.film.medium import Medium, absorption_at, through_water
+from wavetank.view.film.sampling import pair, towards, uniform_direction
+from wavetank.view.film.turbidity import albedo_of, color_of, is_opaque, turbidity_at
 from wavetank.view.lens import vec3
 from wavetank.view.look import Look
 from wavetank.view.optics.bilinear import share_of
 from wavetank.view.optics.hash_noise import scrambled
 from wavetank.view.optics.interface import bent, index_of_water, mirrored, through_drop
+from wavetank.view.paints import Finish
 
 UNIT = 4096.0  # steps of a map in the light of the bare sun
 
@@ -44,8 +45,21 @@ class Photons:
     has_flow: qd.i32  # 1 where the flow is gathered
 
 
+@qd.dataclass
+class Photon:
+    """A photon on its way; flags are 0 or 1."""
+
+    p: vec3  # m
+    ahead: vec3  # unit direction
+    power: vec3  # share that is left of it, per colour
+    in_water: qd.i32
+    crossed: qd.i32  # whether it has met the water, so that shadow rays do not see to it
+    going: qd.i32
+    bounces: qd.i32
+
+
 @qd.kernel(fastcache=True)
-def shine(photons: Photons, world: World, look: Look, medium: Medium, round: qd.i32):
+def trace_photons(photons: Photons, world: World, look: Look, medium: Medium, round: qd.i32):
     """Send one round of photons from the sun, each from its own place of the rectangle, and add what arrives."""
     for number in range(photons.across * photons.rows):
         column, row = number % photons.across, number // photons.across
@@ -56,69 +70,85 @@ def shine(photons: Photons, world: World, look: Look, medium: Medium, round: qd.
             + ((column + u.x) / photons.across) * photons.right
             + ((row + u.y) / photons.rows) * photons.up
         )
-        ahead = -towards(look.to_sun, look.sun_size, lamp)
-        weight, wet, crossed, going, bounce = vec3(1.0, 1.0, 1.0), 0, 0, 1, 0
-        while going == 1:
-            hit, what, which, was_wet = first_hit(world, p, ahead, wet, 1)
+        photon = begun_photon(p, -towards(look.to_sun, look.sun_size, lamp))
+        while photon.going == 1:
+            hit, what, which, was_wet = first_hit(world, photon.p, photon.ahead, photon.in_water, 1)
             n = vec3(hit.x, hit.y, hit.z)
-            at = p + hit.w * ahead
-            chance, reached = pair(seed, round, 2 + 2 * bounce), qd.min(hit.w, 1e3)
-            left = vec3(1.0, 1.0, 1.0)
+            at = photon.p + hit.w * photon.ahead
+            chance, reached = pair(seed, round, 2 + 2 * photon.bounces), qd.min(hit.w, 1e3)
+            transmittance = vec3(1.0, 1.0, 1.0)
             if was_wet == 1:
-                patience = -qd.log(qd.max(1.0 - chance.y, 1e-7))
-                left, _added, reached = through_water(medium, world.field.grid, p, ahead, reached, patience)
+                free_depth = -qd.log(qd.max(1.0 - chance.y, 1e-7))
+                transmittance, _added, reached = through_water(
+                    medium, world.field.grid, photon.p, photon.ahead, reached, free_depth
+                )
                 if reached < qd.min(hit.w, 1e3):
-                    what, at = 6, p + reached * ahead
-            if crossed > 0 and photons.has_flow == 1:
-                leave_in_cells(photons, world.field.grid, p, ahead, reached, weight, medium, was_wet)
-            weight *= left
-            if what == 3:
-                inward = qd.select(n.dot(ahead) > 0.0, -n, n)
-                eta = index_of_water()
-                if was_wet == 0:
-                    eta = 1.0 / eta
-                through = bent(ahead, inward, eta)
-                crossed = 1
-                if chance.x < through.w:
-                    ahead = mirrored(ahead, inward)
-                    p = at + 1e-3 * world.field.grid.step.x * inward
-                    wet = was_wet
-                else:
-                    ahead = vec3(through.x, through.y, through.z)
-                    p = at - 1e-3 * world.field.grid.step.x * inward
-                    wet = 1 - was_wet
-            elif what == 4:
-                ball = world.motes.ball[which]
-                through = bent(ahead, n, 1.0 / index_of_water())
-                crossed = 1
-                if chance.x < through.w:
-                    ahead = mirrored(ahead, n)
-                    p = at + 1e-4 * ball.w * n
-                else:
-                    inner = vec3(through.x, through.y, through.z)
-                    out, ahead = through_drop(ball, at, n, inner, ahead)
-                    p = vec3(out.x, out.y, out.z)
-                    weight *= qd.exp(-out.w * absorbed_at(medium, world.field.grid, at))
-            elif what == 2 and world.finish[which] == 2:
-                mirror = bent(ahead, qd.select(n.dot(ahead) > 0.0, -n, n), 0.667).w
-                if was_wet == 0:
-                    weight *= 1.0 - 2.0 * mirror / (1.0 + mirror)
-                weight *= world.paints[which]
-                p, wet = at + past(hit.w, n, ahead) * ahead, was_wet
-            elif what == 6:
-                here = murk_at(medium.murk, world.field.grid, at)
-                weight *= albedo_of(color_of(here))
-                p, ahead, wet = at, any_way(pair(seed, round, 3 + 2 * bounce)), 1
-                crossed = 1
-                if is_matte(here, world.field.grid) == 1:
-                    going = 0
+                    what, at = Hit.SCATTERING, photon.p + reached * photon.ahead
+            if photon.crossed > 0 and photons.has_flow == 1:
+                leave_in_cells(photons, world.field.grid, photon, reached, medium, was_wet)
+            photon.power *= transmittance
+            if what == Hit.SURFACE:
+                direction, p, wet, _inward = cross_water(
+                    photon.ahead, at, n, was_wet, chance.x, world.field.grid.step.x
+                )
+                photon.ahead, photon.p, photon.in_water, photon.crossed = direction, p, wet, 1
+            elif what == Hit.DROP:
+                cross_drop(photon, world, medium, which, at, n, chance.x)
+            elif what == Hit.SOLID and world.finish[which] == Finish.GLASS:
+                cross_glass(photon, world.paints[which], at, n, hit.w, was_wet)
+            elif what == Hit.SCATTERING:
+                scatter(photon, world, medium, at, pair(seed, round, 3 + 2 * photon.bounces))
             else:
-                if what == 1 and crossed > 0:
-                    arrive(photons, at, weight)
-                going = 0
-            bounce += 1
-            if bounce >= 12 + 60 * medium.murky or weight.max() < 0.01:
-                going = 0
+                if what == Hit.FLOOR and photon.crossed > 0:
+                    arrive(photons, at, photon.power)
+                photon.going = 0
+            photon.bounces += 1
+            if photon.bounces >= 12 + 60 * medium.is_turbid or photon.power.max() < 0.01:
+                photon.going = 0
+
+
+@qd.func
+def begun_photon(p, ahead):
+    """A photon that leaves the sun at a point in a direction."""
+    return Photon(p=p, ahead=ahead, power=vec3(1.0, 1.0, 1.0), in_water=0, crossed=0, going=1, bounces=0)
+
+
+@qd.func
+def cross_drop(photon: qd.template(), world: World, medium: Medium, which, at, n, chance):
+    """Reflect a photon at a drop, or send it through."""
+    ball = world.balls.ball[which]
+    through = bent(photon.ahead, n, 1.0 / index_of_water())
+    photon.crossed = 1
+    if chance < through.w:
+        photon.ahead = mirrored(photon.ahead, n)
+        photon.p = at + 1e-4 * ball.w * n
+    else:
+        inner = vec3(through.x, through.y, through.z)
+        out, ahead = through_drop(ball, at, n, inner, photon.ahead)
+        photon.ahead = ahead
+        photon.p = vec3(out.x, out.y, out.z)
+        photon.power *= qd.exp(-out.w * absorption_at(medium, world.field.grid, at))
+
+
+@qd.func
+def cross_glass(photon: qd.template(), color, at, n, way, was_wet):
+    """Send a photon straight through a wall of glass, without what its two faces reflect in air."""
+    mirror = bent(photon.ahead, qd.select(n.dot(photon.ahead) > 0.0, -n, n), 0.667).w
+    if was_wet == 0:
+        photon.power *= 1.0 - 2.0 * mirror / (1.0 + mirror)
+    photon.power *= color
+    photon.p, photon.in_water = at + past(way, n, photon.ahead) * photon.ahead, was_wet
+
+
+@qd.func
+def scatter(photon: qd.template(), world: World, medium: Medium, at, u):
+    """Scatter a photon in a turbid fluid, the same to all sides; an opaque one ends it."""
+    here = turbidity_at(medium.turbidity, world.field.grid, at)
+    photon.power *= albedo_of(color_of(here))
+    photon.p, photon.ahead, photon.in_water = at, uniform_direction(u), 1
+    photon.crossed = 1
+    if is_opaque(here, world.field.grid) == 1:
+        photon.going = 0
 
 
 @qd.func
@@ -150,14 +180,15 @@ def cell_of(grid: Grid, x):
 
 
 @qd.func
-def leave_in_cells(photons: Photons, grid: Grid, p, ahead, far, weight, medium: Medium, wet):
-    """Add a straight way of a photon to the cells that it passes, in steps of half a cell."""
+def leave_in_cells(photons: Photons, grid: Grid, photon: qd.template(), far, medium: Medium, wet):
+    """Add a straight way of a photon, `far` [m] long, to the cells that it passes, in steps of half a cell."""
+    p, ahead = photon.p, photon.ahead
     step = grid.step
     cell = 8.0 * step.x * step.y * step.z
     pace = step.x
     amount = 4096.0 * photons.power * pace / cell
     count = qd.min(qd.cast(far / pace + 0.5, qd.i32), 2000)
-    left, gone = weight, 0
+    left, gone = photon.power, 0
     for part in range(count):
         if gone == 0:
             number = cell_of(grid, p + (part + 0.5) * pace * ahead)
@@ -169,7 +200,7 @@ def leave_in_cells(photons: Photons, grid: Grid, p, ahead, far, weight, medium: 
             elif part > 2:
                 gone = 1
             if wet == 1:
-                left *= qd.exp(-pace * absorbed_at(medium, grid, p + (part + 0.5) * pace * ahead))
+                left *= qd.exp(-pace * absorption_at(medium, grid, p + (part + 0.5) * pace * ahead))
 
 
 @qd.func
@@ -209,7 +240,7 @@ def flow_at(photons: Photons, grid: Grid, x):
 
 @qd.func
 def light_within(photons: Photons, field: Field, at):
-    """Mean over all directions of the sun's light at a point in murk, per colour, over that of the bare sun."""
+    """Mean over all directions of the sun's light in a turbid fluid, per colour, over that of the bare sun."""
     # A cell of its depth off the surface: those at it lie half in the air.
     cell, depth = 2.0 * field.grid.step.x, value_at(field.level, field.grid, at)
     x = at

@@ -1,13 +1,13 @@
 """What the water does to light between its surfaces: Beer-Lambert, in one colour or in as many as there are cells.
 
-code      symbol   meaning                                                            unit
-swallow   sigma_a  absorption in every cell, per colour                               1/m
-shine              radiance of light that comes back out of deep water there          1
-murk      sigma_t  scattering of fluids that are not clear, see `murk.py`             1/m
-ember              radiance of what shines by itself                                  1
-left      T        share of the light that a way leaves, per colour                   1
-added              what the way adds, but for what is absorbed of it                  1
-patience           optical depth of murk at which a way ends                          1
+code               symbol   meaning                                                   unit
+cell_absorption    sigma_a  absorption in every cell, per colour                      1/m
+cell_glow                   radiance that comes back out of deep water there          1
+turbidity          sigma_t  extinction of fluids that are not clear, see `turbidity.py`   1/m
+emission                    radiance of fluids that glow                              1
+transmittance      T        share of the light that passes a straight way, per colour 1
+added                       radiance that is scattered into the way                   1
+free_depth         tau      optical depth at which the ray is scattered               1
 """
 
 import dataclasses
@@ -16,7 +16,7 @@ import numpy as np
 
 from wavetank.device.compiler import download, qd, upload
 from wavetank.view.film.grid import Grid
-from wavetank.view.film.murk import murk_at
+from wavetank.view.film.turbidity import turbidity_at
 from wavetank.view.lens import vec3, vec4, vector
 from wavetank.view.matter import matter_of
 from wavetank.view.shot import Shot
@@ -33,43 +33,43 @@ class Medium:
     absorption: vec3  # 1/m, where all of it is the same
     scattering: qd.f32  # 1/m
     glow: vec3  # radiance of light that comes back out of deep water, likewise
-    swallow: qd.types.ndarray()  # vec3 [cells], 1/m; [1] where all of it is the same
-    shine: qd.types.ndarray()  # vec3 [cells], likewise
-    varied: qd.i32  # 1 where it is not
-    murk: qd.types.ndarray()  # vec4 [cells]: colour times murk, murk [1/m]; [1] where all is clear
-    ember: qd.types.ndarray()  # vec3 [cells], likewise
-    murky: qd.i32  # 1 where some is not clear
+    cell_absorption: qd.types.ndarray()  # vec3 [cells], 1/m; [1] where all of it is the same
+    cell_glow: qd.types.ndarray()  # vec3 [cells], likewise
+    is_varied: qd.i32  # 1 where it is not
+    turbidity: qd.types.ndarray()  # vec4 [cells]: colour times turbidity, turbidity [1/m]; [1] where all is clear
+    emission: qd.types.ndarray()  # vec3 [cells], likewise
+    is_turbid: qd.i32  # 1 where some is not clear
 
 
 def medium_of(shot: Shot, grid: Grid) -> Medium:
     """Return what the water of a picture does to light, cell by cell where there are several fluids, or dye."""
     glow = np.asarray(shot.look.glow * shot.tint, float)
-    plain, varied = np.concatenate([np.asarray(shot.absorption, float), glow]), _particles(shot)
-    cells = np.zeros((0, COLUMNS)) if varied is None else _in_cells(shot, grid, varied, plain)
-    murky = bool(np.any(cells[:, 9] > 0.0))
+    plain, particles = np.concatenate([np.asarray(shot.absorption, float), glow]), _particles(shot)
+    cells = np.zeros((0, COLUMNS)) if particles is None else _in_cells(shot, grid, particles, plain)
+    is_turbid = bool(np.any(cells[:, 9] > 0.0))
     cells[:, 10:] /= np.maximum(cells[:, 9:10], 1e-9)  # what shines does so as far as it is there
     parts = [(cells[:, :3], vec3), (cells[:, 3:6], vec3)]
-    parts += [(part if murky else part[:0], kind) for part, kind in ((cells[:, 6:10], vec4), (cells[:, 10:], vec3))]
+    parts += [(part if is_turbid else part[:0], kind) for part, kind in ((cells[:, 6:10], vec4), (cells[:, 10:], vec3))]
     arrays = [qd.ndarray(kind, shape=(max(len(part), 1),)) for part, kind in parts]
     for array, (part, _) in zip(arrays, parts, strict=True):
         upload(array, part.astype(np.float32))
-    swallow, shine, murk, ember = arrays
+    cell_absorption, cell_glow, turbidity, emission = arrays
     return Medium(
         absorption=shot.absorption,
         scattering=shot.scattering,
         glow=vector(*glow),
-        swallow=swallow,
-        shine=shine,
-        varied=int(varied is not None),
-        murk=murk,
-        ember=ember,
-        murky=int(murky),
+        cell_absorption=cell_absorption,
+        cell_glow=cell_glow,
+        is_varied=int(particles is not None),
+        turbidity=turbidity,
+        emission=emission,
+        is_turbid=int(is_turbid),
     )
 
 
 def _particles(shot: Shot) -> np.ndarray | None:
-    """Return absorption [1/m], shine, colour times murk, murk [1/m] and ember times murk of every particle, float64
-    [count, COLUMNS], or None where all agree.
+    """Return absorption [1/m], glow, colour times turbidity, turbidity [1/m] and emission times turbidity of every
+    particle, float64 [count, COLUMNS]; None where all particles are the same.
     """
     frame, usual = shot.frame, shot.usual
     table = matter_of(frame, shot.extent).astype(float)
@@ -81,22 +81,22 @@ def _particles(shot: Shot) -> np.ndarray | None:
     found = np.zeros((frame.count, COLUMNS))
     found[:, :6] = plain
     kind = download(frame.material)[: frame.count] if len(table) else np.zeros(frame.count, np.int32)
-    for number, (*color, murk, red, green, blue) in enumerate(table):
-        mine, own, ember = kind == number, np.array(color), np.array([red, green, blue])
-        if murk > 0.0:
-            murk *= OFTEN
+    for number, (*color, turbidity, red, green, blue) in enumerate(table):
+        mine, own, emission = kind == number, np.array(color), np.array([red, green, blue])
+        if turbidity > 0.0:
+            turbidity *= OFTEN
             # What shines of itself is dark in the light of others, as in `optics/mixture.py`.
-            dark = own.clip(0.02, 0.98) / (1.0 + 2.0 * ember.max())
-            found[mine] = np.concatenate([np.zeros(6), murk * dark, [murk], murk * ember])
+            dark = own.clip(0.02, 0.98) / (1.0 + 2.0 * emission.max())
+            found[mine] = np.concatenate([np.zeros(6), turbidity * dark, [turbidity], turbidity * emission])
         elif own[0] >= 0.0:
             found[mine, :6] = np.concatenate([-np.log(own) * STRONG / usual, glow * own**0.6])
     stained = np.flatnonzero(dye)
     own = dye[stained]
     color = (np.stack([own >> 16 & 255, own >> 8 & 255, own & 255], axis=1) / 255.0) ** 2.2
     color, share = color.clip(0.02, 0.98), ((own >> 24 & 127) / 127.0)[:, None]
-    murk = found[stained, 9:10]
+    turbidity = found[stained, 9:10]
     clear = np.concatenate([-np.log(color) * STRONG / usual, glow * color**0.6], axis=1)
-    target = np.concatenate([np.where(murk > 0.0, 0.0, clear), murk * color], axis=1)
+    target = np.concatenate([np.where(turbidity > 0.0, 0.0, clear), turbidity * color], axis=1)
     found[stained, :9] += share * (target - found[stained, :9])
     return found
 
@@ -134,36 +134,37 @@ def cell_near(grid: Grid, x):
 
 
 @qd.func
-def absorbed_at(medium: Medium, grid: Grid, x):
+def absorption_at(medium: Medium, grid: Grid, x):
     """Absorption [1/m] at a point."""
     result = medium.absorption
-    if medium.varied == 1:
-        result = medium.swallow[cell_near(grid, x)]
+    if medium.is_varied == 1:
+        result = medium.cell_absorption[cell_near(grid, x)]
     return result
 
 
 @qd.func
-def through_water(medium: Medium, grid: Grid, p, ahead, far, patience):
-    """(share of the light that a straight way through the water leaves, radiance that it adds), each a vec3, and its
-    end [m]: `far`, or before it where murk has become as much as `patience`.
+def through_water(medium: Medium, grid: Grid, p, ahead, far, free_depth):
+    """(transmittance of a straight way through the water, radiance that it adds), each a vec3, and its end [m]: `far`,
+    or before it where the optical depth of turbidity reaches `free_depth`.
     """
-    left, added, end = qd.exp(-far * medium.absorption), (1.0 - qd.exp(-far * medium.scattering)) * medium.glow, far
-    if medium.varied == 1:
-        left, added = vec3(1.0, 1.0, 1.0), vec3(0.0, 0.0, 0.0)
+    transmittance, end = qd.exp(-far * medium.absorption), far
+    added = (1.0 - qd.exp(-far * medium.scattering)) * medium.glow
+    if medium.is_varied == 1:
+        transmittance, added = vec3(1.0, 1.0, 1.0), vec3(0.0, 0.0, 0.0)
         count = qd.min(qd.cast(far / (2.0 * grid.step.x), qd.i32) + 1, 256)
-        pace, clear, rest, part = far / count, 1.0, patience, 0
+        pace, clear, rest, part = far / count, 1.0, free_depth, 0
         while part < count:
             x, length = p + (part + 0.5) * pace * ahead, pace
-            if medium.murky == 1:
-                depth = pace * murk_at(medium.murk, grid, x)[3]
+            if medium.is_turbid == 1:
+                depth = pace * turbidity_at(medium.turbidity, grid, x)[3]
                 if depth > rest:
                     length = pace * rest / depth
                     end, part = part * pace + length, count
                 rest -= depth
             cell = cell_near(grid, x)
             per = qd.exp(-length * medium.scattering)
-            added += clear * (1.0 - per) * medium.shine[cell]
+            added += clear * (1.0 - per) * medium.cell_glow[cell]
             clear *= per
-            left *= qd.exp(-length * medium.swallow[cell])
+            transmittance *= qd.exp(-length * medium.cell_absorption[cell])
             part += 1
-    return left, added, end
+    return transmittance, added, end

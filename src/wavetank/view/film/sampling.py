@@ -82,3 +82,11 @@ def towards(axis, wide, u):
     p = wide * disc(u)
     across, up = frame_of(axis)
     return (axis + p.x * across + p.y * up).normalized(1e-12)
+
+
+@qd.func
+def uniform_direction(u):
+    """A direction, all of them equally probable."""
+    up, turn = 1.0 - 2.0 * u.x, 6.283185307 * u.y
+    flat = qd.sqrt(qd.max(1.0 - up * up, 0.0))
+    return vec3(flat * qd.cos(turn), up, flat * qd.sin(turn))

@@ -46,14 +46,14 @@ class Tracer:
         )
         self._sky: Any = qd.ndarray(vec3, shape=(1, 1))
         self._seen = ""  # digest of what is in it; empty where there is no picture
-        self._room: field.FieldRoom | None = None
+        self._arrays: field.FieldArrays | None = None
         self._photons: light.Photons | None = None
         self._spare: tuple[Any, Any, Any] | None = None
 
     def draw(self, shot: Shot, style: Style, watch: Watch) -> None:
         """Fill `color` with the picture of a style; stopped, with what there is of it."""
         options = (style.samples, style.aperture, style.focus, style.shutter)
-        self._hang(style.sky())
+        self._set_sky(style.sky())
         about = (*options, self.buffers.rows, self.buffers.columns, self._seen)
         digest = digest_of(shot, about) if watch.path else ""
         watch.begun = watch.done = load(watch.path, self.film, digest) if watch.path else 0
@@ -81,7 +81,7 @@ class Tracer:
             self._spare = (qd.ndarray(vec3, shape=shape), qd.ndarray(vec3, shape=shape), qd.ndarray(vec2, shape=shape))
         self.buffers.pixels.color.copy_from(denoise.clean(self.film, self._spare))
 
-    def _hang(self, sky: np.ndarray | None) -> None:
+    def _set_sky(self, sky: np.ndarray | None) -> None:
         """Put a picture in the place of the sky, or take it away."""
         seen = "" if sky is None else hashlib.sha256(sky.tobytes()).hexdigest()
         if seen == self._seen:
@@ -116,7 +116,7 @@ class Tracer:
             now = shot if moved == 0.0 else dataclasses.replace(shot, frame=shifted(shot.frame, moved))
             world = self._world(now, shutter, moved)
             medium = medium_of(now, world.field.grid)
-            photons = self._lit(now, world, medium, number, len(slices))
+            photons = self._trace_photons(now, world, medium, number, len(slices))
             around = interned(dataclasses.replace(setting, under=under_water(now, self.buffers)))
             while done < end:
                 count = min(self._at_once(), end - done)
@@ -139,7 +139,7 @@ class Tracer:
         distance = max(float(np.linalg.norm(extent.middle - lens.eye)), 0.2 * extent.radius)
         pixels = self.buffers.rows / self.buffers.supersample
         edge = 0.5 * max(1.0, pixels / 420.0) * distance / float(lens.focal) if shot.frame.scene.tank else 0.0
-        fill = vector(1.0, 1.0, 1.0) if self._seen else filled(shot.look)
+        fill = vector(1.0, 1.0, 1.0) if self._seen else sky_fill(shot.look)
         return paths.Setting(
             fill=fill,
             middle=vector(extent.middle[0], 0.0, extent.middle[2]),
@@ -151,7 +151,7 @@ class Tracer:
             under=0,
             brightest=BRIGHTEST,
             sky=self._sky,
-            hung=int(bool(self._seen)),
+            has_panorama=int(bool(self._seen)),
         )
 
     def _world(self, shot: Shot, shutter: float, moved: float) -> World:
@@ -160,24 +160,24 @@ class Tracer:
         ellipsoids.draw(shot, self.buffers)
         water = water_of(self.buffers, shot)
         grid = field.grid_around(shot, 0.0 if not shutter else speed * shutter)
-        if self._room is None or self._room.grid is not grid:
-            self._room = None
-            self._room = field.room_for(grid)
-        motes, touched = balls.motes_of(shot, water, grid, moved)
-        upload(self._room.near, touched)
+        if self._arrays is None or self._arrays.grid is not grid:
+            self._arrays = None
+            self._arrays = field.allocate(grid)
+        spheres, touched = balls.balls_of(shot, water, grid, moved)
+        upload(self._arrays.near, touched)
         paints = self.buffers.paints.of(traced_colors(shot))
         finish = qd.ndarray(qd.i32, shape=(max(shot.frame.solids.count, 1),))
         upload(finish, finishes_of(shot))
         return World(
-            field=field.build(self._room, water, shot),
-            motes=motes,
+            field=field.build(self._arrays, water, shot),
+            balls=spheres,
             solids=shot.frame.solids,
             window=solids.window(shot),
             paints=paints,
             finish=finish,
         )
 
-    def _lit(self, shot: Shot, world: World, medium: Medium, slice: int, slices: int) -> light.Photons:
+    def _trace_photons(self, shot: Shot, world: World, medium: Medium, slice: int, slices: int) -> light.Photons:
         """Return the light that the water of an instant brings."""
         grid, look, d = world.field.grid, shot.look, shot.extent.spacing
         lower, upper = np.asarray(grid.lower, float), np.asarray(grid.upper, float)
@@ -198,7 +198,7 @@ class Tracer:
         texel = max(d / TEXELS_A_SPACING, float(size.max()) / MOST_TEXELS)
         texels = [math.ceil(length / texel) for length in size]
         solid = shot.frame.solids.count > shot.frame.solids.tank_count
-        has_flow = bool(medium.murky) or solid or int(world.motes.list.shape[0]) > 1
+        has_flow = bool(medium.is_turbid) or solid or int(world.balls.list.shape[0]) > 1
         cells = grid.nx * grid.ny * grid.nz // 8 if has_flow else 1
         shapes = ((texels[1], texels[0], 3), (cells, 6))
         kept = self._photons
@@ -223,24 +223,24 @@ class Tracer:
         self._photons = photons
         if float(np.max(look.sun)) > 0.0:
             for number in range(rounds):
-                light.shine(photons, world, look, medium, slice * rounds + number)
+                light.trace_photons(photons, world, look, medium, slice * rounds + number)
         return photons
 
 
 @qd.kernel(fastcache=True)
-def look_around(found: qd.types.ndarray(), directions: qd.types.ndarray(), look: Look, count: qd.i32):
+def sample_sky(found: qd.types.ndarray(), directions: qd.types.ndarray(), look: Look, count: qd.i32):
     """Write the radiance of the sky in every direction."""
     for k in range(count):
         found[k] = background(look, directions[k])
 
 
-def filled(look: Look) -> Any:
+def sky_fill(look: Look) -> Any:
     """Return what a matte surface gets of the sky over what the sky looks like, so that white shows `Look.sky`."""
     count = 2048
     up = np.sqrt((np.arange(count) + 0.5) / count)  # by the cosine
     turn, flat = 2.3999632297 * np.arange(count), np.sqrt(1.0 - up * up)
     directions, found = qd.ndarray(vec3, shape=(count,)), qd.ndarray(vec3, shape=(count,))
     upload(directions, np.stack([flat * np.cos(turn), up, flat * np.sin(turn)], axis=1).astype(np.float32))
-    look_around(found, directions, look, count)
+    sample_sky(found, directions, look, count)
     mean = download(found).mean(axis=0)
     return vector(*(np.asarray(look.sky) / np.maximum(mean, 1e-6)))

@@ -25,7 +25,7 @@ from wavetank.view.lens import Lens, box_of_ball, ray_direction, ray_origin, to_
 from wavetank.view.look import Look
 from wavetank.view.optics.radiance import environment, glint
 from wavetank.view.optics.rays import Box, box, box_interval
-from wavetank.view.paints import FINISHES, colors_of, finishes_of, traced_colors
+from wavetank.view.paints import Finish, colors_of, finishes_of, traced_colors
 from wavetank.view.shot import Shot
 from wavetank.view.strips import Strips, strip, strips_of
 from wavetank.view.water_buffers import water_of
@@ -55,7 +55,7 @@ def draw_from_sun(shot: Shot, buffers: Buffers) -> None:
 
 def draw_glass(shot: Shot, buffers: Buffers) -> None:
     """Lay solids of glass over the finished picture, by the depth of what it shows: thin walls that bend no light."""
-    is_glass = finishes_of(shot) == FINISHES.index("glass")
+    is_glass = finishes_of(shot) == Finish.GLASS
     if shot.frame.dim == 3 and is_glass.any():
         paints = np.where(is_glass[:, None], traced_colors(shot), np.float32(-1.0))
         composite_glass(
