@@ -20,8 +20,8 @@ def scene(size=(1.0, 0.6), periodic=("x",), **changes):
         (lambda: wt.Tank(size=(1, 1), periodic=["y"], open=["top"]), "leaves out a wall along y"),
         (lambda: wt.Tank(size=(1, 1), periodic=["w"]), "periodic"),
         (lambda: scene(size=(0.15, 1)), r"0.15 m long along x, which is periodic; it must be at least 0.152 m"),
-        (lambda: scene(periodic=["y"]), "water would fall along y for ever"),
-        (lambda: scene(gravity=(9.0, -3.0)), "water would fall along x for ever"),
+        (lambda: scene(periodic=["y"]), "water would fall along y without end"),
+        (lambda: scene(gravity=(9.0, -3.0)), "water would fall along x without end"),
         (
             lambda: scene(solids=[wt.Sphere(name="ball", center=(0.5, 0.3), radius=0.1, density=500)]),
             "'ball' is a body, whose contacts do not reach over a seam",

@@ -29,7 +29,7 @@ def test_a_body_outside_of_the_tank():
 
 
 def test_a_target_that_no_motor_reaches():
-    with pytest.raises(WavetankError, match=r"target = 2 of a joint is out of its limits"):
+    with pytest.raises(WavetankError, match=r"target = 2 of a joint is outside of its limits"):
         wt.Hinge(first="crate", at=(0.5, 0.6, 0.5), target=2, limits=(-0.1, 0.1))
     assert wt.Hinge(first="crate", at=(0.5, 0.6, 0.5), target=0.1, limits=(-0.1, 0.1)).target == 0.1
 
@@ -40,7 +40,9 @@ def test_an_aim_that_asks_for_no_body():
         "seconds": 5,
         "aims": [{"kind": "bring", "body": "boat", "lower": [0, 0, 0], "upper": [1, 1, 1], "share": 0.5}],
     }
-    with pytest.raises(WavetankError, match=r"goal\.aims\[0\]\.body = 'boat' is no body of the scene; they are: crate"):
+    with pytest.raises(
+        WavetankError, match=r"goal\.aims\[0\]\.body = 'boat' is not a body of the scene; they are: crate"
+    ):
         pool(solids=[crate()], goal=goal)
     assert pool(solids=[crate(name="boat")], goal=goal).goal is not None
 

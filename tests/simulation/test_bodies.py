@@ -305,7 +305,7 @@ def test_joints_hold():
         ([{"center": (0.5, 0.5, 0.5), "size": (0.1,) * 3, "density": 1, "mass": 1}], [], "density or a mass, not both"),
         ([{"center": (0.5, 0.5, 0.5), "size": (0.1,) * 3, "held": True}], [], "held is for bodies"),
         ([{"center": (0.5, 0.5, 0.5), "size": (0.1,) * 3, "mass": 0}], [], "mass = 0"),
-        ([], [{"kind": "hinge", "first": "door", "at": (0, 0, 0)}], "joints\\[0\\].first = 'door' is no solid"),
+        ([], [{"kind": "hinge", "first": "door", "at": (0, 0, 0)}], "joints\\[0\\].first = 'door' is not a solid"),
         (
             [{"name": "a", "center": (0.5, 0.5, 0.5), "size": (0.1,) * 3}],
             [{"kind": "weld", "first": "a", "at": (0, 0, 0)}],

@@ -176,7 +176,7 @@ def test_live_parameters():
 
 
 def test_a_name_is_no_scene():
-    with pytest.raises(wt.WavetankError, match="'drop' is no Scene; use wt.Scene.load"):
+    with pytest.raises(wt.WavetankError, match="'drop' is not a Scene; use wt.Scene.load"):
         Simulation("drop")
 
 

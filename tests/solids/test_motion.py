@@ -105,5 +105,5 @@ def test_parts_move_with_the_whole():
 
 
 def test_motion_and_an_expression_besides_is_one_too_many():
-    with pytest.raises(wt.WavetankError, match="give one of both"):
+    with pytest.raises(wt.WavetankError, match="give one of the two"):
         wt.Sphere(center=(0, "t"), radius=0.1, motion={"rotation": "t"})

@@ -1,4 +1,4 @@
-"""How much a scene may hold, and how large its numbers may be, so that a stranger's file can do no harm.
+"""How much a scene may hold, and how large its numbers may be, so that a file from anyone can be opened.
 
 Together with `model.FARTHEST` and the bounds of the forces these keep every product that a step makes within float32
 (3.4e38): the largest are squares of speeds, and those times a density.
@@ -17,7 +17,7 @@ MOST = {"solids": 2000, "fluids": 2000, "emitters": 200, "drains": 200, "joints"
 
 
 def check_numbers(values: dict[str, Any]) -> None:
-    """Raise `ValueError` where a table, not looked into yet, lists more than there may be."""
+    """Raise `ValueError` where a table, before it is validated, lists more entries than are allowed."""
     for name, most in MOST.items():
         members = values.get(name)
         if isinstance(members, list | tuple) and len(members) > most:
@@ -25,7 +25,7 @@ def check_numbers(values: dict[str, Any]) -> None:
 
 
 def check_bodies(solids: Any, tank: Any, goal: Any) -> None:
-    """Raise `ValueError` for a body that begins behind a wall of the tank, and for an aim that asks for no body."""
+    """Raise `ValueError` for a body that begins outside of the tank, and for an aim whose body does not exist."""
     for number, solid in enumerate(solids):
         for axis, (low, high) in enumerate(zip(*tank.box(), strict=True) if tank and solid.is_body else ()):
             at, reach = float(solid.origin[axis]), solid.reach()
@@ -38,13 +38,13 @@ def check_bodies(solids: Any, tank: Any, goal: Any) -> None:
     for number, aim in enumerate(goal.aims if goal else []):
         if getattr(aim, "body", None) not in (None, *bodies):
             raise ValueError(
-                f"goal.aims[{number}].body = {aim.body!r} is no body of the scene; they are: "
+                f"goal.aims[{number}].body = {aim.body!r} is not a body of the scene; they are: "
                 f"{', '.join(bodies) or 'none'}."
             )
 
 
 def check_periodic(tank: Any, spacing: float, support: float, gravity: tuple[float, ...], solids: Any) -> None:
-    """Raise `ValueError` where a tank that repeats is too short, falls for ever, or has a solid at its seam."""
+    """Raise `ValueError` where a periodic tank is too short, lies along gravity, or has a solid at its seam."""
     strongest = max(map(abs, gravity), default=0.0)
     for axis in tank.rings if tank else ():
         name, length, least = "xyz"[axis], tank.size[axis], LEAST_SUPPORTS * support * spacing
@@ -55,8 +55,8 @@ def check_periodic(tank: Any, spacing: float, support: float, gravity: tuple[flo
             )
         if abs(gravity[axis]) == strongest > 0.0:
             raise ValueError(
-                f"tank.periodic = {tank.periodic} with gravity = {tuple(gravity)}: water would fall along {name} for "
-                "ever; only axes across gravity can be periodic, all of them in a world without it."
+                f"tank.periodic = {tank.periodic} with gravity = {tuple(gravity)}: water would fall along {name} "
+                "without end; only axes across gravity can be periodic, all of them in a world without it."
             )
         bodies = [solid.name or f"solids[{number}]" for number, solid in enumerate(solids) if solid.is_body]
         if bodies:

@@ -1,4 +1,4 @@
-"""Where water goes: regions that take particles out of the world."""
+"""Outlets: regions that remove particles from the world."""
 
 from typing import Annotated, Any, Literal
 
@@ -30,10 +30,10 @@ class Drain(Timed):
     center: Place | None = None
     radius: Length | None = None
     direction: Vector | None = None  # of a mouth: where the water comes from, out of the wall
-    flow: Annotated[Number, Field(ge=0)] | None = None  # l/s, at most; m^2/s in a 2-D world; all that comes where None
+    flow: Annotated[Number, Field(ge=0)] | None = None  # l/s, at most; m^2/s in a 2-D world; unlimited where None
     suction: Annotated[Number, Field(ge=0, le=1e4)] = 0.0  # m/s^2 towards the center, felt within four radii
     start: Annotated[Number, Field(ge=0)] = 0.0  # s
-    duration: Positive | None = None  # s; without an end where None
+    duration: Positive | None = None  # s; unlimited where None
     level: Annotated[Number | None, METRES] = None  # m: acts while the water of the gauge stands higher
     gauge: Gauge | None = None  # the whole tank where None
 
@@ -67,19 +67,19 @@ class Drain(Timed):
         return len(self.center or self.lower or ()) - 1
 
     def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
-        """Name every point of this drain, to check that all live in one dimension."""
+        """Name every point of this drain, to check that all have the dimension of the world."""
         found = [(name, getattr(self, name)) for name in ("lower", "upper", "center", "direction")]
         own = [(name, value) for name, value in found if value is not None]
         return own + [(f"gauge.{name}", value) for name, value in self.gauge.vectors()] if self.gauge else own
 
     def middle(self) -> np.ndarray | None:
-        """Return the middle [m], [dim], of what takes from a place; None for what takes from all others."""
+        """Return the middle [m], [dim], of the region; None for `outside`."""
         if self.shape == "outside":
             return None
         return np.array(self.center, float) if self.center else 0.5 * (np.array(self.lower) + np.array(self.upper))
 
     def depths(self, x: np.ndarray, spacing: float) -> np.ndarray:
-        """Say how far [m] the points [n, dim] are from where this takes them first; infinite where it takes none."""
+        """Return the distances [m] of points [n, dim] from where this removes first; infinite outside of it."""
         if self.shape in ("box", "outside"):
             lower, upper = np.array(self.lower, float), np.array(self.upper, float)
             inside = np.all((x >= lower) & (x <= upper), axis=1)

@@ -1,4 +1,4 @@
-"""Where water comes from: mouths that let particles into the world, row after row."""
+"""Inlets: openings through which particles enter the world, row after row."""
 
 import math
 import re
@@ -47,10 +47,10 @@ class Emitter(Timed):
     flow: Annotated[Number, Field(ge=0)] | None = None  # l/s; m^2/s in a 2-D world
     spread: Annotated[Number, Field(ge=0, le=1.4)] = 0.0  # rad between the axis and the water from the rim
     start: Annotated[Number, Field(ge=0)] = 0.0  # s
-    duration: Positive | None = None  # s; without an end where None
+    duration: Positive | None = None  # s; unlimited where None
     material: str | None = None  # one of the scene's materials; the scene's own parameters where None
     dye: str = ""  # '#rrggbb'
-    feed: str = ""  # name of a drain: only what that took comes out
+    feed: str = ""  # name of a drain: emits only what that has removed
     level: Annotated[Number | None, METRES] = None  # m: acts while the water of the gauge stands lower
     gauge: Gauge | None = None  # the whole tank where None
     motion: AnyMotion = None  # a position, and a rotation that turns its direction
@@ -98,7 +98,7 @@ class Emitter(Timed):
             unit = "m^2/s" if self.shape == "line" else "l/s"
             raise ValueError(
                 f"emitter: at speed = {self.speed:g} m/s the mouth passes {most:.4g} {unit} at most, and flow is "
-                f"{self.flow:g} {unit}; give one of both, or a larger mouth."
+                f"{self.flow:g} {unit}; give one of the two, or a larger mouth."
             )
 
     def _area(self) -> float | None:
@@ -132,7 +132,7 @@ class Emitter(Timed):
         return tuple(self.mesh.center)
 
     def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
-        """Name every vector of this emitter, to check that all live in one dimension."""
+        """Name every vector of this emitter, to check that all have the dimension of the world."""
         found = [("position", self.middle), ("direction", self.direction)]
         own = [(name, tuple(value)) for name, value in found if value is not None]
         return own + [(f"gauge.{name}", value) for name, value in self.gauge.vectors()] if self.gauge else own

@@ -14,28 +14,28 @@ from wavetank.solids.meshes.mesh import Mesh
 from wavetank.solids.sampling import nearest_distances
 from wavetank.solids.shapes import AnySolid
 
-FINE = 50.0  # lattice points along the longest edge, for those who ask without a spacing
+FINE = 50.0  # lattice points along the longest edge where no spacing is given
 
 
 class Filled(Fluid):
-    """Fluid at rest that fills the shape of a solid, closely packed, with as many particles as its volume asks for.
+    """Fluid at rest that fills the shape of a solid, closely packed, with as many particles as its volume holds.
 
-    What solids, the tank and fluids before take of it is left out. The particles are packed when a simulation starts
+    Parts that solids, the tank or earlier fluids occupy are left out. The particles are packed when a simulation starts
     (`simulation/packing.py`); before that they are those of a lattice.
     """
 
     shape: Literal["filled"] = "filled"
-    inside: AnySolid  # a closed mesh, in 2-D a polygon, or any other shape that has an end
+    inside: AnySolid  # a closed mesh, in 2-D a polygon, or any other finite shape
     _packed: np.ndarray | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
     def _has_end(self) -> "Filled":
         if not np.isfinite(self._box()).all():
             raise ValueError(
-                "inside: this shape has no end and cannot be filled; give one that has, or an intersection."
+                "inside: this shape is infinite and cannot be filled; give a finite one, or an intersection."
             )
         if isinstance(self.inside, Mesh) and self.inside.thickness is not None:
-            raise ValueError("inside.thickness makes walls of a mesh's faces; what is to be filled is a closed mesh.")
+            raise ValueError("inside.thickness makes walls of a mesh's faces; only a closed mesh can be filled.")
         return self
 
     def packed(self, positions: np.ndarray) -> "Filled":

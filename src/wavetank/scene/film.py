@@ -1,4 +1,4 @@
-"""A film of a scene: how long, how slow, how large, and where the camera is; pictures alone know of it.
+"""A film of a scene: duration, speed, size and camera. It does not affect the simulation.
 
     [film]
     duration = 6
@@ -24,7 +24,7 @@ MOST_FRAMES = 100_000
 
 
 class Film(Timed):
-    """How a scene is filmed; what is left out is usual."""
+    """How a scene is filmed."""
 
     duration: Annotated[Number, Field(gt=0.0, le=3600.0)] = 4.0  # s of film
     start: Annotated[Number, Field(ge=0.0, le=86400.0)] = 0.0  # s of water when it begins
@@ -33,7 +33,7 @@ class Film(Timed):
     size: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = (1280, 720)  # px
     quality: Literal["draft", "standard", "high", "film"] = "standard"
     samples: Annotated[int, Field(ge=1, le=4096)] | None = None  # a pixel, of high and film
-    eye: Annotated[Point | None, METRES] = None  # m; what neither eye nor target says frames the world
+    eye: Annotated[Point | None, METRES] = None  # m; without eye and target the camera frames the world
     target: Annotated[Point | None, METRES] = None  # m
     field_of_view: Annotated[Number, Field(gt=1.0, le=150.0)] = 28.0  # deg, from top to bottom
     aperture: Annotated[Number, Field(ge=0.0, le=10.0), METRES] = 0.0  # m: radius of the lens; 0 is sharp everywhere

@@ -46,7 +46,7 @@ class Fluid(Model):
     def placed(
         self, spacing: float, tank: Tank | None, fluids: Sequence["Fluid"], solids: Sequence[Solid]
     ) -> np.ndarray:
-        """Positions [n, dim] of this fluid's particles where it lies in a `tank` beside all `fluids` and `solids`."""
+        """Positions [n, dim] of this fluid's particles in a `tank` with all `fluids` and `solids`."""
         return self.particles(spacing)
 
 

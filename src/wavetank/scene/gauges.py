@@ -1,4 +1,4 @@
-"""What emitters and drains measure to keep a level: the depth that the water of a box has there."""
+"""Level gauges of emitters and drains: the depth of the water in a box."""
 
 import numpy as np
 from pydantic import model_validator

@@ -1,4 +1,4 @@
-"""What a level asks for, as plain data: `[goal]` in a scene file.
+"""The goal of a level as plain data: `[goal]` in a scene file.
 
 An aim compares one number of a frame with `share`; `session/measures.py` takes it.
 """
@@ -17,8 +17,8 @@ Share = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
 class Aim(Model):
     """One thing to reach, or to keep from happening, inside a box of the world."""
 
-    forbids: ClassVar[bool] = False  # whether more than `share` loses the game at once
-    name: str = ""  # shown beside the outline
+    forbids: ClassVar[bool] = False  # whether a value above `share` loses the game at once
+    name: str = ""  # shown next to the outline
     lower: Place
     upper: Place
     share: Share
@@ -32,7 +32,7 @@ class Aim(Model):
         return self
 
     def progress(self, value: float) -> float:
-        """Return how much of the way is done, 0 to 1."""
+        """Return the progress, 0 to 1."""
         return min(1.0, max(0.0, value / self.share))
 
 
@@ -88,27 +88,27 @@ def _one_or_many(value: Any) -> Any:
 
 
 class Goal(Model):
-    """What has to be done in a scene, with what, in which time."""
+    """What the player has to do in a scene, with which tools, and in which time."""
 
     text: str  # one sentence for the player
-    hint: str = ""  # one more, for who has lost
+    hint: str = ""  # another one, shown to a player who has lost
     number: Annotated[int, Field(ge=0)] = 0  # place in the list of levels
     aims: Annotated[list[AnyAim], BeforeValidator(_one_or_many), Field(min_length=1, max_length=12)]
     seconds: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]  # s of water
     hold: Annotated[float, Field(ge=0, le=60, allow_inf_nan=False)] = 0.5  # s for which all aims must be met
     stars: tuple[Positive, Positive] | None = None  # three and two stars: see `Game.stars`
     tools: dict[str, dict[str, Any]] | None = None  # allowed ones with the options that are fixed; all where None
-    strokes: Annotated[int, Field(ge=1)] | None = None  # how often a tool may be put down
+    strokes: Annotated[int, Field(ge=1)] | None = None  # how often a tool may be used
 
     def vectors(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Name every corner, to check that all live in one dimension."""
+        """Name every corner, to check that all have the dimension of the world."""
         for number, aim in enumerate(self.aims):
             yield f"aims[{number}].lower", aim.lower
             yield f"aims[{number}].upper", aim.upper
 
     @property
     def is_endured(self) -> bool:
-        """Whether there is nothing to reach: all that is asked is that nothing happens until time is over."""
+        """Whether all aims are things to prevent until the time is over."""
         return all(aim.forbids for aim in self.aims)
 
     @model_validator(mode="after")

@@ -15,7 +15,7 @@ NotNegative = Annotated[Number, Field(ge=0)]
 
 
 class Joint(Model):
-    """What every joint has: a name, the two solids that it joins, and where."""
+    """The base class of joints: a name, the two solids that it connects, and a point."""
 
     name: str = ""
     first: str  # name of a solid
@@ -23,7 +23,7 @@ class Joint(Model):
     at: Place  # m: where the joint is at the start
 
     def vectors(self) -> Iterator[tuple[str, Sequence[float]]]:
-        """Name every point and direction, to check that all live in one dimension."""
+        """Name every point and direction, to check that all have the dimension of the world."""
         yield "at", self.at
 
 
@@ -54,7 +54,8 @@ class _Motor(Joint):
         if self.limits is not None and isinstance(target, int | float):
             if not self.limits[0] <= target <= self.limits[1]:
                 raise ValueError(
-                    f"target = {target:g} of a joint is out of its limits = {self.limits}; no motor gets there."
+                    f"target = {target:g} of a joint is outside of its limits = {self.limits}; "
+                    "choose a target between them."
                 )
         return self
 
@@ -91,7 +92,7 @@ class Slider(_Motor):
 
 
 class BallJoint(Joint):
-    """Holds a point of both solids together; they turn about it as they like."""
+    """Holds a point of both solids together; both may turn about it freely."""
 
     kind: Literal["ball-joint"] = "ball-joint"
 
@@ -134,12 +135,14 @@ for _joint in JOINTS:
 
 
 def check_joints(joints: Sequence[Joint], bodies: dict[str, bool]) -> None:
-    """Raise `ValueError` for a joint that joins nothing; `bodies` says of each named solid whether it is a body."""
+    """Raise `ValueError` for a joint without a body; `bodies` says of each named solid whether it is a body."""
     for number, joint in enumerate(joints):
         for key, name in (("first", joint.first), ("second", joint.second)):
             if name not in bodies and (name or key == "first"):
                 known = ", ".join(sorted(bodies)) or "none"
-                raise ValueError(f"joints[{number}].{key} = {name!r} is no solid of the scene; named solids: {known}.")
+                raise ValueError(
+                    f"joints[{number}].{key} = {name!r} is not a solid of the scene; named solids: {known}."
+                )
         if joint.first == joint.second:
             raise ValueError(
                 f"joints[{number}] joins {joint.first!r} to itself; give another solid as second, or none."

@@ -1,21 +1,21 @@
-"""Lattices of blocks that fit between what holds them, so that still water is still from its first frame on.
+"""Lattices of blocks that fit between walls, so that still water is at rest from its first frame on.
 
-Rows that are a whole spacing apart leave up to one free beside the last, and the block falls into it: a tank of a metre
-at d = 2.4 cm began at 0.45 m/s. Rows therefore fill the way between two walls, or to a gate or another block, or around
-a world that repeats. Along the other axes they lie as much farther apart or closer as keeps a particle its volume.
+Rows that are a whole spacing apart leave up to one free next to the last, and the block falls into it: a tank of
+a metre at d = 2.4 cm began at 0.45 m/s. Rows therefore fill the distance between two walls, or to a gate or another
+block, or around a periodic world. Along the other axes their distance is changed such that particles keep their volume.
 """
 
 import numpy as np
 
 UNLIKE = 0.1  # of a spacing: by how much rows may lie closer or farther apart than that
 BEYOND = 0.25  # of a row: how far the last one may reach out of its block
-NEAR = 1e-6  # spacings: what is as near touches
+NEAR = 1e-6  # spacings: boxes that are nearer touch
 
 
 def lattice(lower: np.ndarray, counts: np.ndarray, ways: np.ndarray, more: int = 0) -> np.ndarray:
     """Return positions [m], float64 [n, dim]: `counts` rows along each axis, `ways` [m] apart, from half of one on.
 
-    There are `more` rows around these.
+    `more` rows are added on each side.
     """
     axes = [low + (np.arange(-more, n + more) + 0.5) * way for low, n, way in zip(lower, counts, ways, strict=True)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
@@ -41,8 +41,8 @@ def touching(lower: np.ndarray, upper: np.ndarray, low: np.ndarray, high: np.nda
 def fitted(lower: np.ndarray, upper: np.ndarray, spacing: float, held: np.ndarray, rings: list[int]) -> np.ndarray:
     """Return the positions [m], float64 [n, dim], of a block that is `held` on both sides along some axes, bool [dim].
 
-    The world repeats along the axes that are `rings`. Where all axes are held, one that is none gives way, upwards if
-    it can; where all are rings, particles have a little more than their volume.
+    The world repeats along the axes that are `rings`. Where all axes are held, one that is not a ring is left free,
+    y if possible; where all are rings, particles have a little more than their volume.
     """
     size, dim = upper - lower, len(lower)
     counts, ways = plain_rows(lower, upper, spacing), np.full(dim, spacing)

@@ -1,4 +1,4 @@
-"""Openings that water comes out of: where the particles of one row stand, so that rows are as dense as water at rest.
+"""Openings of inlets: places of the particles of one row, such that the jet has the density of water at rest.
 
 Neighbours leave a quarter of a row after each other: a jet that gravity draws out would fall apart into discs if whole
 rows left at once.
@@ -53,13 +53,13 @@ def frame_of(ahead: np.ndarray, dim: int, side: np.ndarray | None = None) -> np.
     Across is horizontal, or along `side` as far as that is not ahead; in a 2-D world it lies in the plane.
     """
     if dim == 2:
-        beside = np.cross(ahead, [0.0, 0.0, 1.0])
+        across = np.cross(ahead, [0.0, 0.0, 1.0])
     elif side is not None:
-        beside = side - ahead * (side @ ahead)
+        across = side - ahead * (side @ ahead)
     else:
-        beside = np.cross([0.0, 1.0, 0.0], ahead) if abs(ahead[1]) < 0.999 else np.array([1.0, 0.0, 0.0])
-    beside = beside / max(float(np.linalg.norm(beside)), 1e-12)
-    return np.stack([beside, np.cross(ahead, beside), ahead])
+        across = np.cross([0.0, 1.0, 0.0], ahead) if abs(ahead[1]) < 0.999 else np.array([1.0, 0.0, 0.0])
+    across = across / max(float(np.linalg.norm(across)), 1e-12)
+    return np.stack([across, np.cross(ahead, across), ahead])
 
 
 def disc_rows(half: float, spacing: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A scene: plain validated data that says what a world is made of, from Python or from a TOML file."""
+"""A scene: plain validated data that describes a world, from Python or from a TOML file."""
 
 import difflib
 import functools
@@ -38,7 +38,7 @@ _TOLERANCE = 1e-6  # of a spacing: how far a fluid may reach beyond a wall by ro
 
 
 def _tagged(values: Any, default: str) -> Any:
-    """Let a table without `shape` mean the usual one."""
+    """Give tables without `shape` the default one."""
     if not isinstance(values, list | tuple):
         return values
     return [{"shape": default, **v} if isinstance(v, dict) and "shape" not in v else v for v in values]
@@ -67,7 +67,7 @@ class Scene(Timetable, Parameters):
             return values
         check_numbers(values)
         chosen = {name: value for name, value in _chosen(values).items() if name not in values}
-        return cls.spread_gravity({**values, **chosen})  # what was there keeps its order: digests tell one from another
+        return cls.spread_gravity({**values, **chosen})  # given keys keep their order, which digests see
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":
@@ -142,7 +142,7 @@ class Scene(Timetable, Parameters):
         slack, (first, last) = _TOLERANCE * self.spacing, self.tank.box()
         for number, fluid in enumerate(self.fluids):
             if isinstance(fluid, Filled) or (isinstance(fluid, Points) and not len(fluid.positions)):
-                continue  # what is filled says so itself, when its shape is measured
+                continue  # checked when their shape is measured
             lower, upper = fluid.bounds()
             if np.any(lower < first - slack) or np.any(upper > last + slack):
                 where = f"fluids[{number}] reaches from {_numbers(lower)} to {_numbers(upper)}, outside the tank; "
@@ -241,7 +241,7 @@ class Scene(Timetable, Parameters):
         parts = []
         for number, fluid in enumerate(self.fluids):
             x = fluid.placed(self.spacing, self.tank, self.fluids, self.solids)
-            x = x.reshape(-1, self.dim)  # none at all have no width of their own
+            x = x.reshape(-1, self.dim)  # an empty array has no width of its own
             v = np.zeros_like(x) if fluid.velocity is None else np.tile(np.array(fluid.velocity, float), (len(x), 1))
             if isinstance(fluid, Points):
                 v = v if fluid.velocities is None else fluid.velocities.reshape(x.shape)
@@ -257,9 +257,9 @@ class Scene(Timetable, Parameters):
 
     @staticmethod
     def checked(scene: Any) -> "Scene":
-        """Return `scene`, or say that it is none."""
+        """Return `scene`; raises `WavetankError` for anything else."""
         if not isinstance(scene, Scene):
-            raise WavetankError(f"{scene!r} is no Scene; use wt.Scene.load(name) for a bundled one or a TOML file.")
+            raise WavetankError(f"{scene!r} is not a Scene; use wt.Scene.load(name) for a bundled one or a TOML file.")
         return scene
 
     @classmethod
@@ -270,7 +270,7 @@ class Scene(Timetable, Parameters):
 
     @classmethod
     def from_text(cls, text: str, origin: str = "scene", **context: Any) -> "Scene":
-        """Read the text of a TOML file; a mistake in it is told with `origin` in front; `context` as in `parse`."""
+        """Read the text of a TOML file; errors begin with `origin`; `context` as in `parse`."""
         with explain_errors(origin, "scene"):
             scene: Scene = cls.parse(parse_toml(text, origin), origin, **context)
         return scene

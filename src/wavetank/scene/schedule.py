@@ -1,7 +1,7 @@
-"""What of a scene changes with time: gravity, by itself or because the tank is tilted.
+"""What changes with time in a scene: sources, sinks, and gravity, by itself or because the tank is tilted.
 
-A tilted tank is computed in its own frame, where gravity is turned the other way. That is all of it as long as the tank
-turns slowly: what a fast turn adds, Coriolis, centrifugal and Euler forces, is left out.
+A tilted tank is computed in its own frame, in which gravity is rotated the other way. That holds for slow rotations:
+Coriolis, centrifugal and Euler forces are neglected.
 """
 
 from typing import Annotated, Any, Literal
@@ -20,30 +20,30 @@ from wavetank.scene.emitters import Emitter
 
 
 class Tilted(Timed):
-    """What a tank has that leans: gravity is turned the other way, and pictures show it leaning."""
+    """The tilt of a tank: gravity is rotated the other way, and pictures show the tank tilted."""
 
     tilt: Number = 0.0  # rad about the axis
     tilt_axis: tuple[Number, Number, Number] = (0.0, 0.0, 1.0)
 
     @property
     def is_tilted(self) -> bool:
-        """Whether it stands, or at some time will stand, otherwise than upright."""
+        """Whether it is tilted at any time."""
         return bool(self.tilt or "tilt" in self.over_time)
 
 
 class Timetable(Model):
-    """What of a scene comes, goes and changes by itself."""
+    """The part of a scene that depends on time."""
 
     emitters: list[Emitter] = []
     drains: list[Drain] = []
-    most_particles: Annotated[int, Field(ge=1)] | None = None  # that emitters may fill the world with
+    most_particles: Annotated[int, Field(ge=1)] | None = None  # at which emitters stop
     when_full: Literal["stop", "recycle"] = "stop"  # what emitters do then: wait, or take the oldest particles
     start_time: Annotated[Number, Field(ge=0)] = 0.0  # s: t of all expressions and keyframes when the water starts
     gravity_track: Any = None  # what gravity does over time; made from expressions or keyframes in its place
 
     @staticmethod
     def spread_gravity(values: dict[str, Any]) -> dict[str, Any]:
-        """Let expressions or keyframes of gravity mean its track; `gravity` is then its value at t = 0."""
+        """Accept expressions or keyframes as gravity; `gravity` is then its value at t = 0. Raises `ValueError`."""
         plain = values.get("gravity")
         if not (callable(plain) or varies(plain)):
             plain = values.get("gravity_track")  # as a state has it
@@ -58,12 +58,12 @@ class Timetable(Model):
         return {**values, "gravity": np.atleast_1d(track(tidy)(0.0)).tolist(), "gravity_track": tidy}
 
     def is_timed(self: Any) -> bool:
-        """Say whether anything here comes, goes or changes at times of its own."""
+        """Say whether anything here depends on time."""
         own = self.emitters or self.drains or changes_gravity(self) or any(force.over_time for force in self.forces)
         return bool(own or any(solid.motion for solid in self.solids))
 
     def check_sources(self) -> None:
-        """Check what emitters ask for of drains; raises `ValueError`."""
+        """Raise `ValueError` for an emitter that is fed by an unknown drain."""
         known = [drain.name for drain in self.drains if drain.name]
         for number, emitter in enumerate(self.emitters):
             if emitter.feed and emitter.feed not in known:
@@ -79,7 +79,7 @@ def changes_gravity(scene: Any) -> bool:
 
 
 def with_gravity(scene: Any, gravity: tuple[float, ...]) -> Any:
-    """Return the scene with that gravity [m/s^2] for good, in a tank that stands upright."""
+    """Return the scene with a constant gravity [m/s^2], in an upright tank."""
     tank = scene.tank and scene.tank.model_copy(update={"tilt": 0.0, "over_time": {}})
     return scene.model_copy(update={"gravity": gravity, "gravity_track": None, "tank": tank})
 

@@ -1,4 +1,4 @@
-"""A scene in one line; what is known of bundled ones without making them."""
+"""One-line summaries of scenes; counts and titles of the bundled ones, without building them."""
 
 import functools
 import importlib.resources
@@ -24,7 +24,7 @@ def bundled_title(name: str) -> str:
 
 
 def summary(scene: Any) -> str:
-    """Say of a `Scene` what a person would: its title, its size, and how much there is of what."""
+    """Describe a `Scene` in one line: title, size, and numbers of particles, solids and sources."""
     count = sum(fluid.estimate(scene.spacing) for fluid in scene.fluids)
     size = f"tank of {' x '.join(f'{side:g}' for side in scene.tank.size)} m" if scene.tank else "no tank"
     members = {kind: len(getattr(scene, f"{kind}s")) for kind in ("solid", "joint", "emitter", "drain")}

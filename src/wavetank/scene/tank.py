@@ -16,7 +16,7 @@ _OTHER_NAMES = {"bottom": "-y", "top": "+y"}
 
 
 class Tank(Tilted):
-    """The container: its inner size [m] and its lower corner, the origin unless told. Two numbers make a 2-D world.
+    """The container: its inner size [m] and its lower corner, by default the origin. Two numbers make a 2-D world.
 
     What crosses an open side is taken out of the world; to the water inside there is air beyond it. What crosses one
     side of an axis that is periodic comes in at the other: there is no wall, and the water goes on.
@@ -48,7 +48,7 @@ class Tank(Tilted):
             if any(self.is_open("xyz".index(axis), side) for side in (0, 1)):
                 raise ValueError(
                     f"tank.open = {self.open} leaves out a wall along {axis}, and tank.periodic = {self.periodic} says "
-                    "that there is none: the water goes on at the other side; take the axis out of one of them."
+                    "that it has no walls: what leaves comes in at the other side; take the axis out of one of them."
                 )
 
     @model_serializer(mode="wrap")

@@ -13,7 +13,7 @@ from wavetank.solids.solid import Solid, point_in_space
 def bounds_of(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
     """Return the lower and upper corner [m], [3] each, of a box around `solid`.
 
-    It is the smallest one for a single shape, and none too small for the others; what has no end gives infinity.
+    It is the smallest one for a single shape and contains the others; corners of infinite solids are infinite.
     """
     if isinstance(solid, HeightField) or (isinstance(solid, Mesh | Polygon) and not solid.invert):
         points = turned(solid.quaternion, solid.vertices()) + solid.origin
@@ -36,7 +36,7 @@ def _in_own_frame(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
     if isinstance(solid, Capsule | Cylinder):
         half = 0.5 * (point_in_space(solid.end) - point_in_space(solid.start))
         along = half / max(float(np.linalg.norm(half)), 1e-12)
-        # A disc across an axis reaches so far along each other one.
+        # Extent of a disc across the axis along each coordinate axis.
         wide = solid.radius * np.sqrt(np.maximum(1.0 - along**2, 0.0)) if isinstance(solid, Cylinder) else solid.radius
         return -np.abs(half) - wide, np.abs(half) + wide
     if isinstance(solid, Union | Intersection | Difference):

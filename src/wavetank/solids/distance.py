@@ -5,7 +5,7 @@ it runs with a stack of `STACK` values. Every value is (gradient, distance): dis
 gradient is the unit outward normal. Shapes are exact; set operations are exact outside of a union and inside of an
 intersection and a lower bound elsewhere, as usual for constructive distance fields.
 
-Two-dimensional worlds are the plane z = 0 of the same solids: a box without a third size is a prism without end.
+Two-dimensional worlds are the plane z = 0 of the same solids: a box without a third size is an infinite prism.
 
 Distance functions after Inigo Quilez, "3D SDF functions" (2013); the gradients are worked out here.
 
@@ -28,8 +28,8 @@ vec3 = qd.types.vector(3, qd.f32)
 vec4 = qd.types.vector(4, qd.f32)
 
 
-# The numbers that `shapes.py` writes and `local_distance` reads: functions, because the compiler's cache does not see
-# constants of modules.
+# Numbers that `shapes.py` writes and `local_distance` reads: functions, because the compiler's cache does not see
+# module constants.
 
 
 @qd.func
@@ -70,7 +70,7 @@ def parts():
 
 @qd.func
 def around():
-    """Reach [m] of a container, which is all but its hollow: pictures look through it at what it holds."""
+    """Reach [m] of a container, which is all of space but its hollow: pictures look through it at what it holds."""
     return 4.0e5
 
 
@@ -154,7 +154,7 @@ DISTANCES = (half_space_distance, box_distance, sphere_distance, capsule_distanc
 def shape_distance(shape, p, size):
     """(gradient, distance) of the shape with that number in DISTANCES.
 
-    Spelled out: the compiler's cache sees this text, but not what the tuple holds.
+    Written out, because the compiler's cache sees this text and not the contents of the tuple.
     """
     value = vec4(0.0, 0.0, 0.0, 0.0)
     if shape == 0:
@@ -194,7 +194,7 @@ def lift(x: qd.template()):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SolidSet:
-    """All solids of a world on the device. Shapes in `model.py` words, frames nested: node in solid in world."""
+    """All solids of a world on the device; frames are nested: node in solid in world."""
 
     op: qd.types.ndarray()  # i32 [nodes]: index into DISTANCES, or a set operation below zero
     size: qd.types.ndarray()  # vec4 [nodes], m
@@ -208,16 +208,16 @@ class SolidSet:
     old_position: qd.types.ndarray()  # vec3 [solids], m, at its start
     old_rotation: qd.types.ndarray()  # vec4 [solids], at its start
     plane: qd.types.ndarray()  # vec4 [solids]: walls of the tank as planes (n, b) at the end, distance n x + b [1, m]
-    sweep: qd.types.ndarray()  # vec2 [solids]: way of the origin [m] and of a point 1 m away in the substep
+    sweep: qd.types.ndarray()  # vec2 [solids]: way in the substep of the origin [m], and by turning at 1 m from it
     center: qd.types.ndarray()  # vec3 [solids], m: centre of mass at the end of the substep
-    unit: qd.types.ndarray()  # f32 [solids], 1/m: of the sums in `reaction`; 0 where a solid feels nothing
-    grip: qd.types.ndarray()  # f32 [solids]: largest share of sliding that friction takes, less for light bodies
-    reaction: qd.types.ndarray()  # i32 [13 solids]: what the water does to each, see `physics/bodies.py`
+    unit: qd.types.ndarray()  # f32 [solids], 1/m: steps of the sums in `reaction`; 0 where no reaction is summed
+    grip: qd.types.ndarray()  # f32 [solids]: largest share of sliding that friction removes, less for light bodies
+    reaction: qd.types.ndarray()  # i32 [15 solids]: fixed-point reactions of the water, see `physics/bodies.py`
     grid: qd.types.ndarray()  # i32 vec4 [grids]: number of its first sample, numbers of nodes along x, y, z
     samples: qd.types.ndarray()  # f32: for each grid its cell edge, then the distances at its nodes, x fastest; m
-    period: qd.types.ndarray()  # vec3 [solids], m: of the world, as far as a solid is seen at its nearest image
+    period: qd.types.ndarray()  # vec3 [solids], m: of the world, for solids that are seen at their nearest image
     count: qd.i32
-    tank_count: qd.i32  # the first so many are the walls of the tank, all of them half-spaces
+    tank_count: qd.i32  # the first `tank_count` are the walls of the tank, all of them half-spaces
     repeats: Final[int]  # bit k is set where the world repeats along axis k
     has_grids: Final[bool]  # whether any solid has a grid of distances: a mesh, a polygon or a height field
     has_operations: Final[bool]  # whether any solid is more than one shape
@@ -340,7 +340,7 @@ def to_local(position, rotation, x):
 def image_near(solids: SolidSet, k, x):
     """The image of the world point `x` (vec3) that is nearest to solid `k`: it is where the solid sees it.
 
-    What moves on and on along an axis may be many lengths of the world away.
+    A solid that keeps moving along an axis may be many lengths of the world away.
     """
     image = x
     if qd.static(solids.repeats):

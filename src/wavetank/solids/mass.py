@@ -1,7 +1,7 @@
-"""Volume, mass, centre and inertia of solids, and what they would do to water: by quadrature over their distances.
+"""Volume, mass, centre of mass and inertia of solids and of the water they displace, by quadrature.
 
-Every solid is cut into equal boxes that fit the box around it; one that its surface crosses counts by the share that a
-plane at that distance leaves. A box is exact, a ball right to a thousandth.
+Every solid is cut into equal cells of the box around it; a cell that its surface crosses counts by the share that a
+plane at the signed distance of its centre leaves. A box is exact, a ball has an error of a thousandth.
 """
 
 import dataclasses
@@ -41,7 +41,7 @@ class Cut:
 
 @dataclasses.dataclass(frozen=True)
 class Inertia:
-    """How mass lies in a solid."""
+    """Mass properties of a solid."""
 
     mass: float  # kg
     center: np.ndarray  # [3], m, in the frame of the solid
@@ -50,7 +50,7 @@ class Inertia:
 
 
 class Ruler:
-    """Asks for the distances of one solid."""
+    """Measures one solid by its signed distances."""
 
     def __init__(self, solid: Solid, dim: int, spacing: float) -> None:
         self.solid, self.dim = solid, dim
@@ -69,7 +69,7 @@ class Ruler:
         lower, upper = np.full(3, -reach), np.full(3, reach)
         if self.dim == 2:
             lower[2] = upper[2] = 0.0
-        for _ in range(2):  # what is thin is found by the second look
+        for _ in range(2):  # thin parts are found in the second pass
             edges = (upper - lower) / SEARCH
             places = _centers(lower, upper, np.where(edges > 0.0, SEARCH, 1))
             near = places[self.distances(places) < 0.5 * float(np.linalg.norm(edges))]
@@ -113,7 +113,7 @@ class Ruler:
 
 
 def inertia_of(solid: Solid, cut: Cut) -> Inertia:
-    """Return how the mass of a body lies in it."""
+    """Return the mass properties of a body."""
     weights = cut.shells if solid.hollow else cut.volumes
     volume = float(cut.volumes.sum())
     mass = solid.mass if solid.mass is not None else (solid.density or 0.0) * volume
@@ -121,7 +121,7 @@ def inertia_of(solid: Solid, cut: Cut) -> Inertia:
 
 
 def water_of(cut: Cut, density: float) -> Inertia:
-    """Return the same for water that fills its place, `density` [kg/m^3]."""
+    """Return the mass properties of the displaced water, `density` [kg/m^3]."""
     weights = density * cut.volumes
     return _spread(cut.places, weights, cut.edges, float(weights.sum()))
 
@@ -131,7 +131,7 @@ def _spread(places: np.ndarray, masses: np.ndarray, edges: np.ndarray, mass: flo
     center = np.sum(masses[:, None] * places, axis=0) / mass
     r = places - center
     second = np.sum(masses[:, None, None] * r[:, :, None] * r[:, None, :], axis=0)
-    second += np.diag(mass * edges**2 / 12.0)  # boxes are no points
+    second += np.diag(mass * edges**2 / 12.0)  # of the boxes about their own centres
     tensor = np.trace(second) * np.eye(3) - second
     planar = edges[2] == 0.0
     per_mass = np.sqrt(np.maximum(np.linalg.eigvalsh(second) / mass, 0.0))

@@ -1,11 +1,11 @@
-"""How a solid, or an emitter, moves by itself: its pose as a function of the time of the water.
+"""Prescribed motion of a solid or an emitter: its pose as a function of the simulated time.
 
     motion = [{time=0, position=[0.5, 0.2]}, {time=2, position=[0.5, 0.6], rotation=1.57}]
     motion = {keyframes=[...], between="smooth", after="loop"}
     motion = {position=["0.4 + 0.1*sin(2*pi*t)", 0.3], rotation="30*deg*sin(t)", axis=[0, 1, 0]}
 
-What is not given is as it is at rest. Positions are those of the frame, the centre of a box. A rotation is an angle
-[rad] about `axis`, which may be of any number of turns, or a quaternion (w, x, y, z).
+What is not given keeps its value at rest. Positions are those of the frame, for example the centre of a box. A rotation
+is an angle [rad] about `axis`, of any number of turns, or a quaternion (w, x, y, z).
 """
 
 import functools
@@ -39,7 +39,7 @@ class Keyframe(Model):
 
 
 def _plain(value: Any) -> Any:
-    """Let a list of keyframes mean a motion; say that a function is none."""
+    """Accept a list of keyframes as a motion; refuse a function."""
     if callable(value) and not isinstance(value, Model):
         raise ValueError(
             "motion is a Python function, which a file cannot hold; write expressions or keyframes, or make keyframes "
@@ -115,13 +115,13 @@ class Motion(Model):
             raise WavetankError("motion: it loops, but the last rotation is not the first; end where it begins.")
 
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
-        """Name the positions, to check that they live in the world's dimension; each as numbers at its time."""
+        """Name the positions, to check that they have the world's dimension; each as numbers at its time."""
         rows = [(f"keyframes[{k}].position", key.position, key.time) for k, key in enumerate(self.keyframes)]
         rows.append(("position", self.position, 0.0))
         return [(name, track(list(row))(time).tolist()) for name, row, time in rows if row is not None]
 
     def path(self) -> "Path":
-        """Return this as functions of time."""
+        """Return the pose as functions of time."""
         return _path_of(self.model_dump_json())
 
     @classmethod
@@ -210,7 +210,7 @@ class Path:
         return np.concatenate([[math.cos(half)], math.sin(half) * self.axis])
 
     def pose(self, time: float, rest: Pose) -> Pose:
-        """Return the pose at `time` [s]; what does not move is as in the pose `rest`."""
+        """Return the pose at `time` [s]; a part that does not move is that of the pose `rest`."""
         place, turn = rest
         if self.position is not None:
             place = place.copy()
@@ -254,7 +254,7 @@ def shorthand(values: Any, places: Sequence[str]) -> Any:
     if not moving:
         return values
     if values.get("motion") is not None:
-        raise ValueError(f"{next(iter(moving))} is an expression, and there is a motion besides; give one of both.")
+        raise ValueError(f"{next(iter(moving))} is an expression, and there is a motion as well; give one of the two.")
     motion: dict[str, Any] = {}
     rest = dict(values)
     for name, plain in moving.items():

@@ -1,7 +1,7 @@
-"""Where solids are, written to the device in every time step.
+"""Poses of solids, written to the device in every time step.
 
 Where the host shares its memory each array is written as it is. Elsewhere a copy costs a tenth of a millisecond however
-little it is, so that all go as one table, which a kernel deals out: notebook/performance.md.
+little it is, so that all are copied as one table, which a kernel distributes: notebook/performance.md.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ class Placing:
         self._mirrors = [Mirror(array) for array in arrays]
 
     def write(self, *values: np.ndarray) -> None:
-        """Write one array [solids or fewer, numbers] for each of `PLACED`; whoever does has waited for the device."""
+        """Write one array [solids or fewer, numbers] for each of `PLACED`; the caller has waited for the device."""
         if self._table is None:
             for mirror, rows in zip(self._mirrors, values, strict=True):
                 mirror.write(rows)
@@ -35,12 +35,12 @@ class Placing:
             table[: len(rows), column : column + width] = rows
             column += width
         self._mirrors[0].write(table)
-        deal_out(self._device, self._table, self._count)
+        distribute(self._device, self._table, self._count)
 
 
 @qd.kernel(fastcache=True)
-def deal_out(solids: SolidSet, table: qd.types.ndarray(), count: qd.i32):
-    """Give each array of `PLACED` its columns of the table, in that order."""
+def distribute(solids: SolidSet, table: qd.types.ndarray(), count: qd.i32):
+    """Write the columns of the table to the arrays of `PLACED`, in that order."""
     for s in range(count):
         solids.old_position[s] = vec3(table[s, 0], table[s, 1], table[s, 2])
         solids.old_rotation[s] = vec4(table[s, 3], table[s, 4], table[s, 5], table[s, 6])

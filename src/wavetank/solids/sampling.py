@@ -1,4 +1,4 @@
-"""Signed distances to a solid, asked for from the host."""
+"""Signed distances to solids, computed for the host."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ _AT_ONCE = 1 << 22  # points
 
 @qd.func
 def nearest_at(solids: SolidSet, first, at):
-    """Number of that of the solids from number `first` on nearest to the place `at`, and its (gradient, distance [m]).
+    """Number of the solid nearest to the point `at`, from number `first` on, and its (gradient, distance [m]).
 
     The number is -1 where there is none.
     """
@@ -55,7 +55,7 @@ def nearest_of(solids: SolidSet, first: int, points: np.ndarray, touch: float = 
     """Return how far the points [n, dim] are from the nearest of the solids from number `first` on, and its number.
 
     Distances [m] are float32 [n], negative inside, 1e9 where there is no solid; numbers int32 [n], -1 there. Seams
-    between solids, up to `touch` [m] wide, are no surfaces: the distance is -1e9 at them.
+    between solids, up to `touch` [m] wide, do not count as surfaces: the distance is -1e9 there.
     """
     parts, whose = [np.zeros(0, np.float32)], [np.zeros(0, np.int32)]
     for begin in range(0, len(points), _AT_ONCE):

@@ -1,4 +1,4 @@
-"""Solids as plain data: shapes, set operations between them, and their way to the device.
+"""Solids as plain data: shapes, set operations between them, and their upload to the device.
 
 A shape is one model here with its `program`, and one distance function in `distance.py`.
 """
@@ -163,7 +163,7 @@ class Cylinder(_Axial):
 
 
 class HalfSpace(Solid):
-    """Everything behind a plane through `point`; `normal` points out of the solid, into the water."""
+    """All points below a plane through `point`; `normal` points out of the solid, into the water."""
 
     shape: Literal["half-space"] = "half-space"
     point: Place
@@ -200,7 +200,7 @@ class _SetOperation(Solid):
     @model_validator(mode="after")
     def _moves_as_a_whole(self) -> "_SetOperation":
         if any(part.motion is not None for part in self.parts):
-            raise ValueError("parts of a solid have no motion of their own; give the motion to the whole.")
+            raise ValueError("parts of a solid cannot have a motion of their own; give the motion to the whole solid.")
         return self
 
     @property
@@ -223,7 +223,7 @@ class _SetOperation(Solid):
         return max(float(np.linalg.norm(part.origin)) + part.reach() for part in self.parts)
 
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
-        own = [("center", self.center)] if any(self.center) else []  # the usual one belongs to any world
+        own = [("center", self.center)] if any(self.center) else []  # the origin is valid in 2-D and 3-D
         return own + [
             (f"parts[{number}].{name}", vector)
             for number, part in enumerate(self.parts)
@@ -252,7 +252,7 @@ class Intersection(_SetOperation):
 
 
 class Difference(_SetOperation):
-    """All points of the first part that are in none of the others."""
+    """All points of the first part that are not in any other."""
 
     shape: Literal["difference"] = "difference"
 
@@ -292,7 +292,8 @@ def build(
 ) -> SolidSet:
     """Put `solids` on the device, for particles of that spacing [m]; the first `tank_count` are the tank's walls.
 
-    `repeats`: bits of the axes along which the world repeats, and what `seams.seen_periods` says of the solids there.
+    `repeats`: bits of the axes along which the world is periodic, and the result of `seams.seen_periods`.
+    Raises `WavetankError` for set operations that are nested too deep and for meshes that cannot be measured.
     """
     programs = [solid.program() for solid in solids]
     for solid, program in zip(solids, programs, strict=True):
@@ -353,7 +354,7 @@ def _check_depth(solid: Solid, program: list[Node]) -> None:
 
 
 def resize(device: SolidSet, solids: Sequence[Solid], scales: Sequence[float]) -> None:
-    """Put the solids on the device at these shares of their sizes, around their origins."""
+    """Scale the solids on the device by these factors around their origins."""
     nodes = [(node, scale) for solid, scale in zip(solids, scales, strict=True) for node in solid.program()]
     for array, values in (
         (device.size, [scale * node.size for node, scale in nodes]),

@@ -1,4 +1,4 @@
-"""What every solid has, and the nodes of the program that it becomes."""
+"""The base class of solids, and the nodes of their programs."""
 
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
@@ -13,11 +13,11 @@ from wavetank.solids.motion import AnyMotion, shorthand
 
 Floats = Sequence[float] | np.ndarray
 Rates = tuple[Number, Number, Number]
-ENDLESS = 1.0e5  # half size [m] of what has no end
+ENDLESS = 1.0e5  # m: half size of infinite shapes
 
 
 class Node:
-    """One step of a solid's program: a shape with its place, or a set operation; that of a mesh knows it."""
+    """One step of a solid's program: a shape with its pose, a grid of distances with its `mesh`, or a set operation."""
 
     def __init__(self, op: int, size: Floats = (), offset: Floats = (), turn: Floats = (), mesh: Any = None) -> None:
         self.op = op
@@ -33,11 +33,11 @@ class Node:
 
 
 class Solid(Model):
-    """What every solid has: a name to move it by, a pose and a surface."""
+    """The base class of solids: a name, a pose and a surface."""
 
     name: str = ""
     rotation: Quaternion | Number = (1.0, 0.0, 0.0, 0.0)  # (w, x, y, z), or an angle about z [rad]
-    color: Annotated[str, Field(pattern=r"^(#[0-9a-fA-F]{6})?$")] = ""  # in pictures; the usual one where empty
+    color: Annotated[str, Field(pattern=r"^(#[0-9a-fA-F]{6})?$")] = ""  # in pictures; the default one where empty
     finish: Literal["matte", "metal", "glass"] = "matte"  # metal in pictures of quality film only
     friction: Annotated[Number, Field(ge=0, le=1)] | None = None  # where None the scene's, or 0.5 between solids
     density: Positive | None = None  # kg/m^3: a density or a mass makes a solid a body that water moves
@@ -97,11 +97,11 @@ class Solid(Model):
         raise NotImplementedError
 
     def span(self) -> float:
-        """Radius [m] around the origin that holds its surface: that of a container, which has no end, is its hollow."""
+        """Radius [m] around the origin that holds its surface; of a container, which is infinite, the hollow's."""
         return self.reach()
 
     def vectors(self) -> list[tuple[str, Sequence[float]]]:
-        """Name every point or size of this solid, to check that all live in one dimension."""
+        """Name every point or size of this solid, to check that all have the dimension of the world."""
         return []
 
 
@@ -112,6 +112,6 @@ def point_in_space(vector: Sequence[float]) -> np.ndarray:
     return point
 
 
-def all_but(nodes: list[Node]) -> list[Node]:
-    """Return the program of all of space but the solid with the program `nodes`."""
+def complement(nodes: list[Node]) -> list[Node]:
+    """Return the program of the complement of the solid with the program `nodes`."""
     return [Node(DISTANCES.index(box_distance), [ENDLESS] * 3), *nodes, Node(DIFFERENCE)]

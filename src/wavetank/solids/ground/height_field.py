@@ -63,7 +63,7 @@ class HeightField(Solid):
     heights: Heights | None = None
     path: str = ""  # a .npy file or a picture, 16-bit PNG for smooth ground, from the scene file's folder
     data: Annotated[str, Field(repr=False)] = ""  # many heights as text, made from the file or the numbers
-    base: Length | None = None  # how far it goes on below the lowest height; a tenth of its longest edge where None
+    base: Length | None = None  # thickness below the lowest height; a tenth of its longest edge where None
 
     @model_validator(mode="after")
     def _from_file(self, info: ValidationInfo) -> "HeightField":
@@ -196,7 +196,7 @@ def read_heights(name: str, folder: Path) -> np.ndarray:
 
 
 def _read(path: Path) -> np.ndarray:
-    """Return the heights in a file; raises `ValueError` with one sentence for what is none."""
+    """Return the heights in a file; raises `ValueError` with one sentence for a file that cannot be read."""
     if not path.exists():
         raise ValueError(f"there is no file of heights {path}.")
     if path.suffix.lower() not in (".npy", *PICTURES):
@@ -233,7 +233,7 @@ def _text(heights: np.ndarray) -> str:
 
 @functools.lru_cache(maxsize=8)
 def _heights(text: str) -> np.ndarray:
-    wrong = "data is no ground that a saved scene holds; give heights or path instead"
+    wrong = "data does not hold the heights of a saved scene; give heights or path instead"
     try:
         return np.asarray(unpack_text(base64.b64decode(text, validate=True), wrong)["heights"], np.float64)
     except (binascii.Error, ValueError, KeyError):

@@ -13,7 +13,7 @@ from wavetank.solids.distance import AROUND, GRIDS
 from wavetank.solids.ground.outline import measure_outline
 from wavetank.solids.meshes.grid import DistanceGrid
 from wavetank.solids.meshes.store import grid_of
-from wavetank.solids.solid import Node, Solid, all_but, point_in_space
+from wavetank.solids.solid import Node, Solid, complement, point_in_space
 
 MOST_CORNERS = 20_000
 
@@ -46,7 +46,7 @@ class Polygon(Solid):
     def program(self) -> list[Node]:
         points = np.array(self.points)
         own = Node(GRIDS, [1.0], point_in_space(0.5 * (points.min(axis=0) + points.max(axis=0))), mesh=self)
-        return all_but([own]) if self.invert else [own]
+        return complement([own]) if self.invert else [own]
 
     @override
     def reach(self) -> float:

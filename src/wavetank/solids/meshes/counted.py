@@ -1,6 +1,6 @@
-"""How many triangles a mesh file will make, read off its first bytes, before anyone builds them.
+"""How many triangles a mesh file will make, read from its header before they are built.
 
-STL (binary): a count behind 80 bytes, 50 bytes a triangle. PLY: lines "element NAME COUNT" of the header. OBJ: lines
+STL (binary): a count after 80 bytes, 50 bytes a triangle. PLY: lines "element NAME COUNT" of the header. OBJ: lines
 that begin with f, and their corners. GLB: the JSON chunk names meshes, accessors with counts, and nodes that place
 meshes, one mesh as often as one likes (glTF 2.0, 3.5 and 3.6).
 """
@@ -13,7 +13,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import one_line, open_regular, parse_json
 from wavetank.foundation.memory import in_words
 
-MOST_FACES = 3_000_000  # before what is double is dropped
+MOST_FACES = 3_000_000  # before duplicates are dropped
 MOST_NUMBERS = 40_000_000  # in all accessors
 MOST_PLACED = 2_000  # meshes in a scene, with repetitions
 DEEPEST = 64  # nodes within nodes
@@ -21,7 +21,7 @@ LARGEST_FILE = 500_000_000  # bytes
 
 
 def check_file(path: Path) -> None:
-    """Raise `ValueError` for a file that is none, too large, or makes more triangles than may be."""
+    """Raise `ValueError` for a file that cannot be read, is too large, or makes more triangles than are allowed."""
     try:
         with open_regular(path, LARGEST_FILE, "mesh file") as file:
             kind = path.suffix.lower()

@@ -25,7 +25,7 @@ def read_model(name: str) -> Triangles:
 
 
 def read_file(path: Path) -> Triangles:
-    """Return the surface of a mesh file; raises `ValueError` with one sentence for what is none."""
+    """Return the surface of a mesh file; raises `ValueError` with one sentence for a file that cannot be read."""
     if path.suffix.lower() not in SUFFIXES:
         raise ValueError(f"{path}: meshes are read from {', '.join(SUFFIXES)} files; convert this one.")
     if not path.exists():

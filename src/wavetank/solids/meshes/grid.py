@@ -6,13 +6,13 @@ from which it meets each triangle, add up to the winding number of a closed surf
 overlapping parts and inner hollows come out right. Where the six do not agree there is a hole; one that is narrower
 than a spacing is outvoted, a wider one is refused.
 
-A wall thinner than `THINNEST` cells could fall between the nodes. Its faces are moved apart to that thickness, which is
-found by a ray inwards from the middle of each triangle; everything else stays where it is.
+A wall thinner than `THINNEST` cells could fall between the nodes. Its faces are moved apart to that thickness, which a
+ray inwards from the middle of each triangle measures; everything else keeps its place.
 
     code      symbol   meaning                                              unit
     u                  distance to the nearest triangle                     cells
     swell              how far a triangle is moved outwards                 cells
-    lean               edge function: on which side of an edge a line lies  cells^2
+    edge_function      on which side of an edge a line lies                 cells^2
 
 Winding numbers by rays and votes after Jacobson et al. 2013, "Robust inside-outside segmentation using generalized
 winding numbers" (10.1145/2461912.2461916); where we differ: six directions instead of all, which a grid gets from
@@ -84,7 +84,7 @@ def measure(
         thicken_walls(tree, THINNEST, len(faces))
     outer, inner = (qd.ndarray(qd.f32, shape=(nx * ny * nz,)) for _ in range(2))
     measure_distances(tree, outer, inner, float(download(tree.swell).max()), exact, NEARLY, nx, ny, nz)
-    # What is on the side of the faces, and behind them; in a hollow it is the inside that faces look at.
+    # Distances on the front side of the faces, and behind them; the faces of a hollow look inwards.
     before, behind = (-download(inner), -download(outer)) if hollow else (download(outer), download(inner))
     distances = before
     if walls is None:
@@ -94,7 +94,7 @@ def measure(
 
 
 def _inside(corners: np.ndarray, counts: tuple[int, int, int], cells: int, name: str) -> np.ndarray:
-    """Which nodes are inside, bool [nz, ny, nx], at so many cells per spacing."""
+    """Return which nodes are inside, bool [nz, ny, nx], at `cells` cells per spacing."""
     votes = np.zeros(counts[::-1], np.int8)
     for axis in range(3):
         # The ray's axis comes first; turning the axes in a circle keeps the sides of the triangles.
@@ -227,7 +227,7 @@ def find_nearest(found: qd.template(), tree: Tree, p, most, exact, nearly):
 
 
 @qd.func
-def lean(py, pz, a, b):
+def edge_function(py, pz, a, b):
     """Twice the area of the triangle of a line along x and an edge; to the last bit the negative from its other end."""
     sign = 1.0
     if a.y > b.y or (a.y == b.y and a.z > b.z):
@@ -253,7 +253,7 @@ def count_crossings(
     aside_z: qd.f32,
     count: qd.i32,
 ):
-    """Count where lines along x cross triangles: 1 at the first node behind a crossing into the solid, -1 out of it."""
+    """Count where lines along x cross triangles: 1 at the first node after a crossing inwards, -1 after an exit."""
     for t in range(count):
         low, high = qd.min(a[t], b[t], c[t]), qd.max(a[t], b[t], c[t])
         y0, y1 = qd.cast(qd.ceil(low.y - aside_y), qd.i32), qd.cast(qd.floor(high.y - aside_y), qd.i32)
@@ -261,7 +261,11 @@ def count_crossings(
         for z in range(z0, z1 + 1):
             for y in range(y0, y1 + 1):
                 py, pz = y + aside_y, z + aside_z
-                u, v, w = lean(py, pz, b[t], c[t]), lean(py, pz, c[t], a[t]), lean(py, pz, a[t], b[t])
+                u, v, w = (
+                    edge_function(py, pz, b[t], c[t]),
+                    edge_function(py, pz, c[t], a[t]),
+                    edge_function(py, pz, a[t], b[t]),
+                )
                 into = 0
                 if u > 0.0 and v > 0.0 and w > 0.0:
                     into = -1
@@ -269,5 +273,5 @@ def count_crossings(
                     into = 1
                 if into != 0:
                     x = (u * a[t].x + v * b[t].x + w * c[t].x) / (u + v + w)
-                    behind = qd.cast(qd.ceil(qd.min(qd.max(x, low.x), high.x)), qd.i32)
-                    qd.atomic_add(crossings[behind + nx * (y + ny * z)], into)
+                    after = qd.cast(qd.ceil(qd.min(qd.max(x, low.x), high.x)), qd.i32)
+                    qd.atomic_add(crossings[after + nx * (y + ny * z)], into)

@@ -17,7 +17,7 @@ from wavetank.solids.meshes.files import bundled_models, read_file, read_model
 from wavetank.solids.meshes.grid import DistanceGrid, measure
 from wavetank.solids.meshes.store import grid_of
 from wavetank.solids.meshes.triangles import Triangles, volume_within
-from wavetank.solids.solid import Node, Solid, all_but, point_in_space
+from wavetank.solids.solid import Node, Solid, complement, point_in_space
 
 FLAT = 1e-6  # of the longest edge
 _UP = {"x": (0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0), "z": (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0)}
@@ -79,7 +79,7 @@ class Mesh(Solid):
     @override
     def program(self) -> list[Node]:
         own = Node(GRIDS, [1.0], mesh=self)
-        return all_but([own]) if self.invert else [own]
+        return complement([own]) if self.invert else [own]
 
     @override
     def reach(self) -> float:

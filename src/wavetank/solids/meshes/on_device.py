@@ -1,4 +1,4 @@
-"""The grids of all meshes of a world, one behind the other on the device."""
+"""The grids of all meshes of a world, concatenated on the device."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Grids that were measured before: in this process, and in the user's cache folder."""
+"""Cache of distance grids: in this process, and in the user's cache folder."""
 
 import contextlib
 import hashlib
@@ -20,9 +20,9 @@ _grids: dict[str, DistanceGrid] = {}
 
 
 def grid_of(key: str, make: Callable[[], DistanceGrid]) -> DistanceGrid:
-    """Return the grid that `make` makes, from memory or disk where it was made before; `key` says all it depends on.
+    """Return the grid that `make` makes, from memory or disk where it is cached; `key` names all it depends on.
 
-    Where nothing can be kept on disk, nothing is; the folder may be deleted at any time.
+    A folder that cannot be written to is not an error, and it may be deleted at any time.
     """
     key = hashlib.sha256(f"{FORMAT} {key}".encode()).hexdigest()
     if key not in _grids:
@@ -41,7 +41,7 @@ def grid_of(key: str, make: Callable[[], DistanceGrid]) -> DistanceGrid:
 
 
 def _read(path: Path) -> DistanceGrid | None:
-    """Return the grid of a file; None where there is none, or one that is damaged or foreign: it is made anew."""
+    """Return the grid in a file; None where the file is missing, damaged or not a grid."""
     with contextlib.suppress(Exception):
         arrays = read_arrays(path, "grid of distances")
         distances, cell = arrays["distances"], float(arrays["cell"])

@@ -33,7 +33,7 @@ class Triangles:
 
     @classmethod
     def of(cls, vertices: Any, faces: Any, origin: str) -> "Triangles":
-        """Return the surface of these arrays, [n, 3] each; `ValueError` names `origin` for what is none."""
+        """Return the surface of these arrays, [n, 3] each; raises `ValueError`, with `origin` in front, for others."""
         try:
             points, corners = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
         except (TypeError, ValueError):
@@ -42,7 +42,7 @@ class Triangles:
             if array.size and (array.ndim != 2 or array.shape[1] != 3):
                 raise ValueError(f"{origin}: {name} have shape {list(array.shape)}; they must be [n, 3].")
         if not corners.size or not points.size:
-            raise ValueError(f"{origin} has no faces; a solid needs a surface of triangles, points alone are none.")
+            raise ValueError(f"{origin} has no faces; a solid needs a surface of triangles, points are not enough.")
         if len(corners) > MOST_TRIANGLES:
             raise ValueError(
                 f"{origin} has {len(corners):,} triangles; at most {MOST_TRIANGLES:,} are allowed: simplify it, "
@@ -76,7 +76,7 @@ class Triangles:
 
     @property
     def digest(self) -> str:
-        """Return what tells this surface from others."""
+        """Return a hash of this surface."""
         return hashlib.sha256(self.vertices.tobytes() + b"|" + self.faces.tobytes()).hexdigest()
 
     def text(self) -> str:
