@@ -173,8 +173,8 @@ def test_what_is_not_clear_has_its_color_under_even_light(clarity):
     tracer = Tracer(renderer.buffers)
     medium = medium_of(shot, tracer._world(shot, 0.0, 0.0).field.grid)
     if clarity == "cloudy":  # ten free ways deep
-        murk = download(medium.turbidity)
-        upload(medium.turbidity, (murk * 7.0 / murk[:, 3:].max()).astype(np.float32))
+        turbidity = download(medium.turbidity)
+        upload(medium.turbidity, (turbidity * 7.0 / turbidity[:, 3:].max()).astype(np.float32))
     mirror = ((ETA - 1.0) / (ETA + 1.0)) ** 2
     seen = mean_radiance(shot, renderer, medium).mean(axis=(0, 1))
     np.testing.assert_allclose(seen, mirror + (1.0 - mirror) * color_of_stuff(), atol=0.05)
@@ -186,8 +186,8 @@ def test_light_that_is_scattered_is_neither_lost_nor_made():
     shot = dataclasses.replace(shot, look=in_white(shot.look))
     tracer = Tracer(renderer.buffers)
     medium = medium_of(shot, tracer._world(shot, 0.0, 0.0).field.grid)
-    murk = download(medium.turbidity)
-    upload(medium.turbidity, np.repeat(1.0 * (murk[:, 3:] > 0.0), 4, axis=1).astype(np.float32))
+    turbidity = download(medium.turbidity)
+    upload(medium.turbidity, np.repeat(1.0 * (turbidity[:, 3:] > 0.0), 4, axis=1).astype(np.float32))
     assert 0.95 < mean_radiance(shot, renderer, medium).mean() < 1.002
 
 
@@ -358,11 +358,11 @@ def test_what_is_left_of_the_noise_goes_and_edges_stay():
     upload(film.mean, (truth + 0.5 * (noise[0] + noise[1])).astype(np.float32))
     upload(film.half, (truth + noise[0]).astype(np.float32))
     spare = (qd.ndarray(vec3, shape=shape), qd.ndarray(vec3, shape=shape), qd.ndarray(vec2, shape=shape))
-    clean = download(denoise.clean(film, spare))
+    clean = download(denoise.denoised(film, spare))
     assert np.abs(clean - truth)[:, :30].std() < 0.3 * 0.02 / math.sqrt(2.0)
     assert np.abs(clean - truth).max() < 0.06  # nothing of the other side of the edge
     upload(film.half, download(film.mean).copy())  # no noise at all: nothing is averaged
-    np.testing.assert_allclose(download(denoise.clean(film, spare)), download(film.mean), atol=2e-3)
+    np.testing.assert_allclose(download(denoise.denoised(film, spare)), download(film.mean), atol=2e-3)
 
 
 def dam():

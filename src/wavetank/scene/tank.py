@@ -52,7 +52,7 @@ class Tank(Tilted):
                 )
 
     @model_serializer(mode="wrap")
-    def _as_it_was(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _without_defaults(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out `periodic` where nothing is, so that digests of other worlds are what they were."""
         values: dict[str, Any] = plain(self)
         if not self.periodic:

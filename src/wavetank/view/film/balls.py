@@ -1,4 +1,4 @@
-"""Lone drops, spray and foam as balls: found on the host, sorted into the cells that they touch."""
+"""Lone drops, spray and foam as small balls, sorted on the host into the cells of the grid that they touch."""
 
 import dataclasses
 
@@ -11,8 +11,8 @@ from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import WaterBuffers
 
 CALM, TORN = 0.7, 2.5  # m/s: as in `passes/drops.py`
-BALL = 0.5  # d: radius of a drop of one particle's volume, a little less than its own
-#: balls that stand for a particle of spray, foam and bubbles; their mean radius [d]; how far they lie from it [d]
+BALL = 0.5  # d: radius of a drop of one particle, a little less than that of its volume
+#: kind of diffuse particle -> balls that it is drawn as, their mean radius [d], their distance from it [d]
 FROTH = {1: (6, 0.05, 0.5), 2: (24, 0.055, 0.62), 3: (8, 0.05, 0.5)}
 MOST = 3_000_000
 
@@ -28,7 +28,7 @@ class Balls:
 
 
 def balls_of(shot: Shot, water: WaterBuffers, grid: Grid, moved: float) -> tuple[Balls, np.ndarray]:
-    """Return the balls of an instant, `moved` [s] after the frame's, and for every cell whether any touches it."""
+    """Return the balls `moved` [s] after the frame, and 1 for each cell that one touches, int32 [cells]."""
     balls, kinds = [_drops(shot, water)], []
     kinds.append(np.zeros(len(balls[0]), np.int32))
     froth = _froth(shot, moved)
@@ -68,7 +68,7 @@ def _array(values: np.ndarray, kind: object) -> object:
 
 
 def _drops(shot: Shot, water: WaterBuffers) -> np.ndarray:
-    """Return middles and radii [m] of lone particles, float32 [n, 4]; fast ones have flown apart."""
+    """Return middles and radii [m] of lone particles, float32 [n, 4]; fast ones break up into several."""
     frame, d = shot.frame, shot.extent.spacing
     lone = np.flatnonzero(download(water.ellipsoids.lone)[: frame.count])
     if not len(lone):
@@ -81,9 +81,9 @@ def _drops(shot: Shot, water: WaterBuffers) -> np.ndarray:
     torn = torn * torn * (3.0 - 2.0 * torn)
     volume, balls = np.ones(len(lone)), []
     for part in range(5):
-        share = 0.16 * torn * _number(number, part)
+        share = 0.16 * torn * _random(number, part)
         volume -= share
-        away = np.stack([2.0 * _number(number, 8 + 3 * part + axis) - 1.0 for axis in range(3)], axis=1)
+        away = np.stack([2.0 * _random(number, 8 + 3 * part + axis) - 1.0 for axis in range(3)], axis=1)
         ball = np.column_stack([place + (0.9 * d * torn)[:, None] * away, BALL * d * np.cbrt(share)])
         balls.append(ball[share > 1e-3])
     balls.append(np.column_stack([place, BALL * d * np.cbrt(volume)]))
@@ -91,7 +91,7 @@ def _drops(shot: Shot, water: WaterBuffers) -> np.ndarray:
 
 
 def _froth(shot: Shot, moved: float) -> np.ndarray:
-    """Return middles and radii [m] of what spray, foam and bubbles consist of, float32 [n, 4]."""
+    """Return middles and radii [m] of the balls of spray, foam and bubbles, float32 [n, 4]."""
     frame, d = shot.frame, shot.extent.spacing
     if not frame.foam_count:
         return np.zeros((0, 4), np.float32)
@@ -105,20 +105,20 @@ def _froth(shot: Shot, moved: float) -> np.ndarray:
         for part in range(max(1, int(parts * min(1.0, share)))):
             own = number[mine]
             # A cloud is thinner at its rim, and loses its balls one by one with age.
-            alive = _number(own, 4 * part) > age[mine] ** 2
-            turn, up = 2.0 * np.pi * _number(own, 4 * part + 1), 2.0 * _number(own, 4 * part + 2) - 1.0
-            far = spread * np.cbrt(_number(own, 4 * part + 3)) * np.where(kind == 2, 1.0, 1.0)
+            alive = _random(own, 4 * part) > age[mine] ** 2
+            turn, up = 2.0 * np.pi * _random(own, 4 * part + 1), 2.0 * _random(own, 4 * part + 2) - 1.0
+            far = spread * np.cbrt(_random(own, 4 * part + 3)) * np.where(kind == 2, 1.0, 1.0)
             flat = np.sqrt(1.0 - up * up)
             tall = 0.45 if kind == 2 else 1.0
             away = np.stack([flat * np.cos(turn), tall * up, flat * np.sin(turn)], axis=1)
-            size = radius * (0.5 + _number(own, 900 + part))
+            size = radius * (0.5 + _random(own, 900 + part))
             ball = np.column_stack([place[mine] + (far * d)[:, None] * away, size * d])
             balls.append(ball[alive])
     return np.concatenate(balls).astype(np.float32)
 
 
-def _number(owner: np.ndarray, purpose: int) -> np.ndarray:
-    """Return numbers from 0 to 1 that belong to whom they are asked for (the mixer of `optics/hash_noise.py`)."""
+def _random(owner: np.ndarray, purpose: int) -> np.ndarray:
+    """Return pseudo-random numbers from 0 to 1 of owner and purpose (the hash of `optics/hash_noise.py`)."""
     x = (owner * np.uint64(1024) + np.uint64(purpose) + np.uint64(0x9E3779B9)) & np.uint64(0xFFFFFFFF)
     for factor, shift in ((0x7FEB352D, 16), (0x846CA68B, 15)):
         x ^= x >> np.uint64(shift)

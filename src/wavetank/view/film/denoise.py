@@ -1,13 +1,13 @@
-"""What noise is left is averaged away along surfaces: an edge-avoiding wavelet filter that knows how noisy a pixel is.
+"""Removes the remaining noise by an edge-avoiding wavelet filter that is guided by the variance of every pixel.
 
 H. Dammertz et al., "Edge-avoiding À-Trous wavelet transform for fast global illumination filtering" (HPG 2010), with
 the variance of C. Schied et al., "Spatiotemporal variance-guided filtering" (HPG 2017), Eq. 3-5. The variance is that
 of the two halves of a pixel's samples, so that well spread samples, which leave less noise than chance does, are
-filtered less. Where the halves agree nothing is averaged, whatever is beside it.
+filtered less. Where the halves agree a pixel is not filtered, whatever its neighbours are.
 
     code      symbol   meaning                                                        unit
     noise     Var      variance of a pixel's brightness                               1
-    apart              difference of two pixels in units that count                   1
+    apart              difference of two pixels in units of their tolerance           1
 """
 
 from typing import Any
@@ -20,27 +20,27 @@ LEVELS = 5
 TOLERANCE = 2.5  # standard deviations by which neighbours may differ
 
 
-def clean(film: Film, spare: tuple[Any, Any, Any]) -> Any:
-    """Return the array with the filtered radiance: one of `spare`, two of vec3 and one of vec2 [rows, columns]."""
+def denoised(film: Film, spare: tuple[Any, Any, Any]) -> Any:
+    """Return the filtered radiance of `film`, one of the temporaries `spare`: two vec3, one vec2, [rows, columns]."""
     given, taken, noise = spare
-    estimate(noise, film)
+    estimate_variance(noise, film)
     given.copy_from(film.mean)
     for level in range(LEVELS):
-        average(taken, noise, given, film, 1 << level, level % 2, TOLERANCE)
+        filter_level(taken, noise, given, film, 1 << level, level % 2, TOLERANCE)
         given, taken = taken, given
     return given
 
 
 @qd.func
 def brightness(color):
-    """Brightness as the eye weighs colours, of what is displayed: a bend where pictures become white."""
+    """Luminance of a displayed colour: compressed where pictures become white."""
     gray = 0.3 * color.x + 0.6 * color.y + 0.1 * color.z
     return gray / (1.0 + 0.5 * gray)
 
 
 @qd.kernel(fastcache=True)
-def estimate(noise: qd.types.ndarray(), film: Film):
-    """Write the variance of every pixel, as its surroundings know it."""
+def estimate_variance(noise: qd.types.ndarray(), film: Film):
+    """Write the variance of every pixel, estimated from the 25 pixels around it."""
     rows, columns = film.mean.shape[0], film.mean.shape[1]
     for row, column in qd.ndrange(rows, columns):
         total, count = 0.0, 0.0
@@ -54,7 +54,7 @@ def estimate(noise: qd.types.ndarray(), film: Film):
 
 
 @qd.kernel(fastcache=True)
-def average(
+def filter_level(
     color: qd.types.ndarray(),
     noise: qd.types.ndarray(),
     before: qd.types.ndarray(),
@@ -63,9 +63,9 @@ def average(
     turn: qd.i32,
     tolerance: qd.f32,
 ):
-    """Average every pixel with those up to two steps away, as far as they show the same.
+    """Average every pixel with those up to two steps away that show the same surface.
 
-    `noise` holds two variances for every pixel, which take turns.
+    `noise` holds two variances for every pixel, one is read and the other one written.
     """
     rows, columns = film.mean.shape[0], film.mean.shape[1]
     for row, column in qd.ndrange(rows, columns):
@@ -84,7 +84,7 @@ def average(
                 apart += (other - guide).norm() * 10.0
                 off = shape - form
                 apart += off.norm() * 6.0
-                w = qd.exp(-apart) * share(i) * share(j)
+                w = qd.exp(-apart) * wavelet(i) * wavelet(j)
                 total += w * there
                 rest += w * w * noise[y, x][turn]
                 weight += w
@@ -93,6 +93,6 @@ def average(
 
 
 @qd.func
-def share(k):
+def wavelet(k):
     """Weight of the cubic spline's wavelet."""
     return qd.select(k == 0, 0.375, qd.select(qd.abs(k) == 1, 0.25, 0.0625))

@@ -1,19 +1,19 @@
-"""Particles to the field of the water: smooth where there is much of it, ellipsoids where it is thin.
+"""Particles to a level-set field of the water: smooth where there is much of it, ellipsoids where it is thin.
 
-Two fields are made and joined. The first is the share of full water around a node, a sum of (1 - q^2)^3 over the
-particles, blurred until the lattice is gone; half of it is the surface (J. Monaghan, "Smoothed particle hydrodynamics",
-2005, Eq. 2.7 for the sum). It is still where water is deep, and loses what is thin. The second is the union of the
-ellipsoids that all pictures show (`passes/ellipsoids.py`), which keeps sheets and threads. Where there is much water
-the second is drawn in, so that its bumps stay below the first; their smooth maximum is the water.
+Two fields are blended. The first is the liquid fraction around a node, a sum of (1 - q^2)^3 over the particles, blurred
+until the lattice of particles disappears; its value of one half is the surface (J. Monaghan, "Smoothed particle
+hydrodynamics", 2005, Eq. 2.7 for the sum). It is smooth over deep water, and loses thin sheets. The second is the union
+of the ellipsoids that all pictures show (`passes/ellipsoids.py`), which keeps sheets and threads. In deep water the
+ellipsoids are inset, so that their bumps stay below the first field. The smooth maximum of both is the water.
 
-Sums and maxima are those of whole numbers, so that threads do not matter. Behind panes lies the mirror image; in solids
-the water goes on as it is before them, so that it meets them at a right angle and without a gap.
+Sums and maxima are taken of whole numbers, so that they do not depend on threads. At panes the field is mirrored; into
+solids it is extended, so that the surface meets them at a right angle and without a gap.
 
-    code      symbol   meaning                                                        unit
-    share     s        share of full water                                            1
-    reach     R        radius of the sum, 1.75 d                                      m
-    bulk               the share in a wider neighbourhood                             1
-    drawn              by how much ellipsoids are drawn in                            m
+    code         symbol   meaning                                                        unit
+    fraction     s        liquid fraction                                                1
+    reach        R        radius of the kernel, 1.75 d                                   m
+    bulk                  liquid fraction in a wider neighbourhood                       1
+    inset                 by how much ellipsoids are shrunk                              m
 """
 
 import dataclasses
@@ -33,18 +33,18 @@ from wavetank.view.water_buffers import Ellipsoids, WaterBuffers
 
 NODES_A_SPACING, MOST_NODES = 2.0, 48_000_000
 REACH = 1.75  # d
-UNIT = 65536.0  # steps of a share, and of a level in units of a node
-SMOOTH, WIDE = 6, 5  # binomial blurs of the surface, and further ones of what tells how much water there is
-DRAWN = 0.16  # d
+UNIT = 65536.0  # fixed-point steps of a liquid fraction, and of a level in units of a node
+SURFACE_BLURS, BULK_BLURS = 6, 5  # binomial blurs of the surface, and further ones of the bulk
+INSET = 0.16  # d
 MARGIN = 4  # nodes of air in the open and above
 
 
 @dataclasses.dataclass(eq=False)
 class FieldArrays:
-    """What building a field needs, for one grid; on the device."""
+    """Temporaries of a field on one grid, on the device."""
 
     grid: Grid
-    sums: Any  # i32 [nodes]: shares while they are added up, then the union of ellipsoids
+    sums: Any  # i32 [nodes]: fixed-point sums of the kernel, then the union of ellipsoids
     one: Any  # f32 [nodes]
     two: Any  # f32 [nodes]
     level: Any  # f32 [nodes], m
@@ -53,7 +53,7 @@ class FieldArrays:
 
 
 def grid_around(shot: Shot, reach: float) -> Grid:
-    """Return the grid for the water of a picture, with room for what moves by `reach` [m]."""
+    """Return the grid for the water of a picture, with a margin of `reach` [m] for motion."""
     d, frame, tank = shot.extent.spacing, shot.frame, shot.frame.scene.tank
     x = frame.positions if frame.count else np.array([shot.extent.middle])
     low, high = x.min(axis=0) - reach, x.max(axis=0) + reach
@@ -83,7 +83,7 @@ def grid_around(shot: Shot, reach: float) -> Grid:
 
 
 def allocate(grid: Grid) -> FieldArrays:
-    """Allocate what a field on that grid needs."""
+    """Allocate the temporaries of a field on that grid."""
     nodes = grid.nx * grid.ny * grid.nz
     real = [qd.ndarray(qd.f32, shape=(nodes,)) for _ in range(3)]
     cells = [qd.ndarray(qd.i32, shape=(nodes // 8,)) for _ in range(2)]
@@ -91,35 +91,37 @@ def allocate(grid: Grid) -> FieldArrays:
 
 
 def rest_sum() -> float:
-    """Return the sum of the weights over the lattice of full water, mean over places in it."""
+    """Return the mean sum of the kernel over the particles of full water."""
     return REACH**3 * 4.0 * math.pi * 16.0 / 315.0
 
 
 def build(arrays: FieldArrays, water: WaterBuffers, shot: Shot) -> Field:
-    """Fill the field of the particles that `water` has sorted and fitted ellipsoids to."""
+    """Return the field of the particles that `water` has sorted and fitted ellipsoids to."""
     grid, count, d = arrays.grid, shot.frame.count, shot.extent.spacing
     arrays.sums.fill(0)
-    add_shares(arrays.sums, water.cells.x, grid, REACH * d, UNIT / rest_sum(), count)
+    splat_particles(arrays.sums, water.cells.x, grid, REACH * d, UNIT / rest_sum(), count)
     solids = shot.frame.solids
-    to_shares(arrays.one, arrays.sums, solids, grid, REACH * d, 1.0 / UNIT)
+    divide_by_free_share(arrays.one, arrays.sums, solids, grid, REACH * d, 1.0 / UNIT)
     given, taken = arrays.one, arrays.two
     if solids.count > solids.tank_count:
         extend_into_solids(taken, given, solids, grid, 0.6 * d)
         given, taken = taken, given
-    for _ in range(SMOOTH):
+    for _ in range(SURFACE_BLURS):
         for axis in range(3):
             blur(taken, given, grid, axis)
             given, taken = taken, given
     arrays.level.copy_from(given)
-    for _ in range(WIDE):
+    for _ in range(BULK_BLURS):
         for axis in range(3):
             blur(taken, given, grid, axis)
             given, taken = taken, given
     arrays.sums.fill(-(1 << 30))
     add_ellipsoids(arrays.sums, water.ellipsoids, grid, UNIT / float(grid.step[0]), count)
     # Standard deviation of the whole blur along an axis: the slope of what a plane becomes.
-    wide = math.sqrt((REACH * d) ** 2 / 11.0 + SMOOTH * float(np.max(grid.step)) ** 2)
-    join(arrays.level, arrays.sums, given, grid, math.sqrt(2.0 * math.pi) * wide, DRAWN * d, float(grid.step[0]) / UNIT)
+    wide = math.sqrt((REACH * d) ** 2 / 11.0 + SURFACE_BLURS * float(np.max(grid.step)) ** 2)
+    blend_fields(
+        arrays.level, arrays.sums, given, grid, math.sqrt(2.0 * math.pi) * wide, INSET * d, float(grid.step[0]) / UNIT
+    )
     mark_cells(arrays.skip, arrays.level, arrays.near, grid)
     for axis in range(3):
         measure_skip(arrays.near, arrays.skip, grid, axis)
@@ -129,7 +131,7 @@ def build(arrays: FieldArrays, water: WaterBuffers, shot: Shot) -> Field:
 
 @qd.func
 def mirrored_index(i, count, walled):
-    """Index of what lies behind a pane: its mirror image; -1 in the open."""
+    """Index of a node, mirrored at panes; -1 outside of the grid where there is none."""
     result = i
     if i < 0:
         result = qd.select(walled == 1, -1 - i, -1)
@@ -139,8 +141,10 @@ def mirrored_index(i, count, walled):
 
 
 @qd.kernel(fastcache=True)
-def add_shares(sums: qd.types.ndarray(), x: qd.types.ndarray(), grid: Grid, reach: qd.f32, unit: qd.f32, count: qd.i32):
-    """Add what every particle has to the nodes around it."""
+def splat_particles(
+    sums: qd.types.ndarray(), x: qd.types.ndarray(), grid: Grid, reach: qd.f32, unit: qd.f32, count: qd.i32
+):
+    """Add the kernel of every particle to the nodes around it, in fixed point."""
     for a in range(count):
         p = x[a]
         first = qd.cast(qd.floor((p - reach - grid.lower) / grid.step - 0.5), qd.i32)
@@ -173,30 +177,30 @@ def nearest_wall(solids: SolidSet, x, far):
 
 
 @qd.func
-def share_before(q):
-    """Share of the weights on the free side of a plane `q` reaches away: the integral of (1 - z^2)^4."""
+def free_share(q):
+    """Share of the kernel on the free side of a plane `q` reaches away: the integral of (1 - z^2)^4."""
     z = qd.min(qd.max(q, -1.0), 1.0)
     s = z * z
     return 0.5 + 1.23046875 * z * (1.0 + s * (-1.3333333 + s * (1.2 + s * (-0.5714286 + s * 0.1111111))))
 
 
 @qd.kernel(fastcache=True)
-def to_shares(
-    share: qd.types.ndarray(), sums: qd.types.ndarray(), solids: SolidSet, grid: Grid, reach: qd.f32, per: qd.f32
+def divide_by_free_share(
+    fraction: qd.types.ndarray(), sums: qd.types.ndarray(), solids: SolidSet, grid: Grid, reach: qd.f32, per: qd.f32
 ):
-    """Turn sums into shares of full water; what a solid takes away is no air."""
+    """Turn sums into liquid fractions, without the share of the kernel that solids cut off."""
     for n in range(grid.nx * grid.ny * grid.nz):
         s = sums[n] * per
         if s > 0.0 and solids.count > solids.tank_count:
             x = grid.lower + (vec3(n % grid.nx, n // grid.nx % grid.ny, n // (grid.nx * grid.ny)) + 0.5) * grid.step
             q = nearest_wall(solids, x, reach)[3] / reach
-            s /= qd.max(share_before(q), 0.4)
-        share[n] = qd.min(s, 1.0)
+            s /= qd.max(free_share(q), 0.4)
+        fraction[n] = qd.min(s, 1.0)
 
 
 @qd.kernel(fastcache=True)
 def extend_into_solids(
-    share: qd.types.ndarray(), before: qd.types.ndarray(), solids: SolidSet, grid: Grid, keep: qd.f32
+    fraction: qd.types.ndarray(), before: qd.types.ndarray(), solids: SolidSet, grid: Grid, keep: qd.f32
 ):
     """Extend the water into solids: nearer than `keep` [m] to them, and inside, it is as at that distance."""
     for n in range(grid.nx * grid.ny * grid.nz):
@@ -205,11 +209,11 @@ def extend_into_solids(
         s = before[n]
         if wall[3] < keep and wall[3] > -8.0 * keep:
             s = value_at(before, grid, x + (keep - wall[3]) * vec3(wall[0], wall[1], wall[2]))
-        share[n] = s
+        fraction[n] = s
 
 
 @qd.kernel(fastcache=True)
-def blur(share: qd.types.ndarray(), before: qd.types.ndarray(), grid: Grid, axis: qd.i32):
+def blur(fraction: qd.types.ndarray(), before: qd.types.ndarray(), grid: Grid, axis: qd.i32):
     """Blur along an axis by 1 4 6 4 1, a standard deviation of one node."""
     for n in range(grid.nx * grid.ny * grid.nz):
         i, j, k = n % grid.nx, n // grid.nx % grid.ny, n // (grid.nx * grid.ny)
@@ -227,12 +231,12 @@ def blur(share: qd.types.ndarray(), before: qd.types.ndarray(), grid: Grid, axis
             if there >= count:
                 there = 2 * count - 1 - there
             total += qd.static((0.0625, 0.25, 0.25, 0.0625)[m]) * before[n + (there - at) * by]
-        share[n] = total
+        fraction[n] = total
 
 
 @qd.kernel(fastcache=True)
 def add_ellipsoids(sums: qd.types.ndarray(), ellipsoids: Ellipsoids, grid: Grid, unit: qd.f32, count: qd.i32):
-    """Raise every node to its depth in the ellipsoids around it; lone particles are balls of their own."""
+    """Raise every node to its depth in the ellipsoids around it; lone particles are drawn as balls instead."""
     for a in range(count):
         size = ellipsoids.size[a]
         if size > 0.0 and ellipsoids.lone[a] == 0:
@@ -284,27 +288,27 @@ def depth_in_ellipsoid(diagonal, others, r, size):
 
 
 @qd.kernel(fastcache=True)
-def join(
+def blend_fields(
     level: qd.types.ndarray(),
     union: qd.types.ndarray(),
     bulk: qd.types.ndarray(),
     grid: Grid,
     slope: qd.f32,
-    drawn: qd.f32,
+    inset: qd.f32,
     unit: qd.f32,
 ):
-    """Join the two fields; `level` holds the shares of the surface before."""
+    """Blend the two fields into `level`, which holds the liquid fraction before."""
     for n in range(grid.nx * grid.ny * grid.nz):
         smooth = (level[n] - 0.5) * slope
         much = qd.min(qd.max((bulk[n] - 0.26) / 0.14, 0.0), 1.0)
-        thin = qd.max(union[n] * unit - drawn * much * much * (3.0 - 2.0 * much), -2.0 * slope)
-        blend = qd.max(drawn - qd.abs(smooth - thin), 0.0)
-        level[n] = qd.max(smooth, thin) + 0.25 * blend * blend / drawn
+        thin = qd.max(union[n] * unit - inset * much * much * (3.0 - 2.0 * much), -2.0 * slope)
+        blend = qd.max(inset - qd.abs(smooth - thin), 0.0)
+        level[n] = qd.max(smooth, thin) + 0.25 * blend * blend / inset
 
 
 @qd.kernel(fastcache=True)
 def mark_cells(skip: qd.types.ndarray(), level: qd.types.ndarray(), near: qd.types.ndarray(), grid: Grid):
-    """Write 0 for cells that hold a surface, by the nodes that count in them, or balls; 99 for others."""
+    """Write 0 for cells that hold a surface or balls, 99 for others."""
     for c in range(grid.nx // 2 * (grid.ny // 2) * (grid.nz // 2)):
         x, y, z = c % (grid.nx // 2), c // (grid.nx // 2) % (grid.ny // 2), c // (grid.nx // 2 * (grid.ny // 2))
         low, high = 1e9, -1e9
@@ -319,7 +323,7 @@ def mark_cells(skip: qd.types.ndarray(), level: qd.types.ndarray(), near: qd.typ
 
 @qd.kernel(fastcache=True)
 def measure_skip(skip: qd.types.ndarray(), before: qd.types.ndarray(), grid: Grid, axis: qd.i32):
-    """Let cells know the distance to the nearest marked one along one more axis, up to 12."""
+    """Extend the distance to the nearest marked cell (Chebyshev, up to 12 cells) by one more axis."""
     for c in range(grid.nx // 2 * (grid.ny // 2) * (grid.nz // 2)):
         mx, my, mz = grid.nx // 2, grid.ny // 2, grid.nz // 2
         at, count, by = c % mx, mx, 1

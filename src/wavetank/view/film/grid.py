@@ -1,11 +1,11 @@
-"""The water as a field on a grid: how deep a point lies in it, and where rays need not look.
+"""The water as a level-set field on a grid, and the empty space that rays can skip.
 
-Nodes lie in the middle of boxes of half a spacing, which fill the tank exactly, so that a mirror image behind a pane is
-a mirrored index. Two nodes a side make a cell; a cell knows how far the next one is that holds any surface.
+Nodes lie in the middle of boxes of half a spacing, which fill the tank exactly, so that mirroring at a pane mirrors
+an index. Two nodes along each axis make a cell; a cell knows its distance to the nearest one that holds a surface.
 
     code      symbol   meaning                                                        unit
-    level     phi      depth below the surface, about: positive in the water          m
-    skip               cells to the nearest one with a surface or a mote in it        1
+    level     phi      approximate depth below the surface, positive in the water     m
+    skip               cells to the nearest one with a surface or a ball in it        1
 """
 
 import dataclasses
@@ -71,7 +71,7 @@ def value_at(values: qd.template(), grid: Grid, x):
 
 @qd.func
 def downhill(sample: qd.template(), values: qd.template(), grid: Grid, x, reach):
-    """Unit vector to where `sample` of a field is less, told from `reach` nodes on each side; nought where even."""
+    """Unit vector along the negative gradient of `sample`, by differences over `reach` nodes; zero where it is even."""
     n = vec3(0.0, 0.0, 0.0)
     for axis in range(3):  # one copy of the code to compile
         side = vec3(0.0, 0.0, 0.0)

@@ -1,9 +1,9 @@
-"""The sun's light that has passed or left the surface of the water: photons, gathered where they arrive.
+"""Sunlight that was refracted or reflected by the water: photon maps.
 
 H. W. Jensen, "Global illumination using photon maps" (1996), with two maps in place of a tree: the floor has texels,
-and solids read the flow of light in the cells of the water's grid (vector irradiance, A. Gershun 1936), which is found
-from the ways of the photons through the cells. Light that meets nothing on its way from the sun is not in the maps:
-shadow rays see to it. All sums are whole numbers.
+and solids read the flow of light in the cells of the water's grid (vector irradiance, A. Gershun 1936), which is
+estimated from the path lengths of photons in the cells. Light that comes straight from the sun is not in the
+maps: shadow rays add it. All sums are whole numbers.
 
     code      symbol   meaning                                                        unit
     floor              light on a texel over that of the bare sun on a plane to it    1
@@ -17,7 +17,7 @@ from wavetank.device.compiler import qd
 from wavetank.view.film.grid import Field, Grid, outward_at, value_at
 from wavetank.view.film.march import Hit, World, cross_water, first_hit, past
 from wavetank.view.film.medium import Medium, absorption_at, through_water
-from wavetank.view.film.sampling import pair, towards, uniform_direction
+from wavetank.view.film.sampling import lamp_direction, pair, uniform_direction
 from wavetank.view.film.turbidity import albedo_of, color_of, is_opaque, turbidity_at
 from wavetank.view.lens import vec3
 from wavetank.view.look import Look
@@ -60,7 +60,7 @@ class Photon:
 
 @qd.kernel(fastcache=True)
 def trace_photons(photons: Photons, world: World, look: Look, medium: Medium, round: qd.i32):
-    """Send one round of photons from the sun, each from its own place of the rectangle, and add what arrives."""
+    """Trace one round of photons from the sun, each from its own place of the rectangle, and add them to the maps."""
     for number in range(photons.across * photons.rows):
         column, row = number % photons.across, number // photons.across
         seed = scrambled(qd.cast(number, qd.u32) ^ qd.u32(0x51ED270B))
@@ -70,7 +70,7 @@ def trace_photons(photons: Photons, world: World, look: Look, medium: Medium, ro
             + ((column + u.x) / photons.across) * photons.right
             + ((row + u.y) / photons.rows) * photons.up
         )
-        photon = begun_photon(p, -towards(look.to_sun, look.sun_size, lamp))
+        photon = begun_photon(p, -lamp_direction(look.to_sun, look.sun_size, lamp))
         while photon.going == 1:
             hit, what, which, was_wet = first_hit(world, photon.p, photon.ahead, photon.in_water, 1)
             n = vec3(hit.x, hit.y, hit.z)
@@ -85,7 +85,7 @@ def trace_photons(photons: Photons, world: World, look: Look, medium: Medium, ro
                 if reached < qd.min(hit.w, 1e3):
                     what, at = Hit.SCATTERING, photon.p + reached * photon.ahead
             if photon.crossed > 0 and photons.has_flow == 1:
-                leave_in_cells(photons, world.field.grid, photon, reached, medium, was_wet)
+                add_to_flow(photons, world.field.grid, photon, reached, medium, was_wet)
             photon.power *= transmittance
             if what == Hit.SURFACE:
                 direction, p, wet, _inward = cross_water(
@@ -100,7 +100,7 @@ def trace_photons(photons: Photons, world: World, look: Look, medium: Medium, ro
                 scatter(photon, world, medium, at, pair(seed, round, 3 + 2 * photon.bounces))
             else:
                 if what == Hit.FLOOR and photon.crossed > 0:
-                    arrive(photons, at, photon.power)
+                    add_to_floor(photons, at, photon.power)
                 photon.going = 0
             photon.bounces += 1
             if photon.bounces >= 12 + 60 * medium.is_turbid or photon.power.max() < 0.01:
@@ -152,7 +152,7 @@ def scatter(photon: qd.template(), world: World, medium: Medium, at, u):
 
 
 @qd.func
-def arrive(photons: Photons, at, weight):
+def add_to_floor(photons: Photons, at, weight):
     """Add a photon to the four texels around its place."""
     texel = photons.corner.y
     x, z = (at.x - photons.corner.x) / texel - 0.5, (at.z - photons.corner.z) / texel - 0.5
@@ -180,8 +180,8 @@ def cell_of(grid: Grid, x):
 
 
 @qd.func
-def leave_in_cells(photons: Photons, grid: Grid, photon: qd.template(), far, medium: Medium, wet):
-    """Add a straight way of a photon, `far` [m] long, to the cells that it passes, in steps of half a cell."""
+def add_to_flow(photons: Photons, grid: Grid, photon: qd.template(), far, medium: Medium, wet):
+    """Add a straight segment of a photon, `far` [m] long, to the cells that it crosses, in steps of half a cell."""
     p, ahead = photon.p, photon.ahead
     step = grid.step
     cell = 8.0 * step.x * step.y * step.z

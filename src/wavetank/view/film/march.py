@@ -1,7 +1,7 @@
-"""Where a ray meets water, solids, balls or the floor.
+"""Intersections of rays with water, solids, balls and the floor.
 
 code      symbol   meaning                                                        unit
-p, ahead           where a ray begins, and its unit direction                     m, 1
+p, ahead           origin of a ray, and its unit direction                        m, 1
 t                  way along it                                                   m
 wet                1 where the ray runs in the water                              1
 cell               edge of a cell of the grid, two nodes                          m
@@ -36,7 +36,7 @@ class Hit(enum.IntEnum):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class World:
-    """All that a ray may meet, on the device."""
+    """All that a ray may hit, on the device."""
 
     field: Field
     balls: Balls
@@ -247,7 +247,7 @@ def face(grid: Grid, x, ahead, side):
 
 @qd.func
 def past(way, n, ahead):
-    """How far [m] behind the place where it met a solid a ray is surely in it: `meet` stops before the surface."""
+    """How far [m] beyond the point where it hit a solid a ray is surely inside: `meet` stops before the surface."""
     return (2e-4 * way + 2e-5) / qd.max(qd.abs(n.dot(ahead)), 0.1)
 
 

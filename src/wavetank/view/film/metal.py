@@ -1,4 +1,4 @@
-"""Solids of metal: rough mirrors, B. Walter et al., "Microfacet models for refraction through rough surfaces" (2007).
+"""Metal as a rough conductor: B. Walter et al., "Microfacet models for refraction through rough surfaces" (2007).
 
 Directions are drawn from the facets that the eye sees (E. Heitz, "Sampling the GGX distribution of visible normals",
 JCGT 7, 2018); what a facet mirrors is C. Schlick's approximation of Fresnel's equations (1994).
@@ -22,7 +22,7 @@ def rough():
 
 @qd.func
 def facet(n, seen, u):
-    """Normal of a facet that is seen, by two even numbers."""
+    """Normal of a visible facet, from two uniform random numbers `u`."""
     across, up = frame_of(n)
     v = vec3(rough() * seen.dot(across), rough() * seen.dot(up), seen.dot(n)).normalized(1e-12)
     one, two = vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0)
@@ -40,14 +40,14 @@ def facet(n, seen, u):
 
 @qd.func
 def unhidden(cosine):
-    """Share of the facets that is not hidden by others in a direction (Smith)."""
+    """Share of the facets that is visible in a direction (Smith)."""
     square = qd.max(cosine * cosine, 1e-8)
     return 2.0 / (1.0 + qd.sqrt(1.0 + rough() * rough() * (1.0 - square) / square))
 
 
 @qd.func
 def mirror_of(color, cosine):
-    """What a facet of that colour mirrors, per colour."""
+    """Reflectance of a facet, per colour (Schlick)."""
     return color + (1.0 - color) * (1.0 - qd.min(qd.max(cosine, 0.0), 1.0)) ** 5
 
 

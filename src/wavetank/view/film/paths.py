@@ -22,7 +22,7 @@ from wavetank.view.film.light import Photons, floor_light, light_within, solid_l
 from wavetank.view.film.march import Hit, World, cross_water, first_hit, past
 from wavetank.view.film.medium import Medium, absorption_at, cell_near, through_water
 from wavetank.view.film.metal import facet, mirror_of, towards_lamp, unhidden
-from wavetank.view.film.sampling import around, disc, pair, towards, uniform_direction
+from wavetank.view.film.sampling import cosine_direction, disc, lamp_direction, pair, uniform_direction
 from wavetank.view.film.turbidity import albedo_of, color_of, is_opaque, towards_clear, turbidity_at
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec2, vec3, vec4, view_ray
 from wavetank.view.look import Look
@@ -437,7 +437,7 @@ def reflect(
     path.indirect, path.diffuse, path.within, path.just_entered = 1, 1, 0, 0
     spread = pair(seed, sample, 3 + 3 * path.bounces)
     path.p = vertex.at + 2e-4 * setting.size * n
-    path.next_p, path.next_ahead = path.p, around(n, spread)
+    path.next_p, path.next_ahead = path.p, cosine_direction(n, spread)
     path.in_water, path.next_in_water = vertex.was_wet, vertex.was_wet
     is_metal = vertex.kind == Hit.SOLID and world.finish[vertex.which] == Finish.METAL
     if is_metal:
@@ -448,7 +448,7 @@ def reflect(
         if path.next_ahead.dot(n) <= 0.0:
             path.throughput = vec3(0.0, 0.0, 0.0)
     if vertex.was_wet == 0 and n.dot(look.to_sun) > -look.sun_size:
-        to_lamp = towards(look.to_sun, look.sun_size, pair(seed, sample, 4 + 3 * path.bounces))
+        to_lamp = lamp_direction(look.to_sun, look.sun_size, pair(seed, sample, 4 + 3 * path.bounces))
         path.sunlight = before * color * look.sun * qd.max(n.dot(to_lamp), 0.0)
         if is_metal:
             path.sunlight = before * look.sun * towards_lamp(color, n, -ahead, to_lamp)

@@ -1,4 +1,4 @@
-"""The samples of a picture under way: who is told of them, and the file that keeps them."""
+"""The samples of an unfinished picture: progress callback, and the file that keeps them."""
 
 import dataclasses
 import hashlib
@@ -16,22 +16,22 @@ from wavetank.view.film.paths import Film
 from wavetank.view.matter import matter_of
 
 NAMES = ("mean", "half", "albedo", "shape")
-FORMAT = 2  # of what the samples mean; another one is begun anew
+FORMAT = 2  # of the meaning of samples; those of another format are discarded
 
 
 @dataclasses.dataclass
 class Watch:
-    """How a picture that takes minutes is watched: whom it tells, where it keeps its samples, whether it is whole."""
+    """Progress of a picture that takes minutes: callback, file of its samples, and whether it is complete."""
 
-    tell: Callable[[int, int], bool] | None = None  # samples there are, and of how many; False stops
-    path: Path | None = None  # of the samples when it is stopped
-    begun: int = 0  # samples that were there
-    done: int = 0  # samples there are
-    whole: bool = True  # whether they are all
+    tell: Callable[[int, int], bool] | None = None  # called with samples done and wanted; False stops
+    path: Path | None = None  # where the samples are kept when it is stopped
+    begun: int = 0  # samples that were loaded
+    done: int = 0  # samples done
+    whole: bool = True  # whether all are done
 
 
 def digest_of(shot: Any, options: tuple[Any, ...]) -> str:
-    """Return what tells one picture from another: water, solids, eye, light, and how it is taken."""
+    """Return a hash of all that a picture depends on: water, solids, eye, light and options."""
     frame = shot.frame
     found = hashlib.sha256(repr((VERSION, FORMAT, options, frame.time, frame.count)).encode())
     count, foam = frame.count, frame.foam_count
@@ -51,14 +51,14 @@ def digest_of(shot: Any, options: tuple[Any, ...]) -> str:
 
 
 def store(path: Path, film: Film, digest: str, done: int) -> None:
-    """Write the samples to a file, which is complete or not there."""
+    """Write the samples to a file atomically."""
     with atomic_write(path) as partial, partial.open("wb") as out:
         arrays: dict[str, Any] = {name: download(getattr(film, name)) for name in NAMES}
         np.savez(out, digest=digest, done=done, **arrays)
 
 
 def load(path: Path, film: Film, digest: str) -> int:
-    """Fill `film` from a file and return how many samples it holds: 0 where there is none of this picture."""
+    """Fill `film` from a file and return how many samples it holds; 0 where it is missing or of another picture."""
     try:
         with np.load(path, allow_pickle=False) as kept:
             if str(kept["digest"]) != digest:

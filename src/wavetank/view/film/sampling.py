@@ -1,7 +1,7 @@
 """Points for the samples of a pixel: well spread pairs of numbers that belong to pixel, sample and purpose.
 
 B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9 (2020): Sobol's first two dimensions, shuffled and scrambled
-anew for every pair of numbers that a path needs. Nothing depends on threads.
+again for every pair of numbers that a path needs. Nothing depends on threads.
 """
 
 from wavetank.device.compiler import qd
@@ -58,7 +58,7 @@ def frame_of(n):
 
 @qd.func
 def disc(u):
-    """A point of the unit disc, evenly (Shirley and Chiu 1997)."""
+    """A uniformly distributed point of the unit disc (Shirley and Chiu 1997)."""
     a, b = 2.0 * u.x - 1.0, 2.0 * u.y - 1.0
     r, turn = 0.0, 0.0
     if qd.abs(a) > qd.abs(b):
@@ -69,15 +69,15 @@ def disc(u):
 
 
 @qd.func
-def around(n, u):
-    """A direction on the side of `n`, with a probability as its cosine."""
+def cosine_direction(n, u):
+    """A cosine-distributed direction around the normal `n`."""
     p = disc(u)
     across, up = frame_of(n)
     return (p.x * across + p.y * up + qd.sqrt(qd.max(1.0 - p.x * p.x - p.y * p.y, 0.0)) * n).normalized(1e-12)
 
 
 @qd.func
-def towards(axis, wide, u):
+def lamp_direction(axis, wide, u):
     """A direction to a round lamp in the direction `axis` whose radius has the tangent `wide`."""
     p = wide * disc(u)
     across, up = frame_of(axis)

@@ -1,4 +1,4 @@
-"""A world a moment before or after its frame, while a shutter is open: water, and solids as they move."""
+"""Frames shifted in time, for the instants of an open shutter: water and moving solids."""
 
 import dataclasses
 from typing import Any
@@ -13,7 +13,7 @@ from wavetank.view.lens import vec3, vec4
 
 
 def shifted(frame: Frame, by: float) -> Frame:
-    """Return the frame `by` [s] later, or earlier: particles on their straight ways, solids on theirs."""
+    """Return the frame `by` [s] later: particles move straight on, solids as `_solids` says."""
     changes: dict[str, Any] = {"solids": _solids(frame, by)}
     if frame.count:
         x = qd.ndarray(vec3, shape=frame.x.shape)
@@ -23,12 +23,12 @@ def shifted(frame: Frame, by: float) -> Frame:
 
 
 def _solids(frame: Frame, by: float) -> SolidSet:
-    """Return the solids then: bodies by their velocities, and what has a motion where that says, unless it is held."""
-    solids, standing = frame.solids, frame.placed
-    poses = {k: _pose(frame, one, by) for k, one in enumerate(standing, solids.tank_count) if k < solids.count}
+    """Return the solids then: bodies moved by their velocities, others by their motion unless they are held."""
+    solids, placed = frame.solids, frame.placed
+    poses = {k: _pose(frame, one, by) for k, one in enumerate(placed, solids.tank_count) if k < solids.count}
     if all(
         np.array_equal(poses[k][0], one.position) and np.array_equal(poses[k][1], one.rotation)
-        for k, one in enumerate(standing, solids.tank_count)
+        for k, one in enumerate(placed, solids.tank_count)
         if k in poses
     ):
         return solids

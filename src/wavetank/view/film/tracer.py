@@ -26,8 +26,8 @@ from wavetank.view.style import Style
 from wavetank.view.water_buffers import water_of
 from wavetank.view.weights import under_water
 
-PHOTONS, ROUNDS = 1_600_000, 16  # of a picture: in all, and rounds in which they are sent
-TEXELS_A_SPACING, MOST_TEXELS = 4.0, 1400  # of the floor's map
+PHOTONS, ROUNDS = 1_600_000, 16  # of a picture, and the rounds in which they are traced
+TEXELS_A_SPACING, MOST_TEXELS = 4.0, 1400  # of the photon map of the floor
 BRIGHTEST = 8.0
 SLICES, TURNS = 8, (0, 2, 4, 6, 1, 3, 5, 7)  # instants of an open shutter: both halves of the samples see all of it
 
@@ -45,7 +45,7 @@ class Tracer:
             shape=qd.ndarray(vec4, shape=shape),
         )
         self._sky: Any = qd.ndarray(vec3, shape=(1, 1))
-        self._seen = ""  # digest of what is in it; empty where there is no picture
+        self._seen = ""  # hash of the panorama; empty without one
         self._arrays: field.FieldArrays | None = None
         self._photons: light.Photons | None = None
         self._spare: tuple[Any, Any, Any] | None = None
@@ -79,10 +79,10 @@ class Tracer:
         if self._spare is None:
             shape = (self.buffers.rows, self.buffers.columns)
             self._spare = (qd.ndarray(vec3, shape=shape), qd.ndarray(vec3, shape=shape), qd.ndarray(vec2, shape=shape))
-        self.buffers.pixels.color.copy_from(denoise.clean(self.film, self._spare))
+        self.buffers.pixels.color.copy_from(denoise.denoised(self.film, self._spare))
 
     def _set_sky(self, sky: np.ndarray | None) -> None:
-        """Put a picture in the place of the sky, or take it away."""
+        """Use a panorama as the sky, or none."""
         seen = "" if sky is None else hashlib.sha256(sky.tobytes()).hexdigest()
         if seen == self._seen:
             return
@@ -101,10 +101,10 @@ class Tracer:
         first: int = 0,
         tell: Callable[[int], bool] | None = None,
     ) -> int:
-        """Take the samples from `first` on and return how many there are: fewer where `tell` says to stop.
+        """Take the samples from `first` on and return how many are done: fewer where `tell` stops them.
 
         `aperture` is the radius of the lens [m], `focus` the depth that is sharp [m], `shutter` for how long it is open
-        [s]. `tell` is called with the number of samples after each few, and ends the work by returning False.
+        [s]. `tell` is called regularly with the number of samples done, and stops by returning False.
         """
         slices = [0.0] if shutter == 0.0 else [shutter * ((k + 0.5) / SLICES - 0.5) for k in TURNS]
         setting = self.setting(shot, aperture, focus)
@@ -155,7 +155,7 @@ class Tracer:
         )
 
     def _world(self, shot: Shot, shutter: float, moved: float) -> World:
-        """Return all that rays may meet at an instant."""
+        """Return all that rays may hit at an instant."""
         speed = float(np.abs(shot.frame.velocities).max()) if shutter and shot.frame.count else 0.0
         ellipsoids.draw(shot, self.buffers)
         water = water_of(self.buffers, shot)
@@ -178,7 +178,7 @@ class Tracer:
         )
 
     def _trace_photons(self, shot: Shot, world: World, medium: Medium, slice: int, slices: int) -> light.Photons:
-        """Return the light that the water of an instant brings."""
+        """Return the photon maps of an instant."""
         grid, look, d = world.field.grid, shot.look, shot.extent.spacing
         lower, upper = np.asarray(grid.lower, float), np.asarray(grid.upper, float)
         corners = np.array([[(lower, upper)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
@@ -235,7 +235,7 @@ def sample_sky(found: qd.types.ndarray(), directions: qd.types.ndarray(), look: 
 
 
 def sky_fill(look: Look) -> Any:
-    """Return what a matte surface gets of the sky over what the sky looks like, so that white shows `Look.sky`."""
+    """Return the factor on sky light for matte surfaces with which a white one shows `Look.sky`."""
     count = 2048
     up = np.sqrt((np.arange(count) + 0.5) / count)  # by the cosine
     turn, flat = 2.3999632297 * np.arange(count), np.sqrt(1.0 - up * up)
