@@ -20,7 +20,7 @@ from wavetank.simulation.simulation import Simulation
 
 def apart(difference: np.ndarray, tank: wt.Tank | None) -> np.ndarray:
     """Difference of nearest images."""
-    for axis in tank.rings if tank else ():
+    for axis in tank.periodic_axes if tank else ():
         length = np.float32(tank.size[axis])
         difference[..., axis] -= length * np.round(difference[..., axis] / length)
     return difference
@@ -54,7 +54,7 @@ def neighbor_sets(sim: Simulation) -> list[set[int]]:
 def check(x: np.ndarray, spacing: float, tank=None) -> None:
     sim = Simulation(wt.Scene(spacing=spacing, tank=tank, fluids=[wt.Points(positions=x)], gravity=(0.0,) * x.shape[1]))
     h = sim.scene.support * spacing
-    rings = tank.rings if tank else []
+    rings = tank.periodic_axes if tank else []
     lower = tank.box()[0] if tank else np.zeros(x.shape[1])
     x = x - lower if rings else x
     boxsize = [tank.size[axis] if axis in rings else 0.0 for axis in range(x.shape[1])] if rings else None

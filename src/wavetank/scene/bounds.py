@@ -46,7 +46,7 @@ def check_bodies(solids: Any, tank: Any, goal: Any) -> None:
 def check_periodic(tank: Any, spacing: float, support: float, gravity: tuple[float, ...], solids: Any) -> None:
     """Raise `ValueError` where a periodic tank is too short, lies along gravity, or has a solid at its seam."""
     strongest = max(map(abs, gravity), default=0.0)
-    for axis in tank.rings if tank else ():
+    for axis in tank.periodic_axes if tank else ():
         name, length, least = "xyz"[axis], tank.size[axis], LEAST_SUPPORTS * support * spacing
         if length < least:
             raise ValueError(
@@ -64,9 +64,9 @@ def check_periodic(tank: Any, spacing: float, support: float, gravity: tuple[flo
                 f"the tank is periodic along {name} and {bodies[0]!r} is a body, whose contacts do not reach over a "
                 "seam; give it no density and no mass, or the tank walls."
             )
-    if tank and tank.rings:
+    if tank and tank.periodic_axes:
         lower, upper = tank.box()
-        check_seams(solids, lower, upper, tank.rings, spacing)
+        check_seams(solids, lower, upper, tank.periodic_axes, spacing)
 
 
 def check_scales(spacing: float, gravity: tuple[float, ...]) -> None:

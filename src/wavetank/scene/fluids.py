@@ -89,7 +89,7 @@ class Block(Fluid):
         for solid in solids:
             if isinstance(solid, Box) and (corners := solid.corners()) is not None:
                 touched |= touching(lower, upper, *corners, spacing)
-        return fitted(lower, upper, spacing, touched[0] & touched[1], tank.rings if tank else [])
+        return fitted(lower, upper, spacing, touched[0] & touched[1], tank.periodic_axes if tank else [])
 
 
 class Ball(Fluid):

@@ -60,22 +60,22 @@ class Tank(Tilted):
         return values
 
     @property
-    def rings(self) -> list[int]:
-        """The axes along which the world repeats."""
+    def periodic_axes(self) -> list[int]:
+        """The periodic axes, as numbers."""
         return sorted("xyz".index(axis) for axis in self.periodic)
 
     def periods(self) -> Periods:
-        """Return how the world repeats, for the device."""
-        return periods_of(self.rings, self.box()[0], self.size)
+        """Return the periods of the world, for the device."""
+        return periods_of(self.periodic_axes, self.box()[0], self.size)
 
     def within(self, places: np.ndarray) -> np.ndarray:
         """Return the images of `places` [m], [n, dim], in the tank along the axes that are periodic."""
-        return places_within(places, *self.box(), self.rings)
+        return places_within(places, *self.box(), self.periodic_axes)
 
     def beside(self, places: np.ndarray, point: np.ndarray) -> np.ndarray:
         """Return the images of `places` [m], [n, dim], that are nearest to a point, along axes that are periodic."""
         half = 0.5 * np.array(self.size, float)
-        return places_within(places, point - half, point + half, self.rings)
+        return places_within(places, point - half, point + half, self.periodic_axes)
 
     def touched_by(self, lower: np.ndarray, upper: np.ndarray, spacing: float) -> np.ndarray:
         """Say where a box between two corners [m] reaches a wall or a seam, at both sides along each axis, [2, dim]."""
@@ -99,17 +99,17 @@ class Tank(Tilted):
         return lower, lower + np.array(self.size, float)
 
     def open_box(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corners of `box`, moved out of reach but where sides are open: what is beyond has left."""
+        """Return the corners of `box`, far away except at open sides: particles outside of it have left."""
         (lower, upper), (low, high) = self.box(), self.beyond(1.0)
         return np.where(low < lower, lower, -1e9), np.where(high > upper, upper, 1e9)
 
     def walls(self) -> list[Solid]:
-        """Return the walls as half-spaces, lower and upper for each axis, but where there are none."""
+        """Return the walls as half-spaces, lower and upper for each axis that has any."""
         result: list[Solid] = []
         for axis, name in enumerate("xyz"[: len(self.size)]):
             normal = np.eye(len(self.size))[axis]
             for side, corner in enumerate(self.box()):
-                if not self.is_open(axis, side) and axis not in self.rings:
+                if not self.is_open(axis, side) and axis not in self.periodic_axes:
                     title, inward = f"tank {name} {('lower', 'upper')[side]}", (1.0 - 2.0 * side) * normal
                     result.append(HalfSpace(name=title, point=tuple(corner * normal), normal=tuple(inward)))
         return result

@@ -61,7 +61,7 @@ def find_speed_limit(
         return math.inf
     counters.fastest_solid = max(counters.fastest_solid, solid_speed(scene, solids, duration))
     counters.fastest_force = max(counters.fastest_force, sum(force.largest_speed() for force in forces))
-    if any(scene.gravity[axis] for axis in scene.tank.rings):
+    if any(scene.gravity[axis] for axis in scene.tank.periodic_axes):
         return math.inf  # falls without end along a periodic axis
     start = max([counters.fastest_start, *(_start_speed(solid) for solid in scene.solids)])
     fall = sum(2.0 * abs(g) * edge for g, edge in zip(scene.gravity, scene.tank.size, strict=True))

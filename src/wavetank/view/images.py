@@ -42,7 +42,7 @@ class Images:
     def within(self, frame: Frame) -> Frame:
         """Return the frame with its solids as they are seen; itself where none is at a seam."""
         tank = frame.scene.tank
-        if tank is None or not tank.rings:
+        if tank is None or not tank.periodic_axes:
             return frame
         standing = frame.placed
         key = tank, tuple((id(one.solid), one.position.tobytes(), one.rotation.tobytes()) for one in standing)
@@ -84,7 +84,7 @@ def _crossed(one: PlacedSolid, tank: Tank) -> list[int]:
     reach, (lower, upper) = one.solid.reach(), tank.box()
     if reach >= 0.1 * ENDLESS:
         return []
-    return [k for k in tank.rings if one.position[k] - reach < lower[k] or one.position[k] + reach > upper[k]]
+    return [k for k in tank.periodic_axes if one.position[k] - reach < lower[k] or one.position[k] + reach > upper[k]]
 
 
 def _ways(one: PlacedSolid, tank: Tank, axes: list[int], spacing: float) -> list[np.ndarray]:

@@ -22,7 +22,7 @@ def with_images(forces: Iterable[Force], tank: Tank | None) -> Iterator[Force]:
     """Yield the forces, each followed by its images whose regions reach into the tank."""
     for force in forces:
         yield force
-        if tank is not None and tank.rings:
+        if tank is not None and tank.periodic_axes:
             yield from _images(force, tank)
 
 
@@ -32,7 +32,7 @@ def _images(force: Force, tank: Tank) -> Iterator[Force]:
         return
     (center, radius, line), (lower, upper) = region, tank.box()
     steps = [[0.0], [0.0], [0.0]]
-    for axis in tank.rings:
+    for axis in tank.periodic_axes:
         low, high = float(lower[axis]), float(upper[axis])
         if line[axis] == 0.0 and 2.0 * radius <= high - low:
             steps[axis] += [high - low] * bool(center[axis] - radius < low)
