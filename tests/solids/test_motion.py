@@ -100,7 +100,7 @@ def test_a_motion_lives_in_the_dimension_of_its_world():
 
 def test_parts_move_with_the_whole():
     part = wt.Sphere(center=(0, "t"), radius=0.1)
-    with pytest.raises(wt.WavetankError, match="parts of a solid have no motion"):
+    with pytest.raises(wt.WavetankError, match="parts of a solid cannot have a motion"):
         wt.Union(parts=[part, wt.Sphere(center=(1, 0), radius=0.1)])
 
 
