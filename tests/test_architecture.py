@@ -96,7 +96,7 @@ def test_rooms_know_only_what_is_below(path):
 
 
 def test_the_rooms_are_those_of_the_plan():
-    entries = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
+    entries = {path.name for path in PACKAGE.iterdir() if path.name not in ("__pycache__", "py.typed")}
     assert entries == {*FLOORS, *FACES}
     assert len(entries) <= MOST_ENTRIES
 
@@ -296,3 +296,30 @@ def test_tests_that_are_called_slow_are_there():
         file, _, test = name.partition("::")
         text = (ROOT / file).read_text("utf-8")
         assert not test or f"def {test.split('[')[0]}(" in text, name
+
+
+def test_data_needs_no_compiler():
+    """Import the package, read, change and save scenes, and ask for help: without the compiler of kernels."""
+    import subprocess
+    import sys
+
+    code = (
+        "import sys, wavetank as wt; wt.Scene.load('ducks').changed(spacing=0.05); "
+        "wt.Scene.load('double-dam-2d').particles(); "
+        "wt.Scene.load('obstacle-tank').text(); wt.Scene(spacing=0.1, fluids=[wt.Ball(center=(0, 0), radius=1)]); "
+        "from typer.testing import CliRunner; from wavetank.cli import app; "
+        "results = [CliRunner().invoke(app, [*args]) for args in (['--help'], ['scenes'], ['--version'])]; "
+        "assert not any(result.exit_code for result in results), results; assert 'quadrants' not in sys.modules"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_codes_of_shapes_are_those_of_the_device():
+    from wavetank.solids import distance, solid
+
+    for code in solid.Code:
+        name = code.name.lower()
+        known = distance.DISTANCES.index(getattr(distance, f"{name}_distance")) if code >= 0 else None
+        assert code == (getattr(distance, name).fn() if known is None else known), name
+    assert (distance.grids.fn(), distance.around.fn()) == (solid.GRIDS, solid.AROUND)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import wavetank as wt
+from wavetank.physics.forces.jet import opening_of
 from wavetank.scene.forces import Attract, Burst, Drag, Vortex, Wind
 from wavetank.scene.forces.images import with_images
-from wavetank.scene.forces.jet import Jet, opening_of
+from wavetank.scene.forces.jet import Jet
 
 RING = wt.Tank(size=(2.0, 1.0), lower=(-1.0, 0.0), periodic=["x"])
 BOTH = wt.Tank(size=(2.0, 1.0, 2.0), periodic=["x", "z"])

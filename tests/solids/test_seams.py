@@ -7,7 +7,7 @@ import wavetank as wt
 from wavetank.device.compiler import qd
 from wavetank.device.periods import periods_of
 from wavetank.device.state import vectors
-from wavetank.solids import shapes
+from wavetank.solids.build import build
 from wavetank.solids.distance import SolidSet, signed_distance
 from wavetank.solids.seams import seen_periods
 
@@ -21,7 +21,7 @@ def ask(values: qd.types.ndarray(), x: qd.types.ndarray(), solids: SolidSet):
 def distances(solid, x, axes=(0,), size=(2.0, 1.0, 1.0)):
     """(gradient, distance) of a solid at `x` in a world that repeats."""
     periods = periods_of(axes, (0, 0, 0), size)
-    device = shapes.build([solid], 0, 0.0, 0.02, (periods.axes, seen_periods([solid], periods, 0.02)))
+    device = build([solid], 0, 0.0, 0.02, (periods.axes, seen_periods([solid], periods, 0.02)))
     places, found = vectors(3, len(x)), vectors(4, len(x))
     places.from_numpy(np.asarray(x, np.float32))
     ask(found, places, device)

@@ -3,7 +3,7 @@ import pytest
 
 import wavetank as wt
 from wavetank.device.compiler import qd
-from wavetank.solids import shapes
+from wavetank.solids.build import build
 from wavetank.solids.distance import SolidSet, lift, signed_distance
 
 
@@ -19,7 +19,7 @@ def distances(solid, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     x = qd.ndarray(qd.types.vector(points.shape[1], qd.f32), shape=(len(points),))
     out = qd.ndarray(qd.types.vector(4, qd.f32), shape=(len(points),))
     x.from_numpy(points)
-    evaluate(0, shapes.build([solid], 0, 0.0, 0.05), x, out)
+    evaluate(0, build([solid], 0, 0.0, 0.05), x, out)
     values = out.to_numpy()
     return values[:, :3], values[:, 3]
 
@@ -97,7 +97,7 @@ def test_too_deep_nesting_is_refused():
     for _ in range(9):
         solid = wt.Union(parts=[BALL, solid])
     with pytest.raises(wt.WavetankError, match=r"nests set operations \d+ deep; at most 8"):
-        shapes.build([solid], 0, 0.0, 0.05)
+        build([solid], 0, 0.0, 0.05)
 
 
 def test_reach_holds_the_solid():

@@ -4,7 +4,7 @@ import numpy as np
 
 from wavetank.device import compiler
 from wavetank.simulation.frame import Frame
-from wavetank.solids.shapes import build
+from wavetank.solids.build import build
 
 compiler.start("cpu")
 from wavetank.device.compiler import qd  # noqa: E402

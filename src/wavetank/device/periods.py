@@ -14,8 +14,6 @@ import dataclasses
 from collections.abc import Iterable
 from typing import Final
 
-import numpy as np
-
 from wavetank.device.compiler import qd
 
 
@@ -43,18 +41,6 @@ def periods_of(axes: Iterable[int], lower: Iterable[float], size: Iterable[float
         return NONE
     lengths, corner = ([*map(float, values), 1.0][:3] for values in (size, lower))
     return Periods(bits, *lengths, *corner)
-
-
-def places_within(places: np.ndarray, lower: np.ndarray, upper: np.ndarray, axes: Iterable[int]) -> np.ndarray:
-    """Return the images of `places` [m], [n, dim], between two corners along the `axes` that repeat."""
-    x = places
-    for axis in axes:
-        x = x.copy() if x is places else x
-        low, high = x.dtype.type(lower[axis]), x.dtype.type(upper[axis])
-        inside = low + np.mod(x[:, axis] - low, high - low)
-        outside = (x[:, axis] < low) | (x[:, axis] >= high)
-        x[:, axis] = np.where(outside, np.where(inside < high, inside, low), x[:, axis])
-    return x
 
 
 @qd.func

@@ -8,7 +8,7 @@ can press on it allows (`simulation/bodies.py`).
 
     code      meaning                                                                unit
     push      way that a particle was moved by, times its mass                       m, heaviest particle's mass
-    reaction  sums for each solid, `PARTS` numbers: push, turn, the grid's push      1/unit
+    reaction  sums for each solid, `distance.parts` numbers: push, turn, the grid's push      1/unit
               and turn, the share of the solid that is under water, how viscous fluids hold it,
               and what of them it displaces
 """

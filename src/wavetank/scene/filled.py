@@ -11,7 +11,6 @@ from wavetank.scene.fluids import Ball, Block, Fluid, Points
 from wavetank.solids.bounds import bounds_of
 from wavetank.solids.ground.polygon import Polygon
 from wavetank.solids.meshes.mesh import Mesh
-from wavetank.solids.sampling import nearest_distances
 from wavetank.solids.shapes import AnySolid
 
 FINE = 50.0  # lattice points along the longest edge where no spacing is given
@@ -70,6 +69,8 @@ class Filled(Fluid):
 
     @override
     def contains(self, points: np.ndarray) -> np.ndarray:
+        from wavetank.solids.sampling import nearest_distances  # kernels
+
         lower, upper = self.bounds()
         result = np.all((points > lower) & (points < upper), axis=1)
         result[result] = nearest_distances([self.inside], points[result], float((upper - lower).max()) / FINE) < 0.0

@@ -1,16 +1,19 @@
 """The tank: a box with walls, which holds the water of a scene."""
 
-from typing import Any, Literal
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from wavetank.device.periods import Periods, periods_of, places_within
 from wavetank.foundation.model import Edges, Place
 from wavetank.scene.lattice import NEAR
 from wavetank.scene.schedule import Tilted
 from wavetank.solids.shapes import HalfSpace
 from wavetank.solids.solid import Solid
+
+if TYPE_CHECKING:
+    from wavetank.device.periods import Periods
 
 _OTHER_NAMES = {"bottom": "-y", "top": "+y"}
 
@@ -64,8 +67,10 @@ class Tank(Tilted):
         """The periodic axes, as numbers."""
         return sorted("xyz".index(axis) for axis in self.periodic)
 
-    def periods(self) -> Periods:
+    def periods(self) -> "Periods":
         """Return the periods of the world, for the device."""
+        from wavetank.device.periods import periods_of  # kernels
+
         return periods_of(self.periodic_axes, self.box()[0], self.size)
 
     def within(self, places: np.ndarray) -> np.ndarray:
@@ -113,3 +118,15 @@ class Tank(Tilted):
                     title, inward = f"tank {name} {('lower', 'upper')[side]}", (1.0 - 2.0 * side) * normal
                     result.append(HalfSpace(name=title, point=tuple(corner * normal), normal=tuple(inward)))
         return result
+
+
+def places_within(places: np.ndarray, lower: np.ndarray, upper: np.ndarray, axes: Iterable[int]) -> np.ndarray:
+    """Return the images of `places` [m], [n, dim], between two corners along the `axes` that repeat."""
+    x = places
+    for axis in axes:
+        x = x.copy() if x is places else x
+        low, high = x.dtype.type(lower[axis]), x.dtype.type(upper[axis])
+        inside = low + np.mod(x[:, axis] - low, high - low)
+        outside = (x[:, axis] < low) | (x[:, axis] >= high)
+        x[:, axis] = np.where(outside, np.where(inside < high, inside, low), x[:, axis])
+    return x

@@ -8,6 +8,7 @@ from wavetank.device.state import integers, vectors
 from wavetank.physics import population
 from wavetank.scene.forces import Attract, Burst, Drag, Force, Sway, Vortex, Wind
 from wavetank.session.tools.picking import pick
+from wavetank.simulation.forces import apply_force
 from wavetank.simulation.simulation import Simulation
 
 
@@ -26,7 +27,7 @@ def launches(sim: Simulation) -> list[Callable[[], object]]:
     )
     return [
         lambda: pick(sim, np.zeros(3), np.array([0.0, 0.0, -1.0])),
-        *(lambda force=force: force.apply(water, 0, 1e-3, 0.0) for force in forces),
+        *(lambda force=force: apply_force(force, water, 0, 1e-3, 0.0) for force in forces),
         lambda: population.append_rows(water, row, row, number, number, 0, 0, 0),
         lambda: sim.free_places(np.zeros((1, dim), np.float32), 0.0, 0.0),
         lambda: population.mark_particles(number, water, capsule, 0),

@@ -34,7 +34,7 @@ from wavetank.simulation.engine import import_engine, isometry, keep_in_plane, p
 from wavetank.simulation.joints import Joints, joint_reaction, put_joints
 from wavetank.simulation.mass_properties import AFLOAT, grip, mass_properties
 from wavetank.simulation.solids import Solids
-from wavetank.solids.distance import PARTS
+from wavetank.solids.distance import parts
 from wavetank.solids.mass import Inertia, Ruler
 from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
@@ -306,7 +306,7 @@ class Bodies(Mapping[str, Body]):
     def _read_reactions(self, world: World, dt: float) -> None:
         """Read the impulses of the water on the bodies in a step of `dt` [s] from the device."""
         synchronize()
-        sums = self._sums.read().reshape(-1, PARTS)[self._numbers].astype(float)
+        sums = self._sums.read().reshape(-1, parts.fn())[self._numbers].astype(float)
         particle = blend(world.materials, self._scene).largest_density * self._scene.spacing**self._dim
         rows, coupling, wet = sums / self._units[:, None], self.coupling, self._displaced_masses
         scale = self._levers * (particle / dt)

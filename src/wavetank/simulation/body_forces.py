@@ -18,6 +18,7 @@ from wavetank.foundation.rotations import turned
 from wavetank.scene.forces import Force
 from wavetank.scene.forces.jet import Jet
 from wavetank.simulation.body import Body
+from wavetank.simulation.forces import apply_force
 from wavetank.solids.mass import Ruler
 
 ACROSS = 4  # pieces along the largest extent of a body
@@ -54,7 +55,7 @@ class BodyForces:
         upload(self.particles.x, x[:, : self.dim])
         upload(self.particles.v, before)
         for force in forces:
-            force.apply(self.particles, len(x), dt, time)
+            apply_force(force, self.particles, len(x), dt, time)
         gained = np.zeros_like(x)
         gained[:, : self.dim] = download(self.particles.v)[: len(x)] - before
         for number, body in enumerate(self.members):

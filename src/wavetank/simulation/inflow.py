@@ -14,8 +14,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from wavetank.foundation.rotations import turned
+from wavetank.physics.forces.jet import opening_of
 from wavetank.scene.emitters import Emitter, unit_vector
-from wavetank.scene.forces.jet import Jet, opening_of
+from wavetank.scene.forces.jet import Jet
 from wavetank.scene.mouths import Mouth, frame_of
 from wavetank.scene.scene import Scene
 from wavetank.scene.schedule import gravity_at

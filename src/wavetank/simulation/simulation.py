@@ -29,6 +29,7 @@ from wavetank.simulation import limits
 from wavetank.simulation.bodies import Bodies
 from wavetank.simulation.cost import check_cost, check_frames, check_time
 from wavetank.simulation.coupling import density_in
+from wavetank.simulation.forces import apply_force
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.initial import cull, relax
 from wavetank.simulation.instant import PlacedSolid
@@ -345,7 +346,7 @@ class Simulation:
         self.world.solids_version = self.solids.move_to(*shares)
         if self.count:
             for force in with_images(forces, scene.tank):
-                force.apply(self.world.particles, self.count, dt, start)
+                apply_force(force, self.world.particles, self.count, dt, start)
             self.bodies.step(self.world, scene, dt, limit, shares)
             for term in self.terms:
                 term.apply(self.world, scene, dt)

@@ -16,7 +16,7 @@ from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene
 from wavetank.simulation.prescribed_motion import PrescribedMotions
 from wavetank.simulation.state import SolidsState
-from wavetank.solids import shapes
+from wavetank.solids.build import build, resize
 from wavetank.solids.motion import Pose
 from wavetank.solids.placing import Placing
 from wavetank.solids.sampling import nearest_of
@@ -136,7 +136,7 @@ class Solids(Mapping[str, LiveSolid]):
         chosen = self.members if members is None else members
         reaches = [solid.span() for solid in chosen]
         repeats = self.periods.axes, seen_periods(chosen, self.periods, self.spacing)
-        self.device = shapes.build(chosen, self.tank_count, self.friction, self.spacing, repeats)
+        self.device = build(chosen, self.tank_count, self.friction, self.spacing, repeats)
         self._placing = Placing(self.device, len(chosen))
         self.members, self.reaches = chosen, reaches
         self.has_friction = self.friction > 0.0 or any(solid.friction for solid in chosen)
@@ -305,7 +305,7 @@ class Solids(Mapping[str, LiveSolid]):
             scales = [1.0] * len(self.members)
             for number, (age, time) in self.growing.items():
                 scales[number] = min(1.0, max(age / time, SMALLEST))
-            shapes.resize(self.device, self.members, scales)
+            resize(self.device, self.members, scales)
 
     def _upload(self, begin: float, end: float) -> None:
         self.version = next(_versions)

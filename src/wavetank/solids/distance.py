@@ -1,7 +1,7 @@
 """Signed distances on the device: one function per shape, and the program that combines them.
 
 A solid is a small program in postfix order over `DISTANCES` and the operations union, intersection and difference;
-it runs with a stack of `STACK` values. Every value is (gradient, distance): distance [m] is negative inside, the
+it runs with a stack of `deepest` values. Every value is (gradient, distance): distance [m] is negative inside, the
 gradient is the unit outward normal. Shapes are exact; set operations are exact outside of a union and inside of an
 intersection and a lower bound elsewhere, as usual for constructive distance fields.
 
@@ -28,8 +28,8 @@ vec3 = qd.types.vector(3, qd.f32)
 vec4 = qd.types.vector(4, qd.f32)
 
 
-# Numbers that `shapes.py` writes and `local_distance` reads: functions, because the compiler's cache does not see
-# module constants.
+# The numbers of `solid.Code` and the other constants there: functions, because the compiler's cache does not see
+# constants of modules.
 
 
 @qd.func
@@ -72,11 +72,6 @@ def parts():
 def around():
     """Reach [m] of a container, which is all of space but its hollow: pictures look through it at what it holds."""
     return 4.0e5
-
-
-PARTS, STACK, UNION, INTERSECTION, DIFFERENCE, GRIDS, AROUND = (
-    code.fn() for code in (parts, deepest, union, intersection, difference, grids, around)
-)
 
 
 @qd.func
@@ -196,7 +191,7 @@ def lift(x: qd.template()):
 class SolidSet:
     """All solids of a world on the device; frames are nested: node in solid in world."""
 
-    op: qd.types.ndarray()  # i32 [nodes]: index into DISTANCES, or a set operation below zero
+    op: qd.types.ndarray()  # i32 [nodes]: `solid.Code` of a shape or a set operation, or of a grid
     size: qd.types.ndarray()  # vec4 [nodes], m
     offset: qd.types.ndarray()  # vec3 [nodes], m: origin of the node in its solid
     turn: qd.types.ndarray()  # vec4 [nodes]: quaternion, node to solid

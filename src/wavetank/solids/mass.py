@@ -12,8 +12,9 @@ import numpy as np
 from wavetank.device.compiler import download, qd, upload
 from wavetank.device.state import scalars, vectors
 from wavetank.foundation.errors import WavetankError
+from wavetank.solids.build import build
 from wavetank.solids.distance import SolidSet, local_distance
-from wavetank.solids.shapes import Box, Sphere, build
+from wavetank.solids.shapes import Box, Sphere
 from wavetank.solids.solid import Solid
 
 SEARCH = 48  # boxes along an axis in which the extent is looked for

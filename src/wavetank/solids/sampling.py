@@ -4,8 +4,8 @@ import numpy as np
 
 from wavetank.device.compiler import borrowed, download, qd, upload
 from wavetank.device.state import integers, scalars, vectors
+from wavetank.solids.build import build
 from wavetank.solids.distance import SolidSet, lift, signed_distance, vec3, vec4
-from wavetank.solids.shapes import build
 from wavetank.solids.solid import Solid
 
 _AT_ONCE = 1 << 22  # points

@@ -10,18 +10,21 @@ beyond both of them.
 """
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wavetank.device.periods import Periods
 from wavetank.solids.bounds import bounds_of
 from wavetank.solids.solid import Solid
+
+if TYPE_CHECKING:
+    from wavetank.device.periods import Periods
 
 FELT = 4.0
 NEVER = 1e30  # m: a period that no difference is half of
 
 
-def seen_periods(solids: Sequence[Solid], periods: Periods, spacing: float) -> np.ndarray:
+def seen_periods(solids: Sequence[Solid], periods: "Periods", spacing: float) -> np.ndarray:
     """Return the period [m] along each axis at which a solid is seen at its nearest image, [solids, 3]."""
     return np.array(
         [

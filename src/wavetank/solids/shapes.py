@@ -1,41 +1,21 @@
-"""Solids as plain data: shapes, set operations between them, and their upload to the device.
+"""Solids as plain data: shapes, and set operations between them.
 
 A shape is one model here with its `program`, and one distance function in `distance.py`.
 """
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 from typing_extensions import override
 
-from wavetank.device.compiler import qd, upload
-from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import Edges, Length, Place, Vector, register_model
 from wavetank.foundation.rotations import turn_from_y, unit_quaternion
-from wavetank.solids.distance import (
-    DIFFERENCE,
-    DISTANCES,
-    INTERSECTION,
-    PARTS,
-    STACK,
-    UNION,
-    SolidSet,
-    box_distance,
-    capsule_distance,
-    cylinder_distance,
-    half_space_distance,
-    sphere_distance,
-    vec2,
-    vec3,
-    vec4,
-)
 from wavetank.solids.ground.height_field import HeightField
 from wavetank.solids.ground.polygon import Polygon
 from wavetank.solids.meshes.mesh import Mesh
-from wavetank.solids.meshes.on_device import put_grids
-from wavetank.solids.solid import ENDLESS, Node, Solid, point_in_space
+from wavetank.solids.solid import ENDLESS, Code, Node, Solid, point_in_space
 
 
 def moved(solid: Solid, position: np.ndarray, rotation: np.ndarray) -> Solid:
@@ -68,7 +48,7 @@ class Box(Solid):
     @override
     def program(self) -> list[Node]:
         half = [0.5 * edge for edge in self.size]
-        return [Node(DISTANCES.index(box_distance), half if len(half) == 3 else [*half, ENDLESS])]
+        return [Node(Code.BOX, half if len(half) == 3 else [*half, ENDLESS])]
 
     @override
     def reach(self) -> float:
@@ -100,7 +80,7 @@ class Sphere(Solid):
 
     @override
     def program(self) -> list[Node]:
-        return [Node(DISTANCES.index(sphere_distance), [self.radius])]
+        return [Node(Code.SPHERE, [self.radius])]
 
     @override
     def reach(self) -> float:
@@ -141,7 +121,7 @@ class Capsule(_Axial):
 
     @override
     def program(self) -> list[Node]:
-        return [self._node(DISTANCES.index(capsule_distance))]
+        return [self._node(Code.CAPSULE)]
 
     @override
     def reach(self) -> float:
@@ -155,7 +135,7 @@ class Cylinder(_Axial):
 
     @override
     def program(self) -> list[Node]:
-        return [self._node(DISTANCES.index(cylinder_distance))]
+        return [self._node(Code.CYLINDER)]
 
     @override
     def reach(self) -> float:
@@ -182,7 +162,7 @@ class HalfSpace(Solid):
 
     @override
     def program(self) -> list[Node]:
-        return [Node(DISTANCES.index(half_space_distance), turn=turn_from_y(point_in_space(self.normal)))]
+        return [Node(Code.HALF_SPACE, turn=turn_from_y(point_in_space(self.normal)))]
 
     @override
     def reach(self) -> float:
@@ -238,7 +218,7 @@ class Union(_SetOperation):
 
     @override
     def program(self) -> list[Node]:
-        return self._combine(UNION)
+        return self._combine(Code.UNION)
 
 
 class Intersection(_SetOperation):
@@ -248,7 +228,7 @@ class Intersection(_SetOperation):
 
     @override
     def program(self) -> list[Node]:
-        return self._combine(INTERSECTION)
+        return self._combine(Code.INTERSECTION)
 
 
 class Difference(_SetOperation):
@@ -258,7 +238,7 @@ class Difference(_SetOperation):
 
     @override
     def program(self) -> list[Node]:
-        return self._combine(DIFFERENCE)
+        return self._combine(Code.DIFFERENCE)
 
     @override
     def reach(self) -> float:
@@ -285,79 +265,3 @@ AnySolid = Annotated[
 for _shape in SHAPES:
     _shape.model_rebuild()
     register_model(_shape.model_fields["shape"].default, _shape)
-
-
-def build(
-    solids: Sequence[Solid], tank_count: int, friction: float, spacing: float, repeats: tuple[int, Any] = (0, ())
-) -> SolidSet:
-    """Put `solids` on the device, for particles of that spacing [m]; the first `tank_count` are the tank's walls.
-
-    `repeats`: bits of the axes along which the world is periodic, and the result of `seams.seen_periods`.
-    Raises `WavetankError` for set operations that are nested too deep and for meshes that cannot be measured.
-    """
-    programs = [solid.program() for solid in solids]
-    for solid, program in zip(solids, programs, strict=True):
-        _check_depth(solid, program)
-    nodes = [node for program in programs for node in program] or [Node(0)]
-    codes, grid, samples = put_grids(nodes, spacing)
-    count = max(len(solids), 1)
-    first = np.concatenate([[0], np.cumsum([len(program) for program in programs], dtype=int)])
-    position = np.array([s.origin for s in solids]).reshape(-1, 3)
-    rotation = np.array([s.quaternion for s in solids]).reshape(-1, 4)
-    frictions = [friction if s.friction is None else s.friction for s in solids]
-
-    def array(values: Any, kind: Any, length: int) -> Any:
-        result = qd.ndarray(kind, shape=(length,))
-        upload(result, values)
-        return result
-
-    return SolidSet(
-        op=array(codes, qd.i32, len(nodes)),
-        size=array([n.size for n in nodes], vec4, len(nodes)),
-        offset=array([n.offset for n in nodes], vec3, len(nodes)),
-        turn=array([n.turn for n in nodes], vec4, len(nodes)),
-        first=array(first, qd.i32, count + 1),
-        reach=array([s.reach() for s in solids], qd.f32, count),
-        friction=array(frictions, qd.f32, count),
-        position=array(position, vec3, count),
-        rotation=array(rotation, vec4, count),
-        old_position=array(position, vec3, count),
-        old_rotation=array(rotation, vec4, count),
-        plane=array([], vec4, count),
-        sweep=array([], vec2, count),
-        center=array(position, vec3, count),
-        unit=array([], qd.f32, count),
-        grip=array(np.ones(count), qd.f32, count),
-        reaction=array([], qd.i32, PARTS * count),
-        grid=grid,
-        samples=samples,
-        period=array(repeats[1], vec3, count),
-        count=len(solids),
-        tank_count=tank_count,
-        repeats=repeats[0],
-        has_grids=any(node.mesh is not None for node in nodes),
-        has_operations=any(len(program) > 1 for program in programs),
-    )
-
-
-def _check_depth(solid: Solid, program: list[Node]) -> None:
-    """Raise `WavetankError` for a solid whose program needs more than the stack on the device holds."""
-    depth = deepest = 0
-    for node in program:
-        depth += 1 if node.op >= 0 else -1
-        deepest = max(deepest, depth)
-    if deepest > STACK:
-        raise WavetankError(
-            f"solid {solid.name or type(solid).__name__!r} nests set operations {deepest} deep; "
-            f"at most {STACK} are allowed: build it from several solids."
-        )
-
-
-def resize(device: SolidSet, solids: Sequence[Solid], scales: Sequence[float]) -> None:
-    """Scale the solids on the device by these factors around their origins."""
-    nodes = [(node, scale) for solid, scale in zip(solids, scales, strict=True) for node in solid.program()]
-    for array, values in (
-        (device.size, [scale * node.size for node, scale in nodes]),
-        (device.offset, [scale * node.offset for node, scale in nodes]),
-    ):
-        upload(array, values)

@@ -1,6 +1,7 @@
 """The base class of solids, and the nodes of their programs."""
 
 from collections.abc import Sequence
+from enum import IntEnum
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -8,12 +9,26 @@ from pydantic import Field, model_validator
 
 from wavetank.foundation.model import Model, Number, Positive, Quaternion, Vector
 from wavetank.foundation.rotations import product, turned, unit_quaternion
-from wavetank.solids.distance import DIFFERENCE, DISTANCES, box_distance
 from wavetank.solids.motion import AnyMotion, shorthand
 
 Floats = Sequence[float] | np.ndarray
 Rates = tuple[Number, Number, Number]
 ENDLESS = 1.0e5  # m: half size of infinite shapes
+AROUND = 4.0e5  # m: reach of a container, whose walls have no outside: pictures look through it at what it holds
+GRIDS = 1 << 16  # the code of the first grid of distances, numbered as in `SolidSet.grid`; others follow
+
+
+class Code(IntEnum):
+    """What a node of a program is: a shape, by its number in `distance.shape_distance`, or a set operation."""
+
+    DIFFERENCE = -3
+    INTERSECTION = -2
+    UNION = -1
+    HALF_SPACE = 0
+    BOX = 1
+    SPHERE = 2
+    CAPSULE = 3
+    CYLINDER = 4
 
 
 class Node:
@@ -114,4 +129,4 @@ def point_in_space(vector: Sequence[float]) -> np.ndarray:
 
 def complement(nodes: list[Node]) -> list[Node]:
     """Return the program of the complement of the solid with the program `nodes`."""
-    return [Node(DISTANCES.index(box_distance), [ENDLESS] * 3), *nodes, Node(DIFFERENCE)]
+    return [Node(Code.BOX, [ENDLESS] * 3), *nodes, Node(Code.DIFFERENCE)]

@@ -9,7 +9,8 @@ import dataclasses
 from typing import Any
 
 from wavetank.device.compiler import download, qd
-from wavetank.solids.distance import GRIDS, SolidSet
+from wavetank.solids.distance import SolidSet
+from wavetank.solids.solid import GRIDS
 
 
 class Rounding:

@@ -6,7 +6,7 @@ from surfaces import CUBE, ball, cup
 
 import wavetank as wt
 from wavetank.device.compiler import qd
-from wavetank.solids import shapes
+from wavetank.solids.build import build, resize
 from wavetank.solids.distance import SolidSet, lift, signed_distance
 
 
@@ -21,7 +21,7 @@ def distances(solid, points, spacing=0.05):
     x = qd.ndarray(qd.types.vector(3, qd.f32), shape=(len(points),))
     out = qd.ndarray(qd.types.vector(4, qd.f32), shape=(len(points),))
     x.from_numpy(np.asarray(points, np.float32))
-    evaluate(shapes.build([solid], 0, 0.0, spacing), x, out)
+    evaluate(build([solid], 0, 0.0, spacing), x, out)
     values = out.to_numpy()
     return values[:, :3], values[:, 3]
 
@@ -91,15 +91,15 @@ def test_no_distance_is_too_long_far_out(name):
 def test_sharing_turning_and_growing():
     """Equal meshes share a grid; a set operation places it; a growing one is smaller, not wrong."""
     pair = [BALL, BALL.model_copy(update={"center": (1.0, 0.0, 0.0)}), BOX]
-    device = shapes.build(pair, 0, 0.0, 0.05)
+    device = build(pair, 0, 0.0, 0.05)
     assert device.grid.shape == (2,)
     points = cloud(2000, 0.5)
     shifted = wt.Union(parts=[BALL, BALL], center=(0.3, 0.0, 0.0))
     np.testing.assert_allclose(
         distances(shifted, points + np.float32((0.3, 0, 0)))[1], distances(BALL, points)[1], atol=1e-5
     )
-    device = shapes.build([BALL], 0, 0.0, 0.05)
-    shapes.resize(device, [BALL], [0.5])
+    device = build([BALL], 0, 0.0, 0.05)
+    resize(device, [BALL], [0.5])
     x, out = (qd.ndarray(qd.types.vector(n, qd.f32), shape=(1,)) for n in (3, 4))
     x.from_numpy(np.array([[0.1, 0.2 + 0.175, -0.1]], np.float32))
     evaluate(device, x, out)

@@ -35,7 +35,7 @@ STAGES: dict[str, tuple[str, ...]] = {
     "foam": ("wavetank.physics.foam",),
     "time step": ("wavetank.physics.time_step",),
     "render": ("wavetank.view",),
-    "other": ("wavetank.scene.forces", "wavetank.session.tools", "wavetank.solids", "wavetank.lab", "quadrants"),
+    "other": ("wavetank.physics.forces", "wavetank.session.tools", "wavetank.solids", "wavetank.lab", "quadrants"),
 }
 #: In the order of a frame, as tables show them.
 STAGE_NAMES = ("contact", "neighbours", "grid", "constraint", "velocities", "foam", "time step", "other", "host")

@@ -18,8 +18,9 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import Particles
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
+from wavetank.physics.forces.regions import in_space
 from wavetank.scene.fluids import Points
-from wavetank.scene.forces.force import Force, in_space
+from wavetank.scene.forces.force import Force
 from wavetank.scene.scene import Scene
 from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation

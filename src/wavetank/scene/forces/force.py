@@ -1,14 +1,14 @@
 """What every force has. A force of your own is a subclass with `apply`: see `examples/04_a_force_of_your_own.py`."""
 
-from collections.abc import Sequence
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 from pydantic import Field
 
-from wavetank.device.state import Particles
 from wavetank.foundation.model import FARTHEST, METRES
 from wavetank.foundation.timed import Timed
+
+if TYPE_CHECKING:
+    from wavetank.device.state import Particles
 
 # Bounds within which speeds, their squares, and what a radius divides are numbers in single precision.
 Speed = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]  # m/s
@@ -21,8 +21,11 @@ Radius = Annotated[float, Field(ge=1e-6, le=FARTHEST, allow_inf_nan=False), METR
 class Force(Timed):
     """Something beside gravity that accelerates particles."""
 
-    def apply(self, particles: Particles, count: int, dt: float, time: float) -> None:
-        """Change the velocities of `count` particles for a substep of `dt` [s] that begins at `time` [s] of water."""
+    def apply(self, particles: "Particles", count: int, dt: float, time: float) -> None:
+        """Change the velocities of `count` particles for a substep of `dt` [s] that begins at `time` [s] of water.
+
+        The bundled forces leave this to their kernels in `physics/forces`.
+        """
         raise NotImplementedError
 
     def largest_acceleration(self) -> float:
@@ -36,10 +39,3 @@ class Force(Timed):
     def vectors(self) -> list[tuple[str, tuple[float, ...]]]:
         """Name every vector of this force, to check that all live in one dimension."""
         return []
-
-
-def in_space(vector: Sequence[float]) -> np.ndarray:
-    """Return a vector of a 2-D or 3-D world as one in space, float32 [3]."""
-    point = np.zeros(3, np.float32)
-    point[: len(vector)] = vector
-    return point

@@ -13,9 +13,9 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from wavetank.scene.forces import Attract, Burst, Drag, Force, Vortex, Wind
-from wavetank.scene.forces.force import in_space
 from wavetank.scene.forces.jet import Jet
 from wavetank.scene.tank import Tank
+from wavetank.solids.solid import point_in_space
 
 
 def with_images(forces: Iterable[Force], tank: Tank | None) -> Iterator[Force]:
@@ -52,8 +52,8 @@ def _region(force: Force) -> tuple[np.ndarray, float, np.ndarray] | None:
     if isinstance(force, Attract | Burst | Drag | Vortex | Wind) and force.center is not None and force.radius:
         line = ball
         if isinstance(force, Vortex | Wind):  # tubes
-            line = in_space(force.axis if isinstance(force, Vortex) else force.velocity)
-        return in_space(force.center).astype(float), float(force.radius), line
+            line = point_in_space(force.axis if isinstance(force, Vortex) else force.velocity).astype(np.float32)
+        return point_in_space(force.center).astype(np.float32).astype(float), float(force.radius), line
     return None
 
 

@@ -18,12 +18,9 @@ from typing_extensions import override
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import open_regular, read_array, unpack_text
 from wavetank.foundation.model import Edges, Length, Place
-from wavetank.solids.distance import GRIDS
-from wavetank.solids.ground.outline import measure_outline
 from wavetank.solids.meshes.files import BUNDLED
-from wavetank.solids.meshes.grid import DistanceGrid, measure
-from wavetank.solids.meshes.store import grid_of
-from wavetank.solids.solid import Node, Solid, point_in_space
+from wavetank.solids.meshes.store import DistanceGrid, grid_of
+from wavetank.solids.solid import GRIDS, Node, Solid, point_in_space
 
 MOST_HEIGHTS = 480_000  # two triangles each
 MOST_INLINE = 4096  # numbers that a saved scene writes out
@@ -153,6 +150,9 @@ class HeightField(Solid):
 
         Raises `WavetankError` where the grid would be too large.
         """
+        from wavetank.solids.ground.outline import measure_outline  # kernels
+        from wavetank.solids.meshes.grid import measure
+
         heights, bottom, name = self.elevations() * self.size[1], self._bottom(), self.name or "the height field"
         digest = hashlib.sha256(heights.tobytes()).hexdigest()
         key = f"heights {digest} {heights.shape} {self.size} {bottom} {spacing}"

@@ -10,7 +10,8 @@ from wavetank.device.compiler import download, qd, upload
 from wavetank.device.state import scalars, vectors
 from wavetank.foundation.errors import WavetankError
 from wavetank.solids.distance import vec2
-from wavetank.solids.meshes.grid import REACH, DistanceGrid
+from wavetank.solids.meshes.grid import REACH
+from wavetank.solids.meshes.store import DistanceGrid
 
 CELLS = (4, 3, 2)  # per particle spacing: the first that makes a grid of at most MOST_NODES
 MOST_NODES = 4_000_000

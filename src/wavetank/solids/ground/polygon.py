@@ -9,11 +9,8 @@ from pydantic import model_validator
 from typing_extensions import override
 
 from wavetank.foundation.model import METRES, Number
-from wavetank.solids.distance import AROUND, GRIDS
-from wavetank.solids.ground.outline import measure_outline
-from wavetank.solids.meshes.grid import DistanceGrid
-from wavetank.solids.meshes.store import grid_of
-from wavetank.solids.solid import Node, Solid, complement, point_in_space
+from wavetank.solids.meshes.store import DistanceGrid, grid_of
+from wavetank.solids.solid import AROUND, GRIDS, Node, Solid, complement, point_in_space
 
 MOST_CORNERS = 20_000
 
@@ -71,6 +68,8 @@ class Polygon(Solid):
 
     def grid(self, spacing: float) -> DistanceGrid:
         """Return the distances to the outline for particles of that spacing [m], around the middle of its box."""
+        from wavetank.solids.ground.outline import measure_outline  # kernels
+
         points = np.array(self.points)
         key = f"outline {hashlib.sha256(points.tobytes()).hexdigest()} {spacing}"
         return grid_of(key, lambda: measure_outline(points, spacing, self.name or "the polygon"))

@@ -19,13 +19,12 @@ winding numbers" (10.1145/2461912.2461916); where we differ: six directions inst
 counting along its lines.
 """
 
-import dataclasses
-
 import numpy as np
 
 from wavetank.device.compiler import download, qd, upload
 from wavetank.foundation.errors import WavetankError
 from wavetank.solids.distance import vec3
+from wavetank.solids.meshes.store import DistanceGrid
 from wavetank.solids.meshes.tree import (
     Tree,
     box_square,
@@ -45,14 +44,6 @@ REACH = 3.0  # spacings, the longest support: so far around the mesh goes the gr
 NEARLY = 0.7  # farther out a distance grows by only that share of the way: never too long, and most of the work saved
 #: Rays pass nodes at this distance [cells], so that they do not run along faces that lie on the grid.
 _ASIDE = (1.13e-3, 1.71e-3)
-
-
-@dataclasses.dataclass(frozen=True)
-class DistanceGrid:
-    """Signed distances at the nodes of a grid around the origin, negative inside."""
-
-    distances: np.ndarray  # float32 [nz, ny, nx], m
-    cell: float  # m
 
 
 def measure(

@@ -12,12 +12,10 @@ from typing_extensions import override
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import METRES, Length, Number
-from wavetank.solids.distance import AROUND, GRIDS
 from wavetank.solids.meshes.files import bundled_models, read_file, read_model
-from wavetank.solids.meshes.grid import DistanceGrid, measure
-from wavetank.solids.meshes.store import grid_of
+from wavetank.solids.meshes.store import DistanceGrid, grid_of
 from wavetank.solids.meshes.triangles import Triangles, volume_within
-from wavetank.solids.solid import Node, Solid, complement, point_in_space
+from wavetank.solids.solid import AROUND, GRIDS, Node, Solid, complement, point_in_space
 
 FLAT = 1e-6  # of the longest edge
 _UP = {"x": (0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0), "z": (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0)}
@@ -127,6 +125,8 @@ class Mesh(Solid):
 
         Raises `WavetankError` for a mesh that cannot be read, is not closed or too large.
         """
+        from wavetank.solids.meshes.grid import measure  # kernels
+
         triangles, points = self._triangles(), self.vertices()
         key = f"{triangles.digest} {self.up} {self.size} {self.thickness} {spacing}" + " hollow" * self.invert
         name = self.name or self._label()

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import qd, upload
-from wavetank.solids.distance import GRIDS
-from wavetank.solids.meshes.grid import DistanceGrid
-from wavetank.solids.solid import Node
+from wavetank.solids.meshes.store import DistanceGrid
+from wavetank.solids.solid import GRIDS, Node
 
 
 def put_grids(nodes: Sequence[Node], spacing: float) -> tuple[list[int], Any, Any]:

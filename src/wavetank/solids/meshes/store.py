@@ -1,6 +1,7 @@
 """Cache of distance grids: in this process, and in the user's cache folder."""
 
 import contextlib
+import dataclasses
 import hashlib
 import math
 from collections.abc import Callable
@@ -12,10 +13,19 @@ from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.folders import cache_folder
 from wavetank.foundation.input_limits import read_arrays
-from wavetank.solids.meshes.grid import DistanceGrid
 
 FORMAT = 2  # counts up when the same mesh would give other distances
 _KEPT = 8  # grids in memory
+
+
+@dataclasses.dataclass(frozen=True)
+class DistanceGrid:
+    """Signed distances at the nodes of a grid around the origin, negative inside."""
+
+    distances: np.ndarray  # float32 [nz, ny, nx], m
+    cell: float  # m
+
+
 _grids: dict[str, DistanceGrid] = {}
 
 

@@ -5,6 +5,10 @@ share    (1 - q^2)^2         1 in the middle, 0 with zero slope at q = 1   1
 q        r / R               distance over the radius                      1
 """
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from wavetank.device.compiler import qd
 
 
@@ -32,3 +36,10 @@ def add_to(v: qd.template(), dv):
     for k in qd.static(range(v.n)):
         result[k] += dv[k]
     return result
+
+
+def in_space(vector: Sequence[float]) -> np.ndarray:
+    """Return a vector of a 2-D or 3-D world as one in space, float32 [3]."""
+    point = np.zeros(3, np.float32)
+    point[: len(vector)] = vector
+    return point
