@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wavetank as wt
-from wavetank.scene.mouths import MOST_IN_A_ROW, mouth_of
+from wavetank.scene.inlets import MOST_IN_A_ROW, inlet_of
 from wavetank.simulation.inflow import closing_speed, jet_force, outlines
 
 FLAT = wt.Tank(size=(1.0, 0.8))
@@ -33,18 +33,18 @@ def world(*emitters, **fields) -> wt.Simulation:
 )
 def test_a_row_has_the_volume_of_its_particles_and_no_clumps(shape, area):
     d = 0.02
-    mouth = mouth_of(shape, d, 0.0, 3)
-    assert len(mouth) * d**3 == pytest.approx(area * mouth.pitch)
-    assert mouth.area == pytest.approx(area)
+    inlet = inlet_of(shape, d, 0.0, 3)
+    assert len(inlet) * d**3 == pytest.approx(area * inlet.pitch)
+    assert inlet.area == pytest.approx(area)
     if area > 3 * d**2:
-        assert mouth.pitch == pytest.approx(d, rel=0.25)
-        gaps = np.linalg.norm(mouth.places[:, None] - mouth.places[None], axis=2) + 9 * np.eye(len(mouth))
+        assert inlet.pitch == pytest.approx(d, rel=0.25)
+        gaps = np.linalg.norm(inlet.places[:, None] - inlet.places[None], axis=2) + 9 * np.eye(len(inlet))
         assert gaps.min() > 0.8 * d
 
 
 def test_a_row_of_too_many_particles_is_refused():
     with pytest.raises(wt.WavetankError, match=f"at most {MOST_IN_A_ROW:,} are allowed"):
-        mouth_of({"shape": "disc", "radius": 1.0}, 0.005, 0.0, 3)
+        inlet_of({"shape": "disc", "radius": 1.0}, 0.005, 0.0, 3)
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_a_row_of_too_many_particles_is_refused():
 def test_flow_is_right_within_a_row(emitter):
     d = 0.02
     sim = wt.Simulation(wt.Scene(spacing=d, tank=wt.Tank(size=(0.6, 0.8, 0.6)), emitters=[emitter], foam=0.0))
-    mouth = emitter.mouth(d)
+    mouth = emitter.inlet(d)
     for frames in (13, 17):
         for _ in range(frames):
             sim.step()

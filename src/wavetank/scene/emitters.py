@@ -11,7 +11,7 @@ from wavetank.foundation.model import METRES, Length, Number, Place, Positive, V
 from wavetank.foundation.timed import Timed
 from wavetank.scene.drains import LITRE
 from wavetank.scene.gauges import Gauge
-from wavetank.scene.mouths import Mouth, mouth_of, mouth_of_mesh
+from wavetank.scene.inlets import Inlet, inlet_of, inlet_of_mesh
 from wavetank.solids.meshes.mesh import Mesh
 from wavetank.solids.motion import AnyMotion
 
@@ -137,23 +137,23 @@ class Emitter(Timed):
         own = [(name, tuple(value)) for name, value in found if value is not None]
         return own + [(f"gauge.{name}", value) for name, value in self.gauge.vectors()] if self.gauge else own
 
-    def mouth(self, spacing: float) -> Mouth:
+    def inlet(self, spacing: float) -> Inlet:
         """Return the places of a row for particles of that spacing [m]."""
         if self.mesh is not None:
-            return mouth_of_mesh(self.mesh, spacing)
+            return inlet_of_mesh(self.mesh, spacing)
         shape = {"shape": self.shape} | {name: getattr(self, name) for name in NEEDS[self.shape]}
-        return mouth_of(shape, spacing, self.spread, len(self.middle))
+        return inlet_of(shape, spacing, self.spread, len(self.middle))
 
-    def rate(self, mouth: Mouth) -> float:
+    def rate(self, inlet: Inlet) -> float:
         """Return the volume that comes out in a second [m^3/s; m^2/s in a 2-D world]."""
         if self.flow is not None:
             return self.flow * self.unit
         assert self.speed is not None
-        return self.speed * mouth.area
+        return self.speed * inlet.area
 
-    def pace(self, mouth: Mouth) -> float:
+    def pace(self, inlet: Inlet) -> float:
         """Return the speed [m/s] at which it comes out."""
-        return self.speed if self.speed is not None else self.rate(mouth) / mouth.area
+        return self.speed if self.speed is not None else self.rate(inlet) / inlet.area
 
 
 def unit_vector(vector: Any) -> np.ndarray:

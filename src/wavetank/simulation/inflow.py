@@ -17,7 +17,7 @@ from wavetank.foundation.rotations import turned
 from wavetank.physics.forces.jet import opening_of
 from wavetank.scene.emitters import Emitter, unit_vector
 from wavetank.scene.forces.jet import Jet
-from wavetank.scene.mouths import Mouth, frame_of
+from wavetank.scene.inlets import Inlet, frame_of
 from wavetank.scene.scene import Scene
 from wavetank.scene.schedule import gravity_at
 
@@ -40,7 +40,7 @@ class Emission:
         return Emission(self.place, since + interval * self.age)
 
 
-def particles_due(inlet: Mouth, phase: float, rows: float) -> tuple[Emission, float]:
+def particles_due(inlet: Inlet, phase: float, rows: float) -> tuple[Emission, float]:
     """Return the particles that leave while `rows` pass an inlet, with ages in rows, and the next phase."""
     after = phase + rows
     whole = np.floor(after - inlet.phases).astype(int)
@@ -52,13 +52,13 @@ def particles_due(inlet: Mouth, phase: float, rows: float) -> tuple[Emission, fl
     return Emission(place[order], age[order]), after - math.floor(after)
 
 
-def one_row(inlet: Mouth) -> Emission:
+def one_row(inlet: Inlet) -> Emission:
     """Return a particle in each place that leaves now."""
     return Emission(np.arange(len(inlet)), np.zeros(len(inlet)))
 
 
 def fly_freely(
-    scene: Scene, emitter: Emitter, inlet: Mouth, due: Emission, end: float, dt: float
+    scene: Scene, emitter: Emitter, inlet: Inlet, due: Emission, end: float, dt: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return positions [m] and velocities [m/s], [n, dim], at `end` [s] of particles with these ages [s].
 
@@ -108,7 +108,7 @@ def inlet_frame(emitter: Emitter, dim: int, clock: float) -> tuple[np.ndarray, n
 
 def jet_force(scene: Scene, emitter: Emitter, clock: float) -> Jet:
     """Return the force that holds the speed of a jet in its inlet at `clock` [s] of the scene."""
-    inlet, dim = emitter.mouth(scene.spacing), scene.dim
+    inlet, dim = emitter.inlet(scene.spacing), scene.dim
     middle, axes = inlet_frame(emitter, dim, clock)
     g = np.zeros(3)
     g[:dim] = gravity_at(scene, clock - scene.start_time)
@@ -157,7 +157,7 @@ def outlines(scene: Scene, time: float) -> list[tuple[str, np.ndarray]]:
     for emitter in (emitter.at(clock) for emitter in scene.emitters if emitter.mesh is None):
         middle, axes = inlet_frame(emitter, scene.dim, clock)
         edge = circle if emitter.shape in ("disc", "ring") else corners
-        found.append(("emitter", middle + (edge * emitter.mouth(scene.spacing).half) @ axes[:2]))
+        found.append(("emitter", middle + (edge * emitter.inlet(scene.spacing).half) @ axes[:2]))
     for drain in (drain.at(clock) for drain in scene.drains if drain.shape == "mouth"):
         assert drain.radius is not None
         axes = frame_of(unit_vector(drain.direction), scene.dim)

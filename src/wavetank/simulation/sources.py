@@ -188,7 +188,7 @@ class Sources(Mapping[str, Source]):
             return
         scene, spacing = particles.scene, particles.scene.spacing
         now = emitter.at(0.5 * (first + last))
-        inlet = now.mouth(spacing)
+        inlet = now.inlet(spacing)
         volume = len(inlet) * spacing**scene.dim
         rows = now.rate(inlet) * (last - first) / volume
         source.flows = rows > 0.0
@@ -275,7 +275,7 @@ def check_places(particles: ParticleSystem, dt: float) -> None:
     scene = particles.scene
     for number, emitter in enumerate(scene.emitters):
         now = emitter.at(scene.start_time)
-        inlet = now.mouth(scene.spacing)
+        inlet = now.inlet(scene.spacing)
         x, _ = fly_freely(scene, emitter, inlet, one_row(inlet), scene.start_time, dt)
         if inlet.pitch > SPARSE * scene.spacing:
             raise WavetankError(

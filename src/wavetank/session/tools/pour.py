@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import PrivateAttr
 from typing_extensions import override
 
-from wavetank.scene.mouths import disc_rows, line_rows
+from wavetank.scene.inlets import disc_rows, line_rows
 from wavetank.session.tools.hand import Hand
 from wavetank.session.tools.tool import Color, Tool, dye_of, option
 from wavetank.simulation.sources import rows_due

@@ -1,15 +1,15 @@
-"""Openings of inlets: places of the particles of one row, such that the jet has the density of water at rest.
+"""Openings of emitters: places of the particles of one row, such that the jet has the density of water at rest.
 
 Neighbours leave a quarter of a row after each other: a jet that gravity draws out would fall apart into discs if whole
 rows left at once.
 
-A row is a slice of the jet as long as the distance to the next one. With n particles in a mouth of the area A, each has
-the area A / n and rows are d^3 n / A apart: whatever n is, a particle has its volume d^3. The lattice in the mouth is
-stretched by a few per cent until it holds such an n that rows are about d apart as well.
+A row is a slice of the jet as long as the distance to the next one. With n particles in an opening of the area A, each
+has the area A / n and rows are d^3 n / A apart: whatever n is, a particle has its volume d^3. The lattice in the opening
+is stretched by a few per cent until it holds such an n that rows are about d apart as well.
 
     code     symbol   meaning                                                          unit
     spacing  d        distance of particles at rest                                    m
-    area     A        of the mouth; in a 2-D world its width                           m^2; m
+    area     A        of the opening; in a 2-D world its width                           m^2; m
     pitch             distance of rows: d^3 n / A, in 2-D d^2 n / A                    m
 """
 
@@ -32,8 +32,8 @@ CANDIDATES = 8  # places that are tried for each particle on a mesh
 
 
 @dataclasses.dataclass(frozen=True)
-class Mouth:
-    """Places of a row in the frame of an emitter: across, up, and ahead."""
+class Inlet:
+    """Places of the particles of a row in the frame of an emitter: across, up and ahead."""
 
     places: np.ndarray  # m, [n, 3]
     ways: np.ndarray  # unit vectors, [n, 3]
@@ -48,7 +48,7 @@ class Mouth:
 
 
 def frame_of(ahead: np.ndarray, dim: int, side: np.ndarray | None = None) -> np.ndarray:
-    """Return the frame (across, up, ahead) of a mouth as rows, [3, 3]; `ahead` has unit length.
+    """Return the frame (across, up, ahead) of an inlet as rows, [3, 3]; `ahead` has unit length.
 
     Across is horizontal, or along `side` as far as that is not ahead; in a 2-D world it lies in the plane.
     """
@@ -161,20 +161,20 @@ def _check_number(number: float) -> None:
         )
 
 
-def mouth_of(shape: dict[str, Any], spacing: float, spread: float, dim: int) -> Mouth:
-    """Return the mouth of a `shape` with its sizes [m]; at the rim water leaves `spread` [rad] off the axis."""
-    return _mouth_of(json.dumps(shape, sort_keys=True), spacing, spread, dim)
+def inlet_of(shape: dict[str, Any], spacing: float, spread: float, dim: int) -> Inlet:
+    """Return the inlet of a `shape` with its sizes [m]; at the rim water leaves at `spread` [rad] to the axis."""
+    return _inlet_of(json.dumps(shape, sort_keys=True), spacing, spread, dim)
 
 
 @functools.lru_cache(maxsize=64)
-def _mouth_of(text: str, spacing: float, spread: float, dim: int) -> Mouth:
+def _inlet_of(text: str, spacing: float, spread: float, dim: int) -> Inlet:
     shape = json.loads(text)
     points, area, half = SHAPES[shape["shape"]](shape, spacing)
     _check_number(len(points))
     places = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
     ways = np.concatenate([points * math.tan(spread) / max(*half, 1e-12), np.ones((len(points), 1))], axis=1)
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    return Mouth(places, ways, _phases(points), area, spacing**dim * len(points) / area, half)
+    return Inlet(places, ways, _phases(points), area, spacing**dim * len(points) / area, half)
 
 
 def _phases(points: np.ndarray) -> np.ndarray:
@@ -186,13 +186,13 @@ def _phases(points: np.ndarray) -> np.ndarray:
     return np.asarray((2 * i.reshape(-1) + j.reshape(-1)) % 4 / 4.0)
 
 
-def mouth_of_mesh(mesh: Mesh, spacing: float) -> Mouth:
-    """Return a mouth that is the surface of a mesh; water leaves along its normals."""
-    return _mouth_of_mesh(mesh.path, mesh.data, mesh.size, mesh.up, spacing)
+def inlet_of_mesh(mesh: Mesh, spacing: float) -> Inlet:
+    """Return the inlet that is the surface of a mesh; water leaves along its normals."""
+    return _inlet_of_mesh(mesh.path, mesh.data, mesh.size, mesh.up, spacing)
 
 
 @functools.lru_cache(maxsize=16)
-def _mouth_of_mesh(path: str, data: str, size: Any, up: Any, spacing: float) -> Mouth:
+def _inlet_of_mesh(path: str, data: str, size: Any, up: Any, spacing: float) -> Inlet:
     corners = Mesh(path=path, data=data, size=size, up=up, center=(0.0, 0.0, 0.0)).corners()
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = 0.5 * np.linalg.norm(sides, axis=1)
@@ -213,4 +213,4 @@ def _mouth_of_mesh(path: str, data: str, size: Any, up: Any, spacing: float) -> 
     normals = sides[which[chosen]] / (2.0 * areas[which[chosen]])[:, None]
     half = np.abs(points).max(axis=0)
     phases = GOLDEN * np.arange(count) % 1.0
-    return Mouth(points[chosen], normals, phases, area, spacing**3 * count / area, (float(half[0]), float(half[1])))
+    return Inlet(points[chosen], normals, phases, area, spacing**3 * count / area, (float(half[0]), float(half[1])))
