@@ -4,8 +4,8 @@ Neighbours leave a quarter of a row after each other: a jet that gravity draws o
 rows left at once.
 
 A row is a slice of the jet as long as the distance to the next one. With n particles in an opening of the area A, each
-has the area A / n and rows are d^3 n / A apart: whatever n is, a particle has its volume d^3. The lattice in the opening
-is stretched by a few per cent until it holds such an n that rows are about d apart as well.
+has the area A / n and rows are d^3 n / A apart: whatever n is, a particle has its volume d^3. The lattice in the
+opening is stretched by a few per cent until it holds such an n that rows are about d apart as well.
 
     code     symbol   meaning                                                          unit
     spacing  d        distance of particles at rest                                    m
