@@ -6,6 +6,7 @@ is an error. Until `start` the compiler is as its makers wrote it: another progr
 """
 
 import contextlib
+import inspect
 import io
 import itertools
 import os
@@ -28,6 +29,10 @@ with contextlib.redirect_stdout(io.StringIO()), patches.short_frames():
     import quadrants as qd
     from quadrants.lang.util import to_numpy_type
 
+# At each function that is declared while a module is imported, the compiler asks `inspect` for the module of a frame of
+# the import system. It is looked for among all modules, each time, unless `inspect` has it in its own table.
+for _frozen in ("_bootstrap", "_bootstrap_external"):
+    getattr(inspect, "modulesbyfile", {}).setdefault(f"<frozen importlib.{_frozen}>", f"importlib.{_frozen}")
 # A damaged cache of kernels costs time; nobody needs to hear of it.
 warnings.filterwarnings("ignore", module=r"quadrants\.lang\._fast_caching")
 
