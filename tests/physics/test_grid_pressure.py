@@ -11,10 +11,10 @@ from wavetank.device.compiler import qd
 from wavetank.foundation.materials import Material
 from wavetank.physics import step as step_of_algorithm
 from wavetank.physics.coefficients import coefficients
-from wavetank.physics.plan import has_grid_pressure
+from wavetank.physics.planning import has_grid_pressure
 from wavetank.physics.pressure import grid as pressure_grid
 from wavetank.physics.pressure import multigrid, solids
-from wavetank.physics.pressure.correct import query_solids
+from wavetank.physics.pressure.correct import update_open_volume
 from wavetank.physics.pressure.grid import Level, Workspace, new_pressure_grid
 from wavetank.physics.smoothing import NAMES, kernel_shape, rest_lattice
 from wavetank.scene.fluids import Points
@@ -346,7 +346,7 @@ def test_the_room_that_solids_leave_follows_them():
             sim.step()
         level = sim.world.pressure.finest
         kept = level.open_volume.to_numpy()
-        query_solids(sim.world, sim.world.pressure, sim.scene, coefficients(sim.scene, 1.0 / 60.0))
+        update_open_volume(sim.world, sim.world.pressure, sim.scene, coefficients(sim.scene, 1.0 / 60.0))
         np.testing.assert_array_equal(level.open_volume.to_numpy(), kept)
         return kept
 
@@ -399,7 +399,7 @@ def test_solids_together_leave_the_room_that_their_union_does(count):
         scene = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6, 0.6)), fluids=[water], solids=solids)
         sim = Simulation(scene)
         level, workspace = sim.world.pressure.finest, sim.world.pressure.workspace
-        query_solids(sim.world, sim.world.pressure, sim.scene, coefficients(sim.scene, 1.0 / 60.0))
+        update_open_volume(sim.world, sim.world.pressure, sim.scene, coefficients(sim.scene, 1.0 / 60.0))
         nodes = level.nx * level.ny * level.nz
         return level.open_volume.to_numpy()[:nodes], workspace.thin_distance.to_numpy()[:nodes]
 

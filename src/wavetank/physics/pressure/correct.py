@@ -281,7 +281,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     assert grid is not None, "there is no tank"
     finest, w, gravity = grid.finest, grid.workspace, (c.gravity_x, c.gravity_y, c.gravity_z)
     if grid.solids_version != world.solids_version or (world.pieces and grid.gravity != gravity):
-        look_at_solids(world, grid, params, c)
+        update_open_volume(world, grid, params, c)
     has = variant_of(world, mixed=kinds.mixed, thin_walls=grid.has_thin_walls)
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     source = source_of(finest, params, stiffness, bodies=world.pieces is not None)
@@ -330,7 +330,7 @@ def variant_of(world: World, *, mixed: int = 0, thin_walls: bool) -> Variant:
     )
 
 
-def look_at_solids(world: World, grid: PressureGrid, params: Parameters, c: Coefficients) -> None:
+def update_open_volume(world: World, grid: PressureGrid, params: Parameters, c: Coefficients) -> None:
     """Find what solids leave open of the cells, once they have moved."""
     has = variant_of(world, thin_walls=world.may_have_thin_walls)
     grid.found.fill(0)
