@@ -131,7 +131,7 @@ def test_pour_stops_at_the_limit():
     session = Session(basin(), most_particles=180)
     use(session, "pour", (0.6, 0.7), frames=60, width=0.3, speed=1.0)
     assert session.sim.count <= 180
-    assert any("at most 180" in note for note in session.notes)
+    assert any("stops at 180" in note for note in session.notes)
 
 
 def test_drain_takes_water_away_and_nothing_else(session):

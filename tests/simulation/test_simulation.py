@@ -443,7 +443,7 @@ def test_a_simulation_is_composed_of_parts():
     assert sim.viscosity == sim.scene.viscosity == 0.2 and {"viscosity", "solids"} <= set(dir(sim))
     sim.viscosity = 0.3
     assert sim.parameters.viscosity == 0.3 and sim.parameters.spacing == 0.1 and "spacing" in dir(sim.parameters)
-    with pytest.raises(wt.WavetankError, match="spacing cannot change while the water runs"):
+    with pytest.raises(wt.WavetankError, match="spacing cannot change during a simulation"):
         sim.parameters.spacing = 0.2
     with pytest.raises(wt.WavetankError, match="viscosity = -1"):
         sim.parameters.viscosity = -1.0

@@ -25,7 +25,7 @@ def test_a_ball_is_cut_at_the_seam_and_goes_on_at_the_other_side():
     assert [ball.color, image.color] == ["#ff0000", "#ff0000"]
     assert ball.origin[0] == 1.95
     np.testing.assert_allclose(image.origin, [-0.05, 0.2, 0.5])
-    boxes = [one.solid.parts[0].radius for one in shown.stand() if one.solid.shape == "difference"]
+    boxes = [one.solid.parts[0].radius for one in shown.placed if one.solid.shape == "difference"]
     assert boxes == [0.15, 0.15]
 
 

@@ -192,7 +192,8 @@ def test_a_library_that_is_missing_is_one_sentence(scene_file, monkeypatch):
 def test_grids_are_measured_once(cache, monkeypatch):
     """In memory, on disk, and again where the file in the cache is damaged or nothing can be written."""
     calls = []
-    monkeypatch.setattr("wavetank.solids.meshes.mesh.measure", lambda *a: calls.append(a) or grid.measure(*a))
+    measure = grid.measure
+    monkeypatch.setattr(grid, "measure", lambda *a: calls.append(a) or measure(*a))
     solid = wt.Mesh.of(*CUBE, **PLACE)
     first = solid.grid(0.05).distances
     solid.grid(0.05)

@@ -153,13 +153,12 @@ def splat_particles(
             kk = mirrored_index(k, grid.nz, grid.walled)
             for j in range(first.y, last.y + 1):
                 jj = qd.select(j >= grid.ny, -1, mirrored_index(j, grid.ny, grid.walled))
-                if kk >= 0 and jj >= 0:
-                    for i in range(first.x, last.x + 1):
-                        ii = mirrored_index(i, grid.nx, grid.walled)
-                        r = grid.lower + (vec3(i, j, k) + 0.5) * grid.step - p
-                        q = 1.0 - r.dot(r) / (reach * reach)
-                        if ii >= 0 and q > 0.0:
-                            qd.atomic_add(sums[node_at(grid, ii, jj, kk)], qd.cast(unit * q * q * q + 0.5, qd.i32))
+                for i in range(first.x, last.x + 1):
+                    ii = mirrored_index(i, grid.nx, grid.walled)
+                    r = grid.lower + (vec3(i, j, k) + 0.5) * grid.step - p
+                    q = 1.0 - r.dot(r) / (reach * reach)
+                    if qd.min(qd.min(ii, jj), kk) >= 0 and q > 0.0:
+                        qd.atomic_add(sums[node_at(grid, ii, jj, kk)], qd.cast(unit * q * q * q + 0.5, qd.i32))
 
 
 @qd.func
@@ -243,16 +242,22 @@ def add_ellipsoids(sums: qd.types.ndarray(), ellipsoids: Ellipsoids, grid: Grid,
             c = ellipsoids.center[a]
             diagonal, others, determinant = inverse_of(ellipsoids.axes[a], ellipsoids.mixed[a])
             if determinant > 0.0:
-                reach = size + 2.0 * grid.step.max()
-                first = qd.cast(qd.ceil((c - reach - grid.lower) / grid.step - 0.5), qd.i32)
-                last = qd.cast(qd.floor((c + reach - grid.lower) / grid.step - 0.5), qd.i32)
-                for k in range(qd.max(first.z, 0), qd.min(last.z, grid.nz - 1) + 1):
-                    for j in range(qd.max(first.y, 0), qd.min(last.y, grid.ny - 1) + 1):
-                        for i in range(qd.max(first.x, 0), qd.min(last.x, grid.nx - 1) + 1):
-                            r = grid.lower + (vec3(i, j, k) + 0.5) * grid.step - c
-                            depth = depth_in_ellipsoid(diagonal, others, r, size)
-                            if depth > -2.5 * grid.step.max():
-                                qd.atomic_max(sums[node_at(grid, i, j, k)], qd.cast(depth * unit, qd.i32))
+                raise_nodes(sums, grid, c, diagonal, others, size, unit)
+
+
+@qd.func
+def raise_nodes(sums: qd.template(), grid: Grid, c, diagonal, others, size, unit):
+    """Raise the nodes around the centre `c` [m] of an ellipsoid with that inverse matrix to their depth in it."""
+    reach = size + 2.0 * grid.step.max()
+    first = qd.cast(qd.ceil((c - reach - grid.lower) / grid.step - 0.5), qd.i32)
+    last = qd.cast(qd.floor((c + reach - grid.lower) / grid.step - 0.5), qd.i32)
+    for k in range(qd.max(first.z, 0), qd.min(last.z, grid.nz - 1) + 1):
+        for j in range(qd.max(first.y, 0), qd.min(last.y, grid.ny - 1) + 1):
+            for i in range(qd.max(first.x, 0), qd.min(last.x, grid.nx - 1) + 1):
+                r = grid.lower + (vec3(i, j, k) + 0.5) * grid.step - c
+                depth = depth_in_ellipsoid(diagonal, others, r, size)
+                if depth > -2.5 * grid.step.max():
+                    qd.atomic_max(sums[node_at(grid, i, j, k)], qd.cast(depth * unit, qd.i32))
 
 
 @qd.func
