@@ -12,11 +12,11 @@ import pytest
 
 #: of the third frame of each scene of `worlds.compile_kernels`; the driver's launches are the loops of ours
 FRAMES = {
-    "obstacle-tank": {"steps": 1, "launch": 101, "wait": 4},
-    "obstacle-tank-2d": {"steps": 1, "launch": 103, "wait": 4},
-    "honey": {"steps": 2, "launch": 211, "wait": 10},
-    "oil-and-water": {"steps": 1, "launch": 108, "wait": 4},
-    "crates": {"steps": 1, "launch": 157, "wait": 15},
+    "obstacle-tank": {"steps": 1, "launch": 111, "wait": 4},
+    "obstacle-tank-2d": {"steps": 1, "launch": 113, "wait": 4},
+    "honey": {"steps": 2, "launch": 215, "wait": 10},
+    "oil-and-water": {"steps": 1, "launch": 107, "wait": 4},
+    "crates": {"steps": 1, "launch": 166, "wait": 15},
 }
 
 
