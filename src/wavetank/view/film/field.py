@@ -238,49 +238,35 @@ def add_ellipsoids(sums: qd.types.ndarray(), ellipsoids: Ellipsoids, grid: Grid,
     """Raise every node to its depth in the ellipsoids around it; lone particles are drawn as balls instead."""
     for a in range(count):
         size = ellipsoids.size[a]
-        if size > 0.0 and ellipsoids.lone[a] == 0:
-            c = ellipsoids.center[a]
-            diagonal, others, determinant = inverse_of(ellipsoids.axes[a], ellipsoids.mixed[a])
-            if determinant > 0.0:
-                raise_nodes(sums, grid, c, diagonal, others, size, unit)
-
-
-@qd.func
-def raise_nodes(sums: qd.template(), grid: Grid, c, diagonal, others, size, unit):
-    """Raise the nodes around the centre `c` [m] of an ellipsoid with that inverse matrix to their depth in it."""
-    reach = size + 2.0 * grid.step.max()
-    first = qd.cast(qd.ceil((c - reach - grid.lower) / grid.step - 0.5), qd.i32)
-    last = qd.cast(qd.floor((c + reach - grid.lower) / grid.step - 0.5), qd.i32)
-    for k in range(qd.max(first.z, 0), qd.min(last.z, grid.nz - 1) + 1):
-        for j in range(qd.max(first.y, 0), qd.min(last.y, grid.ny - 1) + 1):
-            for i in range(qd.max(first.x, 0), qd.min(last.x, grid.nx - 1) + 1):
-                r = grid.lower + (vec3(i, j, k) + 0.5) * grid.step - c
-                depth = depth_in_ellipsoid(diagonal, others, r, size)
-                if depth > -2.5 * grid.step.max():
-                    qd.atomic_max(sums[node_at(grid, i, j, k)], qd.cast(depth * unit, qd.i32))
-
-
-@qd.func
-def inverse_of(m, o):
-    """Inverse of a symmetric matrix by its cofactors, and its determinant: without a positive one there is none.
-
-    `m` is its diagonal, `o` its elements xy, xz, yz; so is the inverse.
-    """
-    p, q, s = m.y * m.z - o.z * o.z, o.y * o.z - o.x * m.z, o.x * o.z - o.y * m.y
-    determinant = m.x * p + o.x * q + o.y * s
-    diagonal, others = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
-    if determinant > 0.0:
+        if not (size > 0.0 and ellipsoids.lone[a] == 0):
+            continue
+        c = ellipsoids.center[a]
+        m, o = ellipsoids.axes[a], ellipsoids.mixed[a]
+        # The inverse of B^2 by its cofactors.
+        p, q, s = m.y * m.z - o.z * o.z, o.y * o.z - o.x * m.z, o.x * o.z - o.y * m.y
+        determinant = m.x * p + o.x * q + o.y * s
+        if not determinant > 0.0:
+            continue
         per = 1.0 / determinant
         diagonal = per * vec3(p, m.x * m.z - o.y * o.y, m.x * m.y - o.x * o.x)
-        others = per * vec3(q, s, o.x * o.y - m.x * o.z)
-    return diagonal, others, determinant
+        others = per * vec3(q, s, o.x * o.y - m.x * o.z)  # xy, xz, yz
+        reach = size + 2.0 * grid.step.max()
+        first = qd.cast(qd.ceil((c - reach - grid.lower) / grid.step - 0.5), qd.i32)
+        last = qd.cast(qd.floor((c + reach - grid.lower) / grid.step - 0.5), qd.i32)
+        for k in range(qd.max(first.z, 0), qd.min(last.z, grid.nz - 1) + 1):
+            for j in range(qd.max(first.y, 0), qd.min(last.y, grid.ny - 1) + 1):
+                for i in range(qd.max(first.x, 0), qd.min(last.x, grid.nx - 1) + 1):
+                    r = grid.lower + (vec3(i, j, k) + 0.5) * grid.step - c
+                    depth = depth_in_ellipsoid(diagonal, others, r, size)
+                    if depth > -2.5 * grid.step.max():
+                        qd.atomic_max(sums[node_at(grid, i, j, k)], qd.cast(depth * unit, qd.i32))
 
 
 @qd.func
 def depth_in_ellipsoid(diagonal, others, r, size):
     """Approximate depth [m] at `r` from the middle of an ellipsoid r^T A r = 1, of which `size` is the largest radius.
 
-    `diagonal` and `others` are those of the matrix A, as in `inverse_of`.
+    `diagonal` is that of the symmetric matrix A, `others` its elements xy, xz, yz.
     """
     g = diagonal * r + vec3(
         others.x * r.y + others.y * r.z, others.x * r.x + others.z * r.z, others.y * r.x + others.z * r.y
