@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     from wavetank.formats.robots import load_mjcf, load_robot, load_urdf
     from wavetank.formats.splishsplash import load_splishsplash
     from wavetank.page.notebook.show import show
+    from wavetank.physics.terms.term import Hook, Term
     from wavetank.scene.forces import Attract, Burst, Drag, Force, Sway, Vortex, Wind
     from wavetank.session import commands
     from wavetank.session.recording import Recording, replay
     from wavetank.session.session import Session
     from wavetank.simulation.simulation import Simulation
-    from wavetank.simulation.term import Term
     from wavetank.view.camera import Camera
     from wavetank.view.renderer import render
 
@@ -68,6 +68,7 @@ __all__ = [
     "HalfSpace",
     "HeightField",
     "Hinge",
+    "Hook",
     "Intersection",
     "Keyframe",
     "Material",
@@ -116,7 +117,7 @@ LATER = {
     "Recording": "wavetank.session.recording",
     "Session": "wavetank.session.session",
     "Simulation": "wavetank.simulation.simulation",
-    "Term": "wavetank.simulation.term",
+    **dict.fromkeys(("Hook", "Term"), "wavetank.physics.terms.term"),
     "commands": "wavetank.session.commands",
     "load_dualsphysics": "wavetank.formats.dualsphysics",
     "load_splishsplash": "wavetank.formats.splishsplash",

@@ -28,7 +28,7 @@ def test_a_term_of_a_script_acts_where_it_says(acts):
         steps.append(c.dt)
         damp(world.particles, 0.5, world.count)
 
-    sim.world.terms = (Term("damping", Hook.VELOCITIES, apply, lambda plan: acts),)
+    sim.terms.append(Term("damping", Hook.VELOCITIES, apply, lambda plan: acts))
     sim.step()
     mean = sim.velocities[:, 0].mean()
     assert len(steps) > 0 if acts else not steps

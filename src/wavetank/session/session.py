@@ -212,7 +212,8 @@ class Session(SessionState):
         tool_forces = {id(force) for force in self.tool_forces}
         changed = [force for force in now if force not in declared] + [force for force in declared if force not in now]
         changed += [force for force in self.sim.pushed if id(force) not in tool_forces]
-        self.unrecorded_forces.update(type(one).__name__ for one in (*changed, *self.sim.terms))
+        self.unrecorded_forces.update(type(force).__name__ for force in changed)
+        self.unrecorded_forces.update(term.name for term in self.sim.terms)
 
     def _fit_frame(self, took: float) -> None:
         """Divide frames on a machine that is too slow for whole ones, by a command, so that it is recorded."""

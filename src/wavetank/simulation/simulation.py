@@ -20,6 +20,7 @@ from wavetank.foundation.params import LIVE, refuse_assignment
 from wavetank.physics import measure, population
 from wavetank.physics.foam.update import load_kernels, update_foam
 from wavetank.physics.planning import has_grid_pressure
+from wavetank.physics.terms.term import Term
 from wavetank.physics.time_step import filled_share, whole
 from wavetank.physics.world import World
 from wavetank.scene.forces import Force
@@ -41,7 +42,6 @@ from wavetank.simulation.solids import Solids, restored_solids, solids_of
 from wavetank.simulation.sources import Sources, check_places
 from wavetank.simulation.state import Continuation, Counters, State
 from wavetank.simulation.state_file import read_state, write_state
-from wavetank.simulation.term import Term
 from wavetank.solids.solid import Solid
 
 NEAR = 0.99  # of the distance that water keeps from walls: particles that start closer to a solid are led out of it
@@ -63,7 +63,7 @@ class Simulation:
     counters: Counters
     forces: list[Force]  # that act in every frame; scripts may append their own
     pushed: list[Force]  # that act in the next frame only
-    terms: list[Term]  # of a script, that act at the end of every time step
+    terms: list[Term]  # of a script, that act in every time step
     notes: list[str]  # for people, one sentence each; who shows them removes them
     time_steps: int  # of the last frame
     seconds_per_frame: float  # s that the last frame took to compute
@@ -71,7 +71,7 @@ class Simulation:
     def __init__(self, scene: Scene, arch: str = "cpu", terms: Iterable[Term] = ()) -> None:
         """Start a scene on a back end: cpu, gpu (the best there is), cuda, vulkan, metal or amdgpu.
 
-        `terms` of a script act at the end of every time step, after the start.
+        `terms` of a script act in every time step, at their hooks.
 
         Raises `WavetankError` for a back end that is not there, and for a scene that cannot run or needs too much
         memory.
@@ -316,6 +316,7 @@ class Simulation:
         limit = self._speed_limit(duration)
         parts = self.time_steps = whole(self._steps_in(duration))
         self.world.solid_speed = limits.solid_speed(self.scene, self.solids, duration)
+        self.world.terms = tuple(self.terms)
         self.solids.grow(duration)
         for part in range(parts):
             start, dt = self.time + duration * part / parts, duration / parts
@@ -348,8 +349,6 @@ class Simulation:
             for force in with_images(forces, scene.tank):
                 apply_force(force, self.world.particles, self.count, dt, start)
             self.bodies.step(self.world, scene, dt, limit, shares)
-            for term in self.terms:
-                term.apply(self.world, scene, dt)
 
     def _relax(self) -> bool:
         """Relax the water around solids to hydrostatic pressure; return whether it is at rest."""
@@ -522,7 +521,8 @@ class Simulation:
         copy.scene = copy.particles.scene = scene
         copy.parameters = LiveParameters(scene, copy.counters)
         copy.resume(dataclasses.replace(self.snapshot(), scene=scene))
-        copy.forces, copy.pushed, copy.terms = deepcopy((self.forces, self.pushed, self.terms))
+        copy.forces, copy.pushed = deepcopy((self.forces, self.pushed))
+        copy.terms = [*self.terms]
         copy.parameters.take_over(self.parameters)
         return copy
 
