@@ -7,6 +7,7 @@ import wavetank as wt
 from wavetank.device.compiler import download, upload
 from wavetank.physics.coefficients import coefficients
 from wavetank.physics.mixture import blend
+from wavetank.physics.terms.dynamic_viscosity import implicit_viscosity
 from wavetank.physics.terms.dynamic_viscosity.conjugate_gradients import TOLERANCE
 from wavetank.physics.terms.dynamic_viscosity.implicit_viscosity import damper_scale, solve_viscosity
 from wavetank.physics.terms.tension import prepare_fluids
@@ -129,7 +130,7 @@ def iterations_of(forgets: bool, monkeypatch) -> float:
         return numbers[-1]
 
     with monkeypatch.context() as patch:
-        patch.setattr("wavetank.physics.step.solve_viscosity", counted)
+        patch.setattr(implicit_viscosity, "solve_viscosity", counted)
         honey().advance(0.3)
     return float(np.mean(numbers))
 
