@@ -25,6 +25,7 @@ from typing import Any
 
 from wavetank.device.freed_arrays import FreedArrays
 from wavetank.device.launches import NEEDED, keep_prepared_launches
+from wavetank.device.used_fields import UsedFields, handed_on
 
 VERSIONS = ("1.3.3", "1.4.0")  # of Quadrants
 SWITCH = "WAVETANK_PATCHES"  # environment variable: 0 applies none
@@ -210,6 +211,59 @@ def flatten_fields(_: Any) -> Any:
 def trust_final_fields(_: Any) -> Any:
     """Reads numbers of a frozen object that are compiled into a kernel (`Final`) once, as ours are plain integers."""
     return lambda _: False
+
+
+USED = UsedFields()  # by the kernels of this package
+
+
+@patch(
+    "one walk",
+    "kernel:Kernel._try_load_fastcache",
+    needs=("kernel:Pruning.filter_call_args", "impl:current_cfg", "kernel:template"),
+)
+def walk_once(load: Callable[..., set[str] | None]) -> Callable[..., set[str] | None]:
+    """Finds the fields that a kernel of this package uses in its source, without a walk over all that it calls.
+
+    Not where arguments are buffers, of which there may be few.
+    """
+    by_value = {_part("impl")._qd_core.Arch.x64, _part("impl")._qd_core.Arch.arm64, _part("impl")._qd_core.Arch.cuda}
+    template = _part("kernel").template
+
+    def is_plain(meta: Any, value: Any) -> bool:
+        is_template = meta.annotation is template or type(meta.annotation) is template
+        return not is_template or isinstance(value, int | float)
+
+    def find(self: Any, args: tuple[Any, ...], key: Any) -> set[str] | None:
+        names = load(self, args, key)
+        ours = self.func.__module__.startswith("wavetank.") and _part("impl").current_cfg().arch in by_value
+        if names is None and ours and all(map(is_plain, self.arg_metas, args)):
+            names = self.used_py_dataclass_parameters_by_key_enforcing[key] = USED.of_kernel(self)
+        return names
+
+    return find
+
+
+@patch("fields of calls", "kernel:Pruning", needs=("func:Func",))
+def hand_on_by_source(pruning: Any) -> Any:
+    """Hands a function the fields that its source uses, where no walk has found them."""
+    function = _part("func").Func
+
+    class Names(dict[int, set[str]]):
+        def __missing__(self, number: int) -> set[str]:
+            return USED.functions[number].names if number in USED.functions else set()
+
+    class BySource(pruning):  # type: ignore[misc]
+        def __init__(self, kernel_used_parameters: set[str] | None) -> None:
+            super().__init__(kernel_used_parameters)
+            if kernel_used_parameters is not None:
+                self.used_vars_by_func_id = Names(self.used_vars_by_func_id)
+
+        def filter_call_args(self, caller: int, called: Any, node: Any, nodes: Any, keywords: Any, args: Any) -> Any:
+            if self.pass_0_ran or type(getattr(called, "wrapper", None)) is not function:
+                return super().filter_call_args(caller, called, node, nodes, keywords, args)
+            return handed_on(USED.of_function(called.wrapper), node.args, nodes, args)
+
+    return BySource
 
 
 # --- products of vectors ---

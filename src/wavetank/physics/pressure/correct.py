@@ -68,8 +68,15 @@ from wavetank.physics.pressure.grid import (
 )
 from wavetank.physics.pressure.multigrid import is_shared, restrict_solids, solve_levels
 from wavetank.physics.pressure.regions import find_regions, fix_null_space, make_compatible
-from wavetank.physics.pressure.solids import UNIT, find_open_volume, open_area, open_hat_weights
-from wavetank.physics.pressure.source import assemble, source_of
+from wavetank.physics.pressure.solids import (
+    UNIT,
+    find_apertures,
+    find_nearest_walls,
+    find_open_volume,
+    open_area,
+    open_hat_weights,
+)
+from wavetank.physics.pressure.source import assemble, find_surface, source_of, sum_liquid
 from wavetank.physics.pressure.thin_walls import may_be_cut_off
 from wavetank.physics.smoothing import rest_lattice
 from wavetank.physics.world import World
@@ -285,6 +292,8 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     has = variant_of(world, mixed=kinds.mixed, thin_walls=grid.has_thin_walls)
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     source = source_of(finest, params, stiffness, bodies=world.pieces is not None)
+    sum_liquid(finest, w, world.particles, world.temporaries, world.grid, source, world.count, has)
+    find_surface(finest, w, c, source, has)
     assemble(
         finest,
         w,
@@ -334,7 +343,9 @@ def update_open_volume(world: World, grid: PressureGrid, params: Parameters, c: 
     """Find what solids leave open of the cells, once they have moved."""
     has = variant_of(world, thin_walls=world.may_have_thin_walls)
     grid.found.fill(0)
-    find_open_volume(grid.finest, grid.workspace, grid.found, world.solids, c, UNIT, params.spacing, params.dim, has)
+    find_nearest_walls(grid.finest, grid.workspace, grid.found, world.solids, has)
+    find_open_volume(grid.finest, grid.workspace, c, UNIT, params.spacing, params.dim, has)
+    find_apertures(grid.finest, grid.workspace, params.spacing, has)
     find_regions(grid.finest, grid.workspace, grid.found)
     restrict_solids(grid.levels)
     grid.solids_version, grid.gravity = world.solids_version, (c.gravity_x, c.gravity_y, c.gravity_z)

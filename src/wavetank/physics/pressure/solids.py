@@ -214,7 +214,7 @@ def aperture_to(grid: Level, n, m, blocked):
 
 
 @qd.func
-def find_apertures(grid: Level, w: Workspace, n):
+def set_apertures(grid: Level, w: Workspace, n):
     """Find the open fractions of the faces from node `n` to the next ones along each axis."""
     blocked = w.blocked_faces[n]
     grid.aperture_x[n] = aperture_to(grid, n, clamped_neighbor(grid, n, 0, 1), blocked & 1)
@@ -281,24 +281,21 @@ def clear_solids(grid: Level, w: Workspace):
 
 
 @qd.kernel(fastcache=True)
-def find_open_volume(
-    grid: Level,
-    w: Workspace,
-    found: qd.types.ndarray(),
-    solids: SolidSet,
-    c: Coefficients,
-    unit: qd.f32,
-    spacing: qd.f32,
-    dim: qd.template(),
-    has: Variant,
-):
-    """Find the open volume of each cell and the apertures of its faces; slits are closed where there are bodies.
-
-    `found[0]` counts nodes at thin walls. Sums are of whole multiples of the inverse of `unit`, so that the order of
-    threads does not matter; they are 0 before and after.
-    """
+def find_nearest_walls(grid: Level, w: Workspace, found: qd.types.ndarray(), solids: SolidSet, has: Variant):
+    """Find the nearest wall of each node; `found[0]` counts nodes at thin walls."""
     for segment in range(grid.segments * grid.ny * grid.nz):
         find_walls(grid, w, found, solids, segment, has)
+
+
+@qd.kernel(fastcache=True)
+def find_open_volume(
+    grid: Level, w: Workspace, c: Coefficients, unit: qd.f32, spacing: qd.f32, dim: qd.template(), has: Variant
+):
+    """Find the open volume of each cell; slits are closed where there are bodies.
+
+    Sums are of whole multiples of the inverse of `unit`, so that the order of threads does not matter; they are 0
+    before and after.
+    """
     qd.loop_config(serialize=bool(has.few_nodes))
     for n in range(grid.nx * grid.ny * grid.nz):
         mark_blocked_faces(grid, w, n, has.thin_walls)
@@ -326,6 +323,11 @@ def find_open_volume(
         qd.loop_config(serialize=bool(has.few_nodes))
         for n in range(grid.nx * grid.ny * grid.nz):
             grid.open_volume[n] = 0.0 if w.slit_cells[n] > 0.0 else grid.open_volume[n]
+
+
+@qd.kernel(fastcache=True)
+def find_apertures(grid: Level, w: Workspace, spacing: qd.f32, has: Variant):
+    """Find the apertures of the cells' faces."""
     qd.loop_config(serialize=bool(has.few_nodes))
     for n in range(grid.nx * grid.ny * grid.nz):
         w.volume_change[n] = qd.abs(grid.open_volume[n] - 1.0)
@@ -345,4 +347,4 @@ def find_open_volume(
     qd.loop_config(serialize=bool(has.few_nodes))
     for n in range(grid.nx * grid.ny * grid.nz):
         mark_far(w, n)
-        find_apertures(grid, w, n)
+        set_apertures(grid, w, n)

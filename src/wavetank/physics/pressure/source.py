@@ -342,23 +342,20 @@ def set_rhs(grid: Level, w: Workspace, n, c: Coefficients, source: Source, has: 
 
 
 @qd.kernel(fastcache=True)
-def assemble(
+def sum_liquid(
     grid: Level,
     w: Workspace,
     particles: Particles,
     temporaries: Temporaries,
     cells: Grid,
-    solids: SolidSet,
-    walls: Walls,
-    c: Coefficients,
     source: Source,
     count: qd.i32,
     has: Variant,
 ):
-    """Sum the footprints of all particles, find voids and the surface, sum density errors, and set up the equation.
+    """Sum the footprints of all particles at the nodes.
 
-    The sums are 0 before and after. Threads share the particles in parts; where these are alone, each has sums of its
-    own and waits for no other.
+    The sums are 0 before. Threads share the particles in parts; where these are alone, each has sums of its own and
+    waits for no other.
     """
     for chunk in range(chunks_over(cluster_count(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(chunk, cluster_count(cells, count), parts_of(grid, cells), cells.lanes)
@@ -377,6 +374,11 @@ def assemble(
                 qd.static(cells.lanes),
                 has,
             )
+
+
+@qd.kernel(fastcache=True)
+def find_surface(grid: Level, w: Workspace, c: Coefficients, source: Source, has: Variant):
+    """Find how full the cells are, the voids in the liquid, its surface, and how deep nodes lie below it."""
     qd.loop_config(serialize=bool(has.few_nodes))
     for n in range(grid.nx * grid.ny * grid.nz):
         measure_liquid(grid, w, n, source, has)
@@ -407,6 +409,23 @@ def assemble(
         qd.loop_config(serialize=bool(has.few_nodes))
         for n in range(grid.nx * grid.ny * grid.nz):
             w.depth[n] = level_depth(grid, w, n, vec3(c.gravity_x, c.gravity_y, c.gravity_z))
+
+
+@qd.kernel(fastcache=True)
+def assemble(
+    grid: Level,
+    w: Workspace,
+    particles: Particles,
+    temporaries: Temporaries,
+    cells: Grid,
+    solids: SolidSet,
+    walls: Walls,
+    c: Coefficients,
+    source: Source,
+    count: qd.i32,
+    has: Variant,
+):
+    """Sum the particles' density errors at the nodes, and set up the equation; the sums are 0 before and after."""
     for chunk in range(chunks_over(cluster_count(cells, count), parts_of(grid, cells), cells.lanes)):
         begin = first_of_part(chunk, cluster_count(cells, count), parts_of(grid, cells), cells.lanes)
         end = end_of_part(chunk, cluster_count(cells, count), parts_of(grid, cells), cells.lanes)
