@@ -6,6 +6,7 @@ is an error. Until `start` the compiler is as its makers wrote it: another progr
 """
 
 import contextlib
+import functools
 import inspect
 import io
 import itertools
@@ -13,12 +14,14 @@ import os
 import pathlib
 import warnings
 from collections.abc import Callable, Iterator
+from threading import get_ident
 from typing import Any
 
 import numpy as np
 
 from wavetank.device import patches
 from wavetank.device.kernel_cache import sweep_damaged
+from wavetank.device.turns import TURN
 from wavetank.foundation.errors import WavetankError
 
 os.environ.setdefault("QD_LOG_LEVEL", "error")
@@ -86,6 +89,7 @@ def cache_folder() -> pathlib.Path:
     return pathlib.Path(impl.default_cfg().offline_cache_file_path)
 
 
+@TURN
 def start(arch: str = "cpu", *, threads: int | None = None) -> str:
     """Start the compiler on `arch` and return the concrete back end that came up.
 
@@ -122,7 +126,7 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
             f"Quadrants {version} is not one that wavetank's patches are made for ({', '.join(patches.VERSIONS)}): "
             "kernels work, and start slower.",
             RuntimeWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
     before = _thread_ids()
     sweep_damaged(cache_folder())
@@ -133,7 +137,25 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
         raise WavetankError(f"arch = {arch!r} was asked for, but the compiler came up on {came_up!r}.")
     _current = wanted
     _bind_threads(_thread_ids() - before)
+    _launch_in_turn()
     return wanted
+
+
+@functools.cache
+def _launch_in_turn() -> None:
+    """Let every launch wait for its turn, and refuse those of forked processes."""
+    from quadrants.lang.kernel import Kernel
+
+    call = Kernel.__call__
+
+    def launch(self: Any, *args: Any, **kwargs: Any) -> Any:
+        if TURN.owner == get_ident():
+            return call(self, *args, **kwargs)
+        with TURN:
+            return call(self, *args, **kwargs)
+
+    Kernel.__call__ = launch
+    TURN.refuse_after_fork()
 
 
 @contextlib.contextmanager
@@ -143,15 +165,16 @@ def borrowed() -> Iterator[None]:
     For those who only measure data before it is known where the water will be computed. No array may outlive it.
     """
     global _current
-    if _current is not None:
-        yield
-        return
-    start("cpu")
-    try:
-        yield
-    finally:
-        _current = None
-        qd.reset()
+    with TURN:
+        if _current is not None:
+            yield
+            return
+        start("cpu")
+        try:
+            yield
+        finally:
+            _current = None
+            qd.reset()
 
 
 def threads() -> int:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.device.turns import one_at_a_time
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import turned
 from wavetank.simulation.coupling import Coupling
@@ -14,6 +15,7 @@ from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
 
+@one_at_a_time()
 @dataclasses.dataclass
 class Body:
     """A solid that water and other solids move."""

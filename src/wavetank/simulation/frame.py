@@ -15,6 +15,7 @@ from typing_extensions import override
 from wavetank.device import compiler
 from wavetank.device.compiler import download, upload
 from wavetank.device.state import MARGIN, Diffuse, integers, new_diffuse, scalars, vectors
+from wavetank.device.turns import TURN, one_at_a_time
 from wavetank.foundation.errors import NotFiniteError
 from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import FOAM, PARTICLES, Field, Instant, PlacedSolid, non_finite_rows
@@ -76,11 +77,13 @@ class Frame(Instant):
         return np.argsort(download(self.id)[: self.count], kind="stable")
 
     @override
+    @TURN
     def _by_id(self, column: str) -> np.ndarray:
         ordered: np.ndarray = download(getattr(self, column))[: self.count][self._order]
         return ordered
 
     @override
+    @TURN
     def _of_foam(self, field: Field) -> np.ndarray:
         if self.diffuse is None:
             return field.zeros(0, self.dim)
@@ -88,6 +91,7 @@ class Frame(Instant):
         return host
 
 
+@one_at_a_time()
 class FrameBuffer:
     """Device arrays that hold one `State` at a time, for pictures of instants without their simulation."""
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.device.turns import one_at_a_time
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import inverse, product, turned
 from wavetank.foundation.tracks import track, varies
@@ -30,6 +31,7 @@ WORLD: Pose = (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 Ends = Callable[[], tuple[Pose, Pose]]  # poses of the first solid, and of the second or the world
 
 
+@one_at_a_time()
 class LiveJoint:
     """A joint of a running world, in `sim.joints`. Hinges and sliders have a position, and may have a motor.
 

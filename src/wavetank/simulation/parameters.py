@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from wavetank.device.turns import TURN
 from wavetank.foundation.params import LIVE, PARAMETERS, Parameters, refuse_assignment
 from wavetank.scene.scene import Scene
 from wavetank.scene.schedule import changes_gravity, gravity_at, with_gravity
@@ -49,6 +50,7 @@ class LiveParameters(Declared):
             return getattr(self._scene, name)
         raise AttributeError(f"there is no parameter {name!r}")
 
+    @TURN
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in LIVE:
             refuse_assignment(name)

@@ -14,6 +14,7 @@ import numpy as np
 
 from wavetank.device import compiler
 from wavetank.device.state import KINDS
+from wavetank.device.turns import TURN, one_at_a_time
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import explain_errors, printable
 from wavetank.foundation.params import LIVE, refuse_assignment
@@ -47,8 +48,11 @@ from wavetank.solids.solid import Solid
 NEAR = 0.99  # of the distance that water keeps from walls: particles that start closer to a solid are led out of it
 
 
+@one_at_a_time("advance", "frames", "numbered_frames")
 class Simulation:
     """A running world of a scene.
+
+    Any thread may make, read and move it: what reads or changes it waits for the end of a frame that is computed.
 
     Live parameters are attributes too: `sim.viscosity = 0.1` is `sim.parameters.viscosity = 0.1`.
     """
@@ -309,6 +313,7 @@ class Simulation:
         """Let a force act during the next frame only."""
         self.pushed.append(force)
 
+    @TURN
     def _advance_frame(self, duration: float) -> None:
         began = time.perf_counter()
         self.solids.follow(self.time, duration)

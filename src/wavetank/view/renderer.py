@@ -10,6 +10,7 @@ import numpy as np
 
 from wavetank.device.compiler import current_backend, download, qd, synchronize, upload
 from wavetank.device.state import interned
+from wavetank.device.turns import TURN, one_at_a_time
 from wavetank.foundation.errors import WavetankError
 from wavetank.simulation.frame import Frame
 from wavetank.view import legend as legends
@@ -42,6 +43,7 @@ ROOM = 1.25  # more height that a picture of a tilted tank shows
 POINT_SUN = 0.004  # tangent of the sun's radius where many suns are averaged
 
 
+@one_at_a_time()
 class Renderer:
     """Takes pictures of one size; its buffers are allocated once."""
 
@@ -259,6 +261,7 @@ def _sun_lens(extent: Extent, to_sun: Any, texels: int) -> Lens:
 _kept: collections.OrderedDict[tuple[int, int, int], Renderer] = collections.OrderedDict()
 
 
+@TURN
 def render(
     world: Any,
     width: int = 1280,
