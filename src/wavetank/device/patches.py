@@ -25,7 +25,7 @@ from typing import Any
 
 from wavetank.device.freed_arrays import FreedArrays
 from wavetank.device.launches import NEEDED, keep_prepared_launches
-from wavetank.device.used_fields import UsedFields, handed_on
+from wavetank.device.used_fields import UsedFields, handed_on, lines_of
 
 VERSIONS = ("1.3.3", "1.4.0")  # of Quadrants
 SWITCH = "WAVETANK_PATCHES"  # environment variable: 0 applies none
@@ -144,10 +144,16 @@ def short_frames() -> Iterator[None]:
 # --- reading kernels ---
 
 
-@patch("sources", "_wrap_inspect:getsourcelines", "_wrap_inspect:getsourcefile")
-def remember_sources(look_up: Any) -> Any:
-    """Looks a function's source up once."""
+@patch("files", "_wrap_inspect:getsourcefile")
+def remember_files(look_up: Any) -> Any:
+    """Looks the file of a function up once."""
     return functools.cache(look_up)
+
+
+@patch("sources", "_wrap_inspect:getsourcelines")
+def remember_sources(look_up: Any) -> Any:
+    """Looks a function's source up once, by the syntax tree of its file."""
+    return functools.cache(lambda function: lines_of(function) or look_up(function))
 
 
 @patch("hashes", "_fast_caching.function_hasher:_hash_function")
@@ -222,10 +228,8 @@ USED = UsedFields()  # by the kernels of this package
     needs=("kernel:Pruning.filter_call_args", "impl:current_cfg", "kernel:template"),
 )
 def walk_once(load: Callable[..., set[str] | None]) -> Callable[..., set[str] | None]:
-    """Finds the fields that a kernel of this package uses in its source, without a walk over all that it calls.
-
-    Not where arguments are buffers, of which there may be few.
-    """
+    """Finds the fields that a kernel of this package uses in its source, without a walk over all that it calls."""
+    # Elsewhere arguments are buffers, of which there may be few: none that is not needed should be among them.
     by_value = {_part("impl")._qd_core.Arch.x64, _part("impl")._qd_core.Arch.arm64, _part("impl")._qd_core.Arch.cuda}
     template = _part("kernel").template
 
@@ -256,7 +260,7 @@ def hand_on_by_source(pruning: Any) -> Any:
         def __init__(self, kernel_used_parameters: set[str] | None) -> None:
             super().__init__(kernel_used_parameters)
             if kernel_used_parameters is not None:
-                self.used_vars_by_func_id = Names(self.used_vars_by_func_id)
+                self.used_vars_by_func_id: dict[int, set[str]] = Names({pruning.KERNEL_FUNC_ID: kernel_used_parameters})
 
         def filter_call_args(self, caller: int, called: Any, node: Any, nodes: Any, keywords: Any, args: Any) -> Any:
             if self.pass_0_ran or type(getattr(called, "wrapper", None)) is not function:

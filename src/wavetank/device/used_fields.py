@@ -9,7 +9,9 @@ is passed as an argument), never fewer; a kernel takes a few more arguments then
 
 import ast
 import dataclasses
+import functools
 import inspect
+import linecache
 import textwrap
 from collections.abc import Iterator
 from typing import Any
@@ -22,7 +24,7 @@ class Function:
     """A function that kernels call, or a kernel: the dataclasses it takes, and the names of the fields that it uses."""
 
     parameters: list[str]
-    structures: dict[str, type]  # by parameter
+    structures: dict[str, Any]  # by parameter
     names: set[str]  # each field, and each dataclass that such a field is in
 
 
@@ -58,12 +60,37 @@ class UsedFields:
         return known
 
     def _read(self, wrapper: Any) -> Function:
-        source = textwrap.dedent("".join(inspect.getsourcelines(wrapper.func)[0]))
+        lines = lines_of(wrapper.func) or inspect.getsourcelines(wrapper.func)
+        source = textwrap.dedent("".join(lines[0]))
         metas = [meta for meta in wrapper.arg_metas if meta.name]
         structures = {meta.name: meta.annotation for meta in metas if dataclasses.is_dataclass(meta.annotation)}
         function = Function([meta.name for meta in metas], structures, set())
         _Reader(self, function, _names_of(wrapper.func)).visit(ast.parse(source).body[0])
         return function
+
+
+def lines_of(function: Any) -> tuple[list[str], int] | None:
+    """Return the lines of a function of a module's own, decorators included, and the number of the first.
+
+    None where there is no such file; `inspect` goes through all tokens of a function to find its end.
+    """
+    code = getattr(inspect.unwrap(function), "__code__", None)
+    if code is None:
+        return None
+    first, lines = code.co_firstlineno, linecache.getlines(code.co_filename)
+    last = _functions_in(code.co_filename).get(first)
+    return (lines[first - 1 : last], first) if last else None
+
+
+@functools.cache
+def _functions_in(file: str) -> dict[int, int]:
+    """Return the last line of each function of a file's module by its first line; none of a file without Python."""
+    try:
+        tree = ast.parse("".join(linecache.getlines(file)))
+    except SyntaxError:
+        return {}
+    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+    return {min([f.lineno, *(d.lineno for d in f.decorator_list)]): f.end_lineno or 0 for f in functions}
 
 
 def _names_of(function: Any) -> dict[str, Any]:
@@ -93,10 +120,10 @@ class _Reader(ast.NodeVisitor):
         if called is None:
             self.generic_visit(node)
             return
-        given = {**dict(zip(called.parameters, node.args, strict=False)), **{k.arg: k.value for k in node.keywords}}
-        for parameter, value in given.items():
+        given: list[tuple[str | None, ast.expr]] = [*zip(called.parameters, node.args, strict=False)]
+        for parameter, value in given + [(keyword.arg, keyword.value) for keyword in node.keywords]:
             found = self._field(value)
-            if found is None or parameter not in called.structures:
+            if found is None or parameter is None or parameter not in called.structures:
                 self.visit(value)
                 continue
             name, _ = found
@@ -152,7 +179,9 @@ def handed_on(function: Function, given: list[Any], expanded: list[Any], values:
     `given` are the arguments as the call has them, `expanded` the same with a name for each field of a dataclass, which
     `values` belong to.
     """
-    taken, seen, k = [], set(), 0
+    taken: list[Any] = []
+    seen: set[str] = set()
+    k = 0
     for parameter, node in zip(function.parameters, given, strict=False):
         if isinstance(node, ast.Starred):
             return taken + values[k:]
