@@ -23,9 +23,9 @@ from wavetank.simulation.simulation import Simulation
 
 @qd.kernel(fastcache=True)
 def set_coefficients(level: Level, w: Workspace):
-    """Set the coefficients of a finest level, as `find_open_volume` and `assemble` do."""
+    """Set the coefficients of a finest level, as `find_apertures` and `assemble` do."""
     for n in range(level.nx * level.ny * level.nz):
-        solids.find_apertures(level, w, n)
+        solids.set_apertures(level, w, n)
     for segment in range(level.segments * level.ny * level.nz):
         multigrid.set_coefficients(level, segment, 0)
 
