@@ -1,7 +1,6 @@
 """Checked models: true and false stand for no number, wherever one is declared."""
 
 import pytest
-from pydantic import ValidationError
 
 import wavetank as wt
 from wavetank.foundation.errors import WavetankError
@@ -49,7 +48,7 @@ def test_true_and_false_are_refused_wherever_a_number_stands(truth):
             model.parse({name: truth})
         with pytest.raises(WavetankError, match=message):
             model(**{name: truth})
-        with pytest.raises(ValidationError, match="booleans are not accepted as numbers"):
+        with pytest.raises(WavetankError, match=message):
             setattr(model.model_construct(), name, truth)
 
 

@@ -15,7 +15,14 @@ console = Console(stderr=True)
 PYTHONS = "<list[str]>"
 
 SceneName = Annotated[str, typer.Argument(help="A bundled scene or the path of a TOML file.")]
-Settings = Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="Set a key of the scene.")]
+Settings = Annotated[
+    list[str],
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Set a key of the scene, as viscosity=0.1, tank.size=[2,1], solids[0].size=[1,1].",
+    ),
+]
 Arch = Annotated[str, typer.Option(help="Back end: cpu, gpu (the best available), cuda, vulkan, metal, amdgpu.")]
 Size = Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Size of a picture [px].")]
 View = Annotated[

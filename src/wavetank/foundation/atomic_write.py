@@ -10,6 +10,7 @@ import socket
 from collections.abc import Iterator
 from pathlib import Path
 
+from wavetank.foundation.arguments import path_of
 from wavetank.foundation.errors import WavetankError
 
 _LEFT = re.compile(r"\..+\.([0-9a-f]{6})-(\d+)(-\d+)?\.partial(\.\w+)?")
@@ -19,7 +20,9 @@ _swept: set[Path] = set()
 
 def partial_path(path: str | Path) -> Path:
     """Return a new temporary path next to `path`; raises `WavetankError` if its folder does not exist."""
-    target = Path(path)
+    target = Path(path_of(path))
+    if not target.name:
+        raise WavetankError(f"{str(path)!r} is not the name of a file.")
     if not target.parent.is_dir():
         raise WavetankError(f"{str(target)!r} cannot be written: there is no folder {str(target.parent)!r}.")
     sweep(target.parent)

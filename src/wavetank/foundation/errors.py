@@ -1,8 +1,12 @@
-"""The exception that a user's mistake raises, and its one special case."""
+"""The exception that a user's mistake raises, and its special cases."""
 
 
 class WavetankError(Exception):
     """A user's mistake, in one sentence: what was wrong, where, what is allowed, what to do."""
+
+
+class NoAttributeError(WavetankError, AttributeError):
+    """An attribute that is not there, or that cannot be set."""
 
 
 class NotFiniteError(WavetankError):

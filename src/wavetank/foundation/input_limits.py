@@ -25,6 +25,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.lib import format as npy
 
+from wavetank.foundation.arguments import path_of
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.memory import free_memory, in_words
 
@@ -82,7 +83,9 @@ def open_regular(path: str | Path, most: int, what: str) -> IO[bytes]:
     """Open a regular file of at most `most` bytes; raises `WavetankError` for all else, and never waits for a pipe."""
     name = printable(path)
     try:
-        file = os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb")
+        file = os.fdopen(
+            os.open(path_of(path, what), os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb"
+        )
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise WavetankError(f"{name}: the {what} cannot be read: {reason}.") from None

@@ -36,8 +36,12 @@ class _OneSentence(ModelMetaclass):
         *args: Any,
         **kwargs: Any,
     ) -> Any:
+        if args:
+            fields = cast(type[BaseModel], cls).model_fields
+            given = ", ".join(f"{name}=..." for name in [n for n in fields if n not in ("shape", "kind")][: len(args)])
+            raise WavetankError(f"{cls.__name__} takes its values by name, as in {cls.__name__}({given}, ...).")
         try:
-            return super().__call__(*args, **kwargs)
+            return super().__call__(**kwargs)
         except ValidationError as report:
             raise WavetankError(sentence(report, cast(type[BaseModel], cls))) from None
 
@@ -57,12 +61,17 @@ class Model(BaseModel, metaclass=_OneSentence):
         return table
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Set a field to what is valid, like any other attribute of a model."""
-        refused = _boolean_for_number(type(self), name, value)
-        if refused:
-            details = InitErrorDetails(type=refused, loc=(), input=value)
-            raise ValidationError.from_exception_data(type(self).__name__, [details])
-        super().__setattr__(name, value)
+        """Set a field to what is valid; raise `WavetankError` and change nothing where it is not."""
+        before = dict(self.__dict__)
+        try:
+            refused = _boolean_for_number(type(self), name, value)
+            if refused:
+                details = InitErrorDetails(type=refused, loc=(), input=value)
+                raise ValidationError.from_exception_data(type(self).__name__, [details])
+            super().__setattr__(name, value)
+        except ValidationError as report:
+            self.__dict__.update(before)  # a check of the whole runs after the value is in place
+            raise WavetankError(sentence(report, type(self))) from None
 
     @classmethod
     def parse(cls, table: dict[str, Any], origin: str = "", **context: Any) -> Any:
@@ -123,12 +132,12 @@ def sentence(report: ValidationError, model: type[BaseModel]) -> str:
     """Return the most informative error of `report` as one sentence: key, value, what is allowed."""
     errors = report.errors(include_url=False)[:MOST_COMPARED]
     # An unknown key explains more than what it leads to, and in a union the deepest complaint is the meant one.
-    error = max(errors, key=lambda e: (e["type"] == "extra_forbidden", len(e["loc"])))
+    error = max(errors, key=lambda e: (e["type"] in ("extra_forbidden", "no_such_attribute"), len(e["loc"])))
     key = _key(error["loc"]) or model.__name__
     value = error.get("input")
     shown = _short(value)
     kind, limits = error["type"], error.get("ctx") or {}
-    if kind == "extra_forbidden":
+    if kind in ("extra_forbidden", "no_such_attribute"):
         known = _known_keys(model, error["loc"][:-1])
         near = difflib.get_close_matches(str(error["loc"][-1]), known, n=1, cutoff=0.5)
         hint = f"did you mean {near[0]!r}?" if near else f"known keys: {', '.join(sorted(known))}."

@@ -26,9 +26,9 @@ from wavetank.run.signals import StopRequest, stop_on_signal
 from wavetank.scene.film import Film
 from wavetank.scene.scene import Scene
 from wavetank.simulation.simulation import Simulation
-from wavetank.view.camera import Camera
+from wavetank.view.camera import ROOM, Camera
 from wavetank.view.film.samples import Watch
-from wavetank.view.renderer import ROOM, Renderer, affordable
+from wavetank.view.renderer import Renderer, affordable
 from wavetank.view.style import quality_options
 
 FRAMES = ".frames"  # suffix of the folder of frames

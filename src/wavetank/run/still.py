@@ -21,9 +21,8 @@ from wavetank.scene.scene import Scene
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.simulation import Simulation
 from wavetank.view.camera import Camera
-from wavetank.view.extent import extent_of_water
 from wavetank.view.film.samples import Watch
-from wavetank.view.renderer import ROOM, Renderer, affordable
+from wavetank.view.renderer import Renderer, affordable
 from wavetank.view.style import Style, quality_options
 
 SAMPLES = ".samples.npz"  # suffix of the samples of an interrupted picture
@@ -159,12 +158,8 @@ def _simulation_at(world: str, scene: Scene | None, at: float | None, arch: str)
 
 def _camera_at(frame: Frame, eye: str | None, target: str | None, aspect: float) -> Camera:
     """Return the camera with `eye` and `target` as texts of the form ``2,1,3``; by default it frames the water."""
-    usual = Camera.framing_extent(extent_of_water(frame), aspect)
-    return Camera(
-        eye=_point("eye", eye) if eye else usual.eye,
-        target=_point("target", target) if target else usual.target,
-        height=usual.height,
-    ).tilted(frame.scene, frame.time, 1.0 if eye else ROOM)
+    at, toward = (_point(name, text) if text else None for name, text in (("eye", eye), ("target", target)))
+    return Camera.looking(frame, at, toward, aspect)
 
 
 def _point(name: str, text: str) -> tuple[float, float, float]:

@@ -4,20 +4,21 @@ import difflib
 import functools
 import importlib.resources
 import json
-import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import tomli_w
-from pydantic import BeforeValidator, ValidationError, model_validator
+from pydantic import BeforeValidator, model_validator
 
+from wavetank.foundation.arguments import array_of, brief, finite, path_of
 from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import explain_errors, parse_toml, printable, read_text
 from wavetank.foundation.materials import COLORS, Material, Properties
-from wavetank.foundation.model import Model, is_length, sentence
+from wavetank.foundation.model import Model, is_length
 from wavetank.foundation.params import PRESETS, QUALITIES, Parameters
 from wavetank.foundation.tracks import scaled
 from wavetank.scene.bounds import check_bodies, check_numbers, check_periodic, check_scales
@@ -89,16 +90,6 @@ class Scene(Timetable, Parameters):
         self._check_names()
         self.check_sources()
         return self
-
-    def assign(self, name: str, value: Any) -> None:
-        """Set one key in place, validated; raise `WavetankError` and change nothing where it is not allowed."""
-        before = dict(self.__dict__)
-        try:
-            setattr(self, name, value)
-        except ValidationError as report:
-            # A whole-scene check runs after the value is in place.
-            self.__dict__.update(before)
-            raise WavetankError(sentence(report, type(self))) from None
 
     def __repr__(self) -> str:
         return summary(self)
@@ -200,7 +191,7 @@ class Scene(Timetable, Parameters):
             first = self.fluids[0].material if self.fluids else None
             usual = 0 if first is None else 1 + [material.name for material in self.materials].index(first)
             return np.full(count, usual, np.int32)
-        kind = np.asarray(numbers, np.int32)
+        kind = array_of("materials", numbers, np.int32, f"[{count}]")
         if kind.shape != (count,) or not np.isin(kind, np.arange(len(self.materials) + 1)).all():
             raise WavetankError(
                 f"materials must be {count} numbers, from 0 for the scene's own fluid to {len(self.materials)}."
@@ -257,10 +248,20 @@ class Scene(Timetable, Parameters):
 
     @staticmethod
     def checked(scene: Any) -> "Scene":
-        """Return `scene`; raises `WavetankError` for anything else."""
+        """Return `scene` as it is now, checked as one that is made; raises `WavetankError` for anything else.
+
+        Its lists, and what is in them, may have changed since it was made.
+        """
         if not isinstance(scene, Scene):
             raise WavetankError(f"{scene!r} is not a Scene; use wt.Scene.load(name) for a bundled one or a TOML file.")
-        return scene
+        known = type(scene).model_fields
+        fields = {
+            name: value
+            for name, value in scene.__dict__.items()
+            if name in scene.model_fields_set or value != known[name].default
+        }
+        checked: Scene = type(scene).parse(fields)
+        return checked
 
     @classmethod
     def load(cls, name: str | Path) -> "Scene":
@@ -282,7 +283,7 @@ class Scene(Timetable, Parameters):
 
     def text(self) -> str:
         """Return this scene as TOML."""
-        return tomli_w.dumps(self.table())
+        return tomli_w.dumps(Scene.checked(self).table())
 
     def table(self) -> dict[str, Any]:
         """Return what was set (not the defaults) as plain data that `parse` reads back to an equal scene."""
@@ -296,17 +297,49 @@ class Scene(Timetable, Parameters):
         return {key: result[key] for key in sorted(result, key=lambda k: isinstance(result[k], list | dict))}
 
     def changed(self, **values: Any) -> "Scene":
-        """Return a copy with these keys changed, validated as a whole; a new preset or quality replaces the old."""
+        """Return a copy with these keys changed, validated as a whole; a new preset or quality replaces the old.
+
+        A key may lead into tables and lists, by numbers or names: "tank.size", "solids[0].size", "solids[gate].size".
+        """
         table = self.table()
         if values.keys() & {"preset", "quality"}:
             table = {k: v for k, v in table.items() if (k, v) not in _chosen(self.__dict__).items()}
-        return type(self).parse({**table, **values})
+        for key, value in values.items():
+            _put(table, key, value)
+        return type(self).parse(table)
 
     def scaled(self, factor: float) -> "Scene":
         """Return the same scene with every length multiplied by `factor` (velocities and gravity stay)."""
-        if not (math.isfinite(factor) and factor > 0):
-            raise WavetankError(f"factor = {factor} is not allowed; it must be a positive number.")
+        if finite("factor", factor, 0.0) == 0.0:
+            raise WavetankError("factor = 0 is not allowed; it must be a positive number.")
         return type(self).parse(self._table(factor))
+
+
+def _put(table: dict[str, Any], key: str, value: Any) -> None:
+    """Set what a key leads to in plain data, as in "tank.size" and "solids[0].size"; raises `WavetankError`."""
+    if not re.fullmatch(r"\w+(\.\w+|\[[^][]+\])+", key):
+        table[key] = value
+        return
+    *path, last = re.findall(r"[^][.]+", key)
+    place: Any = table
+    for part in path:
+        place = place.setdefault(part, {}) if isinstance(place, dict) else place[_number_of(part, place, key)]
+        if not isinstance(place, dict | list):
+            raise WavetankError(f"{key}: {part} = {brief(place)} has no keys.")
+    place[last if isinstance(place, dict) else _number_of(last, place, key)] = value
+
+
+def _number_of(part: str, members: list[Any], key: str) -> int:
+    """Return which of `members` is meant by a number or a name."""
+    names = [member.get("name", "") if isinstance(member, dict) else "" for member in members]
+    number = names.index(part) if part in names else int(part) if part.isdecimal() else len(members)
+    if number >= len(members):
+        named = ", ".join(filter(None, names))
+        raise WavetankError(
+            f"{key}: there is no [{part}]; there are {len(members)}, from [0] on"
+            + (f", named {named}." if named else ".")
+        )
+    return number
 
 
 def with_particles(scene: Scene, wanted: int) -> Scene:
@@ -378,7 +411,7 @@ def _read(name: str | Path) -> tuple[str, str, Path]:
         if str(name) in _names(folder):
             file = importlib.resources.files("wavetank.scene") / folder / f"{name}.toml"
             return file.read_text("utf-8"), str(name), Path()
-    path = Path(name)
+    path = Path(path_of(name, "scene"))
     if not _is_there(path):
         near = difflib.get_close_matches(str(name)[:100], [*_names("scenes"), *_names("levels")], 1)
         raise WavetankError(

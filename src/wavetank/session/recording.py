@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 import tomli_w
 from pydantic import Field
 
+from wavetank.foundation.arguments import instance_of
 from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import explain_errors, parse_toml, printable, read_text
@@ -109,6 +110,11 @@ def replay(recording: Recording, arch: str = "cpu", origin: str = "recording") -
 
     Pauses take no time. Raises `WavetankError` for an invalid recording.
     """
+    instance_of("recording", recording, Recording, "a Recording, as wt.Recording.load(path) returns")
+    return _replay(recording, arch, origin)
+
+
+def _replay(recording: Recording, arch: str, origin: str) -> Iterator[Session]:
     commands = recording.timed_commands(origin)
     session = Session(Scene.parse(recording.scene, origin), arch, most_particles=recording.most_particles)
     yield session

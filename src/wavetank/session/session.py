@@ -44,7 +44,7 @@ class Session(SessionState):
         history: History | None = None,
         own: Simulation | None = None,
     ) -> None:
-        super().__init__(scene, arch, most_particles, history or History(), own)
+        super().__init__(Scene.checked(scene), arch, most_particles, history or History(), own)
         self.ticks = 0  # frames computed since the session started; going back does not lower it
         self.log: list[tuple[int, Command]] = []
         self.smooth = False  # whether frames are divided on a slow machine

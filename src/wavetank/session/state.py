@@ -96,7 +96,7 @@ class SessionState:
             )
         sim = Simulation(scene, self.arch)
         if scene.emitters:
-            sim.scene.assign("most_particles", min(scene.most_particles or self.most_particles, self.most_particles))
+            sim.scene.most_particles = min(scene.most_particles or self.most_particles, self.most_particles)
         self._store_for_undo(cost.bytes)
         give_back()
         if self.own is not None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.turns import one_at_a_time
+from wavetank.foundation.arguments import KnownAttributes, array_of, read_only
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import turned
 from wavetank.simulation.coupling import Coupling
@@ -14,10 +15,13 @@ from wavetank.solids.mass import Inertia
 from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
+MOVED = "sim.hold({name!r}) and sim.move({name!r}, {what}=...) move it"
+SET = "sim.bodies[{name!r}].{what} = ... sets all of it"
+
 
 @one_at_a_time()
 @dataclasses.dataclass
-class Body:
+class Body(KnownAttributes):
     """A solid that water and other solids move."""
 
     name: str  # of the solid
@@ -43,17 +47,17 @@ class Body:
     @property
     def position(self) -> np.ndarray:
         """Position of the solid's frame [m], shape [dim]."""
-        return self.pose()[0][: self.dim].copy()
+        return self._copy("position", self.pose()[0][: self.dim], MOVED)
 
     @property
     def rotation(self) -> np.ndarray:
         """Rotation of the solid's frame as a unit quaternion (w, x, y, z)."""
-        return self.pose()[1].copy()
+        return self._copy("rotation", self.pose()[1], MOVED)
 
     @property
     def velocity(self) -> np.ndarray:
         """Velocity of the centre of mass [m/s], shape [dim]; writable."""
-        return self.coupling.velocity[self.row][: self.dim].copy()
+        return self._copy("velocity", self.coupling.velocity[self.row][: self.dim], SET)
 
     @velocity.setter
     def velocity(self, value: Any) -> None:
@@ -64,7 +68,7 @@ class Body:
     @property
     def angular_velocity(self) -> np.ndarray:
         """Angular velocity [rad/s], shape [3] (in a 2-D world the first two are 0); writable."""
-        return self.coupling.velocity[self.row][3:].copy()
+        return self._copy("angular_velocity", self.coupling.velocity[self.row][3:], SET)
 
     @angular_velocity.setter
     def angular_velocity(self, value: Any) -> None:
@@ -109,8 +113,11 @@ class Body:
         position, rotation = self.pose()
         return position + turned(rotation, self.dry.center)
 
+    def _copy(self, what: str, values: np.ndarray, setter: str) -> np.ndarray:
+        return read_only(values.copy(), f"{what} of body {self.name!r}", setter.format(what=what, name=self.name))
+
     def _checked(self, what: str, value: Any, length: int) -> np.ndarray:
-        row = np.asarray(value, float)
+        row = array_of(f"{what} of body {self.name!r}", value, float, f"[{length}]")
         if row.shape != (length,) or not np.isfinite(row).all():
             raise WavetankError(f"{what} = {value} of body {self.name!r} must be {length} finite numbers.")
         return row

@@ -7,11 +7,11 @@ processor needs for a particle and a step, so that only what is really long is r
 import contextlib
 import dataclasses
 import functools
-import math
 import os
 from collections.abc import Iterator
 
 from wavetank.device import compiler
+from wavetank.foundation.arguments import finite
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.memory import free_memory, in_words, time_in_words
 from wavetank.physics.neighbors import MAX_ENTRIES, list_room
@@ -106,9 +106,8 @@ def check_time(particles: int, scene: Scene, seconds: float, what: str) -> None:
 
 def check_frames(particles: int, scene: Scene, seconds: float, fps: float) -> None:
     """Raise `WavetankError` for a time [s] or rate [1/s] that is not finite, and for what takes more than an hour."""
-    if not (math.isfinite(fps) and fps > 0):
-        raise WavetankError(f"fps = {fps} is not allowed; it must be a positive number.")
-    if not (math.isfinite(seconds) and seconds >= 0):
-        raise WavetankError(f"seconds = {seconds} is not allowed; it must be a finite number of at least 0.")
+    if finite("fps", fps, 0.0) == 0.0:
+        raise WavetankError("fps = 0 is not allowed; it must be a positive number.")
+    finite("seconds", seconds, 0.0)
     work = max(seconds, 0.05 * seconds * fps * scene.frame_time)  # a frame is work, however short
     check_time(particles, scene, work, f"frames({seconds:g}, {fps:g})")

@@ -24,7 +24,7 @@ from wavetank.simulation.state import State
 from wavetank.solids.distance import SolidSet
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True)
 class Frame(Instant):
     """One instant of a world on the device."""
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.foundation.arguments import read_only
 from wavetank.scene.scene import Scene
 from wavetank.solids.solid import Solid
 
@@ -65,6 +66,12 @@ FOAM = (
     Field("foam_lives", "life", np.float32),  # s
 )
 
+#: What sets arrays of a running world.
+SETTERS = {
+    name: f"x = sim.{name}.copy(), x[...] = ... and sim.{name} = x set it" for name in ("positions", "velocities")
+}
+SETTERS["dyes"] = "sim.paint_inside dyes, and sim.add with dyes"
+
 
 @dataclasses.dataclass(frozen=True)
 class PlacedSolid:
@@ -93,6 +100,9 @@ class Instant(ABC):
     def _of_foam(self, field: Field) -> np.ndarray:
         """Return an array of the foam on the host."""
 
+    def _copy(self, name: str, values: np.ndarray) -> np.ndarray:
+        return read_only(values, name, SETTERS.get(name, "nothing sets it, .copy() can be changed"))
+
     @property
     def dim(self) -> int:
         """Number of dimensions of the world, 2 or 3."""
@@ -101,32 +111,32 @@ class Instant(ABC):
     @functools.cached_property
     def positions(self) -> np.ndarray:
         """Positions [m], float32 [count, dim], ordered by particle id."""
-        return self._by_id("x")
+        return self._copy("positions", self._by_id("x"))
 
     @functools.cached_property
     def velocities(self) -> np.ndarray:
         """Velocities [m/s], float32 [count, dim], ordered by particle id."""
-        return self._by_id("v")
+        return self._copy("velocities", self._by_id("v"))
 
     @functools.cached_property
     def densities(self) -> np.ndarray:
         """Densities [kg/m^3], float32 [count], ordered by particle id."""
-        return self._by_id("rho")
+        return self._copy("densities", self._by_id("rho"))
 
     @functools.cached_property
     def ids(self) -> np.ndarray:
         """Ids of the particles, int32 [count], rising; those of removed particles are missing."""
-        return self._by_id("id")
+        return self._copy("ids", self._by_id("id"))
 
     @functools.cached_property
     def dyes(self) -> np.ndarray:
         """Dyes, int32 [count], ordered by particle id; 0 is clear water, see `Particles.dye`."""
-        return self._by_id("dye")
+        return self._copy("dyes", self._by_id("dye"))
 
     @functools.cached_property
     def materials(self) -> np.ndarray:
         """Number of the material of each particle, see `Scene.palette`, int32 [count], ordered by particle id."""
-        return self._by_id("material")
+        return self._copy("materials", self._by_id("material"))
 
     @property
     def rest_densities(self) -> np.ndarray:
@@ -164,32 +174,32 @@ class Instant(ABC):
     @functools.cached_property
     def foam_ids(self) -> np.ndarray:
         """Numbers of the births of foam, int32 [n]: a drop has the same number in every frame."""
-        return self._of_foam(FOAM[0])
+        return self._copy("foam_ids", self._of_foam(FOAM[0]))
 
     @functools.cached_property
     def foam_positions(self) -> np.ndarray:
         """Positions [m] of spray, foam and bubbles, float32 [n, dim], in the order of their births."""
-        return self._of_foam(FOAM[1])
+        return self._copy("foam_positions", self._of_foam(FOAM[1]))
 
     @functools.cached_property
     def foam_velocities(self) -> np.ndarray:
         """Their velocities [m/s], float32 [n, dim]."""
-        return self._of_foam(FOAM[2])
+        return self._copy("foam_velocities", self._of_foam(FOAM[2]))
 
     @functools.cached_property
     def foam_kinds(self) -> np.ndarray:
         """Their kinds, int32 [n]: index in `state.KINDS`, 1 spray, 2 foam, 3 bubble."""
-        return self._of_foam(FOAM[3])
+        return self._copy("foam_kinds", self._of_foam(FOAM[3]))
 
     @functools.cached_property
     def foam_ages(self) -> np.ndarray:
         """Time since their births [s], float32 [n]."""
-        return self._of_foam(FOAM[4])
+        return self._copy("foam_ages", self._of_foam(FOAM[4]))
 
     @functools.cached_property
     def foam_lives(self) -> np.ndarray:
         """Ages [s] at which they vanish, float32 [n]."""
-        return self._of_foam(FOAM[5])
+        return self._copy("foam_lives", self._of_foam(FOAM[5]))
 
 
 def in_space(rows: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.turns import one_at_a_time
+from wavetank.foundation.arguments import KnownAttributes
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import inverse, product, turned
 from wavetank.foundation.tracks import track, varies
@@ -32,12 +33,16 @@ Ends = Callable[[], tuple[Pose, Pose]]  # poses of the first solid, and of the s
 
 
 @one_at_a_time()
-class LiveJoint:
+class LiveJoint(KnownAttributes):
     """A joint of a running world, in `sim.joints`. Hinges and sliders have a position, and may have a motor.
 
     The first solid turns or slides relative to the second one, or the world: angles [rad] and distances [m] count from
     the start. A value that is set holds until the next one; it is part of saved states.
     """
+
+    name: str
+    joint: Joint
+    response: float  # s
 
     def __init__(
         self,

@@ -3,6 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 from wavetank.device.turns import TURN
+from wavetank.foundation.arguments import near
+from wavetank.foundation.errors import NoAttributeError
 from wavetank.foundation.params import LIVE, PARAMETERS, Parameters, refuse_assignment
 from wavetank.scene.scene import Scene
 from wavetank.scene.schedule import changes_gravity, gravity_at, with_gravity
@@ -54,13 +56,13 @@ class LiveParameters(Declared):
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in LIVE:
             refuse_assignment(name)
-            raise AttributeError(f"there is no parameter {name!r}; dir() of this object lists them")
+            raise NoAttributeError(f"there is no parameter {name!r}; {near(name, type(self))}.")
         if name == "gravity" and changes_gravity(self._scene):
             trial = self._scene.model_copy(update={"gravity_track": None})
-            trial.assign(name, value)
+            setattr(trial, name, value)
             vars(self)["_gravity"] = trial.gravity
         else:
-            self._scene.assign(name, value)
+            setattr(self._scene, name, value)
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *Parameters.model_fields})

@@ -11,6 +11,7 @@ import numpy as np
 from wavetank.device.compiler import download, upload
 from wavetank.device.periods import NONE
 from wavetank.device.state import LASTING, Fluids, Particles, Walls, new_particles, new_temporaries, vectors
+from wavetank.foundation.arguments import array_of, finite, instance_of
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import FARTHEST
 from wavetank.physics import population
@@ -84,6 +85,7 @@ class ParticleSystem:
         x = check_rows("positions", values, (self.count, self.scene.dim))
         x = self.scene.tank.within(x) if self.scene.tank else x
         check_crowd("positions", x, self.scene.spacing)
+        check_inside(self.scene, x)
         if not np.array_equal(x, by_id(self.world.particles, self.count, "x")):
             population.clear_forces(self.world.particles, self.count)  # the pressure there was is that of other places
             put_by_id(self.world.particles, self.count, "x", x)
@@ -99,10 +101,9 @@ class ParticleSystem:
 
     # --- particles that come and go ---
 
-    def add(self, positions: Any, velocities: Any = None, dyes: Any = None, materials: Any = None) -> np.ndarray:
+    def add(self, new: Newcomers) -> np.ndarray:
         """Add particles and return their ids, [n]; see `Simulation.add`."""
-        counters, new = self.counters, check_newcomers(self.scene, positions, velocities, dyes, materials)
-        number = len(new.x)
+        counters, number = self.counters, len(new.x)
         count = self.count + number
         if count > MAX_PARTICLES:
             raise WavetankError(f"{count:,} particles are more than the {MAX_PARTICLES:,} that are allowed.")
@@ -119,7 +120,7 @@ class ParticleSystem:
 
     def remove(self, ids: Any) -> int:
         """Remove the particles with these ids and return their number; the others keep their ids."""
-        gone = np.isin(download(self.world.particles.id)[: self.count], np.asarray(ids))
+        gone = np.isin(download(self.world.particles.id)[: self.count], array_of("ids", ids, np.int64, "[n]"))
         return self._keep(~gone)
 
     def remove_inside(self, start: Any, end: Any, radius: float) -> int:
@@ -142,15 +143,19 @@ class ParticleSystem:
     def free_places(self, places: np.ndarray, gap: float, wall: float) -> np.ndarray:
         """Return which `places` [n, dim] are `gap` [m] from all particles and `wall` [m] from all solids, bool [n]."""
         clearance = population.Clearance(gap, wall, periods=self.world.grid.periods)
+        places = check_rows("places", places, (len(np.atleast_1d(places)), self.scene.dim))
+        gap, wall = finite("gap", gap, 0.0), finite("wall", wall, -FARTHEST)
         return population.free_places(places, self.world.particles, self.world.solids, self.count, clearance)
 
     def paint_inside(self, start: Any, end: Any, radius: float, dye: int) -> None:
         """Dye the particles within `radius` [m] of a segment; 0 removes their dye."""
+        dye = int(array_of("dye", dye, np.int32, "[], a number as Particles.dye"))
         if self.count:
             population.dye_particles(self.world.particles, self._capsule(start, end, radius), dye, self.count)
 
     def freeze_inside(self, start: Any, end: Any, radius: float, frozen: bool = True) -> None:
         """Turn the particles within `radius` [m] of a segment to ice that keeps its place, or back to water."""
+        instance_of("frozen", frozen, bool, "True or False")
         if self.count:
             capsule = self._capsule(start, end, radius)
             self.world.frozen = int(population.freeze_particles(self.world.particles, capsule, int(frozen), self.count))
@@ -226,14 +231,16 @@ def _new_world(scene: Scene, capacity: int, solids: SolidSet, pieces: Pieces | N
 
 def check_newcomers(scene: Scene, positions: Any, velocities: Any, dyes: Any, materials: Any) -> Newcomers:
     """Return the arguments of `Simulation.add` as arrays; raises `WavetankError` for wrong shapes and numbers."""
-    x = np.asarray(positions, np.float32)
-    v = np.zeros_like(x) if velocities is None else np.asarray(velocities, np.float32)
-    dye = np.zeros(len(x), np.int32) if dyes is None else np.asarray(dyes, np.int32)
+    rows = f"[n, {scene.dim}]"
+    x = np.atleast_1d(array_of("positions", positions, np.float32, rows))
+    v = np.zeros_like(x) if velocities is None else array_of("velocities", velocities, np.float32, rows)
+    dye = np.zeros(len(x), np.int32) if dyes is None else array_of("dyes", dyes, np.int32, "[n]")
     material = scene.checked_kinds(materials, len(x))
     shape = (len(x), scene.dim)
     if x.shape != shape or v.shape != shape or dye.shape != shape[:1]:
         raise WavetankError(
-            f"positions have shape {list(x.shape)}, velocities {list(v.shape)}; both must be [n, {scene.dim}]."
+            f"positions have shape {list(x.shape)}, velocities {list(v.shape)}, dyes {list(dye.shape)}; they must be "
+            f"{rows}, {rows} and [n]."
         )
     if not (bool((np.abs(x) <= FARTHEST).all()) and bool((np.abs(v) <= FARTHEST).all())):
         raise WavetankError(f"positions and velocities of new particles must be finite numbers within {FARTHEST:g}.")
@@ -260,6 +267,20 @@ def check_crowd(name: str, x: np.ndarray, spacing: float) -> None:
         raise WavetankError(
             f"{name}: {number:,} particles lie in one place, within a spacing of {place}; at most {CROWD} can: at rest "
             "there is one."
+        )
+
+
+def check_inside(scene: Scene, x: np.ndarray) -> None:
+    """Raise `WavetankError` where a position of `x` [n, dim] [m] is outside of the tank by half a spacing or more."""
+    if scene.tank is None:
+        return
+    lower, upper = scene.tank.box()
+    far = (np.maximum(lower - x, x - upper) > 0.5 * scene.spacing).any(axis=1)
+    if far.any():
+        row = int(np.argmax(far))
+        raise WavetankError(
+            f"positions[{row}] = {x[row].tolist()} is outside of the tank, as are {int(far.sum()) - 1:,} others; it "
+            f"must lie between {lower.tolist()} and {upper.tolist()}."
         )
 
 

@@ -2,7 +2,6 @@
 
 import contextlib
 import dataclasses
-import inspect
 import math
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -11,10 +10,12 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+from typing_extensions import override
 
 from wavetank.device import compiler
 from wavetank.device.state import KINDS
 from wavetank.device.turns import TURN, one_at_a_time
+from wavetank.foundation.arguments import KnownAttributes, finite, instance_of
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import explain_errors, printable
 from wavetank.foundation.params import LIVE, refuse_assignment
@@ -38,7 +39,7 @@ from wavetank.simulation.instant import PlacedSolid
 from wavetank.simulation.joints import Joints
 from wavetank.simulation.packing import pack
 from wavetank.simulation.parameters import LiveParameters
-from wavetank.simulation.particles import ParticleSystem
+from wavetank.simulation.particles import ParticleSystem, check_inside, check_newcomers
 from wavetank.simulation.solids import Solids, restored_solids, solids_of
 from wavetank.simulation.sources import Sources, check_places
 from wavetank.simulation.state import Continuation, Counters, State
@@ -49,7 +50,7 @@ NEAR = 0.99  # of the distance that water keeps from walls: particles that start
 
 
 @one_at_a_time("advance", "frames", "numbered_frames")
-class Simulation:
+class Simulation(KnownAttributes):
     """A running world of a scene.
 
     Any thread may make, read and move it: what reads or changes it waits for the end of a frame that is computed.
@@ -80,23 +81,30 @@ class Simulation:
         Raises `WavetankError` for a back end that is not there, and for a scene that cannot run or needs too much
         memory.
         """
+        self._start(Scene.checked(scene), arch)
+        self.terms += [_checked_term(term) for term in instance_of("terms", terms, Iterable, "a list of wt.Term")]
+
+    def _start(self, scene: Scene, arch: str) -> None:
         compiler.start(arch)
         self.arch = compiler.current_backend()
-        self.counters = Counters()
-        self._set_scene(Scene.checked(scene).model_copy(deep=True))
-        self.terms = []
+        self.counters, self.terms = Counters(), []
+        self.scene = scene.model_copy(deep=True)
+        self.parameters = LiveParameters(self.scene, self.counters)
+        self.particles = ParticleSystem(self.scene, self.counters)
         self.reset()
-        self.terms += terms
 
-    def _set_scene(self, scene: Scene) -> None:
-        self.scene, self.parameters = scene, LiveParameters(scene, self.counters)
-        self.particles = ParticleSystem(scene, self.counters)
+    @classmethod
+    def _of(cls, scene: Scene, arch: str) -> Self:
+        """Return a world of a scene that follows from one that was checked."""
+        self = cls.__new__(cls)
+        self._start(scene, arch)
+        return self
 
     def reset(self) -> None:
         """Put everything back to the start of the scene."""
         scene = self.scene
         check_cost(scene)
-        start = pack(scene, lambda scene: type(self)(scene, self.arch or "cpu"))
+        start = pack(scene, lambda scene: self._of(scene, self.arch or "cpu"))
         self.solids = solids_of(scene, self._walls(), scene.solids)
         self.notes = []
         self.sources = Sources(scene, self.notes)
@@ -275,8 +283,7 @@ class Simulation:
         What is shorter than a fifth of a usual time step is kept for the next call: a position-based step turns the
         density error of the steps before into velocity, and a much shorter one into much velocity.
         """
-        if not (math.isfinite(seconds) and seconds >= 0):
-            raise WavetankError(f"seconds = {seconds} is not allowed; it must be a finite number of at least 0.")
+        seconds = finite("seconds", seconds, 0.0)
         frame, counters = self.scene.frame_time, self.counters
         check_time(self.count, self.scene, seconds, f"advance({seconds:g})")
         counters.pending_time += seconds
@@ -310,12 +317,16 @@ class Simulation:
             yield number, self.frame()
 
     def push(self, force: Force) -> None:
-        """Let a force act during the next frame only."""
-        self.pushed.append(force)
+        """Let a force act during the next frame only; raises `WavetankError` for what is not a `wt.Force`."""
+        self.pushed.append(_checked_force(force))
 
     @TURN
     def _advance_frame(self, duration: float) -> None:
         began = time.perf_counter()
+        for force in self.forces:
+            _checked_force(force)
+        for term in self.terms:
+            _checked_term(term)
         self.solids.follow(self.time, duration)
         self.pushed += self.sources.forces(self.scene, self.time, duration)
         limit = self._speed_limit(duration)
@@ -403,8 +414,9 @@ class Simulation:
     def hold(self, name: str, held: bool = True) -> None:
         """Hold the body `name` at its pose, or where `move` moves it; with `held` = False let it go."""
         body = self.bodies[name]
+        instance_of("held", held, bool, "True or False")
         body.solid = self.solids.members[body.number] = body.solid.model_copy(update={"held": held})
-        self.scene.assign("solids", self.solids.members[self.solids.tank_count :])
+        self._set_solids(self.solids.members[self.solids.tank_count :])
 
     def release(self, name: str, within: float = 0.5) -> None:
         """Let the solid `name` that `move` took return to its own motion `within` [s].
@@ -423,12 +435,12 @@ class Simulation:
         Raises `WavetankError` and changes nothing where it cannot be built.
         """
         before = self.scene.solids
-        self.scene.assign("solids", [*before, solid])
+        self._set_solids([*before, solid])
         try:
             name = self.solids.add(solid, grow)
             self._renew_solids()
         except BaseException:
-            self.scene.assign("solids", before)
+            self.scene.solids = before
             for number in range(self.solids.tank_count + len(before), len(self.solids.members)):
                 self.solids.remove(number)
             raise
@@ -439,11 +451,14 @@ class Simulation:
         number = self.solids.find(name) - self.solids.tank_count
         if number < 0:
             raise WavetankError(f"{name!r} is a wall of the tank, which stays; only other solids can be removed.")
-        self.scene.assign("solids", [solid for k, solid in enumerate(self.scene.solids) if k != number])
+        self.scene.solids = [solid for k, solid in enumerate(self.scene.solids) if k != number]
         device, reach = self.solids.device, 2.0 * self.scene.support * self.scene.spacing
         population.forget_solid(self.world.particles, self.count, device, number + self.solids.tank_count, reach)
         self.solids.remove(number + self.solids.tank_count)
         self._renew_solids()
+
+    def _set_solids(self, solids: Sequence[Any]) -> None:
+        self.scene.solids = list(solids)
 
     def _renew_solids(self, density: float = 0.0) -> None:
         """Update bodies and device arrays to the present solids, in fluids of `density` [kg/m^3] (0: as before)."""
@@ -456,9 +471,11 @@ class Simulation:
         """Add particles at `positions` [m], shape [n, dim], with `velocities` [m/s] and return their new ids, [n].
 
         `materials` are numbers in `Scene.palette`, [n]; that of the scene's first fluid where None. Particles may
-        overlap others: see `free_places`. Raises `WavetankError` for wrong shapes.
+        overlap others: see `free_places`. Raises `WavetankError` for wrong shapes, and places outside of the tank.
         """
-        return self.particles.add(positions, velocities, dyes, materials)
+        new = check_newcomers(self.scene, positions, velocities, dyes, materials)
+        check_inside(self.scene, new.x)
+        return self.particles.add(new)
 
     def remove(self, ids: Any) -> int:
         """Remove the particles with these ids and return their number; the others keep their ids."""
@@ -504,8 +521,9 @@ class Simulation:
 
     def resume(self, state: State) -> None:
         """Go back (or on) to a state of `snapshot`; parameters and forces stay as they are now."""
+        instance_of("state", state, State, "a state of sim.snapshot()")
         more, now = state.resumable, self.counters.copy()
-        self.scene.assign("solids", state.scene.solids)
+        self.scene.solids = state.scene.solids
         self.solids = restored_solids(self.scene, self._walls(), more.solids, state.scene.solids)
         if more.counters.capacity > now.capacity:
             self.particles.allocate(more.counters.capacity, self.solids, self.bodies.pieces)
@@ -521,7 +539,7 @@ class Simulation:
     def clone(self) -> Self:
         """Return another world that continues from here to the same bits, with the same forces and parameters."""
         empty = self.scene.model_copy(update={"fluids": [], "solids": []})
-        copy = type(self)(empty, self.arch or "cpu")
+        copy = self._of(empty, self.arch or "cpu")
         scene = self.scene.model_copy(deep=True)
         copy.scene = copy.particles.scene = scene
         copy.parameters = LiveParameters(scene, copy.counters)
@@ -568,20 +586,37 @@ class Simulation:
         raise AttributeError(f"'Simulation' object has no attribute {name!r}")
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name in self.__dict__ or _is_declared(type(self), name):
-            super().__setattr__(name, value)
-        elif name in LIVE:
+        if name in LIVE:
             setattr(self.parameters, name, value)
-        else:
+            return
+        if not hasattr(type(self), name):
             refuse_assignment(name)
-            raise WavetankError(
-                f"a simulation has no attribute {name!r}; dir(sim) lists what it has, its live parameters among them."
-            )
+        super().__setattr__(name, value)
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *LIVE})
 
+    # --- copies ---
 
-def _is_declared(cls: type, name: str) -> bool:
-    """Return whether a class declares an attribute, or it is private."""
-    return name.startswith("_") or hasattr(cls, name) or any(name in inspect.get_annotations(c) for c in cls.__mro__)
+    def __copy__(self) -> Self:
+        return self.clone()
+
+    def __deepcopy__(self, memo: Any) -> Self:
+        return self.clone()
+
+    @override
+    def __reduce__(self) -> Any:
+        raise WavetankError(
+            "a Simulation lives on a device and cannot be pickled; sim.save(path) and Simulation.restore(path), or its "
+            "scene, go to another process."
+        )
+
+
+def _checked_force(force: Any) -> Force:
+    checked: Force = instance_of("a force", force, Force, "a wt.Force, as wt.Wind(...)")
+    return checked
+
+
+def _checked_term(term: Any) -> Term:
+    checked: Term = instance_of("a term", term, Term, "a wt.Term")
+    return checked

@@ -10,7 +10,9 @@ from typing_extensions import override
 
 from wavetank.device.compiler import synchronize, upload
 from wavetank.device.periods import NONE, Periods
+from wavetank.foundation.arguments import KnownAttributes, array_of, read_only
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.model import FARTHEST
 from wavetank.foundation.rotations import interpolate, matrix_of, turned, unit_quaternion
 from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene
@@ -29,8 +31,10 @@ Rows = tuple[np.ndarray, np.ndarray]  # positions [n, 3] and rotations [n, 4]
 _versions = itertools.count(1)
 
 
-class LiveSolid:
+class LiveSolid(KnownAttributes):
     """A solid of a running world by name, in `sim.solids`."""
+
+    name: str
 
     def __init__(self, solids: "Solids", name: str) -> None:
         self.name, self._solids = name, solids
@@ -46,12 +50,12 @@ class LiveSolid:
     @property
     def position(self) -> np.ndarray:
         """Position of its frame [m], shape [dim]."""
-        return self._solids.poses[self._number][0][: self._solids.dim].copy()
+        return self._copy("position", self._solids.poses[self._number][0][: self._solids.dim])
 
     @property
     def rotation(self) -> np.ndarray:
         """Rotation of its frame as a unit quaternion (w, x, y, z)."""
-        return self._solids.poses[self._number][1].copy()
+        return self._copy("rotation", self._solids.poses[self._number][1])
 
     @property
     def has_motion(self) -> bool:
@@ -61,6 +65,10 @@ class LiveSolid:
     def move(self, position: Sequence[float] | None = None, rotation: Any = None) -> None:
         """Set the pose that it reaches at the end of the next frame; see `Solids.move`."""
         self._solids.move(self.name, position, rotation)
+
+    def _copy(self, what: str, values: np.ndarray) -> np.ndarray:
+        setter = f"sim.move({self.name!r}, {what}=...) moves it"
+        return read_only(values.copy(), f"{what} of solid {self.name!r}", setter)
 
     @property
     def _number(self) -> int:
@@ -225,15 +233,18 @@ class Solids(Mapping[str, LiveSolid]):
         """
         dim = self.dim
         number = self.find(name)
-        self.motions.hold(name)
         old_position, old_rotation = self.targets.get(number, self.poses[number])
         point = np.array(old_position, float)
         if position is not None:
-            values = np.asarray(position, float)
-            if values.shape != (dim,) or not np.isfinite(values).all():
-                raise WavetankError(f"position = {position} must be {dim} finite numbers.")
+            values = array_of("position", position, float, f"[{dim}]")
+            if values.shape != (dim,) or not (np.abs(values) <= FARTHEST).all():
+                raise WavetankError(f"position = {position} must be {dim} finite numbers within {FARTHEST:g} [m].")
             point[:dim] = values
-        self.targets[number] = (point, old_rotation if rotation is None else unit_quaternion(rotation))
+        if rotation is not None:
+            array_of("rotation", rotation, float, "[4], a quaternion, or an angle [rad]")
+        target = point, old_rotation if rotation is None else unit_quaternion(rotation)
+        self.motions.hold(name)
+        self.targets[number] = target
 
     def follow(self, time: float, duration: float) -> None:
         """Set the targets of solids with a prescribed motion for a frame of `duration` [s] from `time` [s] on."""

@@ -15,6 +15,7 @@ import numpy as np
 from typing_extensions import override
 
 from wavetank.device.compiler import download
+from wavetank.foundation.arguments import KnownAttributes, instance_of
 from wavetank.foundation.errors import WavetankError
 from wavetank.scene.drains import Drain
 from wavetank.scene.emitters import Emitter
@@ -22,7 +23,7 @@ from wavetank.scene.forces import Attract, Force
 from wavetank.scene.gauges import Gauge
 from wavetank.scene.scene import Scene
 from wavetank.simulation.inflow import fly_freely, jet_force, one_row, particles_due
-from wavetank.simulation.particles import ParticleSystem
+from wavetank.simulation.particles import ParticleSystem, check_newcomers
 
 GAP = 0.8  # d: distance of new particles from others, at least
 PRESSED = 0.45  # d: the same where more than a row is pending because of water under pressure
@@ -34,10 +35,10 @@ REACH = 4.0  # radii: range of the suction of a drain
 
 @dataclasses.dataclass
 class Source:
-    """An emitter or a drain of a running world, in `sim.sources`."""
+    """An emitter or a drain of a running world."""
 
     name: str  # of the scene, or "emitter 1", "drain 1" and so on
-    on: bool = True  # writable: whether it acts when the scene lets it
+    on: bool = True  # whether it acts when the scene lets it
     rate: float = 0.0  # m^3/s, in 2-D m^2/s: flow in the last frame
     phase: float = 0.0  # of a row; of a drain: fraction of the next particle
     pending: int = 0  # particles that found no free space yet
@@ -56,6 +57,45 @@ class Source:
         for name, key in STORED.items():
             setattr(self, name, plain.get(key, getattr(self, name)))
         self.on = bool(plain.get("on", True))
+
+
+class LiveSource(KnownAttributes):
+    """An emitter or a drain of a running world by name, in `sim.sources`."""
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+
+    def __repr__(self) -> str:
+        return f"<source {self.name!r}: {'on' if self.on else 'off'}, {self.rate:g} m^3/s, {self.total:,} particles>"
+
+    @property
+    def name(self) -> str:
+        """Name in the scene, or "emitter 1", "drain 1" and so on."""
+        return self._source.name
+
+    @property
+    def on(self) -> bool:
+        """Whether it acts when the scene lets it; writable."""
+        return self._source.on
+
+    @on.setter
+    def on(self, value: bool) -> None:
+        self._source.on = instance_of("on", value, bool, "True or False")
+
+    @property
+    def rate(self) -> float:
+        """Flow in the last frame [m^3/s], in 2-D [m^2/s]."""
+        return self._source.rate
+
+    @property
+    def total(self) -> int:
+        """Number of particles that it emitted or removed."""
+        return self._source.total
+
+    @property
+    def withheld(self) -> int:
+        """Number of particles that an emitter could not emit."""
+        return self._source.withheld
 
 
 #: Attributes of a source that decide how it continues, and their keys in saved states.
@@ -80,7 +120,7 @@ def rows_due(way: float, more: float, pitch: float) -> tuple[np.ndarray, float]:
     return way + pitch * np.arange(rows), way
 
 
-class Sources(Mapping[str, Source]):
+class Sources(Mapping[str, LiveSource]):
     """The emitters and drains of a world by name. Raises `WavetankError` for an unknown name."""
 
     def __init__(self, scene: Scene, notes: list[str]) -> None:
@@ -91,10 +131,10 @@ class Sources(Mapping[str, Source]):
         self._said: set[str] = set()  # notes that were given
 
     @override
-    def __getitem__(self, name: str) -> Source:
+    def __getitem__(self, name: str) -> LiveSource:
         for source in (*self.emitters, *self.drains):
             if source.name == name:
-                return source
+                return LiveSource(source)
         raise WavetankError(f"there is no emitter or drain named {name!r}; there are: {', '.join(self) or 'none'}.")
 
     @override
@@ -258,7 +298,8 @@ class Sources(Mapping[str, Source]):
             particles.remove(np.sort(ids)[:full])
         names = [None, *(material.name for material in scene.materials)]
         kinds = np.full(len(free), names.index(emitter.material), np.int32)
-        particles.add(x[free], v[free], np.full(len(free), emitter.dye_number, np.int32), kinds)
+        dyes = np.full(len(free), emitter.dye_number, np.int32)
+        particles.add(check_newcomers(scene, x[free], v[free], dyes, kinds))
         return len(free)
 
     def _fed(self, scene: Scene, emitter: Emitter) -> Source:

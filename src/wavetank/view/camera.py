@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.foundation.arguments import array_of, brief, finite
 from wavetank.foundation.errors import WavetankError
 from wavetank.scene.schedule import tilted_by
-from wavetank.view.extent import Extent, extent_of
+from wavetank.view.extent import Extent, extent_of, extent_of_water
 from wavetank.view.lens import Lens, basis, lens_at
 
 Point = tuple[float, float, float]
@@ -17,6 +18,7 @@ Point = tuple[float, float, float]
 #: Three-quarter view from slightly above: azimuth from +z towards +x, elevation above the horizon [rad].
 FRAMING_AZIMUTH, FRAMING_ELEVATION = math.radians(30.0), math.radians(20.0)
 UPRIGHT = 0.85  # width over height of a picture below which it is upright
+ROOM = 1.25  # more height that a picture of a tilted tank shows
 STEEPEST = math.radians(89.0)  # an orbit stops short of the pole, where `up` has no meaning
 NEAREST, FARTHEST = 1e-3, 1e4  # m: how close and how far zooming goes
 
@@ -35,16 +37,15 @@ class Camera:
     def __post_init__(self) -> None:
         """Refuse what has no picture; raises `WavetankError`."""
         for name in ("eye", "target", "up"):
-            point = getattr(self, name)
-            if len(point) != 3 or not all(math.isfinite(part) for part in point):
-                raise WavetankError(f"camera {name} = {point} must be three finite numbers.")
-            object.__setattr__(self, name, tuple(float(part) for part in point))
-        if not 0.0 < self.field_of_view < math.pi:
-            raise WavetankError(f"camera field_of_view = {self.field_of_view} must lie between 0 and pi [rad].")
-        if not (math.isfinite(self.near) and self.near >= 1e-6):
-            raise WavetankError(f"camera near = {self.near} must be a length of at least 1e-6 m.")
-        if self.height is not None and not (math.isfinite(self.height) and self.height > 0.0):
-            raise WavetankError(f"camera height = {self.height} must be a positive length [m], or None.")
+            value = getattr(self, name)
+            point = array_of(f"camera {name}", value, float, "[3]")
+            if point.shape != (3,) or not np.isfinite(point).all():
+                raise WavetankError(f"camera {name} = {brief(value)} must be three finite numbers.")
+            object.__setattr__(self, name, _point(point))
+        finite("camera field_of_view [rad]", self.field_of_view, 1e-6, math.pi - 1e-6)
+        finite("camera near [m]", self.near, 1e-6)
+        if self.height is not None and finite("camera height [m]", self.height, 0.0) == 0.0:
+            raise WavetankError("camera height = 0 must be a positive length [m], or None.")
         if self.distance < 1e-9:
             raise WavetankError(f"camera eye and target are both {self.eye}; they must differ.")
         if not any(self.up):
@@ -151,6 +152,17 @@ class Camera:
         if extent.dim == 2:
             return _front(cls, extent, aspect)
         return _three_quarter(cls, extent, aspect)
+
+    @classmethod
+    def looking(cls, frame: Any, eye: Any = None, target: Any = None, aspect: float = 16 / 9) -> "Camera":
+        """Return a camera at `eye` [m] that looks at `target` [m]; what is None frames the water of `frame`."""
+        usual = cls.framing_extent(extent_of_water(frame), aspect)
+        chosen = cls(
+            eye=usual.eye if eye is None else eye,
+            target=usual.target if target is None else target,
+            height=usual.height,
+        )
+        return chosen.tilted(frame.scene, frame.time, ROOM if eye is None else 1.0)
 
     def tilted(self, scene: Any, time: float, room: float = 1.0) -> "Camera":
         """Turn around the target as the tank of `scene` stands at `time` [s]: it is seen tilted, gravity points down.

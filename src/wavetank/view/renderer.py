@@ -4,6 +4,7 @@ import collections
 import dataclasses
 import math
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,12 @@ import numpy as np
 from wavetank.device.compiler import current_backend, download, qd, synchronize, upload
 from wavetank.device.state import interned
 from wavetank.device.turns import TURN, one_at_a_time
+from wavetank.foundation.arguments import instance_of
 from wavetank.foundation.errors import WavetankError
 from wavetank.simulation.frame import Frame
 from wavetank.view import legend as legends
 from wavetank.view.buffers import allocate
-from wavetank.view.camera import Camera
+from wavetank.view.camera import ROOM, Camera
 from wavetank.view.colormaps import ENTRIES, table
 from wavetank.view.extent import Extent, extent_of
 from wavetank.view.film.samples import Watch
@@ -39,7 +41,6 @@ from wavetank.view.water_buffers import sun_texels, water_of
 LARGEST_SIDE, LARGEST_SUPERSAMPLE = 8192, 4
 KEPT_RENDERERS, KEPT_SAMPLES = 4, 2**24
 Timings = dict[str, float] | None  # milliseconds of each pass, added up
-ROOM = 1.25  # more height that a picture of a tilted tank shows
 POINT_SUN = 0.004  # tangent of the sun's radius where many suns are averaged
 
 
@@ -48,13 +49,7 @@ class Renderer:
     """Takes pictures of one size; its buffers are allocated once."""
 
     def __init__(self, width: int, height: int, supersample: int = 1) -> None:
-        for name, value, most in (
-            ("width", width, LARGEST_SIDE),
-            ("height", height, LARGEST_SIDE),
-            ("supersample", supersample, LARGEST_SUPERSAMPLE),
-        ):
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= most:
-                raise WavetankError(f"render: {name} = {value!r} must be a whole number from 1 to {most}.")
+        check_size(width, height, supersample)
         if current_backend() is None:
             raise WavetankError("render: nothing computes yet; make a Simulation first, or call compiler.start().")
         self.width, self.height, self.supersample = int(width), int(height), int(supersample)
@@ -83,6 +78,8 @@ class Renderer:
         how far a traced picture is, and can stop it. Raises `WavetankError` for what is not allowed.
         """
         style = Style.of(options)
+        if camera is not None:
+            instance_of("render: camera", camera, Camera, "a wt.Camera(eye=..., target=...), or eye and target alone")
         shot = self.shot(frame, camera, style)
         if style.traced and style.kind.name == "water" and frame.dim == 3:
             began = time.perf_counter()
@@ -258,6 +255,8 @@ def _sun_lens(extent: Extent, to_sun: Any, texels: int) -> Lens:
     return lens_at(eye, axes, texels, texels, 0.5 * texels / reach, perspective=False, near=1e-6)
 
 
+#: Fields of `Style` that are arguments of `render`.
+_STYLED = {field.name for field in dataclasses.fields(Style)} - {"lit", "glare", "hasty", "traced"}
 _kept: collections.OrderedDict[tuple[int, int, int], Renderer] = collections.OrderedDict()
 
 
@@ -269,14 +268,35 @@ def render(
     *,
     quality: str | None = None,
     supersample: int | None = None,
+    camera: Camera | None = None,
+    eye: Sequence[float] | None = None,
+    target: Sequence[float] | None = None,
+    view: str | None = None,
+    color_by: str | None = None,
+    colormap: str | None = None,
+    limits: tuple[float, float] | None = None,
+    radius: float | None = None,
+    cut: str | None = None,
+    legend: bool | None = None,
+    environment: str | None = None,
+    sun: str | None = None,
+    floor: str | None = None,
+    edges: bool | None = None,
+    samples: int | None = None,
+    aperture: float | None = None,
+    focus: float | None = None,
+    shutter: float | None = None,
     **options: Any,
 ) -> np.ndarray:
     """Return a picture of a `Frame` or a `Simulation`, uint8 [height, width, 3].
 
-    `options` are those of `Renderer.render`: a view by name, a camera and the fields of `Style`. `quality` is draft,
-    standard, high or film. Without either `supersample` is 2, or 1 for pictures of more than 16 million pixels.
-    Renderers of the last few sizes are kept.
+    The camera is at `eye` [m] and looks at `target` [m], or is a `Camera`; what is None frames the world. All from
+    `view` to `shutter` are fields of `Style`, None for its own choice; further `options` are those of
+    `Renderer.render`. `quality` is draft, standard, high or film. Without either `supersample` is 2, or 1 for pictures
+    of more than 16 million pixels. Renderers of the last few sizes are kept.
     """
+    named = locals()
+    options |= {name: named[name] for name in _STYLED if named[name] is not None}
     if quality is not None:
         usual_samples, chosen = quality_options(quality)
         supersample, options = supersample or usual_samples, {**chosen, **options}
@@ -286,6 +306,11 @@ def render(
         raise WavetankError(f"render: a {type(world).__name__} cannot be drawn; give a simulation or a frame.")
     if supersample is None:
         supersample = affordable(width, height, 2)
+    check_size(width, height, supersample)
+    if eye is not None or target is not None:
+        if camera is not None:
+            raise WavetankError("render: camera and eye, or target, exclude each other; a camera has both.")
+        camera = Camera.looking(frame, eye, target, width / height)
     key = (width, height, supersample)
     renderer = _kept.pop(key, None)
     # Large ones go first, so that two of them are never alive at once.
@@ -293,7 +318,18 @@ def render(
         _kept.popitem(last=False)
     renderer = renderer or Renderer(width, height, supersample)
     _kept[key] = renderer
-    return renderer.render(frame, **options)
+    return renderer.render(frame, camera, **options)
+
+
+def check_size(width: Any, height: Any, supersample: Any) -> None:
+    """Raise `WavetankError` for a size of pictures that is not allowed."""
+    for name, value, most in (
+        ("width", width, LARGEST_SIDE),
+        ("height", height, LARGEST_SIDE),
+        ("supersample", supersample, LARGEST_SUPERSAMPLE),
+    ):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= most:
+            raise WavetankError(f"render: {name} = {value!r} must be a whole number from 1 to {most}.")
 
 
 def affordable(width: Any, height: Any, supersample: int) -> int:

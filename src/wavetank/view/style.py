@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from wavetank.foundation.arguments import instance_of
 from wavetank.foundation.errors import WavetankError
 from wavetank.simulation.frame import Frame
 from wavetank.view.colormaps import ENTRIES, bands, rgb_of, table, to_linear
@@ -62,6 +63,9 @@ class Style:
 
     def __post_init__(self) -> None:
         """Check what needs no frame to be checked."""
+        for name in ("view", "color_by", "colormap", "cut", "environment", "sun", "floor"):
+            if getattr(self, name) is not None:
+                instance_of(f"render: {name}", getattr(self, name), str, "a text")
         if self.view is not None and self.view not in VIEWS:
             raise WavetankError(f"render: view = {self.view!r} is not known; use one of {', '.join(VIEWS)}.")
         if self.color_by is not None and self.color_by not in QUANTITIES:
@@ -84,6 +88,9 @@ class Style:
         if radius is not None and not (isinstance(radius, int | float) and 0.0 < radius <= 10.0):
             raise WavetankError(f"render: radius = {radius!r} must be a number of spacings above 0, at most 10.")
         chosen_light(None, self.environment, self.sun, self.floor)
+        self._check_numbers()
+
+    def _check_numbers(self) -> None:
         samples = self.samples
         if isinstance(samples, bool) or not isinstance(samples, int) or not 1 <= samples <= MOST_SAMPLES:
             raise WavetankError(f"render: samples = {samples!r} must be a whole number from 1 to {MOST_SAMPLES}.")
@@ -160,7 +167,7 @@ class Style:
 
 def quality_named(name: str) -> str:
     """Return the name of a quality, or raise `WavetankError`."""
-    if name not in QUALITIES:
+    if not isinstance(name, str) or name not in QUALITIES:
         raise WavetankError(f"quality = {name!r} is not known; use one of {', '.join(QUALITIES)}.")
     return name
 
