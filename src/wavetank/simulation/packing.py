@@ -6,6 +6,8 @@ whose walls count as water; in it, without gravity and with velocities reset aft
 until they are even. Particles along the surface of the shape then lie as water at rest along a wall: half a spacing
 from it, without gaps and without compression.
 
+Solids are at rest where they are when the water starts: that they move, or have moved elsewhere, is not packing's.
+
 Packing particles by their own density errors: Colagrossi et al. 2012, "Particle packing algorithm for SPH schemes"
 (10.1016/j.cpc.2012.02.032); where we differ: corrections of positions (Eq. 6) instead of forces.
 
@@ -17,9 +19,10 @@ Packing particles by their own density errors: Colagrossi et al. 2012, "Particle
 import dataclasses
 import itertools
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from typing_extensions import override
 
 from wavetank.device.compiler import upload
 from wavetank.foundation.errors import WavetankError
@@ -30,7 +33,7 @@ from wavetank.scene.lattice import plain_lattice
 from wavetank.scene.scene import Scene
 from wavetank.solids.sampling import nearest_distances
 from wavetank.solids.shapes import Box, Difference, Sphere
-from wavetank.solids.solid import ENDLESS, Solid
+from wavetank.solids.solid import ENDLESS, Node, Solid
 
 STEPS, MOST_STEPS = 30, 120  # frames of packing, at most
 EVEN = 0.004  # mean of the positive density errors at which packing ends
@@ -39,6 +42,51 @@ MOST_POINTS = 40_000_000
 DEEP = 0.3  # d: places for particles are where the shape is this deep, and half a spacing around
 LEAST_VOLUME = 0.5  # share of the volume that must have places for particles
 SLACK = 0.02  # d: by how much a shape may reach beyond the tank by rounding
+
+
+#: what makes a solid one that stays where it is
+FIXED = {
+    "name": "",
+    "motion": None,
+    "density": None,
+    "mass": None,
+    "hollow": False,
+    "held": False,
+    "velocity": None,
+    "angular_velocity": None,
+}
+
+
+class Still(Solid):
+    """A solid at a pose of its own."""
+
+    solid: Any
+    pose: Any
+
+    @property
+    @override
+    def origin(self) -> np.ndarray:
+        place: np.ndarray = self.pose[0]
+        return place
+
+    @property
+    @override
+    def quaternion(self) -> np.ndarray:
+        turn: np.ndarray = self.pose[1]
+        return turn
+
+    @override
+    def program(self) -> list[Node]:
+        nodes: list[Node] = self.solid.program()
+        return nodes
+
+    @override
+    def reach(self) -> float:
+        return float(self.solid.reach())
+
+    @override
+    def span(self) -> float:
+        return float(self.solid.span())
 
 
 class Packed(Protocol):
@@ -75,7 +123,8 @@ def pack(scene: Scene, simulate: Callable[[Scene], Packed]) -> Scene:
 
 
 def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulate: Callable[[Scene], Packed]) -> Filled:
-    obstacles = [*scene.solids, *(_as_solid(other) for other in before if not isinstance(other, Points))]
+    solids = [_at_rest(solid, scene.start_time) for solid in scene.solids]
+    obstacles = [*solids, *(_as_solid(other) for other in before if not isinstance(other, Points))]
     measured = _measure(name, fluid, scene, obstacles)
     number = round(measured.volume / scene.spacing**scene.dim)
     places = measured.places(number)
@@ -84,20 +133,10 @@ def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulat
             f"{name} has not enough places for its {number:,} particles; use a smaller spacing or a larger shape."
         )
     container = _inside_out(fluid.inside, scene.dim)
-    fixed = {
-        "name": "",
-        "density": None,
-        "mass": None,
-        "hollow": False,
-        "held": False,
-        "velocity": None,
-        "angular_velocity": None,
-    }
-    solids = [solid.model_copy(update=fixed) for solid in (*obstacles, container)]
     world = scene.model_copy(
         update={
             "fluids": [Points(positions=places)],
-            "solids": solids,
+            "solids": [*obstacles, container.model_copy(update=FIXED)],
             "forces": [],
             "materials": [],
             "goal": None,
@@ -194,6 +233,14 @@ def _to_tank(points: np.ndarray, scene: Scene) -> np.ndarray:
     lower, upper = scene.tank.box()
     distances: np.ndarray = np.minimum(points - lower, upper - points).min(axis=1)
     return distances
+
+
+def _at_rest(solid: Solid, time: float) -> Solid:
+    """Return a solid that stays where its motion has it at a `time` [s]."""
+    still = solid.model_copy(update=FIXED)
+    if solid.motion is None:
+        return still
+    return Still(solid=still, pose=solid.motion.path().pose(time, (solid.origin, solid.quaternion)))
 
 
 def _inside_out(solid: Solid, dim: int) -> Solid:
