@@ -1,6 +1,7 @@
 """Mistakes in a script, by kind: each is one sentence that says what is allowed, none is raw, none is accepted."""
 
 import copy
+import dataclasses
 import inspect
 import pickle
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 import wavetank as wt
+from wavetank.view.style import Style
 
 MISTAKES = {
     "arrays that are copies": """
@@ -412,7 +414,7 @@ def test_the_bundled_scenes_are_checked_to_the_same_data():
 
 def test_render_and_dir_show_what_there_is(names):
     shown = inspect.signature(wt.render).parameters
-    assert {"eye", "target", "view", "color_by", "environment", "cut"} <= set(shown)
+    assert {"eye", "target", "quality", *(field.name for field in dataclasses.fields(Style))} <= set(shown)
     assert {"viscosity", "gravity", "substeps"} <= set(dir(names["S"]))
     far, near = (wt.render(names["S"], 64, 48, eye=(0.5, 0.4, z), target=(0.5, 0.4, 0)) for z in (2.0, 4.0))
     assert far.shape == near.shape == (48, 64, 3)

@@ -48,6 +48,7 @@ class Viewpoint:
     target: tuple[float, float, float]  # m
     field_of_view: float  # rad, vertical
     height: float | None = None  # m that are seen by a camera without perspective
+    up: tuple[float, float, float] = (0.0, 1.0, 0.0)
 
 
 @dataclasses.dataclass(frozen=True)

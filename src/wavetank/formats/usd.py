@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.formats.plan import Plan
-from wavetank.formats.usd_static import build_static, names_of
+from wavetank.formats.usd_static import build_static, names_of, up_axis
 from wavetank.foundation.atomic_write import atomic_write, make_folder
 from wavetank.foundation.errors import WavetankError
 from wavetank.scene.scene import Scene
@@ -103,6 +103,7 @@ class UsdSeries:
                 % {
                     "last": last,
                     "fps": f"{self.plan.fps:g}",
+                    "up": up_axis(self.plan.scene),
                     "folder": self.folder.name,
                     "title": self.plan.scene.title.replace("\\", "").replace('"', "'").replace("\n", " "),
                 },
@@ -122,7 +123,7 @@ _STAGE = """#usda 1.0
         @./%(folder)s/static.usdc@
     ]
     timeCodesPerSecond = %(fps)s
-    upAxis = "Y"
+    upAxis = "%(up)s"
 )
 
 over "World" (

@@ -11,6 +11,7 @@ import numpy as np
 
 from wavetank.formats.plan import Plan, Viewpoint
 from wavetank.foundation.atomic_write import atomic_write
+from wavetank.scene.scene import Scene
 from wavetank.simulation.state import State
 
 SOLID = (0.694, 0.361, 0.224)  # linear colour of solids
@@ -61,13 +62,18 @@ def names_of(names: Sequence[str]) -> dict[str, str]:
     return found
 
 
+def up_axis(scene: Scene) -> str:
+    """Return the axis that points up as USD names it, which knows Y and Z only."""
+    return "Z" if scene.upward == "z" else "Y"
+
+
 def build_static(plan: Plan, instant: State, solids: dict[str, str], folder: Path) -> None:
     """Write `static.usdc` and `manifest.usda` into `folder`; `solids` are prims by the names of solids."""
     from pxr import Sdf, Usd, UsdGeom
 
     static, manifest = (Usd.Stage.CreateInMemory() for _ in range(2))
     for stage in (static, manifest):
-        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+        UsdGeom.SetStageUpAxis(stage, up_axis(plan.scene))
         UsdGeom.SetStageMetersPerUnit(stage, 1.0)
         stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/World").GetPrim())
     prims: list[tuple[str, str, Any]] = []
@@ -190,7 +196,7 @@ def _surroundings(stage: Any, plan: Plan) -> None:
 def _camera(camera: Any, view: Viewpoint) -> None:
     from pxr import Gf, UsdGeom
 
-    matrix = Gf.Matrix4d(1.0).SetLookAt(Gf.Vec3d(*view.eye), Gf.Vec3d(*view.target), Gf.Vec3d(0, 1, 0)).GetInverse()
+    matrix = Gf.Matrix4d(1.0).SetLookAt(Gf.Vec3d(*view.eye), Gf.Vec3d(*view.target), Gf.Vec3d(*view.up)).GetInverse()
     camera.AddTransformOp().Set(matrix)
     distance = float(np.linalg.norm(np.subtract(view.eye, view.target)))
     camera.CreateClippingRangeAttr(Gf.Vec2f(0.01 * distance, 100.0 * distance))

@@ -38,10 +38,12 @@ def aim(session: Session, tool: str, u: float, v: float, reach: float, size: tup
         return {}
     flat, center, radius = session.sim.scene.dim == 2, held.point, held.radius(reach)
     around = [2.0 * math.pi * k / CORNERS for k in range(CORNERS + 1)]
-    turns = np.array([(math.cos(a), math.sin(a), 0.0) if flat else (math.cos(a), 0.0, math.sin(a)) for a in around])
+    ring = [(math.cos(a), math.sin(a), 0.0) if flat else (math.cos(a), 0.0, math.sin(a)) for a in around]
+    turns = np.array([turn if flat else held.along_axes(*turn) for turn in ring])
     result = {"ring": _seen(session, center + radius * turns, size)}
-    floor = np.array([center[0], held.lower[1], center[2]])
-    if not flat and center[1] - floor[1] > held.spacing:
+    up, floor = held.axes[1], np.array(center, float)
+    floor[up] = held.lower[up]
+    if not flat and center[up] - floor[up] > held.spacing:
         result["drop"] = _seen(session, np.array([center, floor]), size)
         result["foot"] = _seen(session, floor + FOOT * radius * turns, size)
     return result

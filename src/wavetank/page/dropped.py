@@ -30,7 +30,8 @@ def command_for(session: Session, text: str, file: str) -> AddSolid:
         raise WavetankError(f"{file}: all corners of the mesh are one point.")
     size = SHARE * float((extent.upper - extent.lower).max())
     middle = extent.middle.copy()
-    middle[1] = extent.lower[1] + 0.5 * size * float(edges[1] / edges.max()) + 0.25 * extent.spacing
+    up = "xyz".index(scene.upward[-1])
+    middle[up] = extent.lower[up] + 0.5 * size * float(edges[up] / edges.max()) + 0.25 * extent.spacing
     names = set(session.sim.solids.names)
     stem = PurePath(file).stem[:40] or "mesh"
     name = next(n for n in (stem, *(f"{stem} {k}" for k in range(2, 1000))) if n not in names)

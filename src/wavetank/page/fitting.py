@@ -120,7 +120,7 @@ def _spacing(scene: Scene, particles: float) -> float:
 
 def _facts(scene: Scene) -> Any:
     """Return what time steps depend on."""
-    extent = extent_of(scene)
+    extent = extent_of(scene).turned(scene.upright)
     height = float(extent.upper[1] - extent.lower[1])
     speed = math.sqrt(2.0 / 3.0 * math.hypot(*scene.gravity) * height)
     return types.SimpleNamespace(

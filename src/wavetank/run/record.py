@@ -30,7 +30,6 @@ from wavetank.simulation.cost import check_time
 from wavetank.simulation.frame import Frame
 from wavetank.simulation.simulation import Simulation
 from wavetank.view.camera import Camera
-from wavetank.view.extent import extent_of
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import quality_options
 
@@ -104,8 +103,8 @@ def resume_run(out: Path, arch: str = "", console: Console | None = None) -> dic
 
 def viewpoint_of(scene: Scene) -> Viewpoint:
     """Return the camera of a scene's pictures, for files."""
-    camera = Camera.framing_extent(extent_of(scene))
-    return Viewpoint(camera.eye, camera.target, camera.field_of_view, camera.height)
+    camera = Camera.framing(scene)
+    return Viewpoint(camera.eye, camera.target, camera.field_of_view, camera.height, camera.upward)
 
 
 class _ActiveRun:

@@ -25,11 +25,14 @@ class Gauge(Model):
         """Name the corners."""
         return [("lower", self.lower), ("upper", self.upper)]
 
-    def base(self) -> float:
-        """Return its base [m^2], in a 2-D world its width [m]."""
-        return float(np.prod([b - a for k, (a, b) in enumerate(zip(self.lower, self.upper, strict=True)) if k != 1]))
+    def base(self, up: str) -> float:
+        """Return its base [m^2] across the axis `up`, in a 2-D world its width [m]."""
+        edges = zip("xyz", self.lower, self.upper, strict=False)
+        return float(np.prod([b - a for axis, a, b in edges if axis != up[-1]]))
 
-    def level(self, x: np.ndarray, spacing: float) -> float:
-        """Return the level [m] for particles at `x` [n, dim]."""
+    def level(self, x: np.ndarray, spacing: float, up: str) -> float:
+        """Return the level [m] along the axis `up` for particles at `x` [n, dim]."""
         inside = np.all((x >= np.array(self.lower)) & (x < np.array(self.upper)), axis=1)
-        return float(self.lower[1]) + int(inside.sum()) * spacing ** x.shape[1] / self.base()
+        axis = "xyz".index(up[-1])
+        bottom = -self.upper[axis] if up.startswith("-") else self.lower[axis]
+        return float(bottom) + int(inside.sum()) * spacing ** x.shape[1] / self.base(up)

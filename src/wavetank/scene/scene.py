@@ -32,6 +32,7 @@ from wavetank.scene.light import Light
 from wavetank.scene.schedule import Timetable
 from wavetank.scene.summary import summary
 from wavetank.scene.tank import Tank
+from wavetank.scene.upward import TURNS, Up, upward_of
 from wavetank.solids.shapes import AnySolid
 
 MAX_PARTICLES = 100_000_000
@@ -46,11 +47,12 @@ def _tagged(values: Any, default: str) -> Any:
 
 
 class Scene(Timetable, Parameters):
-    """A world as data. Lengths in metres, y up; parameters of `params.py` are keys of the scene itself."""
+    """A world as data. Lengths in metres, up against gravity; those of `params.py` are keys of the scene itself."""
 
     title: str = ""
     preset: Literal["standard", "paper"] = "standard"
     quality: Literal["draft", "standard", "high"] = "standard"
+    up: Up | None = None  # in levels, pictures, tools and files; the axis against the first gravity where None
     tank: Tank | None = None
     fluids: Annotated[list[AnyFluid], BeforeValidator(lambda v: _tagged(v, "block"))] = []
     materials: list[Material] = []
@@ -76,6 +78,7 @@ class Scene(Timetable, Parameters):
             self.__dict__["gravity"] = self.gravity[: self._world_dim()]
         dim = self._world_dim()
         for number, solid in enumerate(self.solids):
+            solid.stand(self.upright)
             if dim == 2 and solid.is_spatial:
                 raise ValueError(f"solids[{number}] is (or has) a mesh, and a mesh needs a 3-D world; this one is 2-D.")
         for name, vector in self._vectors():
@@ -83,6 +86,8 @@ class Scene(Timetable, Parameters):
                 raise ValueError(
                     f"{name} = {tuple(vector)} has {len(vector)} components in a {dim}-D world; give {dim}."
                 )
+        if dim == 2 and self.up in ("z", "-z"):
+            raise ValueError(f"up = {self.up!r} is not an axis of a 2-D world; use x, y, -x or -y.")
         check_scales(self.spacing, self.gravity)
         check_periodic(self.tank, self.spacing, self.support, self.gravity, self.solids)
         self._check_count()
@@ -102,6 +107,16 @@ class Scene(Timetable, Parameters):
             return len(self.tank.size)
         first = next((vector for fluid in self.fluids for _, vector in fluid.vectors()), None)
         return len(first if first is not None else self.gravity)
+
+    @property
+    def upward(self) -> str:
+        """The axis that points up: "x", "y", "z", "-x", "-y" or "-z"."""
+        return self.up or upward_of(self.gravity, self.tank.periodic_axes if self.tank else [])
+
+    @property
+    def upright(self) -> np.ndarray:
+        """Rotation matrix [3, 3] that turns this world so that y is up."""
+        return TURNS[self.upward]
 
     def _vectors(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         yield "gravity", self.gravity

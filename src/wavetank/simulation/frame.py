@@ -72,6 +72,11 @@ class Frame(Instant):
             placed=self.placed,
         )
 
+    @property
+    def frozen_by_id(self) -> np.ndarray:
+        """Whether each particle is ice, int32 [count], ordered by particle id."""
+        return self._by_id("frozen")
+
     @functools.cached_property
     def _order(self) -> np.ndarray:
         return np.argsort(download(self.id)[: self.count], kind="stable")

@@ -57,6 +57,8 @@ class LiveParameters(Declared):
         if name not in LIVE:
             refuse_assignment(name)
             raise NoAttributeError(f"there is no parameter {name!r}; {near(name, type(self))}.")
+        if name == "gravity" and self._scene.up is None:
+            self._scene.up = self._scene.upward  # it stays where it was
         if name == "gravity" and changes_gravity(self._scene):
             trial = self._scene.model_copy(update={"gravity_track": None})
             setattr(trial, name, value)

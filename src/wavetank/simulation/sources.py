@@ -383,7 +383,8 @@ def missing_particles(particles: ParticleSystem, source: Emitter | Drain, level:
     if gauge is None:
         lower, upper = scene.tank.box() if scene.tank else (np.zeros(scene.dim), np.ones(scene.dim))
         gauge = Gauge.parse({"lower": lower.tolist(), "upper": upper.tolist()})
-    lack = (level - gauge.level(x, scene.spacing)) * gauge.base() / scene.spacing**scene.dim
+    up = scene.upward
+    lack = (level - gauge.level(x, scene.spacing, up)) * gauge.base(up) / scene.spacing**scene.dim
     return math.floor(lack + 0.5)
 
 

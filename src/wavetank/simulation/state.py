@@ -190,7 +190,8 @@ class State(Instant):
             whole.update(f"pose {number}".encode() + np.concatenate(pose).tobytes())
         others = [sorted(solids.targets), sorted(solids.growing.items()), solids.motions, more.sources]
         whole.update(json.dumps(others, sort_keys=True).encode())
-        whole.update(self.scene.model_dump_json(exclude=UNFELT).encode())
+        unfelt = UNFELT | ({"up": True} if self.scene.upward == "y" else {})
+        whole.update(self.scene.model_dump_json(exclude=unfelt).encode())
         return whole.hexdigest()
 
     def pack(self) -> "PackedState":

@@ -83,6 +83,11 @@ class Solid(Model):
                 raise ValueError(f"{name} is for bodies; give this solid a density or a mass as well.")
         return self
 
+    def stand(self, upright: np.ndarray) -> None:
+        """Stand in a world that the matrix `upright` [3, 3] turns so that y is up; parts of a solid do as well."""
+        for part in getattr(self, "parts", ()):
+            part.stand(upright)
+
     @property
     def is_body(self) -> bool:
         """Whether water and other solids move this."""

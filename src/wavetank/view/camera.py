@@ -10,6 +10,7 @@ import numpy as np
 from wavetank.foundation.arguments import array_of, brief, finite
 from wavetank.foundation.errors import WavetankError
 from wavetank.scene.schedule import tilted_by
+from wavetank.scene.upward import TURNS, nearest_axis
 from wavetank.view.extent import Extent, extent_of, extent_of_water
 from wavetank.view.lens import Lens, basis, lens_at
 
@@ -29,7 +30,7 @@ class Camera:
 
     eye: Point  # m
     target: Point  # m
-    up: Point = (0.0, 1.0, 0.0)
+    up: Point | None = None  # that of the world which it sees where None
     field_of_view: float = math.radians(28.0)  # rad, vertical
     near: float = 0.01  # m, nothing nearer is drawn
     height: float | None = None  # m; a number makes the camera orthographic with that much height in view
@@ -38,6 +39,8 @@ class Camera:
         """Refuse what has no picture; raises `WavetankError`."""
         for name in ("eye", "target", "up"):
             value = getattr(self, name)
+            if value is None and name == "up":
+                continue
             point = array_of(f"camera {name}", value, float, "[3]")
             if point.shape != (3,) or not np.isfinite(point).all():
                 raise WavetankError(f"camera {name} = {brief(value)} must be three finite numbers.")
@@ -48,8 +51,22 @@ class Camera:
             raise WavetankError("camera height = 0 must be a positive length [m], or None.")
         if self.distance < 1e-9:
             raise WavetankError(f"camera eye and target are both {self.eye}; they must differ.")
-        if not any(self.up):
+        if self.up is not None and not any(self.up):
             raise WavetankError("camera up = (0, 0, 0) has no direction; (0, 1, 0) is usual.")
+
+    @property
+    def upward(self) -> Point:
+        """What points up in the picture, y where nothing else was chosen."""
+        return self.up or (0.0, 1.0, 0.0)
+
+    def turned(self, turn: np.ndarray) -> "Camera":
+        """Return this rotated about the origin by a matrix [3, 3]."""
+        eye, target, up = (_point(turn @ np.array(point)) for point in (self.eye, self.target, self.upward))
+        return dataclasses.replace(self, eye=eye, target=target, up=up)
+
+    def in_world(self, scene: Any) -> "Camera":
+        """Return this with what is up in `scene`, where nothing else was chosen."""
+        return dataclasses.replace(self, up=_point(scene.upright[1])) if self.up is None else self
 
     @property
     def distance(self) -> float:
@@ -74,12 +91,14 @@ class Camera:
         )
 
     def orbit(self, azimuth: float, elevation: float) -> "Camera":
-        """Turn around the target by `azimuth` about y and `elevation` towards the zenith [rad], distance kept."""
-        offset = np.subtract(self.eye, self.target)
+        """Turn around the target by `azimuth` about the vertical and `elevation` to the zenith [rad], distance kept."""
+        turn = TURNS[nearest_axis(self.upward)]
+        offset = turn @ np.subtract(self.eye, self.target)
         old = math.asin(max(-1.0, min(1.0, offset[1] / self.distance)))
         new = max(-STEEPEST, min(STEEPEST, old + elevation))
         around = math.atan2(offset[0], offset[2]) + azimuth
-        return self._looking_from(around, new, self.distance)
+        offset = self.distance * turn.T @ _direction(around, new)
+        return dataclasses.replace(self, eye=_point(np.add(self.target, offset)))
 
     def zoom(self, factor: float, right: float = 0.0, up: float = 0.0) -> "Camera":
         """Show `factor` times as much height: below 1 comes closer, above 1 goes away.
@@ -123,7 +142,7 @@ class Camera:
             return along
 
         eye = np.add(self.target, turned(np.subtract(self.eye, self.target)))
-        return dataclasses.replace(self, eye=_point(eye), up=_point(turned(np.array(self.up))))
+        return dataclasses.replace(self, eye=_point(eye), up=_point(turned(np.array(self.upward))))
 
     def ray(self, column: float, row: float, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         """Return origin [m] and unit direction of the ray through a place in a picture of `width` x `height` px."""
@@ -144,7 +163,7 @@ class Camera:
     @classmethod
     def framing(cls, scene: Any, aspect: float = 16 / 9) -> "Camera":
         """Return a camera that frames the tank: from slightly above in 3-D, straight from the front in 2-D."""
-        return cls.framing_extent(extent_of(scene), aspect)
+        return cls.framing_extent(extent_of(scene).turned(scene.upright), aspect).turned(scene.upright.T)
 
     @classmethod
     def framing_extent(cls, extent: Extent, aspect: float = 16 / 9) -> "Camera":
@@ -156,10 +175,12 @@ class Camera:
     @classmethod
     def looking(cls, frame: Any, eye: Any = None, target: Any = None, aspect: float = 16 / 9) -> "Camera":
         """Return a camera at `eye` [m] that looks at `target` [m]; what is None frames the water of `frame`."""
-        usual = cls.framing_extent(extent_of_water(frame), aspect)
+        turn = frame.scene.upright
+        usual = cls.framing_extent(extent_of_water(frame).turned(turn), aspect).turned(turn.T)
         chosen = cls(
             eye=usual.eye if eye is None else eye,
             target=usual.target if target is None else target,
+            up=usual.up,
             height=usual.height,
         )
         return chosen.tilted(frame.scene, frame.time, ROOM if eye is None else 1.0)
@@ -177,14 +198,11 @@ class Camera:
     @property
     def _axes(self) -> np.ndarray:
         """Unit vectors (right, up, forward), [3, 3]."""
-        return basis(np.subtract(self.target, self.eye), np.array(self.up))
+        return basis(np.subtract(self.target, self.eye), np.array(self.upward))
 
     def _focal(self, height: int) -> float:
         """Pixels per unit of the picture plane; pixels are square, so the height alone sets it."""
         return height / (self.height or 2.0 * math.tan(0.5 * self.field_of_view))
-
-    def _looking_from(self, azimuth: float, elevation: float, distance: float) -> "Camera":
-        return dataclasses.replace(self, eye=_point(np.add(self.target, distance * _direction(azimuth, elevation))))
 
 
 def _front(kind: type[Camera], extent: Extent, aspect: float) -> Camera:

@@ -19,6 +19,11 @@ class Extent:
     lower: np.ndarray  # m, [3]
     upper: np.ndarray  # m, [3]
 
+    def turned(self, turn: np.ndarray) -> "Extent":
+        """Return the box around this one, rotated by a matrix [3, 3]."""
+        corners = self.corners @ turn.T
+        return dataclasses.replace(self, lower=corners.min(axis=0), upper=corners.max(axis=0))
+
     @property
     def middle(self) -> np.ndarray:
         """Centre of the box [m], shape [3]."""
@@ -70,7 +75,9 @@ def extent_of_water(frame: Any) -> Extent:
     margin = 0.04 * whole.radius
     lower = np.maximum(np.min([low for low, _ in boxes], axis=0) - margin, whole.lower)
     upper = np.minimum(np.max([high for _, high in boxes], axis=0) + margin, whole.upper)
-    lower[1] = whole.lower[1]  # what floats, with its shadow
+    up = frame.scene.upward
+    axis, (end, floor) = "xyz".index(up[-1]), (upper, whole.upper) if up.startswith("-") else (lower, whole.lower)
+    end[axis] = floor[axis]  # what floats, with its shadow
     return Extent(whole.dim, whole.spacing, lower, np.maximum(upper, lower + whole.spacing))
 
 

@@ -42,7 +42,7 @@ def nothing(x, v, rho, kind):
 
 def _speed_limits(scene: Any) -> Limits:
     """Zero to a round number near the speed of water that falls through a third of the world's height."""
-    extent = extent_of(scene)
+    extent = extent_of(scene).turned(scene.upright)
     gravity = math.hypot(*scene.gravity)
     top = math.sqrt(2.0 / 3.0 * gravity * float(extent.upper[1] - extent.lower[1]))
     return 0.0, _round_up(top) if top > 0.0 else 1.0

@@ -2,10 +2,11 @@
 
 import collections
 import dataclasses
+import inspect
 import math
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from wavetank.view.rounding import Rounding
 from wavetank.view.shot import Shot
 from wavetank.view.stages import Stages, Sunlight, eye_and_style, sun_and_solids
 from wavetank.view.style import Style, quality_options
+from wavetank.view.upright import Upright
 from wavetank.view.views import Pass, View
 from wavetank.view.water_buffers import sun_texels, water_of
 
@@ -61,6 +63,7 @@ class Renderer:
         self._total: Any = None  # vec3 [rows, columns]: mean of the samples so far
         self._tracer: Tracer | None = None
         self._images = Images()
+        self._upright = Upright()
         self._rounding = Rounding()
 
     def render(
@@ -105,6 +108,11 @@ class Renderer:
     def shot(self, frame: Frame, camera: Camera | None = None, style: Style | None = None) -> Shot:
         """Return what the passes need to know of a picture."""
         style = style or Style()
+        turn = frame.scene.upright
+        normal, offset = style.plane(extent_of(frame.scene), frame.scene.tank is not None)
+        if camera is not None:
+            camera = camera.in_world(frame.scene).turned(turn) if frame.scene.upward != "y" else camera
+        frame = self._upright.frame(frame)
         frame = self._images.within(self._with_ice(frame, style))
         if (solids := self._rounding.seen(frame.solids)) is not frame.solids:
             frame = dataclasses.replace(frame, solids=solids)
@@ -134,7 +142,9 @@ class Renderer:
             scattering=scattering,
             tint=tint,
             usual=usual_depth(extent),
-            plane=style.plane(extent, frame.scene.tank is not None),
+            plane=(turn @ normal, offset)
+            if style.cut is not None
+            else style.plane(extent, frame.scene.tank is not None),
             dyed=may_be_dyed(frame),
             lit=-1 if style.lit is None else style.lit,
             hasty=style.hasty,
@@ -255,9 +265,35 @@ def _sun_lens(extent: Extent, to_sun: Any, texels: int) -> Lens:
     return lens_at(eye, axes, texels, texels, 0.5 * texels / reach, perspective=False, near=1e-6)
 
 
-#: Fields of `Style` that are arguments of `render`.
-_STYLED = {field.name for field in dataclasses.fields(Style)} - {"lit", "glare", "hasty", "traced"}
 _kept: collections.OrderedDict[tuple[int, int, int], Renderer] = collections.OrderedDict()
+
+
+class Options(TypedDict, total=False):
+    """Options of `render` beside a camera; those of a style that are left out, or None, are its own choice."""
+
+    quality: str | None  # draft, standard, high or film
+    supersample: int | None  # samples a pixel has in each direction
+    timings: dict[str, float]  # receives the milliseconds of each pass
+    watch: Watch  # is told how far a traced picture is, and can stop it
+    view: str | None
+    color_by: str | None
+    colormap: str | None
+    limits: tuple[float, float] | None
+    radius: float | None
+    cut: str | None
+    legend: bool
+    lit: int | None
+    environment: str | None
+    sun: str | None
+    floor: str | None
+    glare: bool
+    edges: bool
+    hasty: bool
+    samples: int
+    traced: bool
+    aperture: float
+    focus: float | None
+    shutter: float
 
 
 @TURN
@@ -266,42 +302,24 @@ def render(
     width: int = 1280,
     height: int = 720,
     *,
-    quality: str | None = None,
-    supersample: int | None = None,
     camera: Camera | None = None,
     eye: Sequence[float] | None = None,
     target: Sequence[float] | None = None,
-    view: str | None = None,
-    color_by: str | None = None,
-    colormap: str | None = None,
-    limits: tuple[float, float] | None = None,
-    radius: float | None = None,
-    cut: str | None = None,
-    legend: bool | None = None,
-    environment: str | None = None,
-    sun: str | None = None,
-    floor: str | None = None,
-    edges: bool | None = None,
-    samples: int | None = None,
-    aperture: float | None = None,
-    focus: float | None = None,
-    shutter: float | None = None,
-    **options: Any,
+    **options: Unpack[Options],
 ) -> np.ndarray:
     """Return a picture of a `Frame` or a `Simulation`, uint8 [height, width, 3].
 
-    The camera is at `eye` [m] and looks at `target` [m], or is a `Camera`; what is None frames the world. All from
-    `view` to `shutter` are fields of `Style`, None for its own choice; further `options` are those of
-    `Renderer.render`. `quality` is draft, standard, high or film. Without either `supersample` is 2, or 1 for pictures
-    of more than 16 million pixels. Renderers of the last few sizes are kept.
+    The camera is at `eye` [m] and looks at `target` [m], or is a `Camera`; what is None frames the world. `options` are
+    the fields of `Style`, and `quality`: draft, standard, high or film. Without it and `supersample` that is 2, or 1
+    for pictures of more than 16 million pixels. Renderers of the last few sizes are kept.
     """
-    named = locals()
-    options |= {name: named[name] for name in _STYLED if named[name] is not None}
+    chosen: dict[str, Any] = {**options}
+    quality, supersample = chosen.pop("quality", None), chosen.pop("supersample", None)
     if quality is not None:
-        usual_samples, chosen = quality_options(quality)
-        supersample, options = supersample or usual_samples, {**chosen, **options}
+        usual_samples, usual = quality_options(quality)
+        supersample, chosen = supersample or usual_samples, {**usual, **chosen}
     # Neighbours are searched for only where densities are seen.
-    frame = world.frame(measured=options.get("color_by") == "density") if hasattr(world, "frame") else world
+    frame = world.frame(measured=chosen.get("color_by") == "density") if hasattr(world, "frame") else world
     if not (hasattr(frame, "scene") and hasattr(frame, "x")):
         raise WavetankError(f"render: a {type(world).__name__} cannot be drawn; give a simulation or a frame.")
     if supersample is None:
@@ -318,7 +336,17 @@ def render(
         _kept.popitem(last=False)
     renderer = renderer or Renderer(width, height, supersample)
     _kept[key] = renderer
-    return renderer.render(frame, camera, **options)
+    return renderer.render(frame, camera, **chosen)
+
+
+def _shown(call: Any) -> inspect.Signature:
+    """Return the signature of `call` with the names of its options, for editors and `help`."""
+    own = inspect.signature(call)
+    more = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None) for name in Options.__annotations__]
+    return own.replace(parameters=[*list(own.parameters.values())[:-1], *more])
+
+
+render.__signature__ = _shown(render)  # type: ignore[attr-defined]
 
 
 def check_size(width: Any, height: Any, supersample: Any) -> None:

@@ -159,7 +159,7 @@ def tap_and_drain(dim: int, spacing: float, seconds: float, arch: str) -> tuple[
     while sim.time < seconds - 1e-6:
         sim.step()
         times.append(sim.time)
-        levels.append(gauge.level(sim.positions, spacing))
+        levels.append(gauge.level(sim.positions, spacing, sim.scene.upward))
         counts.append(sim.count / n)
     second = round(1.0 / sim.scene.frame_time)
     means = np.convolve(levels, np.ones(second) / second, "valid")[SPLASH * second :]

@@ -38,14 +38,15 @@ class Drop(Tool):
         reach = half * (
             2.2 if self.shape in ("log", "plank") else math.sqrt(sim.scene.dim) if self.shape == "box" else 1
         )
-        center = hand.anchor + [0.0, self.height * hand.size + reach, 0.0]
+        center = hand.anchor + (self.height * hand.size + reach) * hand.up
         if sim.scene.dim == 3 and hand.hit.kind != "water":  # in front of what the pointer met
-            center -= reach * hand.normal * [1.0, 0.0, 1.0]
+            center -= reach * hand.normal * (1.0 - np.abs(hand.up))
         middle = 0.5 * (hand.lower + hand.upper)
         inside = np.clip(center, np.minimum(hand.lower + reach, middle), np.maximum(hand.upper - reach, middle))
-        center[[0, 2]] = inside[[0, 2]]
-        center[1] = self._clear(hand, center, reach)
-        sim.add_solid(self._solid(hand.flat(center), half))
+        level = [hand.axes[0], hand.axes[2]]
+        center[level] = inside[level]
+        center += (self._clear(hand, center, reach) - float(center @ hand.up)) * hand.up
+        sim.add_solid(self._solid(hand, center, half))
 
     def _clear(self, hand: Hand, center: np.ndarray, reach: float) -> float:
         """Return the height [m], from that of `center` on up, where neither water nor another body is in the way."""
@@ -53,26 +54,29 @@ class Drop(Tool):
         balls = [(place, reach + far) for place, far in others]
         x = hand.sim.positions.astype(float)
         x = np.concatenate([x, np.zeros((len(x), 3 - x.shape[1]))], axis=1)
-        beside = np.hypot(*(x - center)[:, [0, 2]].T)
+        level, up = [hand.axes[0], hand.axes[2]], hand.up
+        beside = np.hypot(*(x - center)[:, level].T)
         over = x[beside < reach + hand.spacing]
-        height = float(center[1])
+        height = float(center @ up)
         if len(over):
-            height = max(height, float(over[:, 1].max()) + reach + hand.spacing)
-        for place, apart in sorted(balls, key=lambda ball: float(ball[0][1])):
-            away = math.hypot(*(place - center)[[0, 2]])
-            if away < apart and abs(place[1] - height) < math.sqrt(apart**2 - away**2):
-                height = float(place[1]) + math.sqrt(apart**2 - away**2)
+            height = max(height, float((over @ up).max()) + reach + hand.spacing)
+        for place, apart in sorted(balls, key=lambda ball: float(ball[0] @ up)):
+            away = math.hypot(*(place - center)[level])
+            if away < apart and abs(float(place @ up) - height) < math.sqrt(apart**2 - away**2):
+                height = float(place @ up) + math.sqrt(apart**2 - away**2)
         return height
 
-    def _solid(self, center: tuple[float, ...], half: float) -> Solid:
+    def _solid(self, hand: Hand, middle: np.ndarray, half: float) -> Solid:
         density = 1000.0 * self.density
+        center = hand.flat(middle)
         dim = len(center)
         if self.shape == "log":
-            along = np.array([2.0 * half, 0.0, 0.0])[:dim]
-            ends = (np.array(center) - along, np.array(center) + along)
-            return Capsule(start=tuple(ends[0]), end=tuple(ends[1]), radius=0.6 * half, density=density)
+            along = hand.along_axes(2.0 * half, 0.0, 0.0)
+            start, end = hand.flat(middle - along), hand.flat(middle + along)
+            return Capsule(start=start, end=end, radius=0.6 * half, density=density)
         if self.shape == "plank":
-            return Box(center=center, size=(4.0 * half, 0.8 * half, 2.0 * half)[:dim], density=density)
+            size = hand.along_axes(4.0 * half, 0.8 * half, 2.0 * half)
+            return Box(center=center, size=hand.flat(size), density=density)
         if self.shape == "box":
             return Box(center=center, size=(2.0 * half,) * dim, density=density)
         return Sphere(center=center, radius=half, density=density)

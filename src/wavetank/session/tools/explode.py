@@ -2,7 +2,6 @@
 
 from typing import ClassVar
 
-import numpy as np
 from pydantic import PrivateAttr
 from typing_extensions import override
 
@@ -30,5 +29,5 @@ class Explode(Tool):
             return
         self._done = True
         radius = hand.radius(self.radius)
-        place = hand.anchor + 0.4 * radius * (np.array([0.0, -1.0, 0.0]) if hand.sim.scene.dim == 2 else hand.normal)
+        place = hand.anchor + 0.4 * radius * (-hand.up if hand.sim.scene.dim == 2 else hand.normal)
         hand.sim.push(Burst(center=hand.flat(place), radius=radius, speed=self.speed * hand.speed, duration=duration))

@@ -30,6 +30,9 @@ class Hand:
         self.notes: list[str] = []  # messages to viewers, one sentence each
         extent = extent_of(sim.scene)
         self.lower, self.upper = extent.lower, extent.upper
+        #: axes of the world: along, up and across; tools think of a world in which these are x, y and z
+        self.axes = {"x": [1, 0, 2], "y": [0, 1, 2], "z": [0, 2, 1]}[sim.scene.upward[-1]]
+        self.up = sim.scene.upright[1]  # unit vector, [3]
         self.size = float((extent.upper - extent.lower).max())  # m, L: length of the world
         self.speed = float(np.sqrt(9.81 * self.size))  # m/s, sqrt(g L)
         self.origin, self.direction = _ray(origin, direction)
@@ -66,6 +69,12 @@ class Hand:
     def radius(self, share: float) -> float:
         """Return a share of the world's length [m], but at least 1.5 particle spacings."""
         return max(share * self.size, 1.5 * self.spacing)
+
+    def along_axes(self, along: float, up: float, across: float) -> np.ndarray:
+        """Return a vector of the world, [3], from its components along the axes of tools."""
+        vector = np.zeros(3)
+        vector[self.axes] = along, up, across
+        return vector
 
     def flat(self, vector: np.ndarray) -> tuple[float, ...]:
         """Return the components of a 3-D vector that this world has, 2 or 3."""

@@ -2,7 +2,6 @@
 
 from typing import ClassVar
 
-import numpy as np
 from pydantic import PrivateAttr
 from typing_extensions import override
 
@@ -28,10 +27,12 @@ class Paddle(Tool):
 
     @override
     def begin(self, hand: Hand) -> None:
+        along, up, across = hand.axes
         size = hand.upper - hand.lower
-        plate = np.array([max(0.02 * hand.size, 2.0 * hand.spacing), self.height * size[1], size[2]])
-        start = np.array([hand.anchor[0], hand.upper[1] + 0.5 * plate[1], hand.lower[2] + 0.5 * size[2]])
-        box = Box(name=f"{TOOL_SOLID}paddle", center=hand.flat(start), size=hand.flat(plate))
+        plate = max(0.02 * hand.size, 2.0 * hand.spacing), self.height * size[up], size[across]
+        start = hand.anchor[along], hand.upper[up] + 0.5 * plate[1], hand.lower[across] + 0.5 * size[across]
+        center, edges = (hand.flat(hand.along_axes(*part)) for part in (start, plate))
+        box = Box(name=f"{TOOL_SOLID}paddle", center=center, size=edges)
         self._held = hand.sim.add_solid(box)
 
     @override
@@ -39,7 +40,9 @@ class Paddle(Tool):
         if self._held not in hand.sim.solids.names:
             return
         where = hand.sim.solids.poses[hand.sim.solids.find(self._held)][0].copy()
-        goal = np.array([hand.point[0], hand.lower[1] + 0.5 * self.height * (hand.upper - hand.lower)[1], where[2]])
+        along, up, across = hand.axes
+        middle = hand.lower[up] + 0.5 * self.height * (hand.upper - hand.lower)[up]
+        goal = hand.along_axes(hand.point[along], middle, where[across])
         move_towards(hand.sim, self._held, goal, None, self.pace * hand.speed * duration, inside=False)
 
     @override

@@ -47,10 +47,10 @@ class Pour(Tool):
         point = hand.pick_again().point
         if hand.sim.scene.dim == 3 and self.aim == "down":
             point = point.copy()
-            point[1] = hand.upper[1]
+            point[hand.axes[1]] = (hand.lower if hand.up.min() < 0.0 else hand.upper)[hand.axes[1]]
         elif hand.sim.scene.dim == 3:
             point = point - 0.5 * hand.size * hand.direction
-        room = hand.spacing + np.array([half, 0.0 if self.aim == "down" else half, half])
+        room = hand.spacing + hand.along_axes(half, 0.0 if self.aim == "down" else half, half)
         low, high = hand.lower + room, hand.upper - room
         self._nozzle = np.clip(point, np.minimum(low, high), np.maximum(low, high))
         if hand.sim.scene.dim == 2:
@@ -62,9 +62,9 @@ class Pour(Tool):
         steps, self._way = rows_due(self._way, speed * duration, spacing)
         if not len(steps) or self._nozzle is None:
             return
-        ahead = np.array([0.0, -1.0, 0.0])
+        ahead = -hand.up
         if self.aim == "ahead":
-            ahead = np.array([1.0, 0.0, 0.0]) if hand.sim.scene.dim == 2 else hand.direction
+            ahead = hand.along_axes(1.0, 0.0, 0.0) if hand.sim.scene.dim == 2 else hand.direction
         disc = self._disc(hand, ahead)
         places = (self._nozzle + disc[None] + steps[:MOST_LAYERS, None, None] * ahead).reshape(-1, 3)[
             :, : hand.sim.scene.dim

@@ -36,14 +36,15 @@ class Tilt(Tool):
             return
         strength = float(np.linalg.norm(self._upright)) or 9.81
         drag = (hand.point - hand.anchor) / hand.size
-        lean = np.array([drag[0], 0.0, drag[2]])
+        up = hand.up
+        lean = drag - float(drag @ up) * up
         if hand.sim.scene.dim == 3:
             # Up on the screen is away from the eye.
-            away = hand.normal * [1.0, 0.0, 1.0]
-            lean += drag[1] * away / max(float(np.linalg.norm(away)), 1e-9)
+            away = hand.normal * (1.0 - np.abs(up))
+            lean += float(drag @ up) * away / max(float(np.linalg.norm(away)), 1e-9)
         angle = min(np.radians(self.most), 3.0 * float(np.linalg.norm(lean)))
         way = lean / max(float(np.linalg.norm(lean)), 1e-12)
-        gravity = strength * (np.sin(angle) * way - np.cos(angle) * np.array([0.0, 1.0, 0.0]))
+        gravity = strength * (np.sin(angle) * way - np.cos(angle) * up)
         hand.sim.gravity = hand.flat(gravity)
 
     @override

@@ -41,11 +41,13 @@ class Waves(Tool):
     def begin(self, hand: Hand) -> None:
         size = hand.upper - hand.lower
         thick = 2.0 * self.stroke * hand.size + 2.0 * hand.spacing
-        left = hand.anchor[0] < 0.5 * (hand.lower[0] + hand.upper[0])
+        along = hand.axes[0]
+        left = hand.anchor[along] < 0.5 * (hand.lower[along] + hand.upper[along])
         self._side = 1.0 if left else -1.0
-        x = hand.lower[0] - 0.5 * thick if left else hand.upper[0] + 0.5 * thick
-        self._home = np.array([x, hand.lower[1] + 0.5 * size[1], hand.lower[2] + 0.5 * size[2]])
-        plate = np.array([thick, size[1], size[2]])
+        self._home = hand.lower + 0.5 * size
+        self._home[along] = hand.lower[along] - 0.5 * thick if left else hand.upper[along] + 0.5 * thick
+        plate = size.copy()
+        plate[along] = thick
         box = Box(name=f"{TOOL_SOLID}piston", center=hand.flat(self._home), size=hand.flat(plate))
         self._held = hand.sim.add_solid(box)
 
@@ -61,7 +63,7 @@ class Waves(Tool):
             k = np.arange(8)
             waves = np.sin(2.0 * np.pi * (f * (0.5 + k / 7.0) * self._time + k * GOLDEN))
             way = (1.0 + np.clip(waves.sum() / 3.0, -1.0, 1.0)) * min(1.0, f * self._time)
-        place = self._home + [self._side * self.stroke * hand.size * way, 0.0, 0.0]
+        place = self._home + hand.along_axes(self._side * self.stroke * hand.size * way, 0.0, 0.0)
         hand.sim.move(self._held, hand.flat(place))
 
     @override

@@ -12,12 +12,21 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, WithJsonSchema, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    PlainSerializer,
+    PrivateAttr,
+    ValidationInfo,
+    WithJsonSchema,
+    model_validator,
+)
 from typing_extensions import override
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import open_regular, read_array, unpack_text
 from wavetank.foundation.model import Edges, Length, Place
+from wavetank.foundation.rotations import product, quaternion_of
 from wavetank.solids.meshes.files import BUNDLED
 from wavetank.solids.meshes.store import DistanceGrid, grid_of
 from wavetank.solids.solid import GRIDS, Node, Solid, point_in_space
@@ -50,16 +59,20 @@ class HeightField(Solid):
 
     `heights` [rows along z, columns along x] (2-D: [columns]) times the second number of `size` lie above the height of
     `center`, the middle of the rectangle. Between them the ground is flat triangles. A picture has heights from 0 for
-    black to 1 for white, its upper row lies at the far side, at the lowest z. A file is read once, when this is made;
+    black to 1 for white, its upper row lies at the far side, at the lowest z. Where z is up, rows follow each other
+    against y, and heights are along z. A file is read once, when this is made;
     from then on `data` is the ground.
     """
 
     shape: Literal["height-field"] = "height-field"
     center: Place
-    size: Edges  # along x, of a height of 1, along z; give 1 m for the second where heights are in metres
+    size: (
+        Edges  # along x, of a height of 1, along z; 1 m for the second where heights are in metres; z up: x, y, height
+    )
     heights: Heights | None = None
     path: str = ""  # a .npy file or a picture, 16-bit PNG for smooth ground, from the scene file's folder
     data: Annotated[str, Field(repr=False)] = ""  # many heights as text, made from the file or the numbers
+    _upright: np.ndarray | None = PrivateAttr(None)  # turns the world so that y is up; None where it is
     base: Length | None = None  # thickness below the lowest height; a tenth of its longest edge where None
 
     @model_validator(mode="after")
@@ -104,6 +117,23 @@ class HeightField(Solid):
     def origin(self) -> np.ndarray:
         return point_in_space(self.center)
 
+    @property
+    @override
+    def quaternion(self) -> np.ndarray:
+        own = super().quaternion
+        return own if self._upright is None else product(own, np.array(quaternion_of(self._upright.T)))
+
+    @override
+    def stand(self, upright: np.ndarray) -> None:
+        self._upright = None if np.array_equal(upright, np.eye(3)) else upright
+
+    def _edges(self) -> tuple[float, ...]:
+        """Return `size` in its own frame, in which y is up."""
+        if self._upright is None:
+            return self.size
+        dim = len(self.size)
+        return tuple(np.abs(self._upright[:dim, :dim] @ np.array(self.size)).tolist())
+
     def elevations(self) -> np.ndarray:
         """Return the heights as they were given, float64 [rows, columns] or [columns]."""
         if self.heights is not None:
@@ -115,22 +145,25 @@ class HeightField(Solid):
 
     def _bottom(self) -> float:
         """Height [m] of its lower face, over the centre."""
-        edges = (self.size[0], *self.size[2:])
-        lowest = min(0.0, float(self.elevations().min()) * self.size[1])
+        size = self._edges()
+        edges = (size[0], *size[2:])
+        lowest = min(0.0, float(self.elevations().min()) * size[1])
         return lowest - (self.base or 0.1 * max(edges))
 
     def vertices(self) -> np.ndarray:
         """Return the corners of the box around it [m], [8, 3], in its own frame."""
-        x, z = 0.5 * self.size[0], 0.5 * self.size[2] if len(self.size) == 3 else 0.0
-        top = float(self.elevations().max()) * self.size[1]
+        size = self._edges()
+        x, z = 0.5 * size[0], 0.5 * size[2] if len(size) == 3 else 0.0
+        top = float(self.elevations().max()) * size[1]
         return np.array([(a, b, c) for a in (-x, x) for b in (self._bottom(), top) for c in (-z, z)])
 
     def volume(self) -> float:
         """Return its volume [m^3], in a 2-D world its area [m^2]."""
-        h = self.elevations() * self.size[1] - self._bottom()
+        size = self._edges()
+        h = self.elevations() * size[1] - self._bottom()
         for _ in range(h.ndim):
             h = np.mean(0.5 * (h[1:] + h[:-1]), axis=0)
-        return float(h) * self.size[0] * (self.size[2] if len(self.size) == 3 else 1.0)
+        return float(h) * size[0] * (size[2] if len(size) == 3 else 1.0)
 
     @override
     def program(self) -> list[Node]:
@@ -153,14 +186,15 @@ class HeightField(Solid):
         from wavetank.solids.ground.outline import measure_outline  # kernels
         from wavetank.solids.meshes.grid import measure
 
-        heights, bottom, name = self.elevations() * self.size[1], self._bottom(), self.name or "the height field"
+        size = self._edges()
+        heights, bottom, name = self.elevations() * size[1], self._bottom(), self.name or "the height field"
         digest = hashlib.sha256(heights.tobytes()).hexdigest()
-        key = f"heights {digest} {heights.shape} {self.size} {bottom} {spacing}"
-        if len(self.size) == 2:
-            line = np.column_stack([np.linspace(-0.5, 0.5, len(heights)) * self.size[0], heights])
+        key = f"heights {digest} {heights.shape} {size} {bottom} {spacing}"
+        if len(size) == 2:
+            line = np.column_stack([np.linspace(-0.5, 0.5, len(heights)) * size[0], heights])
             ends = [(line[-1, 0], bottom), (line[0, 0], bottom)]
             return grid_of(key, lambda: measure_outline(np.concatenate([line, ends]), spacing, name))
-        points, faces = surface(heights, (self.size[0], self.size[-1]), bottom)
+        points, faces = surface(heights, (size[0], size[-1]), bottom)
         points -= 0.5 * (points.min(axis=0) + points.max(axis=0))
         return grid_of(key, lambda: measure(points, faces, spacing, None, name))
 
