@@ -28,7 +28,7 @@ def test_damaged_caches_change_nothing(tmp_path):
             [sys.executable, "-c", RUN], capture_output=True, text=True, env=os.environ | places, timeout=600
         )
         assert done.returncode == 0, done.stderr[-2000:]
-        assert done.stderr == ""
+        assert [line for line in done.stderr.splitlines() if "preparing kernels" not in line] == []
         return done.stdout
 
     first, chance = run(), random.Random(3)

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device import patches
+from wavetank.device.compile_log import CompileLog
 from wavetank.device.kernel_cache import sweep_damaged
 from wavetank.device.turns import TURN
 from wavetank.foundation.errors import WavetankError
@@ -155,6 +156,7 @@ def _launch_in_turn() -> None:
             return call(self, *args, **kwargs)
 
     Kernel.__call__ = launch
+    patches.LISTENERS.append(CompileLog(patches.LISTENERS).hear)
     TURN.refuse_after_fork()
 
 

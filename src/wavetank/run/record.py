@@ -3,7 +3,7 @@
 import dataclasses
 import json
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from wavetank.foundation.atomic_write import atomic_write
 from wavetank.foundation.errors import NotFiniteError
 from wavetank.foundation.input_limits import explain_errors, printable
 from wavetank.run.checkpoints import Checkpoints, ResumedRun, SegmentedVideo, load_run
+from wavetank.run.compile_status import compile_status
 from wavetank.run.folder import SUMMARY, Run, RunFolder
 from wavetank.run.options import RunOptions
 from wavetank.run.outputs import Outputs, check_exports
@@ -60,8 +61,9 @@ def record(
     with stop_on_signal(say="interrupted; completing the files (once more stops at once)") as stop:
         supersample, _ = quality_options(options.quality)
         renderer = Renderer(*options.size, supersample)
-        # Wrong options of a picture raise before anything is written.
-        renderer.render(sim.frame(), **options.style | {"samples": 1})
+        with compile_status(console) if console else nullcontext():
+            # Wrong options of a picture raise before anything is written.
+            renderer.render(sim.frame(), **options.style | {"samples": 1})
         work = _ActiveRun(sim, options, stop, resumed)
         with ExitStack() as stack:
             sinks = _open_sinks(options, stack, work)
