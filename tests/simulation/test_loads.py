@@ -150,3 +150,58 @@ def test_numbers_have_three_digits():
         "78.5",
         "12346",
     ]
+
+
+def hung(kind, dim=3, frame_time=1 / 60, **fields):
+    """A ball of 2 kg in the air, on a line of 0.2 m to a place above it."""
+    aside = (0.4,) * (dim - 2)
+    block = wt.Block(lower=(0.0,) * dim, upper=(0.8, 0.1, *(0.8,) * (dim - 2)))
+    return wt.Scene(
+        spacing=0.05,
+        tank=wt.Tank(size=(0.8,) * dim),
+        foam=0,
+        fluids=[block],
+        frame_time=frame_time,
+        solids=[wt.Sphere(name="ball", center=(0.4, 0.5, *aside), radius=0.05, mass=2)],
+        joints=[kind(name="line", first="ball", at=(0.4, 0.55, *aside), to=(0.4, 0.75, *aside), **fields)],
+    )
+
+
+@pytest.mark.parametrize("frame_time", [1 / 60, 1 / 200])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_rope_bears_what_hangs_on_it(dim, frame_time):
+    sim = wt.Simulation(hung(wt.Rope, dim, frame_time))
+    sim.advance(1.0)
+    line = sim.joints["line"]
+    assert line.effort == pytest.approx(2 * 9.81, rel=0.02)
+    assert line.position == pytest.approx(0.2, abs=0.002) and abs(line.velocity) < 0.002
+    assert sim.stats()["joints.line.effort"] == line.effort
+    assert "joints.line.power" not in sim.stats()
+
+
+def test_a_slack_rope_pulls_nothing():
+    """The ball lies on the floor, which bears it."""
+    sim = wt.Simulation(hung(wt.Rope, length=0.8))
+    sim.advance(1.0)
+    assert sim.joints["line"].effort == 0.0
+    assert 0.5 < sim.joints["line"].position < 0.8
+
+
+@pytest.mark.parametrize("stiffness", [200.0, 2000.0])
+def test_a_spring_is_longer_by_what_hangs_on_it_over_its_stiffness(stiffness):
+    """Hooke's law."""
+    sim = wt.Simulation(hung(wt.Spring, stiffness=stiffness, damping=20.0))
+    line = sim.joints["line"]
+    assert line.effort == 0.0, "before the first step"
+    sim.advance(3.0)
+    assert line.effort == pytest.approx(2 * 9.81, rel=0.02)
+    assert line.position == pytest.approx(0.2 + 2 * 9.81 / stiffness, abs=0.001)
+
+
+def test_joints_without_an_axis_have_no_effort():
+    scene = hung(wt.Rope)
+    weld = wt.BallJoint(name="line", first="ball", at=(0.4, 0.55, 0.4))
+    sim = wt.Simulation(scene.model_copy(update={"joints": [weld]}))
+    sim.step()
+    with pytest.raises(wt.WavetankError, match="'line' is a ball-joint"):
+        _ = sim.joints["line"].effort

@@ -6,6 +6,8 @@ take, and cancel. So the sum over all of it of the momentum that the engine gave
     code      symbol                meaning                                        unit
     pulled    J                     momentum of a body by contact and joints       kg m/s, kg m^2/s
     effort    n sum(L + r x J) / dt with the axis n, of a hinge; n sum J / dt      N m; N
+
+The axis of a rope or a spring goes from its end on the first solid to the other one: their effort is their tension.
 """
 
 import math
@@ -25,6 +27,7 @@ from wavetank.simulation.solids import Solids
 from wavetank.solids.motion import Pose
 
 SETTLED = 4.744  # critically damped: 5 % are left after this many times the inverse of the frequency
+TAUT = 0.999  # a rope that is not this much of its length pulls nothing
 STOPS = 1e8  # N m s/rad or N s/m: a motor gives its full strength until it has the speed wanted
 FIGURES = ("position", "velocity", "effort", "power")
 WORLD: Pose = (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
@@ -37,7 +40,8 @@ class LiveJoint(KnownAttributes):
     """A joint of a running world, in `sim.joints`. Hinges and sliders have a position, and may have a motor.
 
     The first solid turns or slides relative to the second one, or the world: angles [rad] and distances [m] count from
-    the start. A value that is set holds until the next one; it is part of saved states.
+    the start. A value that is set holds until the next one; it is part of saved states. The position of a rope or a
+    spring is the distance of its ends [m].
     """
 
     name: str
@@ -70,7 +74,12 @@ class LiveJoint(KnownAttributes):
 
     @property
     def position(self) -> float:
-        """Angle [rad], -pi to pi, or distance [m] from the start. Raises `WavetankError` for other kinds of joints."""
+        """Angle [rad], -pi to pi, or distance [m] from the start; of a rope or a spring that of its ends [m].
+
+        Raises `WavetankError` for other kinds of joints.
+        """
+        if isinstance(self.joint, Rope | Spring):
+            return float(np.linalg.norm(self._line(self.joint)))
         first, second = self._frames(self._poses())
         if isinstance(self._moving, Slider):
             return float((first[0] - second[0])[0])
@@ -81,7 +90,7 @@ class LiveJoint(KnownAttributes):
     def velocity(self) -> float:
         """Angular velocity [rad/s] or velocity [m/s] in the last step; 0 before the first of this run."""
         way = self.position - self._last_position
-        if isinstance(self._moving, Hinge):
+        if isinstance(self.joint, Hinge):
             way = (way + np.pi) % (2.0 * np.pi) - np.pi
         return way / self._last_dt if self._last_dt else 0.0
 
@@ -123,11 +132,22 @@ class LiveJoint(KnownAttributes):
     def effort(self) -> float:
         """Torque [N m] or force [N] along its axis in the last step: of its motor, or of its stop at a limit.
 
-        It is what moved all that hangs on the joint; contact with other solids may bear a part of the load. NaN where
-        joints form a ring, and 0 before the first step of this run.
+        Of a rope or a spring its tension [N], below 0 where a spring pushes. It is what moved all that hangs on the
+        joint; contact with other solids may bear a part of the load. NaN where joints form a ring, of a spring what its
+        law says there; 0 before the first step of this run. Raises `WavetankError` for other kinds of joints.
         """
-        frame = self._carried(self._poses())[-1]
-        return self._reaction(self._moving, frame) if self._last_dt else 0.0
+        position, velocity = self.position, self.velocity
+        if not self._last_dt:
+            return 0.0
+        if isinstance(self.joint, Rope | Spring):
+            length = _length(self.joint)
+            if isinstance(self.joint, Rope) and position < TAUT * length:
+                return 0.0
+            pull = self._reaction(self.joint, (WORLD[0], _turn_from_x(self._line(self.joint))))
+            if isinstance(self.joint, Spring) and math.isnan(pull):
+                return self.joint.stiffness * (position - length) + self.joint.damping * velocity
+            return pull
+        return self._reaction(self._moving, self._carried(self._poses())[-1])
 
     @property
     def power(self) -> float:
@@ -142,9 +162,11 @@ class LiveJoint(KnownAttributes):
 
     def drive(self, time: float, dt: float) -> None:
         """Set the motor to what expression or keyframes give for the step of `dt` [s] that ends at `time` [s]."""
-        if not isinstance(self.joint, Hinge | Slider):
+        if isinstance(self.joint, BallJoint | Weld):
             return
         joint, self._last_position, self._last_dt = self.joint, self.position, dt
+        if not isinstance(joint, Hinge | Slider):
+            return
         if varies(joint.target):
             target = track(joint.target)
             end, begin = float(target(time)), float(target(time - dt))
@@ -182,7 +204,7 @@ class LiveJoint(KnownAttributes):
     @property
     def _moving(self) -> Hinge | Slider:
         if not isinstance(self.joint, Hinge | Slider):
-            raise WavetankError(f"joint {self.name!r} is a {self.joint.kind}; hinges and sliders have these.")  # type: ignore[attr-defined]
+            raise WavetankError(f"joint {self.name!r} is a {self.joint.kind}; hinges and sliders have this.")  # type: ignore[attr-defined]
         return self.joint
 
     @property
@@ -205,6 +227,15 @@ class LiveJoint(KnownAttributes):
             now = product(rotation, product(inverse(before), turn))
             result.append((position + turned(rotation, there), now))
         return result[0], result[1]
+
+    def _line(self, joint: Rope | Spring) -> np.ndarray:
+        """Return the way from the end of a line on the first solid to the other [m], shape [3]."""
+        ends = zip(self._poses(), self._starts, (joint.at, joint.to), strict=False)
+        first, second = (
+            position + turned(product(rotation, inverse(before)), np.array([*end, 0.0][:3]) - place)
+            for (position, rotation), (place, before), end in ends
+        )
+        return second - first
 
     def _check_free(self, what: str, value: Any) -> None:
         if varies(self._moving.speed) or varies(self._moving.target):
@@ -261,11 +292,15 @@ class Joints(dict[str, LiveJoint]):
         return {name: self[name].power for name in self.motors}
 
     def figures(self) -> dict[str, float]:
-        """Return position [rad or m], velocity, effort [N m or N] and power [W] of hinges and sliders, by name."""
+        """Return position [rad or m], velocity and effort [N m or N] of all but ball joints and welds, by name.
+
+        And the power [W] of hinges and sliders.
+        """
         rows: dict[str, float] = {}
         for name, live in self.items():
-            if isinstance(live.joint, Hinge | Slider):
-                rows |= {f"joints.{name}.{key}": float(getattr(live, key)) for key in FIGURES}
+            if not isinstance(live.joint, BallJoint | Weld):
+                keys = FIGURES if isinstance(live.joint, Hinge | Slider) else FIGURES[:-1]
+                rows |= {f"joints.{name}.{key}": float(getattr(live, key)) for key in keys}
         return {key: value for key, value in rows.items() if math.isfinite(value)}  # a ring has no effort of its own
 
     def __missing__(self, name: str) -> LiveJoint:
@@ -318,10 +353,19 @@ def _frame(joint: Joint) -> Pose:
     at = np.array([*joint.at, 0.0][:3], float)
     if not isinstance(joint, Hinge | Slider):
         return at, WORLD[1]
-    axis = np.array([*joint.axis, 0.0][:3], float)
-    axis /= np.linalg.norm(axis)
-    turn = np.array([1.0 + axis[0], 0.0, -axis[2], axis[1]])  # the shortest rotation from x to the axis
-    return at, turn / np.linalg.norm(turn) if axis[0] > -1.0 + 1e-12 else np.array([0.0, 0.0, 1.0, 0.0])
+    return at, _turn_from_x(np.array([*joint.axis, 0.0][:3], float))
+
+
+def _turn_from_x(axis: np.ndarray) -> np.ndarray:
+    """Return the shortest rotation from x to the direction of an axis, as a quaternion."""
+    axis = axis / max(float(np.linalg.norm(axis)), 1e-30)
+    turn = np.array([1.0 + axis[0], 0.0, -axis[2], axis[1]])
+    return turn / np.linalg.norm(turn) if axis[0] > -1.0 + 1e-12 else np.array([0.0, 0.0, 1.0, 0.0])
+
+
+def _length(joint: Rope | Spring) -> float:
+    """Return the length of a rope, or that of a spring at rest [m]."""
+    return float(np.linalg.norm(np.subtract(joint.to, joint.at))) if joint.length is None else joint.length
 
 
 def _built(engine: Any, joint: Joint, starts: tuple[Pose, Pose, Pose]) -> Any:
@@ -337,12 +381,10 @@ def _built(engine: Any, joint: Joint, starts: tuple[Pose, Pose, Pose]) -> Any:
         return engine.Isometry3(local(pose, at), rotation)
 
     if isinstance(joint, Rope | Spring):
-        span = float(np.linalg.norm(np.subtract(joint.to, joint.at)))
-        length = span if joint.length is None else joint.length
         if isinstance(joint, Rope):
-            line = engine.RopeJointBuilder(length)
+            line = engine.RopeJointBuilder(_length(joint))
         else:
-            line = engine.SpringJointBuilder(length, joint.stiffness, joint.damping)
+            line = engine.SpringJointBuilder(_length(joint), joint.stiffness, joint.damping)
         return line.local_anchor1(local(second, joint.to)).local_anchor2(local(first, joint.at)).build()
     if isinstance(joint, Weld):
         return engine.FixedJointBuilder().local_frame1(frame(second)).local_frame2(frame(first)).build()
