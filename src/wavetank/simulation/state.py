@@ -44,6 +44,7 @@ class Counters:
     fastest_solid: float = 0.0  # m/s: largest speed of a solid so far
     fastest_force: float = 0.0  # m/s that forces can have given
     steepest: float = 0.0  # m^2/s^2: half the square of the speed of the longest free fall so far
+    lift: float = 1.0  # of the speed limit, by flows that reached it
     start_box: tuple[np.ndarray, np.ndarray] = dataclasses.field(
         default_factory=lambda: (np.zeros(3), np.zeros(3))
     )  # m: lower and upper corner of the particles at the start
@@ -57,8 +58,10 @@ class Counters:
         vars(self).update(vars(other))
 
     def plain(self) -> dict[str, Any]:
-        """Return the values as JSON has them in saved states, where the pending time is `owed`."""
+        """Return the values as JSON has them in saved states: the pending time as `owed`, `lift` where it is not 1."""
         values = {"owed" if name == "pending_time" else name: value for name, value in vars(self).items()}
+        if self.lift == 1.0:
+            del values["lift"]
         return {**values, "start_box": [corner.tolist() for corner in self.start_box]}
 
     @classmethod
@@ -67,7 +70,7 @@ class Counters:
         names = {
             field.name: "owed" if field.name == "pending_time" else field.name for field in dataclasses.fields(cls)
         }
-        known = {name: values[key] for name, key in names.items()}
+        known = {name: values[key] for name, key in names.items() if key != "lift" or key in values}
         lower, upper = values["start_box"]
         return cls(**{**known, "start_box": (np.array(lower), np.array(upper))})
 

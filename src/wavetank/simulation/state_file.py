@@ -54,6 +54,7 @@ class _Numbers(_Part):
     fastest_solid: Annotated[float, Limits(ge=0, le=1e12, allow_inf_nan=False)]
     fastest_force: Annotated[float, Limits(ge=0, le=1e12, allow_inf_nan=False)]
     steepest: Annotated[float, Limits(ge=0, le=1e24, allow_inf_nan=False)] = 0.0
+    lift: Annotated[float, Limits(ge=1, le=1e12, allow_inf_nan=False)] = 1.0
     start_box: tuple[list[Number], list[Number]]
     frozen_count: Count
     foam_born: Annotated[int, Limits(ge=-1, le=MOST_IDS)]
