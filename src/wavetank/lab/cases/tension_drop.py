@@ -38,7 +38,9 @@ def run(quick: bool, arch: str) -> Outcome:
         if quick and dim == 3:
             continue
         t, shape = oscillation(dim, number, arch)
-        figures.append(Figure(f"{dim}-D drop: period, error", 100 * (period(t, shape) - 1), "%", -20, 20, "0", LAMB))
+        found = 100.0 * (periods(t, shape) - 1.0)
+        figures.append(Figure(f"{dim}-D drop: period, error", _mean(found), "%", -20, 20, "0", LAMB))
+        figures.append(Figure(f"{dim}-D drop: period, spread", float(np.ptp(found)) if len(found) else math.nan, "%"))
         curves[f"{dim}-D"] = (t, shape)
 
     def draw(plot: Any) -> None:
@@ -61,6 +63,11 @@ def run(quick: bool, arch: str) -> Outcome:
     for name, (t, shape) in curves.items():
         series |= {f"periods {name}": t, f"shape {name}": shape}
     return Outcome(figures, series, draw)
+
+
+def _mean(values: np.ndarray) -> float:
+    """Return the mean, not a number of none."""
+    return float(values.mean()) if len(values) else math.nan
 
 
 def square(number: int, tension: float, arch: str) -> tuple[list[float], list[float], list[np.ndarray]]:
@@ -115,18 +122,19 @@ def oscillation(dim: int, number: int, arch: str) -> tuple[list[float], list[flo
     return times, shape
 
 
-def period(times: list[float], shape: list[float]) -> float:
-    """Return the period between the first and the last extreme of `shape`; not a number with fewer than two.
+def periods(times: list[float], shape: list[float]) -> np.ndarray:
+    """Return twice the time from each extreme of `shape` to the next one, empty with fewer than two.
 
-    Extremes, not zeros: a lattice that is left in the middle of a drop shifts its mean shape.
+    Extremes, not zeros: a lattice that is left in the middle of a drop shifts its mean shape. Each is the vertex of the
+    parabola through three values of the smoothed curve.
     """
-    a = np.array(shape)
-    middle = np.arange(2, len(a) - 2)
-    smooth = np.convolve(a, np.full(5, 0.2), "same")
-    turns = [k for k in middle if (smooth[k] - smooth[k - 1]) * (smooth[k + 1] - smooth[k]) < 0.0]
-    # The ends of the smoothed curve are those of the average, not of the drop.
-    turns = [k for k in turns if 4 <= k < len(a) - 4]
-    return 2.0 * (times[turns[-1]] - times[turns[0]]) / (len(turns) - 1) if len(turns) > 1 else math.nan
+    smooth = np.convolve(shape, np.full(5, 0.2), "same")
+    turns = []
+    for k in range(4, len(smooth) - 4):  # the ends of the smoothed curve are those of the average, not of the drop
+        before, after = smooth[k] - smooth[k - 1], smooth[k + 1] - smooth[k]
+        if before * after < 0.0:
+            turns.append(times[k] + 0.5 * (times[k + 1] - times[k]) * (before + after) / (before - after))
+    return 2.0 * np.diff(turns)
 
 
 CASE = Case("tension-drop", "Drops under surface tension", run)
