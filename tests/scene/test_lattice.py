@@ -1,5 +1,7 @@
 """Blocks are filled evenly between what holds them, at any spacing."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -95,3 +97,19 @@ def test_a_world_without_walls_is_never_too_full():
     assert len(x) == 20 * 10
     for axis, length in enumerate(ring.size):
         np.testing.assert_allclose(np.diff(rows(x, axis)), length / len(rows(x, axis)), atol=2e-5)
+
+
+@pytest.mark.parametrize("shape", ["block", "ball"])
+def test_many_fluids_in_one_place_begin_soon(shape):
+    """As many as a scene may have: time that grows with the square of their number would be minutes."""
+    rng = np.random.default_rng(1)
+    block = "{lower = [0.4, 0.4, 0.4], upper = [0.6, 0.6, 0.6]}"
+    balls = [
+        f'{{shape = "ball", center = {place.tolist()}, radius = 0.3}}' for place in rng.uniform(0.4, 0.6, (2000, 3))
+    ]
+    each = balls if shape == "ball" else [block] * 2000
+    text = f"spacing = 0.1\ntank.size = [1, 1, 1]\nfluids = [{', '.join(each)}]\n"
+    began = time.process_time()
+    x = wt.Scene.from_text(text).particles()[0]
+    assert (len(x) and len(x) == len(np.unique(x, axis=0))) or shape == "ball"
+    assert time.process_time() - began < 5.0

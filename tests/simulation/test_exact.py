@@ -82,3 +82,46 @@ def test_foam_without_water_goes_on_to_the_same_bits(tmp_path):
         sim.step()
         again.step()
         assert again.digest() == sim.digest()
+
+
+def paint() -> wt.Scene:
+    """Heavy paint in front of light oil, in a flat tank."""
+    return wt.Scene(
+        spacing=0.05,
+        tank=wt.Tank(size=(1, 1)),
+        materials=[wt.Material(name="paint", density=2000, viscosity=1.0), wt.Material(name="oil", density=800)],
+        fluids=[
+            wt.Block(lower=(0, 0), upper=(0.3, 0.3), material="paint"),
+            wt.Block(lower=(0.6, 0), upper=(1.0, 0.3), material="oil"),
+        ],
+    )
+
+
+BALL = {"shape": "sphere", "name": "ball", "center": (0.5, 0.7), "radius": 0.12, "density": 500}
+EDITS = {
+    "new particles": lambda sim: sim.add([(0.4, 0.8), (0.5, 0.8)]),
+    "no particle of the first fluid": lambda sim: sim.remove_inside((0.15, 0.15), (0.16, 0.15), 0.5),
+    "no particle": lambda sim: sim.remove(range(10**4)),
+    "a body": lambda sim: sim.add_solid(wt.Sphere(**BALL)),
+    "a body that is taken away": lambda sim: (sim.add_solid(wt.Sphere(**BALL)), sim.remove_solid("ball")),
+}
+
+
+@pytest.mark.parametrize(
+    ("first", "then"), [(a, b) for a in EDITS for b in EDITS if not (a == "a body" and "body" in b)]
+)
+def test_edits_after_a_restore_have_the_same_effect(first, then, tmp_path):
+    """What a digest says is all that goes on from it: fluids of new particles, and around bodies."""
+    sim = wt.Simulation(paint())
+    sim.step()
+    EDITS[first](sim)
+    sim.step()
+    sim.save(tmp_path / "state.npz")
+    other = wt.Simulation.restore(tmp_path / "state.npz")
+    assert other.digest() == sim.digest()
+    for one in (sim, other):
+        EDITS[then](one)
+        one.add([(0.7, 0.8)])
+        one.step()
+    assert (other.frame().materials == sim.frame().materials).all()
+    assert other.digest() == sim.digest()

@@ -43,10 +43,8 @@ class Fluid(Model):
         x = plain_lattice(lower, upper, spacing)
         return x[self.contains(x)]
 
-    def placed(
-        self, spacing: float, tank: Tank | None, fluids: Sequence["Fluid"], solids: Sequence[Solid]
-    ) -> np.ndarray:
-        """Positions [n, dim] of this fluid's particles in a `tank` with all `fluids` and `solids`."""
+    def placed(self, spacing: float, tank: Tank | None, boxes: np.ndarray) -> np.ndarray:
+        """Positions [n, dim] of this fluid in a `tank`, beside all `boxes` of fluid and solids, [n, 2, dim]."""
         return self.particles(spacing)
 
 
@@ -80,15 +78,11 @@ class Block(Fluid):
         return np.all((points > lower) & (points < upper), axis=1)
 
     @override
-    def placed(self, spacing: float, tank: Tank | None, fluids: Sequence[Fluid], solids: Sequence[Solid]) -> np.ndarray:
+    def placed(self, spacing: float, tank: Tank | None, boxes: np.ndarray) -> np.ndarray:
         lower, upper = self.bounds()
-        touched = np.zeros((2, len(lower)), bool) if tank is None else tank.touched_by(lower, upper, spacing)
-        for other in fluids:
-            if isinstance(other, Block) and other is not self:
-                touched |= touching(lower, upper, *other.bounds(), spacing)
-        for solid in solids:
-            if isinstance(solid, Box) and (corners := solid.corners()) is not None:
-                touched |= touching(lower, upper, *corners, spacing)
+        touched = touching(lower, upper, boxes[:, 0], boxes[:, 1], spacing)  # itself does not touch itself
+        if tank is not None:
+            touched |= tank.touched_by(lower, upper, spacing)
         return fitted(lower, upper, spacing, touched[0] & touched[1], tank.periodic_axes if tank else [])
 
 
@@ -173,6 +167,45 @@ class Points(Fluid):
     @override
     def particles(self, spacing: float) -> np.ndarray:
         return self.positions
+
+
+def boxes_of(fluids: Sequence[Fluid], solids: Sequence[Solid], dim: int) -> np.ndarray:
+    """Return lower and upper corner [m] of all blocks and of all upright boxes, float64 [n, 2, dim]."""
+    corners: list[Any] = [fluid.bounds() for fluid in fluids if isinstance(fluid, Block)]
+    corners += [solid.corners() for solid in solids if isinstance(solid, Box)]
+    return np.array([pair for pair in corners if pair is not None], float).reshape(-1, 2, dim)
+
+
+class Earlier:
+    """Fluids so far, to tell which points lie in one of them: the first fluid wins."""
+
+    def __init__(self, dim: int) -> None:
+        self.fluids: list[Fluid] = []
+        self._bounds = np.zeros((0, 2, dim))
+        self._count = 0
+
+    def append(self, fluid: Fluid) -> None:
+        """Add a fluid that is not empty."""
+        if self._count == len(self._bounds):
+            self._bounds = np.concatenate([self._bounds, np.zeros((max(16, self._count), *self._bounds.shape[1:]))])
+        self._bounds[self._count] = fluid.bounds()
+        self.fluids.append(fluid)
+        self._count += 1
+
+    def contain(self, points: np.ndarray) -> np.ndarray:
+        """Return which of the points [n, dim] lie in one of them, bool [n]."""
+        free = np.arange(len(points))
+        if not len(points):
+            return np.zeros(0, bool)
+        bounds = self._bounds[: self._count]
+        near = ((bounds[:, 0] < points.max(axis=0)) & (bounds[:, 1] > points.min(axis=0))).all(axis=1)
+        for number in np.flatnonzero(near):
+            free = free[~self.fluids[number].contains(points[free])]
+            if not len(free):
+                break
+        taken = np.ones(len(points), bool)
+        taken[free] = False
+        return taken
 
 
 for _fluid in (Block, Ball, Points):

@@ -32,10 +32,10 @@ def plain_lattice(lower: np.ndarray, upper: np.ndarray, spacing: float, more: in
 
 
 def touching(lower: np.ndarray, upper: np.ndarray, low: np.ndarray, high: np.ndarray, spacing: float) -> np.ndarray:
-    """Say where another box lies next to the first one, at its lower and its upper side along each axis, [2, dim]."""
+    """Say where other boxes [n, dim] lie next to the first, at its lower and its upper side of each axis, [2, dim]."""
     overlaps = np.minimum(upper, high) - np.maximum(lower, low) > NEAR * spacing
-    beside = np.array([np.delete(overlaps, axis).all() for axis in range(len(lower))])
-    return beside & (np.abs([lower - high, upper - low]) < NEAR * spacing)
+    beside = np.stack([np.delete(overlaps, axis, axis=1).all(axis=1) for axis in range(len(lower))], axis=1)
+    return np.any(beside & (np.abs([lower - high, upper - low]) < NEAR * spacing), axis=1)
 
 
 def fitted(lower: np.ndarray, upper: np.ndarray, spacing: float, held: np.ndarray, rings: list[int]) -> np.ndarray:

@@ -1,5 +1,6 @@
 """A scene: plain validated data that describes a world, from Python or from a TOML file."""
 
+import dataclasses
 import difflib
 import functools
 import importlib.resources
@@ -24,7 +25,7 @@ from wavetank.foundation.tracks import scaled
 from wavetank.scene.bounds import check_bodies, check_numbers, check_periodic, check_scales
 from wavetank.scene.filled import AnyFluid, Filled
 from wavetank.scene.film import Film
-from wavetank.scene.fluids import Points
+from wavetank.scene.fluids import Earlier, Points, boxes_of
 from wavetank.scene.forces import AnyForce
 from wavetank.scene.goal import Goal
 from wavetank.scene.joints import AnyJoint, check_joints
@@ -44,6 +45,16 @@ def _tagged(values: Any, default: str) -> Any:
     if not isinstance(values, list | tuple):
         return values
     return [{"shape": default, **v} if isinstance(v, dict) and "shape" not in v else v for v in values]
+
+
+@dataclasses.dataclass(frozen=True)
+class Lattice:
+    """The particles of a scene's fluids."""
+
+    positions: np.ndarray  # m, float32 [n, dim]
+    velocities: np.ndarray  # m/s, float32 [n, dim]
+    kinds: np.ndarray  # number of the material, int32 [n]
+    has_own_place: np.ndarray  # whether it is placed one by one, as those of `Points`, bool [n]
 
 
 class Scene(Timetable, Parameters):
@@ -197,15 +208,18 @@ class Scene(Timetable, Parameters):
         palette = self.palette()
         return {number: palette[number] for number in np.unique(kinds).tolist()}
 
-    def checked_kinds(self, numbers: Any, count: int) -> np.ndarray:
-        """Return the numbers of the materials of `count` particles, int32; those of the first fluid for None.
+    def first_kind(self) -> int:
+        """Return the number of the material of the first fluid; 0 without any."""
+        first = self.fluids[0].material if self.fluids else None
+        return 0 if first is None else 1 + [material.name for material in self.materials].index(first)
+
+    def checked_kinds(self, numbers: Any, count: int, default: int) -> np.ndarray:
+        """Return the numbers of the materials of `count` particles, int32; all are `default` for None.
 
         Raises `WavetankError` for numbers that are not in the palette.
         """
         if numbers is None:
-            first = self.fluids[0].material if self.fluids else None
-            usual = 0 if first is None else 1 + [material.name for material in self.materials].index(first)
-            return np.full(count, usual, np.int32)
+            return np.full(count, default, np.int32)
         kind = array_of("materials", numbers, np.int32, f"[{count}]")
         if kind.shape != (count,) or not np.isin(kind, np.arange(len(self.materials) + 1)).all():
             raise WavetankError(
@@ -215,49 +229,43 @@ class Scene(Timetable, Parameters):
 
     def kinds(self) -> np.ndarray:
         """Return the number of the material of each particle, int32 [n], in the order of `particles`."""
-        numbers = {None: 0} | {material.name: k for k, material in enumerate(self.materials, 1)}
-        pairs = zip(self.fluids, self._lattices(), strict=True)
-        parts = [np.full(len(x), numbers[fluid.material], np.int32) for fluid, (x, _) in pairs]
-        return np.concatenate([np.empty(0, np.int32), *parts])
-
-    def has_own_place(self) -> np.ndarray:
-        """Say which particles are placed one by one, as those of `Points`, bool [n], in the order of `particles`."""
-        parts = zip(self.fluids, self._lattices(), strict=True)
-        return np.concatenate(
-            [np.empty(0, bool), *(np.full(len(x), isinstance(f, Points | Filled)) for f, (x, _) in parts)]
-        )
+        return self.lattice().kinds
 
     def particles(self) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [m] and velocities [m/s], float32 [n, dim], of the fluids; a simulation leaves out those in solids.
+        """Return positions [m] and velocities [m/s], float32 [n, dim], of `lattice`."""
+        lattice = self.lattice()
+        return lattice.positions, lattice.velocities
+
+    def lattice(self) -> "Lattice":
+        """Return the particles of the fluids; a simulation leaves out those in solids.
 
         Where fluids overlap, the first one wins.
         """
-        parts = self._lattices()
-        positions = np.concatenate([np.empty((0, self.dim)), *(x for x, _ in parts)])
-        if not len(positions) and any(not isinstance(fluid, Points) for fluid in self.fluids):
-            raise WavetankError(
-                f"the fluids of this scene hold no particle at spacing = {self.spacing:g} m; use a smaller spacing or "
-                "larger fluids."
-            )
-        velocities = np.concatenate([np.empty((0, self.dim)), *(v for _, v in parts)])
-        return positions.astype(np.float32), velocities.astype(np.float32)
-
-    def _lattices(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Positions and velocities of each fluid."""
-        parts = []
-        for number, fluid in enumerate(self.fluids):
-            x = fluid.placed(self.spacing, self.tank, self.fluids, self.solids)
+        numbers = {None: 0} | {material.name: k for k, material in enumerate(self.materials, 1)}
+        boxes, earlier = boxes_of(self.fluids, self.solids, self.dim), Earlier(self.dim)
+        positions, velocities = [np.empty((0, self.dim))], [np.empty((0, self.dim))]
+        kinds, placed = [np.empty(0, np.int32)], [np.empty(0, bool)]
+        for fluid in self.fluids:
+            x = fluid.placed(self.spacing, self.tank, boxes)
             x = x.reshape(-1, self.dim)  # an empty array has no width of its own
             v = np.zeros_like(x) if fluid.velocity is None else np.tile(np.array(fluid.velocity, float), (len(x), 1))
             if isinstance(fluid, Points):
                 v = v if fluid.velocities is None else fluid.velocities.reshape(x.shape)
             else:
-                taken = np.zeros(len(x), bool)
-                for other in self.fluids[:number]:
-                    taken |= other.contains(x)
-                x, v = x[~taken], v[~taken]
-            parts.append((x, v))
-        return parts
+                free = ~earlier.contain(x)
+                x, v = x[free], v[free]
+                earlier.append(fluid)
+            positions.append(x)
+            velocities.append(v)
+            kinds.append(np.full(len(x), numbers[fluid.material], np.int32))
+            placed.append(np.full(len(x), isinstance(fluid, Points | Filled)))
+        x, v = np.concatenate(positions), np.concatenate(velocities)
+        if not len(x) and any(not isinstance(fluid, Points) for fluid in self.fluids):
+            raise WavetankError(
+                f"the fluids of this scene hold no particle at spacing = {self.spacing:g} m; use a smaller spacing or "
+                "larger fluids."
+            )
+        return Lattice(x.astype(np.float32), v.astype(np.float32), np.concatenate(kinds), np.concatenate(placed))
 
     # --- files ---
 

@@ -31,7 +31,7 @@ from wavetank.device.compiler import upload
 from wavetank.foundation.errors import WavetankError
 from wavetank.physics.population import Clearance, free_places
 from wavetank.physics.world import World
-from wavetank.scene.scene import Scene
+from wavetank.scene.scene import Lattice, Scene
 from wavetank.simulation.particles import by_id, put_by_id
 from wavetank.simulation.solids import Solids
 from wavetank.solids.distance import SolidSet
@@ -51,33 +51,35 @@ STANDING = 0.3  # of the fall: water that moved less in the last step is at rest
 LIVELY = 0.002  # of the particles: where fewer move by more than that, steps end
 
 
-def cull(scene: Scene, places: np.ndarray, solids: Solids, world: World, *, clear: bool) -> np.ndarray:
-    """Return which `places` [n, dim] [m] of a scene's fluids are outside of its solids, bool [n]; all `Points` stay.
+def cull(scene: Scene, lattice: Lattice, solids: Solids, world: World, *, clear: bool) -> np.ndarray:
+    """Return which particles of a scene's `lattice` are outside of its solids, bool [n]; all `Points` stay.
 
     With `clear` only those as far from solids as water rests; else as many as there is volume for, some of them closer.
     Raises `WavetankError` where none is.
     """
+    places = lattice.positions
     if not solids.reaches_into(scene):
         return np.ones(len(places), bool)
     if clear:
         clearance = Clearance(0.0, scene.wall_gap * scene.spacing, solids.tank_count)
         free = free_places(places, world.particles, solids.device, 0, clearance)
     else:
-        free = outside_solids(scene, places, solids.device, solids.tank_count)
-    free |= scene.has_own_place()
+        free = outside_solids(scene, lattice, solids.device, solids.tank_count)
+    free |= lattice.has_own_place
     if not free.any():
         raise WavetankError("the fluids of this scene are inside of its solids; move them, or make them larger.")
     return free
 
 
-def outside_solids(scene: Scene, places: np.ndarray, solids: SolidSet, first: int) -> np.ndarray:
-    """Return which `places` [n, dim] [m] of a scene's fluids the solids from number `first` on leave free, bool [n]."""
+def outside_solids(scene: Scene, lattice: Lattice, solids: SolidSet, first: int) -> np.ndarray:
+    """Return which particles of a scene's `lattice` the solids from number `first` on leave free, bool [n]."""
+    places = lattice.positions
     s, nearest = nearest_of(solids, first, places, TOUCH * scene.spacing)
     s /= scene.spacing
     free, cut = s >= CUT, np.flatnonzero(np.abs(s) < CUT)
     cells = np.floor(places[cut] / scene.spacing)
     order = s[cut] + EVEN * ((cells @ SPREAD[: places.shape[1]]) % 1.0 - 0.5)
-    kinds = scene.kinds()[cut]
+    kinds = lattice.kinds[cut]
     for kind, solid in {*zip(kinds.tolist(), nearest[cut].tolist(), strict=True)}:
         chosen = np.flatnonzero((kinds == kind) & (nearest[cut] == solid))
         number = round(float((CUT + s[cut[chosen]]).sum()))

@@ -53,6 +53,7 @@ class ParticleSystem:
     def __init__(self, scene: Scene, counters: Counters) -> None:
         """Begin without arrays; `allocate` makes them."""
         self.scene, self.counters = scene, counters
+        self.default_kind = scene.first_kind()  # number of the material of new particles that are not given any
         self.outdated = True  # whether particles moved or changed since densities were measured
 
     @property
@@ -199,7 +200,8 @@ class ParticleSystem:
             upload(getattr(world.particles, name), arrays[name])
         if VISCOUS in arrays or world.remembers_viscosity:
             world.remember_viscosity(arrays.get(VISCOUS, np.zeros(0)))
-        world.materials = self.scene.materials_of(arrays["material"])
+        self.default_kind = more.default_kind
+        world.materials = self.scene.materials_of(np.array(more.known_kinds, int))
         world.count, world.frozen = len(arrays["id"]), int(arrays["frozen"].sum())
         capacity = self.counters.capacity
         world.pool = pool_from(arrays, more.foam_born, more.foam_capacity, self.scene.dim, capacity)
@@ -229,13 +231,15 @@ def _new_world(scene: Scene, capacity: int, solids: SolidSet, pieces: Pieces | N
     )
 
 
-def check_newcomers(scene: Scene, positions: Any, velocities: Any, dyes: Any, materials: Any) -> Newcomers:
+def check_newcomers(
+    scene: Scene, positions: Any, velocities: Any, dyes: Any, materials: Any, default_kind: int = 0
+) -> Newcomers:
     """Return the arguments of `Simulation.add` as arrays; raises `WavetankError` for wrong shapes and numbers."""
     rows = f"[n, {scene.dim}]"
     x = np.atleast_1d(array_of("positions", positions, np.float32, rows))
     v = np.zeros_like(x) if velocities is None else array_of("velocities", velocities, np.float32, rows)
     dye = np.zeros(len(x), np.int32) if dyes is None else array_of("dyes", dyes, np.int32, "[n]")
-    material = scene.checked_kinds(materials, len(x))
+    material = scene.checked_kinds(materials, len(x), default_kind)
     shape = (len(x), scene.dim)
     if x.shape != shape or v.shape != shape or dye.shape != shape[:1]:
         raise WavetankError(

@@ -21,6 +21,7 @@ from wavetank.foundation.input_limits import explain_errors, printable
 from wavetank.foundation.params import LIVE, refuse_assignment
 from wavetank.physics import measure, population
 from wavetank.physics.foam.update import load_kernels, update_foam
+from wavetank.physics.mixture import blend
 from wavetank.physics.planning import has_grid_pressure
 from wavetank.physics.terms.term import Term
 from wavetank.physics.time_step import filled_share, whole
@@ -118,12 +119,13 @@ class Simulation(KnownAttributes):
 
     def _begin(self, start: Scene, *, clear: bool) -> bool:
         """Place the water of `start` outside of solids (see `cull`); return whether solids may displace any of it."""
-        positions, velocities = start.particles()
+        lattice = start.lattice()
+        positions, velocities = lattice.positions, lattice.velocities
         self.counters.assign(Counters())
         self.bodies = Bodies(self.scene, self.solids)
         self.particles.allocate(len(positions), self.solids, self.bodies.pieces)
-        free = cull(start, positions, self.solids, self.world, clear=clear)
-        self.add(positions[free], velocities[free], materials=start.kinds()[free])
+        free = cull(start, lattice, self.solids, self.world, clear=clear)
+        self.add(positions[free], velocities[free], materials=lattice.kinds[free])
         box = positions[free] if free.any() else np.zeros((1, self.scene.dim))
         self.counters.start_box = (box.min(axis=0), box.max(axis=0))
         return bool(free.any()) and (bool(self.bodies) or self.solids.reaches_into(start))
@@ -462,6 +464,8 @@ class Simulation(KnownAttributes):
 
     def _renew_solids(self, density: float = 0.0) -> None:
         """Update bodies and device arrays to the present solids, in fluids of `density` [kg/m^3] (0: as before)."""
+        if not density and not self.bodies:  # a state without bodies does not hold it
+            density = blend(self.world.materials, self.scene).largest_density
         self.bodies = self.bodies.renewed(self.scene, self.solids, density)
         self.particles.set_solids(self.solids, self.bodies.pieces)
 
@@ -470,10 +474,10 @@ class Simulation(KnownAttributes):
     def add(self, positions: Any, velocities: Any = None, dyes: Any = None, materials: Any = None) -> np.ndarray:
         """Add particles at `positions` [m], shape [n, dim], with `velocities` [m/s] and return their new ids, [n].
 
-        `materials` are numbers in `Scene.palette`, [n]; that of the scene's first fluid where None. Particles may
+        `materials` are numbers in `Scene.palette`, [n]; that of the first fluid at the start where None. Particles may
         overlap others: see `free_places`. Raises `WavetankError` for wrong shapes, and places outside of the tank.
         """
-        new = check_newcomers(self.scene, positions, velocities, dyes, materials)
+        new = check_newcomers(self.scene, positions, velocities, dyes, materials, self.particles.default_kind)
         check_inside(self.scene, new.x)
         return self.particles.add(new)
 
@@ -516,6 +520,8 @@ class Simulation(KnownAttributes):
                 foam_capacity=pool.capacity if pool else 0,
                 solids=self.solids.state(),
                 sources=self.sources.plain(),
+                default_kind=self.particles.default_kind,
+                known_kinds=tuple(sorted(self.world.materials)),
             ),
         )
 

@@ -95,6 +95,8 @@ class Continuation:
     foam_capacity: int
     solids: SolidsState
     sources: dict[str, Any] = dataclasses.field(default_factory=dict)  # see `Sources.plain`
+    default_kind: int = 0  # number of the material of new particles that are not given any
+    known_kinds: tuple[int, ...] = ()  # materials of all particles so far, also of those that are gone
 
 
 @dataclasses.dataclass(frozen=True)
@@ -175,9 +177,10 @@ class State(Instant):
         That is, in this order, each array with its name and shape: the counters without the capacity, the number of
         births of foam, every array in the order of particle ids (positions, velocities, warm-started pressure,
         viscosity, dyes, ice, materials), foam in the order of births, bodies and their engine, poses, targets and
-        growth of solids, which of them are held, emitters and drains, and the scene without what the water does not
-        feel. There is no state of random numbers: they follow from ids and the number of the frame. Recordings, tests
-        and `wavetank run` compare by this and nothing else.
+        growth of solids, which of them are held, emitters and drains, the scene without what the water does not feel,
+        and the material of new particles and all materials so far where they are not those of the particles. There
+        is no state of random numbers: they follow from ids and the number of the frame. Recordings, tests and
+        `wavetank run` compare by this and nothing else.
         """
         more = self.resumable
         solids = more.solids
@@ -195,6 +198,9 @@ class State(Instant):
         whole.update(json.dumps(others, sort_keys=True).encode())
         unfelt = UNFELT | ({"up": True} if self.scene.upward == "y" else {})
         whole.update(self.scene.model_dump_json(exclude=unfelt).encode())
+        told = kinds_of(self.arrays)
+        if (more.default_kind, more.known_kinds) != told:
+            whole.update(json.dumps([more.default_kind, more.known_kinds]).encode())
         return whole.hexdigest()
 
     def pack(self) -> "PackedState":
@@ -217,6 +223,13 @@ class State(Instant):
     @override
     def _of_foam(self, field: Field) -> np.ndarray:
         return self.arrays[field.name] if field.name in self.arrays else field.zeros(0, self.dim)
+
+
+def kinds_of(arrays: Mapping[str, np.ndarray]) -> tuple[int, tuple[int, ...]]:
+    """Return the material of the particle with the lowest id, 0 without any, and those of all, as numbers."""
+    kinds = arrays["material"]
+    first = int(kinds[np.argmin(arrays["id"])]) if len(kinds) else 0
+    return first, tuple(np.unique(kinds).tolist())
 
 
 def _fitted(field: Field, given: np.ndarray | None, rows: int, dim: int) -> np.ndarray:

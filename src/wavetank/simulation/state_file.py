@@ -23,7 +23,7 @@ from wavetank.scene.scene import MAX_PARTICLES, Scene
 from wavetank.simulation.coupling import STATE_ROWS, upgraded
 from wavetank.simulation.instant import COLUMNS, FOAM, Field
 from wavetank.simulation.particles import check_crowd
-from wavetank.simulation.state import VISCOUS, Continuation, Counters, SolidsState, State
+from wavetank.simulation.state import VISCOUS, Continuation, Counters, SolidsState, State, kinds_of
 from wavetank.solids.motion import Pose
 
 FORMAT = 3  # 1 has no foam, 2 no seal; both are read
@@ -88,6 +88,11 @@ class _Sources(_Part):
     drains: list[_Source] = []
 
 
+class _Kinds(_Part):
+    default: Count
+    known: list[Count]
+
+
 class Header(_Part):
     """All of a state that is neither scene nor array."""
 
@@ -98,6 +103,7 @@ class Header(_Part):
     growing: dict[Count, tuple[Time, Annotated[float, Limits(gt=0, le=1e6, allow_inf_nan=False)]]]
     courses: _Courses = _Courses()
     sources: _Sources = _Sources()
+    kinds: _Kinds | None = None  # of materials; earlier versions did not write them
 
 
 def write_state(path: str | Path, state: State, *, lasting: bool = False) -> None:
@@ -125,6 +131,7 @@ def write_state(path: str | Path, state: State, *, lasting: bool = False) -> Non
         "growing": solids.growing,
         "courses": solids.motions,
         "sources": more.sources,
+        "kinds": {"default": more.default_kind, "known": more.known_kinds},
     }
     scene = state.scene.model_dump_json(exclude={"fluids"})
     parts = {"format": FORMAT, "scene": scene, "about": json.dumps(about, allow_nan=False), **state.arrays}
@@ -190,12 +197,17 @@ def _state(header: Header, about: dict[str, Any], scene: Scene, arrays: dict[str
         growing={**header.growing},
         motions=header.courses.model_dump() if "courses" in about else {},
     )
+    default, known = kinds_of(arrays)
+    if header.kinds is not None:
+        default, known = header.kinds.default, tuple(sorted({*header.kinds.known, *known}))
     more = Continuation(
         counters=Counters.read(numbers.model_dump()),
         foam_born=numbers.foam_born,
         foam_capacity=numbers.foam_capacity,
         solids=solids,
         sources=about.get("sources", {}),
+        default_kind=default,
+        known_kinds=known,
     )
     return State(scene=scene, number=numbers.frame_number, time=numbers.time, arrays=arrays, continuation=more)
 
@@ -220,6 +232,9 @@ def _check_header(header: Header, scene: Scene, refuse: str) -> None:
         raise WavetankError(f"{refuse}: courses names a solid that is not there.")
     if len(header.sources.emitters) > len(scene.emitters) or len(header.sources.drains) > len(scene.drains):
         raise WavetankError(f"{refuse}: sources has more emitters or drains than its scene.")
+    kinds = [header.kinds.default, *header.kinds.known] if header.kinds else []
+    if any(kind > len(scene.materials) for kind in kinds):
+        raise WavetankError(f"{refuse}: kinds names material {max(kinds)}; there are 0 to {len(scene.materials)}.")
     if any(len(corner) not in (scene.dim, 3) for corner in header.numbers.start_box):
         raise WavetankError(f"{refuse}: start_box must be two corners of {scene.dim} numbers.")
 
