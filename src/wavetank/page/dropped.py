@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import explain_errors
 from wavetank.session.commands import AddSolid
 from wavetank.session.session import Session
 from wavetank.solids.meshes.mesh import Mesh
@@ -14,6 +15,16 @@ from wavetank.view.extent import extent_of
 
 SHARE = 0.3  # of the world's length: longest edge of a dropped mesh
 MOST_CORNERS = 400_000
+
+
+def drop_mesh(session: Session, text: str, file: str) -> str:
+    """Add the mesh of an OBJ file's `text` as a solid; return the sentence that says so, or why it was refused."""
+    try:
+        with explain_errors(file, "mesh"):
+            session.apply(command_for(session, text, file))
+    except WavetankError as error:
+        return str(error)[:400]
+    return f"{file} was added as a solid; move it with Grab."
 
 
 def command_for(session: Session, text: str, file: str) -> AddSolid:

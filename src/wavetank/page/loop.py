@@ -9,12 +9,13 @@ import os
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Any, Protocol
 
 import numpy as np
 
 from wavetank.device.compiler import on_compile
+from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import one_line
 from wavetank.page.about import figures, status, world
 from wavetank.page.hud import Hud
@@ -24,6 +25,9 @@ from wavetank.session.session import Session
 STATUS_EVERY = 0.1  # s
 FIGURES_SHARE = 0.03  # of the time that measuring may take
 FIGURES_EVERY = 2.0  # s between two measurements, at most
+ASKED_SHARE = 0.15  # of the time that answers to viewers may take
+MOST_ASKED = 64  # questions that wait
+SIZE_EVERY = 0.2  # s between two sizes of pictures
 CALM = 0.25  # s without a change after which a sharp picture is made
 REST = 0.05  # s, at most, between two looks at the queue of calls
 
@@ -82,6 +86,9 @@ class Loop:
         self.session, self.audience, self.figures_every = session, audience, figures_every
         self.painter, self.hud = Painter(session), Hud(session)
         self._calls: queue.SimpleQueue[tuple[Callable[[], Any], concurrent.futures.Future[Any]]] = queue.SimpleQueue()
+        self._asked: dict[Hashable, tuple[Callable[[], Any], concurrent.futures.Future[Any]]] = {}
+        self._lock = threading.Lock()  # of `_asked`
+        self._next_answer = self._next_size = 0.0  # s of `perf_counter`
         self._stopped = threading.Event()
         self._painted, self._painted_at, self._sharp = -1, 0.0, False
         self._next_status = self._next_figures = self._next_progress = 0.0
@@ -95,13 +102,35 @@ class Loop:
         self.session.wake()
         return future
 
+    def ask(self, key: Hashable, function: Callable[[], Any]) -> concurrent.futures.Future[Any]:
+        """Do what `call` does for a viewer: spaced, so that all answers take `ASKED_SHARE` of the time.
+
+        A later question takes the place of one with the same `key` that still waits, whose future is cancelled. Raises
+        `WavetankError` where too many wait.
+        """
+        future: concurrent.futures.Future[Any] = concurrent.futures.Future()
+        with self._lock:
+            replaced = self._asked.get(key)
+            if replaced is None and len(self._asked) >= MOST_ASKED:
+                raise WavetankError("Too many questions at once: one was dropped.")
+            self._asked[key] = (function, future)
+        if replaced is not None:
+            replaced[1].cancel()
+        self.session.wake()
+        return future
+
     def _answer_calls(self) -> None:
-        while not self._calls.empty():
-            function, future = self._calls.get()
-            try:
-                future.set_result(function())
-            except Exception as error:
-                future.set_exception(error)
+        for _ in range(self._calls.qsize()):
+            _answer(*self._calls.get())
+        while time.perf_counter() >= self._next_answer:
+            with self._lock:
+                if not self._asked:
+                    return
+                question = self._asked.pop(next(iter(self._asked)))
+            began = time.perf_counter()
+            _answer(*question)
+            end = time.perf_counter()
+            self._next_answer = end + (end - began) * (1.0 / ASKED_SHARE - 1.0)
 
     def run(self) -> None:
         """Run until `stop`."""
@@ -138,8 +167,9 @@ class Loop:
         """Do what is due: calls, commands, a frame, a picture, a report."""
         self._answer_calls()
         self.painter.detail = self.audience.detail
-        size = self.audience.size
-        if size is not None and size != self.painter.asked:
+        size, now = self.audience.size, time.perf_counter()
+        if size is not None and size != self.painter.asked and now >= self._next_size:
+            self._next_size = now + SIZE_EVERY
             self.painter.want(*size)
         if self.audience.has_new_viewer or self._painted < 0:  # before the first frame, whose kernels take longest
             self._paint(time.perf_counter())
@@ -175,7 +205,7 @@ class Loop:
             return
         changed = self.session.changes != self._painted
         calm = not changed and not self._sharp and self.painter.is_reduced and now - self._painted_at > CALM
-        if not (self.audience.has_new_viewer or ((changed or calm) and self.painter.is_due(now))):
+        if not ((self.audience.has_new_viewer or changed or calm) and self.painter.is_due(now)):
             return
         self._painted, self._painted_at, self._sharp = self.session.changes, now, calm
         image = self.painter.paint(sharp=calm)
@@ -190,3 +220,11 @@ class Loop:
         self._figures, self._measured, self._measured_at = figures(self.session), self._measured + 1, instant
         took = time.perf_counter() - began
         self._next_figures = now + min(FIGURES_EVERY, max(self.figures_every, took / FIGURES_SHARE))
+
+
+def _answer(function: Callable[[], Any], future: concurrent.futures.Future[Any]) -> None:
+    if future.set_running_or_notify_cancel():
+        try:
+            future.set_result(function())
+        except Exception as error:
+            future.set_exception(error)

@@ -30,7 +30,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.memory import share_arenas
 from wavetank.page.about import hello_message
 from wavetank.page.aim import aim
-from wavetank.page.dropped import command_for
+from wavetank.page.dropped import drop_mesh
 from wavetank.page.fitting import fits
 from wavetank.page.gate import HEADERS, Gate
 from wavetank.page.loop import Loop, Report
@@ -42,13 +42,27 @@ from wavetank.session.recording import Recording
 from wavetank.session.session import Session
 
 PORT = 8420  # the first one tried by default
-MOST_CONNECTIONS = 1200  # at once; more are refused with 503
+MOST_CONNECTIONS = 1200  # at once; more are closed
+OTHER_FILES = 128  # open files that the process may need for all else
+IDLE = 10.0  # s after which a connection without a request is closed
 MOST_DOWNLOADS = 4  # that wait for the simulation's thread
 DOWNLOAD_PAUSE = 0.3  # s between two of them
 
 
 class Protocol(H11Protocol):
-    """HTTP/1.1 whose every response has our headers, also those to malformed requests."""
+    """HTTP/1.1 whose every response has our headers, also those to malformed requests; few connections, none idle."""
+
+    @override
+    def connection_made(self, transport: Any) -> None:
+        super().connection_made(transport)
+        if len(self.connections) > connections_allowed():
+            transport.abort()
+        else:
+            self.loop.call_later(IDLE, self._close_if_idle, transport)
+
+    def _close_if_idle(self, transport: Any) -> None:
+        if self.cycle is None and transport.get_protocol() is self:  # a web socket has another protocol
+            transport.close()
 
     @override
     def send_400_response(self, msg: str) -> None:
@@ -72,7 +86,7 @@ class PageServer:
         self.viewers.fit, self.viewers.aim, self.viewers.drop_mesh = self._fit, self._aim, self._drop_mesh
         self.run_number = secrets.token_hex(8)  # identifies this run of the server
         self.loop = Loop(session, self)
-        self.painter, self.call = self.loop.painter, self.loop.call
+        self.painter, self.call, self.ask = self.loop.painter, self.loop.call, self.loop.ask
         self._socket = _listen(host, port)
         self.port = self._socket.getsockname()[1]
         everywhere = host in ("0.0.0.0", "::")
@@ -102,6 +116,7 @@ class PageServer:
                 http=Protocol,
                 server_header=False,
                 limit_concurrency=MOST_CONNECTIONS,
+                backlog=64,
             )
         )
         self._events: asyncio.AbstractEventLoop | None = None
@@ -224,7 +239,7 @@ class PageServer:
         origin, direction = self.session.camera_for(tool).ray(u * width, v * height, width, height)
         return {"origin": tuple(map(float, origin)), "direction": tuple(map(float, direction))}
 
-    def _answer(self, viewer: Viewer, job: Callable[[], dict[str, Any]]) -> None:
+    def _answer(self, viewer: Viewer, what: str, job: Callable[[], dict[str, Any]]) -> None:
         """Send one viewer the result of a call in the simulation's thread; an error becomes a note."""
 
         def done() -> dict[str, Any]:
@@ -237,21 +252,20 @@ class PageServer:
             if not answer.cancelled() and answer.exception() is None:
                 self._in_server(lambda: viewer.post(answer.result()))
 
-        self.call(done).add_done_callback(tell)
+        self.ask((viewer, what), done).add_done_callback(tell)
 
     def _fit(self, viewer: Viewer) -> None:
-        self._answer(viewer, lambda: fits(self.session))
+        self._answer(viewer, "fit", lambda: fits(self.session))
 
     def _aim(self, viewer: Viewer, tool: str, u: float, v: float, reach: float) -> None:
         size = self.painter.wanted
-        self._answer(viewer, lambda: {"type": "aim", **aim(self.session, tool, u, v, reach, size)})
+        self._answer(viewer, "aim", lambda: {"type": "aim", **aim(self.session, tool, u, v, reach, size)})
 
     def _drop_mesh(self, viewer: Viewer, text: str, file: str) -> None:
         def job() -> dict[str, Any]:
-            self.session.submit(command_for(self.session, text, file))
-            return {"type": "note", "text": f"{file} was added as a solid; move it with Grab."}
+            return {"type": "note", "text": drop_mesh(self.session, text, file)}
 
-        self._answer(viewer, job)
+        self._answer(viewer, f"mesh {file}", job)
 
     async def _page(self, request: Request) -> Response:
         return _packaged("index.html")
@@ -296,13 +310,23 @@ class PageServer:
         try:
             async with self._one_download:
                 await asyncio.sleep(max(0.0, self._next_download - time.monotonic()))
-                text = await asyncio.wrap_future(self.call(made))
+                text = await asyncio.wrap_future(self.ask("download", made))
                 self._next_download = time.monotonic() + DOWNLOAD_PAUSE
             return Response(text, media_type=kind, headers=headers)
         except WavetankError as error:
             return Response(f"{error}\n", status_code=409, media_type="text/plain")
         finally:
             self._downloads -= 1
+
+
+def connections_allowed() -> int:
+    """Return how many connections may be open: fewer where the system allows this process few files."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return MOST_CONNECTIONS
+    files = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    return MOST_CONNECTIONS if files < 0 else max(1, min(MOST_CONNECTIONS, files - OTHER_FILES))
 
 
 def _packaged(name: str) -> Response:

@@ -9,9 +9,21 @@ from typing import Any
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import explain_errors, one_line, parse_json
-from wavetank.session.commands import Command, ToolBegin, ToolEnd, ToolMove, command_of
+from wavetank.session.commands import COMMANDS, Command, ToolBegin, ToolEnd, ToolMove, command_of
 
 RATE, BURST = 500.0, 1000.0  # messages a second, and at once: more than a pointer makes
+FIRST = 200.0  # at once from one who has just connected, so that connecting again gains nothing
+BYTES = 4096  # of a message that cost as much as a short message
+SLOW = 25.0  # messages that one costs which makes others wait
+COSTS = {
+    **{kind.model_fields["do"].default: SLOW for kind in COMMANDS if kind.is_slow},
+    **dict.fromkeys(("drive", "fit", "detail", "mesh"), SLOW),
+    **dict.fromkeys(("size", "point-begin", "tool-begin"), 5.0),
+}
+DROPPED = 50  # messages beyond the rate that are dropped, unread, between two pauses of `REST`
+REST = 0.02  # s
+LARGEST_DEBT = 20_000.0  # messages beyond the rate after which a viewer is disconnected
+MOST_NOTES = 20  # that wait to be sent
 MOST_VIEWERS = 16
 LONGEST_SIDE = 8192  # px
 REPEAT_AFTER = 1.0  # s after which the same note is sent again
@@ -23,19 +35,17 @@ Submit = Callable[[Command, Tell], bool]  # takes a command, and what reports a 
 
 
 class RateLimit:
-    """Limits messages to `RATE` a second (a token bucket of size `BURST`)."""
+    """Limits what messages cost to `RATE` a second (a token bucket of size `BURST`); who sends on gets into debt."""
 
     def __init__(self) -> None:
-        self.left, self.last = BURST, time.monotonic()
+        self.left, self.last = FIRST, time.monotonic()
 
-    def take(self) -> bool:
-        """Return whether one more message may pass."""
+    def take(self, cost: float = 1.0) -> bool:
+        """Charge a message; return whether it may pass."""
         now = time.monotonic()
         self.left, self.last = min(BURST, self.left + RATE * (now - self.last)), now
-        if self.left < 1.0:
-            return False
-        self.left -= 1.0
-        return True
+        self.left -= cost
+        return self.left >= 0.0
 
 
 class Viewer:
@@ -48,27 +58,24 @@ class Viewer:
         self.is_new = True  # whether it has not seen any picture yet
         self.size = (960, 540)
         self.last_note = "", -math.inf  # and its time [s]
-        self.outbox: asyncio.Queue[dict[str, Any] | bytes] = asyncio.Queue(maxsize=64)
-        self.status: dict[str, Any] | None = None  # in the outbox, where a later one is merged into it
+        self.outbox: dict[str, dict[str, Any] | bytes] = {}  # what waits to be sent: the last message of each kind
+        self.filled, self.noted = asyncio.Event(), 0  # whether there are any; notes so far
 
     def post(self, message: dict[str, Any] | bytes) -> None:
-        """Queue a message; on a slow line statuses are merged, and notes that do not fit are dropped."""
-        if isinstance(message, dict) and message["type"] == "status":
-            if self.status is not None:
-                self.status.update(message, notes=[*self.status["notes"], *message["notes"]][-20:])
-                return
-            message = self.status = dict(message)
-        if not self.outbox.full():
-            self.outbox.put_nowait(message)
-        elif message is self.status:
-            self.status = None
+        """Queue a message in place of one of its kind that still waits; the last notes wait together."""
+        kind = "picture" if isinstance(message, bytes) else str(message["type"])
+        earlier = self.outbox.get(kind)
+        if kind == "note":
+            kind, self.noted = f"note {self.noted % MOST_NOTES}", self.noted + 1
+        elif kind == "status" and isinstance(message, dict) and isinstance(earlier, dict):
+            message = {**earlier, **message, "notes": [*earlier["notes"], *message["notes"]][-MOST_NOTES:]}
+        self.outbox[kind] = message
+        self.filled.set()
 
     def note(self, text: str) -> None:
-        """Queue a sentence, unless it repeats the last one, or would delay pictures."""
+        """Queue a sentence, unless it repeats the last one."""
         now = time.monotonic()
-        if (
-            text != self.last_note[0] or now - self.last_note[1] > REPEAT_AFTER
-        ) and self.outbox.qsize() < self.outbox.maxsize // 2:
+        if text != self.last_note[0] or now - self.last_note[1] > REPEAT_AFTER:
             self.last_note = text, now
             self.post({"type": "note", "text": text})
 
@@ -89,13 +96,14 @@ class Viewer:
     async def send_all(self) -> None:
         """Send queued messages indefinitely."""
         while True:
-            message = await self.outbox.get()
-            if message is self.status:
-                self.status = None
-            if isinstance(message, bytes):
-                await self.socket.send_bytes(message)
-            else:
-                await self.socket.send_text(json.dumps(message, allow_nan=False))
+            await self.filled.wait()
+            self.filled.clear()
+            while self.outbox:
+                message = self.outbox.pop(next(iter(self.outbox)))
+                if isinstance(message, bytes):
+                    await self.socket.send_bytes(message)
+                else:
+                    await self.socket.send_text(json.dumps(message, allow_nan=False))
 
 
 class Viewers:
@@ -138,19 +146,27 @@ class Viewers:
             self._disconnect(viewer)
 
     async def _listen(self, viewer: Viewer) -> None:
+        dropped = 0
         while True:
             message = await viewer.socket.receive()
             if message["type"] == "websocket.disconnect":
                 return
-            if not viewer.rate_limit.take():
+            if not viewer.rate_limit.take(1.0 + len(message.get("text") or message.get("bytes") or "") / BYTES):
                 # Reading slowly makes the sender wait, and does not affect the simulation.
-                await asyncio.sleep(0.02)
+                dropped += 1
+                if viewer.rate_limit.left < -LARGEST_DEBT:
+                    await viewer.socket.close(1008, "too many messages")
+                    return
+                if dropped % DROPPED == 0:
+                    await asyncio.sleep(REST)
                 continue
             try:
                 with explain_errors("a message", "command"):
-                    self.hear(viewer, _table(message))
+                    table = _table(message)
+                    viewer.rate_limit.take(COSTS.get(str(table.get("do")), 0.0))
+                    self.hear(viewer, table)
             except WavetankError as error:
-                viewer.post({"type": "note", "text": str(error)[:400]})
+                viewer.note(str(error)[:400])
 
     def hear(self, viewer: Viewer, table: dict[str, Any]) -> None:
         """Act on one message; raises `WavetankError` where it is not allowed."""

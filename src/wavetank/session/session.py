@@ -22,11 +22,12 @@ SLOW_FRAME, FAST_FRAME = 0.045, 0.025  # s of computing: above it frames are div
 MOST_PARTS = 8  # of a frame; shorter time steps would turn density errors into velocity
 FRAME_PER_PICTURE = 1.0  # least time of a frame over that of its picture, or pictures would take most of the time
 MOST_SLOW = 8  # slow commands in the queue
-PAUSE, SHORTEST_PAUSE = 2.0, 0.1  # until the next slow command: times the duration of the last, and s at least
+PAUSE, SHORTEST_PAUSE = 2.0, 0.1  # until the next slow command: times what the last one took, and s at least
+QUICK = 0.02  # s after which other commands wait for the next frame
 LONGEST_NOTE = 400  # characters
 Report = Callable[[str], None] | None  # takes the reason why a command failed
 Waiting = tuple[Command, Report]
-MOST_WAITING = 4096  # commands in the queue; more are dropped
+MOST_WAITING = 256  # commands in the queue; more are dropped
 
 
 class Session(SessionState):
@@ -53,6 +54,7 @@ class Session(SessionState):
         self.unrecorded_forces: set[str] = set()  # names of forces that a script added or removed
         self._waiting: list[Waiting] = []
         self._slow_after = 0.0  # s of `perf_counter`, until which slow commands wait
+        self._slow_began: float | None = None  # s, likewise: the last one, until the first frame after it
         self._latest: dict[Any, int] = {}
         self._lock, self._wake = threading.Lock(), threading.Event()
 
@@ -101,20 +103,33 @@ class Session(SessionState):
     def drain(self, *, defer_slow: bool = False) -> int:
         """Apply the queued commands in order and return how many; failures become notes.
 
-        With `defer_slow` a slow command, and all after it, wait until twice the duration of the last slow one has
-        passed, so that most of the time remains for the water.
+        With `defer_slow` most of the time remains for the water: a slow command, and all after it, wait until twice the
+        time has passed that the last slow one took up to the first frame after it; all wait for the next frame once
+        some have taken `QUICK`.
         """
+        began = time.perf_counter()
         with self._lock:
             commands, self._waiting = self._waiting, []
             self._latest.clear()
         for number, (command, report_refusal) in enumerate(commands):
-            if defer_slow and command.is_slow and time.perf_counter() < self._slow_after:
+            if defer_slow and self._must_wait(command, began):
                 with self._lock:
                     self._waiting[:0] = commands[number:]
                     self._latest.clear()  # positions have changed: no coalescing with those ahead
                 return number
             self._apply_safely(command, report_refusal)
         return len(commands)
+
+    def _must_wait(self, command: Command, began: float) -> bool:
+        """Return whether a command waits, in a drain that began at that time [s]."""
+        now, is_settling = time.perf_counter(), self._slow_began is not None and not self.paused
+        return now > began + QUICK or (command.is_slow and (is_settling or now < self._slow_after))
+
+    def _slow_has_ended(self) -> None:
+        """Space the next slow command by what the last one has taken until now."""
+        if self._slow_began is not None:
+            end = time.perf_counter()
+            self._slow_after = end + max(PAUSE * (end - self._slow_began), SHORTEST_PAUSE)
 
     def _apply_safely(self, command: Command, report_refusal: Report) -> None:
         """Apply one command; any error is reported to its sender, and the water continues."""
@@ -126,8 +141,8 @@ class Session(SessionState):
             self.report_refusal(str(error)[:LONGEST_NOTE])
         self.report_refusal = self.note
         if command.is_slow:
-            end = time.perf_counter()
-            self._slow_after = end + max(PAUSE * (end - began), SHORTEST_PAUSE)
+            self._slow_began = began
+            self._slow_has_ended()
 
     def apply(self, command: Command) -> None:
         """Apply one command now; raises `WavetankError` and changes nothing where it is not allowed."""
@@ -201,6 +216,8 @@ class Session(SessionState):
             return happened
         self.steps_left = max(0, self.steps_left - 1)
         duration = self.tick()
+        self._slow_has_ended()
+        self._slow_began = None
         self.pace.passed(time.perf_counter(), duration, duration / self.speed)
         if self.smooth:
             self._fit_frame(time.perf_counter() - now)

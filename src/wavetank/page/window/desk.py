@@ -8,7 +8,7 @@ from typing import Any
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.page.about import hello_message
-from wavetank.page.dropped import command_for
+from wavetank.page.dropped import drop_mesh
 from wavetank.page.keys import LOOK
 from wavetank.page.window.engine import Engine
 from wavetank.scene.scene import Scene
@@ -165,16 +165,8 @@ class Desk:
 
     def _place_mesh(self, text: str, file: str) -> None:
         """Let the mesh of an OBJ become a solid; what is wrong with it becomes a note."""
-        session = self.engine.session
-
-        def job() -> str:
-            try:
-                session.submit(command_for(session, text, file))
-            except WavetankError as error:
-                return str(error)
-            return f"{file} is a solid now; carry it with Grab."
-
-        self.engine.call(job).add_done_callback(lambda answer: self.engine.notes.put(answer.result()))
+        answer = self.engine.call(lambda: drop_mesh(self.engine.session, text, file))
+        answer.add_done_callback(lambda answer: self.engine.notes.put(answer.result()))
 
     def begin(self, **which: str) -> None:
         """Begin a bundled scene or level by `name`, or one whose file says `text`."""

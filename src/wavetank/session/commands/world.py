@@ -100,6 +100,7 @@ class Undo(Command):
     """Swap the world with the one that the last reset or scene replaced; a second undo swaps back."""
 
     do: Literal["undo"] = "undo"
+    is_slow: ClassVar = True
 
     def apply(self, state: SessionState) -> None:
         """Swap them."""
