@@ -11,11 +11,12 @@ import numpy as np
 from wavetank.formats.committed import CommittedFile
 from wavetank.foundation import input_limits
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.memory import in_words
+from wavetank.foundation.memory import check_free, in_words
 from wavetank.foundation.retry import Retry
 
 CHUNK = 1 << 17  # bytes of a chunk, about
 LARGEST = 2**48  # bytes
+MOST_OBJECTS = 1000  # groups and tables of a file
 FEW = 128  # rows per chunk of a column with one row per frame
 #: what h5py, and what reads its values, raise for a damaged file
 UNREADABLE = (OSError, KeyError, IndexError, ValueError, TypeError, RuntimeError, AttributeError, ArithmeticError)
@@ -88,11 +89,54 @@ class GrowingFile:
 
 
 def open_hdf5(path: str | Path) -> Any:
-    """Open an HDF5 file for reading; raises `WavetankError` for any other file."""
+    """Open an HDF5 file for reading; raises `WavetankError` for another file, and what `check_whole` refuses."""
     h5py = import_h5py()
     input_limits.open_regular(path, LARGEST, "HDF5 file").close()  # a regular file, not a pipe
     with damaged(path):
-        return h5py.File(path, "r")
+        file = h5py.File(path, "r")
+        try:
+            check_whole(file, Path(path).stat().st_size)
+        except BaseException:
+            file.close()
+            raise
+        return file
+
+
+def check_whole(file: Any, size: int) -> None:
+    """Raise `ValueError` where data lie elsewhere, or unpack to more than a file of `size` bytes may hold.
+
+    External links, external storage and virtual datasets bring in other files; nothing of them is opened, as only links
+    and headers are read.
+    """
+    h5py, most = import_h5py(), max(input_limits.UNPACKED, input_limits.TIMES * size)
+    waiting, seen = [file], 0
+    while waiting:
+        group = waiting.pop()
+        for name in group:
+            seen += 1
+            if seen > MOST_OBJECTS:
+                raise ValueError(f"it has more than {MOST_OBJECTS:,} groups and tables")
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                raise ValueError(f"{name!r} is a link; only what is in the file is read")
+            member = group[name]
+            if isinstance(member, h5py.Group):
+                waiting.append(member)
+            elif isinstance(member, h5py.Dataset):
+                _check_dataset(member, most)
+
+
+def _check_dataset(dataset: Any, most: int) -> None:
+    if dataset.is_virtual or dataset.external:
+        raise ValueError(f"the data of {dataset.name!r} are in other files; only what is in the file is read")
+    if dataset.dtype.kind not in "fiubS":
+        raise ValueError(f"{dataset.name!r} holds {dataset.dtype}; only numbers and texts of fixed length are read")
+    whole, chunk = (
+        math.prod(map(int, shape)) * dataset.dtype.itemsize for shape in (dataset.shape, dataset.chunks or ())
+    )
+    if max(whole, chunk) > most:
+        raise ValueError(
+            f"{dataset.name!r} takes {in_words(max(whole, chunk))}; in a file of this size {in_words(most)} are allowed"
+        )
 
 
 @contextlib.contextmanager
@@ -109,12 +153,13 @@ def damaged(path: str | Path) -> Iterator[None]:
 
 
 Rows = Mapping[str, np.ndarray]
+Columns = Mapping[str, tuple[Any, tuple[int, ...]]]  # type and width
 
 
 class Table:
     """Columns of a growing file that have a number of rows in each frame, which `first` and `count` tell."""
 
-    def __init__(self, file: GrowingFile, name: str, columns: Mapping[str, tuple[Any, tuple[int, ...]]]) -> None:
+    def __init__(self, file: GrowingFile, name: str, columns: Columns) -> None:
         self.file, self.name, self.columns = file, name, [*columns]
         for column, (kind, width) in columns.items():
             file.column(f"{name}/{column}", kind, *width)
@@ -131,16 +176,36 @@ class Table:
 
 
 def table_rows(group: Any, frame: int) -> dict[str, np.ndarray]:
-    """Return the columns of a table in a frame; raises `ValueError` where they cannot be."""
+    """Return the columns of a table in a frame; raises `ValueError` where they cannot be.
+
+    The rows of a frame follow those of the one before, so that a file does not stand for more than it holds.
+    """
     first, count = int(group["first"][frame]), int(group["count"][frame])
+    before = int(group["first"][frame - 1]) + int(group["count"][frame - 1]) if frame else 0
+    if first != before:
+        raise ValueError(
+            f"frame {frame} begins at row {first} of {group.name}, not at {before}, where the last one ends"
+        )
     columns = {name: group[name] for name in group if name not in ("first", "count")}
     for name, column in columns.items():
         if not 0 <= first <= first + count <= len(column):
             raise ValueError(f"frame {frame} has rows {first} to {first + count} of {name}, which has {len(column)}")
     needed = sum(count * column.dtype.itemsize * math.prod(column.shape[1:]) for column in columns.values())
-    if needed > max(input_limits.UNPACKED, input_limits.TIMES * Path(group.file.filename).stat().st_size):
-        raise ValueError(f"frame {frame} takes {in_words(needed)}, too much for a file of this size")
+    check_free(2 * needed, f"frame {frame}")
     return {name: column[first : first + count] for name, column in columns.items()}
+
+
+def fitting(rows: Rows, columns: Columns, what: str) -> Rows:
+    """Return the rows of a table; raises `ValueError` where a column is not of its kind and width, or not finite."""
+    for name, (kind, width) in columns.items():
+        found = rows[name]
+        if found.dtype.kind != np.dtype(kind).kind or found.shape[1:] != width:
+            raise ValueError(
+                f"{what}/{name} is {found.dtype} {[*found.shape]}; rows of {np.dtype(kind)} {[*width]} are needed"
+            )
+        if found.dtype.kind == "f" and not np.isfinite(found).all():
+            raise ValueError(f"{what}/{name} holds numbers that are not finite")
+    return rows
 
 
 def frames_of(path: str | Path, read: Callable[[Any, int], Any], counter: str, first: int = 0) -> Iterator[Any]:

@@ -12,7 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.formats.growing import GrowingFile, Table, damaged, frames_of, import_h5py, open_hdf5, table_rows
+from wavetank.formats.growing import (
+    Columns,
+    GrowingFile,
+    Table,
+    damaged,
+    fitting,
+    frames_of,
+    import_h5py,
+    open_hdf5,
+    table_rows,
+)
 from wavetank.formats.plan import Plan
 from wavetank.formats.surface import WaterSurface
 from wavetank.foundation.errors import WavetankError
@@ -25,19 +35,20 @@ SUFFIXES = (".h5", ".hdf5")
 KIND = "series"
 VERSION_OF_LAYOUT = 1
 COUNTER = "NFrames"
-SOLIDS: dict[str, tuple[Any, tuple[int, ...]]] = {
+SOLIDS: Columns = {
     "names": ("S64", ()),
     "positions": ("f8", (3,)),
     "rotations": ("f8", (4,)),
     "velocities": ("f8", (3,)),
     "angular_velocities": ("f8", (3,)),
 }
-VERTICES: dict[str, tuple[Any, tuple[int, ...]]] = {
+VERTICES: Columns = {
     "positions": ("f4", (3,)),
     "normals": ("f4", (3,)),
     "velocities": ("f4", (3,)),
     "materials": ("i4", ()),
 }
+TRIANGLES: Columns = {"corners": ("i4", (3,))}
 
 
 def check(scene: Scene) -> None:
@@ -72,7 +83,7 @@ class Hdf5Series:
         self.solids = Table(file, "solids", SOLIDS)
         self.surface: tuple[Table, Table] | None = None
         if "surface" in plan.parts:
-            self.surface = Table(file, "surface", VERTICES), Table(file, "triangles", {"corners": ("i4", (3,))})
+            self.surface = Table(file, "surface", VERTICES), Table(file, "triangles", TRIANGLES)
         self._keep(path, plan.kept)
 
     def _keep(self, path: Path, frames: int) -> None:
@@ -111,7 +122,7 @@ class Hdf5Series:
         self.file.close()
 
 
-def _columns(fields: tuple[Field, ...], dim: int, prefix: str) -> dict[str, tuple[Any, tuple[int, ...]]]:
+def _columns(fields: tuple[Field, ...], dim: int, prefix: str) -> Columns:
     return {field.name.removeprefix(prefix): (np.dtype(field.kind), field.shape(0, dim)[1:]) for field in fields}
 
 
@@ -140,7 +151,10 @@ def _surfaces(file: Any, frame: int, scene: Scene) -> tuple[WaterSurface, ...]:
     """What `_joined` joined."""
     if "surface" not in file:
         return ()
-    rows, corners = table_rows(file["surface"], frame), table_rows(file["triangles"], frame)["corners"]
+    rows = fitting(table_rows(file["surface"], frame), VERTICES, "surface")
+    corners = fitting(table_rows(file["triangles"], frame), TRIANGLES, "triangles")["corners"]
+    if len(corners) and not 0 <= corners.min() <= corners.max() < len(rows["positions"]):
+        raise ValueError(f"triangles have corners from {corners.min()} to {corners.max()}, which are not there")
     found, palette = [], scene.palette()
     for number in np.unique(rows["materials"]).tolist():
         own = np.flatnonzero(rows["materials"] == number)  # those of a fluid are together
@@ -171,7 +185,7 @@ def read(path: str | Path, first: int = 0) -> Iterator[State]:
 
     def instant(file: Any, frame: int) -> State:
         foam = {f"foam_{name}": rows for name, rows in table_rows(file["foam"], frame).items()}
-        solids = table_rows(file["solids"], frame)
+        solids = fitting(table_rows(file["solids"], frame), SOLIDS, "solids")
         standing = tuple(
             PlacedSolid(
                 name,

@@ -5,10 +5,13 @@ import ctypes
 import os
 from pathlib import Path
 
+from wavetank.foundation.errors import WavetankError
+
 _LIMITS = (  # of the group of processes that this one is in, and what they take
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
 )
+SHARE = 0.9  # of free memory that may be used
 _ARENA_MAX = -8  # M_ARENA_MAX of malloc.h
 
 
@@ -16,6 +19,13 @@ def free_memory() -> int | None:
     """Estimate the bytes that this process may still allocate; None where the system does not tell."""
     found = [free for free in (_of_machine(), *map(_of_group, *zip(*_LIMITS, strict=True)), _of_process()) if free]
     return min(found) if found else None
+
+
+def check_free(needed: float, what: str, remedy: str = "") -> None:
+    """Raise `WavetankError` where `what` needs more bytes than are free, before it allocates them."""
+    free = free_memory()
+    if free is not None and needed > SHARE * free:
+        raise WavetankError(f"{what} needs {in_words(needed)} of memory, and {in_words(free)} are free{remedy}.")
 
 
 def give_back() -> None:

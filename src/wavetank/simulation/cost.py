@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from wavetank.device import compiler
 from wavetank.foundation.arguments import finite
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.memory import free_memory, in_words, time_in_words
+from wavetank.foundation.memory import SHARE, free_memory, in_words, time_in_words
 from wavetank.physics.neighbors import MAX_ENTRIES, list_room
 from wavetank.physics.pressure.grid import OPEN_CELLS, bytes_per_node, count_nodes
 from wavetank.scene.scene import Scene
@@ -22,7 +22,6 @@ SCRATCH = 12  # numbers of `Temporaries` for each particle
 PER_PARTICLE = 2.0e-7  # s of a step of one thread, at the least
 PER_STEP = 1.0e-4  # s, however few particles
 LONGEST = 3600.0  # s: largest expected time of a run without `large_worlds_allowed`
-SHARE = 0.9  # of free memory
 _allowed = False
 
 
