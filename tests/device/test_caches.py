@@ -5,6 +5,8 @@ import random
 import subprocess
 import sys
 
+import pytest
+
 from wavetank.device.compiler import cache_folder
 from wavetank.device.kernel_cache import ENTRY, HEAD, NAME, is_whole
 
@@ -57,3 +59,32 @@ def test_a_damaged_list_of_kernels_is_told_from_a_whole_one():
         damaged = bytearray(content)
         damaged[place] ^= 255
         assert not is_whole(bytes(damaged)), place
+
+
+@pytest.mark.parametrize("mode", ["absent", "read-only"])
+def test_caches_that_cannot_be_written_change_nothing(mode, tmp_path):
+    """A folder that cannot be made; one whose kernels can be read and not written is used as it is."""
+    (tmp_path / "file").write_bytes(b"")
+    (tmp_path / "temporary").mkdir()
+    places = {name: str(tmp_path / "file" / "cache") for name in ("XDG_CACHE_HOME", "WAVETANK_CACHE", "HOME")}
+    places |= {"TMPDIR": str(tmp_path / "temporary")}
+    code = RUN
+    if mode == "read-only":  # whoever runs the tests may be allowed to write anywhere
+        places = {"TMPDIR": places["TMPDIR"], "WAVETANK_CACHE": places["WAVETANK_CACHE"]}
+        code = (
+            """
+import tempfile
+
+def refused(*args, dir=None, **more):
+    raise PermissionError(13, "Permission denied")
+tempfile.TemporaryFile = refused
+"""
+            + RUN
+        )
+    runs = [
+        subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, env=os.environ | more, timeout=600)
+        for text, more in ((RUN, {}), (code, places))
+    ]
+    assert runs[1].returncode == 0 and runs[1].stderr == "", runs[1].stderr[-2000:]
+    assert runs[0].stdout == runs[1].stdout
+    assert not [*(tmp_path / "temporary").glob("wavetank-kernels-*")]

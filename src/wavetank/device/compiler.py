@@ -5,6 +5,7 @@ made. The compiler keeps one device program per process, so the back end is chos
 is an error. Until `start` the compiler is as its makers wrote it: another program in this process may use it by itself.
 """
 
+import atexit
 import contextlib
 import functools
 import inspect
@@ -12,6 +13,7 @@ import io
 import itertools
 import os
 import pathlib
+import shutil
 import warnings
 from collections.abc import Callable, Iterator
 from threading import get_ident
@@ -21,7 +23,7 @@ import numpy as np
 
 from wavetank.device import patches
 from wavetank.device.compile_log import CompileLog
-from wavetank.device.kernel_cache import sweep_damaged
+from wavetank.device.kernel_cache import sweep_damaged, writable
 from wavetank.device.turns import TURN
 from wavetank.foundation.errors import WavetankError
 
@@ -131,6 +133,10 @@ def start(arch: str = "cpu", *, threads: int | None = None) -> str:
         )
     before = _thread_ids()
     sweep_damaged(cache_folder())
+    kept = writable(cache_folder())
+    options["offline_cache_file_path"] = str(kept)
+    if kept != cache_folder():
+        atexit.register(_forget, kept)
     with contextlib.redirect_stdout(io.StringIO()):
         qd.init(**options)
     came_up = {"x64": "cpu", "arm64": "cpu"}.get(_name(qd.lang.impl.current_cfg().arch), wanted)
@@ -195,6 +201,12 @@ def lanes() -> int:
 def worth_sharing(number: int) -> bool:
     """Whether threads gain more on so many things, none of them much work, than it costs to wake them."""
     return _current != "cpu" or number > FEW
+
+
+def _forget(folder: pathlib.Path) -> None:
+    """Stop the compiler, which writes to its cache when it ends, and remove that."""
+    qd.reset()
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _thread_ids() -> set[int]:

@@ -9,6 +9,8 @@ as Quadrants 1.3 and 1.4 write it. Without the list kernels are compiled anew, w
 """
 
 import contextlib
+import shutil
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -38,3 +40,20 @@ def sweep_damaged(folder: Path) -> None:
     with contextlib.suppress(OSError):
         if not is_whole(path.read_bytes()):
             path.unlink()
+
+
+def writable(folder: Path) -> Path:
+    """Return `folder`, made if missing; where it cannot be written to, a copy, which its user removes.
+
+    The compiler ends a run at the first kernel that it cannot keep.
+    """
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+        for part in (folder, *(part for part in folder.iterdir() if part.is_dir())):
+            with tempfile.TemporaryFile(dir=part):
+                pass
+        return folder
+    own = Path(tempfile.mkdtemp(prefix="wavetank-kernels-"))
+    with contextlib.suppress(OSError, shutil.Error):
+        shutil.copytree(folder, own, dirs_exist_ok=True)
+    return own
