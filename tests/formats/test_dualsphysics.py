@@ -1,6 +1,8 @@
 """Cases of DualSPHysics as scenes of ours; files made here in their format."""
 
+import contextlib
 import math
+from time import process_time
 
 import numpy as np
 import pytest
@@ -236,3 +238,48 @@ def test_the_command_writes_a_scene_that_runs(read, tmp_path, monkeypatch, capsy
     sim = wt.Simulation(wt.Scene.load(out))
     sim.advance(0.2)
     assert sim.count == 8 * 6 * 12
+
+
+PRISM = (
+    '<drawprism><point x="0.8" y="0.1" z="0"/><point x="1" y="0.1" z="0"/><point x="0.8" y="0.3" z="0"/>'
+    '<point x="0.8" y="0.1" z="0.2"/><point x="1" y="0.1" z="0.2"/><point x="0.8" y="0.3" z="0.2"/></drawprism>'
+)
+FILE = (
+    '<drawfilestl file="cube.stl"><drawscale x="0.2" y="0.2" z="0.2"/><drawmove x="1" y="0.3" z="0.2"/></drawfilestl>'
+)
+
+
+@pytest.mark.parametrize(("drawn", "middle", "size"), [(PRISM, (0.9, 0.1, -0.2), 0.2), (FILE, (1.0, 0.2, -0.3), 0.2)])
+def test_prisms_and_files_become_meshes(read, tmp_path, drawn, middle, size):
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box().export(tmp_path / "cube.stl")
+    scene = read(WALLS + WATER + bound(5) + drawn).scene
+    (solid,) = (solid for solid in scene.solids if solid.name == "mk 5")
+    assert isinstance(solid, wt.Mesh)
+    assert solid.center == pytest.approx(middle) and solid.size == pytest.approx(size)
+
+
+@pytest.mark.parametrize(
+    "bomb",
+    [
+        '<runlist name="none" times="1e12"/>',
+        '<runlist name="none" times="1e300"/>',
+        "".join(FILE for _ in range(1900)),
+        "".join(
+            bound(k) + box((1, 0.2, 0.1), (0.2, 0.1, 0.1)) + "<setmkvoid/>" + box((0, 0, 0), (1, 1, 1))
+            for k in range(990)
+        ),
+        fluid(0)
+        + "".join(box((0, 0, 0), (1, 1, 1)) for _ in range(900))
+        + "<setmkvoid/>"
+        + "".join(box((0.1 * k % 0.9, 0.1, 0.01 * (k % 90)), (0.001, 0.001, 0.001)) for k in range(900)),
+    ],
+    ids=["repeats", "repeats without end", "files", "holes in solids", "holes in fluids"],
+)
+def test_repetitions_end_soon(read, tmp_path, bomb):
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.icosphere(5).export(tmp_path / "cube.stl")
+    began = process_time()
+    with contextlib.suppress(wt.WavetankError):
+        read(WALLS + WATER + bomb)
+    assert process_time() - began < 20.0

@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -202,7 +203,7 @@ def test_what_holds_besides_is_joined(arm):
         ('name="leg"', 'name="post"', "two of the same name"),
         ('angle="degree"', 'angle="degree" eulerseq="xyw"', "is three of x, y, z"),
         ("<actuator>", '<include file="../other.xml"/><actuator>', "lies in another folder"),
-        ("<actuator>", '<include file="arm.xml"/><actuator>', "more than 20 deep"),
+        ("<actuator>", '<include file="arm.xml"/><actuator>', "included once"),
         ("<worldbody>", "<worldbody>" + "<body>" * 5000 + "</body>" * 5000, "nested too deep|more than 300"),
     ],
 )
@@ -227,3 +228,15 @@ def test_the_command_says_what_another_file_is(tmp_path):
         check=False,
     )
     assert done.returncode != 0 and "no bodies with a shape" in done.stderr
+
+
+def test_files_that_include_many_again_and_again(tmp_path):
+    """Ten files that include the next ten, each ten times, would be 10^10 of them."""
+    for number in range(10):
+        rows = "".join(f'<include file="{number + 1}.xml"/>' for _ in range(10))
+        (tmp_path / f"{number}.xml").write_text(f"<mujoco>{rows}</mujoco>")
+    (tmp_path / "10.xml").write_text("<mujoco/>")
+    began = time.process_time()
+    with pytest.raises(wt.WavetankError, match="included once"):
+        wt.load_robot(tmp_path / "0.xml")
+    assert time.process_time() - began < 2.0

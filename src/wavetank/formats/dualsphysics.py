@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from wavetank.formats.dualsphysics_drawing import Drawing, Item, numbers_of
+from wavetank.formats.dualsphysics_drawing import Drawing, Item, meeting, numbers_of
 from wavetank.formats.dualsphysics_motion import courses
 from wavetank.formats.dualsphysics_solids import OURS, Placed, placed_solids
 from wavetank.formats.imported import Imported
@@ -25,6 +25,7 @@ from wavetank.scene.scene import Scene
 from wavetank.scene.tank import Tank
 
 LARGEST = 20_000_000  # characters
+MOST_PARTS = 1000  # boxes that a box of fluid without voids may become, and all of them twice as many
 MOST_TIME = 600.0  # s, over which motions are written down
 #: face of a box -> side of our tank
 SIDES = {"bottom": "-y", "top": "+y", "left": "-x", "right": "+x", "front": "+z", "back": "-z"}
@@ -156,7 +157,7 @@ class _Reader:
 
     def _fluids(self, items: list[Item], tank: Tank, place: Placed, material: str | None) -> Iterator[Fluid]:
         """Yield the fluids, the last one that was drawn first; what fills what is free comes after all others."""
-        speeds = self._speeds()
+        speeds, blocks = self._speeds(), 0
         order = [k for k in reversed(range(len(items))) if not items[k].is_filling]
         order += [k for k in range(len(items)) if items[k].is_filling]
         for k in order:
@@ -166,9 +167,14 @@ class _Reader:
             velocity = speeds.get(item.mk)
             fields = {"material": material, "velocity": None if velocity is None else self._ours(velocity)}
             if item.shape == "box" and item.is_straight:
-                holes = [other.corners() for other in items[k + 1 :] if other.what == "void" and other.is_straight]
-                for box in _without(item.corners(), holes):
+                voids = [other for other in items[k + 1 :] if other.what == "void" and other.is_straight]
+                holes = [voids[n].corners() for n in np.flatnonzero(meeting(item, voids))]
+                parts = _without(item.corners(), holes)
+                for box in parts:
                     yield from self._block(box, tank, fields)
+                blocks += len(parts)
+                if blocks > 2 * MOST_PARTS:
+                    raise WavetankError(f"its fluid is more than {2 * MOST_PARTS:,} boxes.")
             elif item.shape == "sphere":
                 yield Ball(
                     center=self._ours(item.corners()[0] + item.radius * item.scale),
@@ -238,9 +244,10 @@ class _Reader:
 
     def _tell_of_holes(self, items: list[Item], walls: Item | None) -> None:
         for k, hole in enumerate(items):
-            cut = [item for item in items[:k] if item.what == "bound" and item is not walls and _meet(item, hole)]
-            if hole.what == "void" and cut:
-                self.notes.append(f"what is drawn void in mk {cut[0].mk} is left out: solids stay whole.")
+            solid = [item for item in items[:k] if item.what == "bound" and item is not walls]
+            if hole.what == "void" and solid and (cut := meeting(hole, solid)).any():
+                mk = solid[int(np.argmax(cut))].mk
+                self.notes.append(f"what is drawn void in mk {mk} is left out: solids stay whole.")
 
     def _tell_the_rest(self) -> None:
         told = {"gauges": "", "wavepaddles": "", "timeout": "", "savedt": "", "outputparts": ""}
@@ -258,21 +265,15 @@ def _volume(item: Item) -> float:
     return float(np.prod(np.maximum(upper - lower, 1e-9)))
 
 
-def _meet(item: Item, other: Item) -> bool:
-    (a, b), (c, d) = item.corners(), other.corners()
-    return bool((np.minimum(b, d) - np.maximum(a, c) > 1e-9).all())
-
-
 def _without(box: tuple[np.ndarray, np.ndarray], holes: list[Any]) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return a box less others, as boxes."""
     parts = [box]
     for low, high in holes:
-        left = []
-        for lower, upper in parts:
-            if not (np.minimum(upper, high) - np.maximum(lower, low) > 1e-12).all():
-                left.append((lower, upper))
-                continue
-            lower, upper = lower.copy(), upper.copy()
+        corners = np.array(parts).reshape(-1, 2, 3)
+        overlaps = (np.minimum(corners[:, 1], high) - np.maximum(corners[:, 0], low) > 1e-12).all(axis=1)
+        left = [part for part, overlap in zip(parts, overlaps, strict=True) if not overlap]
+        for number in np.flatnonzero(overlaps):
+            lower, upper = parts[number][0].copy(), parts[number][1].copy()
             for axis in range(3):
                 for is_upper, edge in ((False, low[axis]), (True, high[axis])):
                     if lower[axis] < edge < upper[axis]:
@@ -281,6 +282,8 @@ def _without(box: tuple[np.ndarray, np.ndarray], holes: list[Any]) -> list[tuple
                         (upper if is_upper else lower)[axis] = edge
                         left.append((a, b))
         parts = left
-        if len(parts) > 1000:
-            raise WavetankError("its void boxes cut the fluid into more than 1,000 parts.")
+        if not parts:
+            break
+        if len(parts) > MOST_PARTS:
+            raise WavetankError(f"its void boxes cut the fluid into more than {MOST_PARTS:,} parts.")
     return parts

@@ -5,6 +5,7 @@ number (mk), and a matrix that moves it. Numbers may be expressions of `Dp` and 
 """
 
 import dataclasses
+import functools
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -19,6 +20,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.expressions import Expression
 from wavetank.foundation.input_limits import one_line
 from wavetank.foundation.rotations import unit_quaternion
+from wavetank.solids.meshes.counted import MOST_FACES
 
 MOST_ITEMS, DEEPEST, MOST_COMMANDS = 2000, 8, 20_000  # shapes; lists that run lists; commands
 FACES = ("bottom", "top", "left", "right", "front", "back")  # -z, +z, -x, +x, -y, +y of theirs
@@ -72,6 +74,10 @@ class Item:
 
     def corners(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the corners of the box along the axes that holds it [m], each [3]."""
+        return self._corners
+
+    @functools.cached_property
+    def _corners(self) -> tuple[np.ndarray, np.ndarray]:
         points = self.points
         if self.shape == "box":
             points = np.array([[self.points[k >> axis & 1, axis] for axis in range(3)] for k in range(8)])
@@ -94,6 +100,14 @@ class Item:
         return unit_quaternion(np.linalg.eigh(table)[1][:, -1].tolist())
 
 
+def meeting(item: Item, others: Sequence[Item]) -> np.ndarray:
+    """Return which of the others reach into the box that holds an item, bool [n]."""
+    corners = np.array([other.corners() for other in others]).reshape(-1, 2, 3)
+    lower, upper = item.corners()
+    overlaps = (corners[:, 0] < upper - 1e-9) & (corners[:, 1] > lower + 1e-9)
+    return np.all(overlaps, axis=1)
+
+
 class Drawing:
     """Runs the commands of a case; raises `WavetankError` for numbers that it cannot read."""
 
@@ -103,7 +117,8 @@ class Drawing:
         self.variables = {"Dp": dp}
         self.what, self.mk, self.matrix = "void", 0, np.eye(4)
         self._kept: list[Any] = []
-        self._left = MOST_COMMANDS
+        self._left, self._faces = MOST_COMMANDS, 0  # commands that may come; triangles so far
+        self._meshes: dict[str, tuple[np.ndarray, np.ndarray]] = {}  # by the names of their files
         for row in geometry.findall("predefinition/*"):
             self._run(row, 0)
         commands = geometry.find("commands")
@@ -127,13 +142,17 @@ class Drawing:
         """Return x, y, z of a tag, float [3]."""
         return np.array([usual if row is None else self.number(row.get(axis, str(usual))) for axis in "xyz"])
 
-    def _run(self, row: Element, depth: int) -> None:
+    def _charge(self, depth: int) -> None:
+        """Count a command, or a repetition of a list; raises `WavetankError` beyond what a case may draw."""
         self._left -= 1
-        if self._left < 0 or depth > DEEPEST or len(self.items) > MOST_ITEMS:
+        if self._left < 0 or depth > DEEPEST or len(self.items) > MOST_ITEMS or self._faces > MOST_FACES:
             raise WavetankError(
-                f"it draws too much; at most {MOST_COMMANDS:,} commands, {MOST_ITEMS:,} shapes and lists in lists "
-                f"{DEEPEST} deep are allowed."
+                f"it draws too much; at most {MOST_COMMANDS:,} commands, {MOST_ITEMS:,} shapes, {MOST_FACES:,} "
+                f"triangles and lists in lists {DEEPEST} deep are allowed."
             )
+
+    def _run(self, row: Element, depth: int) -> None:
+        self._charge(depth)
         tag = str(row.tag)
         if tag in ("newvar", "newvarcte", "setvar"):
             for name, text in row.attrib.items():
@@ -151,6 +170,7 @@ class Drawing:
             self.matrix = np.eye(4) if tag == "matrixreset" else self.matrix @ self._moved(row)
         elif tag == "runlist":
             for _ in range(int(self.number(row.get("times", "1")))):
+                self._charge(depth)
                 for part in self.lists.get(row.get("name", ""), ()):
                     self._run(part, depth + 1)
         elif tag in _SILENT or row.get("active", "true") in ("false", "0"):
@@ -206,7 +226,11 @@ class Drawing:
         self.items.append(Item(self.what, self.mk, shape, points, self.matrix.copy(), **rest))
 
     def _add_file(self, row: Element) -> None:
-        vertices, faces = arrays_of(Solids.find_file(self.path, row.get("file", "")))
+        name = row.get("file", "")
+        if name not in self._meshes:
+            self._meshes[name] = arrays_of(Solids.find_file(self.path, name))
+        vertices, faces = self._meshes[name]
+        self._faces += len(faces)
         vertices = vertices * self.vector(row.find("drawscale"), 1.0)
         turns = row.find("drawrotate")
         angles = {} if turns is None else turns.attrib
@@ -255,8 +279,11 @@ def turning(axis: np.ndarray, angle: float) -> np.ndarray:
 
 
 def numbers_of(text: str) -> Iterator[int]:
-    """Yield the numbers of a list as theirs, "1,4-6"."""
+    """Yield the numbers of a list as theirs, "1,4-6", at most `MOST_ITEMS`."""
+    left = MOST_ITEMS
     for part in text.split(","):
         first, _, last = part.strip().partition("-")
-        if first.isdigit():
-            yield from range(int(first), min(int(last) if last.isdigit() else int(first), int(first) + 1000) + 1)
+        if first.isdecimal() and left > 0:
+            numbers = range(int(first), min(int(last) if last.isdecimal() else int(first), int(first) + left - 1) + 1)
+            left -= len(numbers)
+            yield from numbers

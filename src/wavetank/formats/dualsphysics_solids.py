@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.formats.dualsphysics_drawing import FACES, Item
+from wavetank.formats.dualsphysics_drawing import FACES, Item, meeting
 from wavetank.formats.dualsphysics_motion import RATE, Course
 from wavetank.formats.splishsplash_solids import is_closed, section
 from wavetank.foundation.errors import WavetankError
@@ -138,11 +138,10 @@ def placed_solids(
 
 def _pieces(item: Item, fluids: list[Item], place: Placed) -> Iterator[Item]:
     """Yield what is solid: a box that is but its faces is whole where it is closed and holds no fluid."""
-    if not item.faces:
+    if item.shape != "box" or not item.faces:
         yield item
         return
-    lower, upper = item.corners()
-    holds = any(((f.corners()[0] < upper - 1e-9) & (f.corners()[1] > lower + 1e-9)).all() for f in fluids)
+    holds = bool(meeting(item, fluids).any())
     sides = [f for f in FACES if place.dim == 3 or f not in ("front", "back")]
     if not holds and len([f for f in sides if f not in item.faces]) <= 1:
         yield dataclasses.replace(item, faces=None)

@@ -37,7 +37,7 @@ from wavetank.scene.joints import BallJoint, Hinge, Joint, Slider, Weld
 from wavetank.solids.motion import Pose
 from wavetank.solids.solid import Solid
 
-DEEPEST = 20  # files that include each other
+MOST_FILES = 50  # of a model
 WATER = 1000.0  # kg/m^3, of geoms that tell no density
 MOTORS = ("motor", "position", "velocity", "general")
 LEFT_OUT = ("tendon", "contact", "deformable", "extension", "keyframe")
@@ -48,7 +48,7 @@ RESISTING = ("damping", "stiffness", "frictionloss", "armature")
 
 def read_mjcf(root: ElementTree.Element, path: Path, place: Pose, prefix: str, held: bool | None) -> Robot:
     """Return the robot of the top element of an MJCF file, its world at that pose."""
-    return _Reader(_included(root, path.parent, 0), path, prefix, held).read(place)
+    return _Reader(_included(root, path.parent, {path.resolve()}), path, prefix, held).read(place)
 
 
 @dataclasses.dataclass
@@ -321,18 +321,25 @@ class _Reader:
             self.joints[number] = type(joint).model_validate(vars(joint) | fields)
 
 
-def _included(root: ElementTree.Element, folder: Path, depth: int) -> ElementTree.Element:
-    """Put what other files hold in the place of <include>; they lie in the folder of the first, or below it."""
-    if depth > DEEPEST:
-        raise WavetankError(f"files include each other more than {DEEPEST} deep.")
+def _included(root: ElementTree.Element, folder: Path, read: set[Path]) -> ElementTree.Element:
+    """Put what other files hold in the place of <include>; they lie in the folder of the first, or below it.
+
+    As MuJoCo has it, a file is included once: `read` has those so far.
+    """
     for parent in [*root.iter()]:
         for number, child in [*enumerate(parent)][::-1]:
             if child.tag == "include":
                 path = folder / child.get("file", "")
                 if not path.resolve().is_relative_to(folder.resolve()):
                     raise WavetankError(f"it includes {child.get('file', '')[:60]!r}, which lies in another folder.")
+                if path.resolve() in read or len(read) >= MOST_FILES:
+                    raise WavetankError(
+                        f"it includes {child.get('file', '')[:60]!r} again, or more than {MOST_FILES} files; a file is "
+                        "included once."
+                    )
+                read.add(path.resolve())
                 other = parse_xml(read_text(path, "included file", LARGEST), printable(path), "an MJCF file")
                 parent.remove(child)
-                for place, row in enumerate(_included(other, folder, depth + 1)):
+                for place, row in enumerate(_included(other, folder, read)):
                     parent.insert(number + place, row)
     return root

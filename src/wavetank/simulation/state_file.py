@@ -163,6 +163,7 @@ def read_state(path: str | Path) -> State:
         about = _table(parts, "about", "header", refuse)
         header: Header = Header.parse(about, refuse)
         _check_header(header, scene, refuse)
+        _check_kinds(header, scene, refuse)
         arrays = _checked_arrays(_Arrays(parts, scene.dim, refuse), header, scene)
         return _state(header, about, scene, arrays)
 
@@ -232,11 +233,15 @@ def _check_header(header: Header, scene: Scene, refuse: str) -> None:
         raise WavetankError(f"{refuse}: courses names a solid that is not there.")
     if len(header.sources.emitters) > len(scene.emitters) or len(header.sources.drains) > len(scene.drains):
         raise WavetankError(f"{refuse}: sources has more emitters or drains than its scene.")
+    if any(len(corner) not in (scene.dim, 3) for corner in header.numbers.start_box):
+        raise WavetankError(f"{refuse}: start_box must be two corners of {scene.dim} numbers.")
+
+
+def _check_kinds(header: Header, scene: Scene, refuse: str) -> None:
+    """Raise `WavetankError` where the header names materials that its scene does not have."""
     kinds = [header.kinds.default, *header.kinds.known] if header.kinds else []
     if any(kind > len(scene.materials) for kind in kinds):
         raise WavetankError(f"{refuse}: kinds names material {max(kinds)}; there are 0 to {len(scene.materials)}.")
-    if any(len(corner) not in (scene.dim, 3) for corner in header.numbers.start_box):
-        raise WavetankError(f"{refuse}: start_box must be two corners of {scene.dim} numbers.")
 
 
 class _Arrays:
