@@ -191,7 +191,7 @@ def check_kills(count: int, seed: int) -> int:
                 goes_on = (out / "states" / "run.json").exists()
                 process = wavetank(*(("resume", str(out)) if goes_on else ("run", *RUN, "--out", str(out))))
             told = json.loads((out / "stats.json").read_text()) if (out / "stats.json").exists() else {}
-            left = [path.name for path in out.rglob(".*")] + [path.name for path in out.glob("states/*")]
+            left = [path.name for path in out.rglob(".*")] + [path.name for path in [*out.glob("states/*.npz")][1:]]
             pictures = 0
             if (out / "a.mp4").exists():
                 with av.open(str(out / "a.mp4")) as film:

@@ -10,7 +10,13 @@ from typer.core import TyperCommand
 
 from wavetank import Scene, WavetankError, __version__
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+app = typer.Typer(
+    context_settings={"help_option_names": ["-h", "--help"]},
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
 console = Console(stderr=True)
 PYTHONS = "<list[str]>"
 
@@ -57,6 +63,11 @@ AllowLarge = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object as the last line.")]
 
 
+def say(text: str) -> None:
+    """Print a sentence on stderr, in one line however long it is."""
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
 class Plain(TyperCommand):
     """A command whose help does not show Python's types of its arguments."""
 
@@ -75,14 +86,19 @@ def _root(version: Annotated[bool, typer.Option("--version", help="Print the ver
 
 def configured(name: str, settings: list[str]) -> Scene:
     """Return a scene with the changes of `--set`."""
-    scene = Scene.load(name)
+    scene, changes = Scene.load(name), changes_in(settings)
+    return scene.changed(**changes) if changes else scene
+
+
+def changes_in(settings: list[str]) -> dict[str, Any]:
+    """Return the keys and values of `--set`."""
     changes: dict[str, Any] = {}
     for setting in settings:
         key, equals, text = setting.partition("=")
         if not equals or not key:
             raise WavetankError(f"--set {setting} is not allowed; write it as NAME=VALUE, as in --set viscosity=0.1.")
         changes[key.strip()] = value_of(text.strip())
-    return scene.changed(**changes) if changes else scene
+    return changes
 
 
 def value_of(text: str) -> Any:

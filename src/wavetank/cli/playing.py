@@ -93,6 +93,8 @@ def _chosen(scene: str, level: str) -> str:
         raise WavetankError(f"both the scene {scene} and --level {level} are given; give one of them.")
     if level.isdigit() and 1 <= int(level) <= len(levels):
         return levels[int(level) - 1]
-    if level not in levels:
-        raise WavetankError(f"--level {level} is not known; it must be 1 to {len(levels)}, or {', '.join(levels)}.")
+    if level not in levels and not Path(level).is_file():
+        raise WavetankError(
+            f"--level {level} is not known; it must be 1 to {len(levels)}, {', '.join(levels)}, or a scene's file."
+        )
     return level

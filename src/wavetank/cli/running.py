@@ -20,16 +20,17 @@ from wavetank.cli.options import (
     Json,
     Only,
     Quality,
-    SceneName,
     Settings,
     Size,
     Sun,
     View,
     app,
+    changes_in,
     configured,
     console,
     names_in,
     picture_name,
+    say,
     size_of,
 )
 from wavetank.scene.scene import bundled_levels, scene_schema
@@ -79,9 +80,16 @@ def scenes(
 
 @app.command()
 def run(
-    scene: SceneName,
+    scene: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENE|STATE.npz|RUN", help="A bundled scene, a TOML file, a saved state, or another run's folder."
+        ),
+    ],
     seconds: Annotated[float, typer.Option(help="Seconds of water.")] = 4.0,
-    out: Annotated[Path, typer.Option(help="Folder for the files.")] = Path("out"),
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the files; by default out/ and the scene's name.")
+    ] = None,
     video: Annotated[bool, typer.Option("--video", help="Write an MP4.")] = False,
     gif: Annotated[bool, typer.Option("--gif", help="Write an animated GIF.")] = False,
     frames: Annotated[bool, typer.Option("--frames", help="Write a PNG for each frame.")] = False,
@@ -106,23 +114,26 @@ def run(
     ] = 0.0,
     allow_large: AllowLarge = False,
     settings: Settings = [],  # noqa: B006
+    at: Annotated[
+        float | None, typer.Option(help="Where another run is left [s of water]; by default at its end.")
+    ] = None,
     arch: Arch = "cpu",
     as_json: Json = False,
 ) -> None:
-    """Simulate a scene and write video, pictures, particles and figures."""
+    """Simulate a scene, or go on from a state or another run, and write video, pictures, particles and figures."""
     from wavetank.run.compile_status import compile_status
     from wavetank.run.options import RunOptions
     from wavetank.run.record import record
+    from wavetank.run.starting import start_world
     from wavetank.simulation.cost import large_worlds_allowed
-    from wavetank.simulation.simulation import Simulation
 
-    world = configured(scene, settings)
+    changes, name = changes_in(settings), name or Path(scene).stem
     order = RunOptions(
-        out,
+        out or Path("out", name),
         seconds,
         fps,
         size_of(size or "1280x720"),
-        name or Path(scene).stem,
+        name,
         small_gif=not size,
         video=video,
         gif=gif,
@@ -136,23 +147,29 @@ def run(
     )
     with large_worlds_allowed(allow_large):
         with compile_status(console):
-            sim = Simulation(world, arch=arch)
+            sim = start_world(scene, changes, at, arch)
         _finish(record(sim, order, console), as_json)
 
 
 @app.command()
 def resume(
-    folder: Annotated[Path, typer.Argument(help="The folder of a run --checkpoint-every.")],
+    folder: Annotated[Path, typer.Argument(help="The folder of a run.")],
+    seconds: Annotated[
+        float | None, typer.Option(help="Seconds of water in all; extends a run that is complete.")
+    ] = None,
     arch: Annotated[str, typer.Option(help="Back end; by default that of the run.")] = "",
     allow_large: AllowLarge = False,
     as_json: Json = False,
 ) -> None:
-    """Resume a run that ended early, from its last checkpoint, to the same bits."""
+    """Resume a run that ended early, from its last checkpoint, to the same bits; with --seconds extend it."""
     from wavetank.run.record import resume_run
     from wavetank.simulation.cost import large_worlds_allowed
 
     with large_worlds_allowed(allow_large):
-        _finish(resume_run(folder, arch, console), as_json)
+        figures = resume_run(folder, arch, console, seconds)
+    if figures.pop("complete", False):
+        say(f"{folder}: this run is complete; --seconds {2.0 * figures['seconds_of_water']:g} extends it.")
+    _finish(figures, as_json)
 
 
 def _finish(figures: dict[str, Any], as_json: bool) -> None:
@@ -205,12 +222,14 @@ def render(
     as_json: Json = False,
 ) -> None:
     """Render a picture of a scene, a saved state or an instant of a run; or a film of a finished run."""
-    from wavetank.run.archived import FILMS, is_archive
+    from wavetank.run.archived import FILMS
+    from wavetank.run.starting import kind_of
     from wavetank.run.still import render_still
 
     out = out or picture_name(world, at, view, color_by)
-    archived = is_archive(world) or (world.endswith(".toml") and out.suffix.lower() in FILMS)
-    scene = None if archived or world.endswith(".npz") else configured(world, settings)
+    kind = kind_of(world)
+    archived = kind in ("run", "frames") or (world.endswith(".toml") and out.suffix.lower() in FILMS)
+    scene = None if archived or kind in ("state", "frame") else configured(world, settings)
     if scene is None and settings:
         raise WavetankError("--set cannot be used with a saved state or a run, which contains its scene.")
     across, down = size_of(size)

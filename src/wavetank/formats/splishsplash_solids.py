@@ -46,9 +46,7 @@ def arrays_of(path: Path) -> tuple[np.ndarray, np.ndarray]:
     try:
         import trimesh
     except ImportError:
-        raise WavetankError(
-            f"{path}: mesh files are read by trimesh; install it: pip install 'wavetank[mesh]'."
-        ) from None
+        raise WavetankError(f"{path}: mesh files are read by trimesh; install it: pip install trimesh.") from None
     if path.suffix.lower() not in SUFFIXES:
         raise WavetankError(f"{path}: meshes are read from {', '.join(SUFFIXES)} files; convert this one.")
     try:

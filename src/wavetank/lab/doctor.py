@@ -22,16 +22,17 @@ _PACKAGES = {
     "av": "",
     "tomli-w": "",
     "platformdirs": "",
+    "trimesh": "",
+    "rapier3d": "",
     **dict.fromkeys(
-        ("imgui-bundle", "moderngl", "glfw", "svg.path"), "the window of `wavetank play`: pip install wavetank[window]"
+        ("imgui-bundle", "moderngl", "glfw", "svg.path"),
+        "the window of `wavetank play`: pip install 'wavetank[window]'",
     ),
-    "trimesh": "solids from OBJ, STL, PLY and GLB files: pip install wavetank[mesh]",
-    "pysplashsurf": "surfaces in OBJ, USD, PLY and others: pip install wavetank[surface]",
-    "rapier3d": "solids that float: pip install wavetank[bodies]",
-    "usd-core": "USD: pip install wavetank[usd]",
-    "h5py": "VTKHDF and tables: pip install wavetank[hdf5]",
-    "anywidget": "`wt.show` in notebooks: pip install wavetank[notebook]",
-    "matplotlib": "plots of `wavetank converge` and `validate`: pip install wavetank[plot]",
+    "pysplashsurf": "surfaces in OBJ, USD, PLY and others: pip install 'wavetank[surface]'",
+    "usd-core": "USD: pip install 'wavetank[usd]'",
+    "h5py": "VTKHDF and tables: pip install 'wavetank[hdf5]'",
+    "anywidget": "`wt.show` in notebooks: pip install 'wavetank[notebook]'",
+    "matplotlib": "plots of `wavetank converge` and `validate`: pip install 'wavetank[plot]'",
 }
 
 
@@ -89,8 +90,11 @@ def _about(patch: patches.Patch) -> str:
 
 
 def told(checks: list[dict[str, str]]) -> list[dict[str, str]]:
-    """Return the findings as a person wants them: the patches of the compiler as one line, or one for each reason."""
-    rows = [row for row in checks if not row["name"].startswith(PATCH)]
+    """Return the findings as a person wants them: packages that are there in one line, and patches of the compiler."""
+    packages = [row for row in checks if row["name"] in _PACKAGES and row["found"] != "missing"]
+    listed = ", ".join(f"{row['name']} {row['found']}" for row in packages)
+    rows = [row for row in checks if not row["name"].startswith(PATCH) and row not in packages]
+    rows.insert(3, _check("packages", str(len(packages)), listed))
     of_patches = [row for row in checks if row["name"].startswith(PATCH)]
     reasons = {row["note"] for row in of_patches if row["found"] != IN_FORCE}
     if len(reasons) == 1 and all(row["found"] != IN_FORCE for row in of_patches):

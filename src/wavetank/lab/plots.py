@@ -12,7 +12,7 @@ def pyplot() -> Any:
     try:
         import matplotlib
     except ImportError:
-        raise WavetankError("plots need matplotlib; install it with `pip install wavetank[plot]`.") from None
+        raise WavetankError("plots need matplotlib; install it with `pip install 'wavetank[plot]'`.") from None
     matplotlib.use("Agg")
     from matplotlib import pyplot
 

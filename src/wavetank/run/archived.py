@@ -14,7 +14,8 @@ from wavetank.run.checkpoints import FILE, FOLDER, load_run
 from wavetank.run.export import open_source
 from wavetank.run.folder import SCENE, RunFolder
 from wavetank.run.signals import stop_on_signal
-from wavetank.scene.scene import Scene, bundled_levels, bundled_scenes
+from wavetank.run.starting import kind_of
+from wavetank.scene.scene import Scene
 from wavetank.simulation.frame import Frame, FrameBuffer
 from wavetank.simulation.simulation import Simulation
 from wavetank.simulation.state import State
@@ -26,9 +27,7 @@ FILMS = (".mp4", ".gif")
 
 def is_archive(world: str) -> bool:
     """Say whether this is a run's folder or an HDF5 file of frames; names of bundled scenes are not."""
-    if world in (*bundled_scenes(), *bundled_levels()):
-        return False
-    return RunFolder.is_one(world) or world.endswith((".h5", ".hdf5"))
+    return kind_of(world) in ("run", "frames")
 
 
 def scene_path(world: str) -> str:

@@ -13,6 +13,7 @@ from `run.json`.
 import dataclasses
 import hashlib
 import json
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -75,7 +76,8 @@ class Checkpoints:
             state=path.name, sha256=_digest(path), frame=frame, figures=figures, parts=[part.name for part in parts]
         )
         self.written = [made, *(other for other in self.written if other.state != made.state)][:2]
-        self.next = self.start + self.every * np.floor((sim.time - self.start) / self.every + 1.0 + 1e-9)
+        every = self.every or math.inf
+        self.next = self.start + every * np.floor((sim.time - self.start) / every + 1.0 + 1e-9)
         about = Progress(arch=sim.arch or "cpu", start=self.start, order=self.order, checkpoints=self.written)
         with atomic_write(self.folder / FILE, lasting=True) as partial:
             partial.write_text(json.dumps(about.model_dump(), indent=1, allow_nan=False), encoding="utf-8")
@@ -83,14 +85,12 @@ class Checkpoints:
             if other.name not in {checkpoint.state for checkpoint in self.written}:
                 other.unlink(missing_ok=True)
 
-    def finish(self) -> None:
-        """Delete all of them: the run is complete."""
-        for pattern in ("*.npz", "film-*.mp4"):
-            for path in self.folder.glob(pattern):
-                path.unlink(missing_ok=True)
-        (self.folder / FILE).unlink(missing_ok=True)
-        if not any(self.folder.iterdir()):
-            self.folder.rmdir()
+    def finish(self, sim: Simulation, frame: int, figures: dict[str, Any]) -> None:
+        """Keep the last instant alone, from which a complete run can be extended."""
+        self.written = []
+        self.write(sim, frame, figures, [])
+        for path in self.folder.glob("film-*.mp4"):
+            path.unlink(missing_ok=True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,8 +109,8 @@ def load_run(out: Path, arch: str = "") -> ResumedRun:
     origin = printable(place)
     if not place.exists():
         raise WavetankError(
-            f"{printable(out)}: there is no run to resume; name the folder of a `wavetank run --checkpoint-every` that "
-            "ended early; a completed run has no checkpoints."
+            f"{printable(out)}: there is no run to resume; name the folder of a `wavetank run` that is complete, or "
+            "that ended early with --checkpoint-every."
         )
     with explain_errors(origin, "checkpoint"):
         table = parse_json(read_text(place, "checkpoint", 64_000_000), origin)
@@ -136,6 +136,15 @@ def load_run(out: Path, arch: str = "") -> ResumedRun:
             continue
         return ResumedRun(sim, progress, checkpoint, " ".join(problems))
     raise WavetankError(f"{origin}: no checkpoint can be used: {' '.join(problems)}")
+
+
+def name_of_run(out: Path) -> str:
+    """Return the name of the run whose checkpoints a folder has, "" without any that can be read."""
+    try:
+        table = parse_json(read_text(out / FOLDER / FILE, "checkpoint", 64_000_000), FILE)
+        return str(table["order"]["name"])
+    except (WavetankError, KeyError, TypeError):
+        return ""
 
 
 def _digest(path: Path) -> str:

@@ -16,6 +16,7 @@ from wavetank.foundation.errors import WavetankError
 from wavetank.run.folder import RunFolder
 from wavetank.run.outputs import Outputs
 from wavetank.run.record import viewpoint_of
+from wavetank.run.starting import kind_of
 from wavetank.scene.scene import Scene
 from wavetank.session.recording import Recording, replay
 from wavetank.simulation.simulation import Simulation
@@ -86,11 +87,12 @@ def open_source(path: Path, arch: str = "") -> Source:
         raise WavetankError(
             f"there is no file or folder {str(path)!r}; give a run's folder, a state, a recording or an .h5."
         )
-    if path.suffix == ".npz":
+    kind = kind_of(path)
+    if kind in ("state", "frame"):
         return _from_state(path, arch)
-    if path.suffix == ".toml":
+    if kind == "recording" or path.suffix == ".toml":
         return _from_recording(path, arch)
-    if path.suffix in hdf5.SUFFIXES:
+    if kind == "frames":
         return _from_hdf5(path)
     raise WavetankError(
         f"{path}: frames are read from a run's folder, a state (.npz), a recording (.toml) or an HDF5 file "

@@ -9,6 +9,7 @@ states/        checkpoints: complete states, from which the run can be resumed b
 NAME*          pictures, films and files of frames
 """
 
+import contextlib
 import csv
 import json
 import math
@@ -20,7 +21,7 @@ import tomli_w
 from pydantic import Field
 
 from wavetank.formats import hdf5, npz
-from wavetank.foundation.atomic_write import atomic_write, make_folder
+from wavetank.foundation.atomic_write import atomic_write, make_folder, partial_path
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import explain_errors, parse_toml, printable, read_text
 from wavetank.foundation.model import Model
@@ -31,6 +32,7 @@ from wavetank.simulation.state import State
 FILE, SCENE, STATS, SUMMARY = "run.toml", "scene.toml", "stats.jsonl", "stats.json"
 TABLE = "stats.csv"
 LARGEST_STATS = 4_000_000_000  # bytes: a day of water at 60 frames per second
+NUMBER = "[0-9]" * 5  # of a frame in the name of its file
 LONGEST_ROW = 400_000  # characters
 
 
@@ -55,6 +57,23 @@ class Run(Model):
     look: dict[str, str] = {}
 
 
+@contextlib.contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """Have a folder for one run; raises `WavetankError` where a run of another process writes to it."""
+    mark = partial_path(make_folder(folder) / "run")  # what a dead process left was swept
+    others = [path for path in folder.glob(".run.*.partial") if path.name.split("-")[1] != mark.name.split("-")[1]]
+    if others:
+        raise WavetankError(
+            f"{printable(folder)}: another run, process {others[0].name.split('-')[1]}, writes to this folder; name "
+            "another one with --out, or wait."
+        )
+    mark.touch()
+    try:
+        yield
+    finally:
+        mark.unlink(missing_ok=True)
+
+
 class RunFolder:
     """A run's folder, open for reading or writing."""
 
@@ -68,9 +87,20 @@ class RunFolder:
         scene.save(folder.path / SCENE)
         for stale in (STATS, SUMMARY, TABLE):
             (folder.path / stale).unlink(missing_ok=True)
-        with atomic_write(folder.path / FILE) as partial:
-            partial.write_text(tomli_w.dumps(run.model_dump()), encoding="utf-8")
+        for frame in folder.path.glob(f"{_escaped(run.name)}-{NUMBER}.*"):
+            frame.unlink(missing_ok=True)  # of a longer run before
+        folder.save_options()
         return folder
+
+    def extend(self, seconds: float) -> None:
+        """Make it a run of so many seconds of water in all."""
+        self.run.seconds = seconds
+        self.save_options()
+
+    def save_options(self) -> None:
+        """Write `run.toml`."""
+        with atomic_write(self.path / FILE) as partial:
+            partial.write_text(tomli_w.dumps(self.run.model_dump()), encoding="utf-8")
 
     @classmethod
     def is_one(cls, path: str | Path) -> bool:
@@ -163,8 +193,7 @@ class RunFolder:
     def _archives(self) -> list[Path]:
         if "npz" not in self.run.exports:
             return []
-        number = "[0-9]" * 5
-        return sorted(self.path.glob(f"{_escaped(self.run.name)}-{number}{npz.SUFFIXES[0]}"))
+        return sorted(self.path.glob(f"{_escaped(self.run.name)}-{NUMBER}{npz.SUFFIXES[0]}"))
 
 
 def _line(row: Mapping[str, float]) -> str:

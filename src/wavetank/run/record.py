@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import shutil
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, nullcontext
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.table import Column
 from rich.text import Text
 
 from wavetank.device.compiler import on_compile
@@ -16,12 +18,12 @@ from wavetank.formats.gif import GifWriter, resized
 from wavetank.formats.mp4 import VideoWriter
 from wavetank.formats.plan import Viewpoint
 from wavetank.formats.png import write_png
-from wavetank.foundation.atomic_write import atomic_write
-from wavetank.foundation.errors import NotFiniteError
-from wavetank.foundation.input_limits import explain_errors, printable
-from wavetank.run.checkpoints import Checkpoints, ResumedRun, SegmentedVideo, load_run
+from wavetank.foundation.atomic_write import atomic_write, make_folder
+from wavetank.foundation.errors import NotFiniteError, WavetankError
+from wavetank.foundation.input_limits import explain_errors, printable, read_text
+from wavetank.run.checkpoints import FOLDER, Checkpoints, ResumedRun, SegmentedVideo, load_run, name_of_run
 from wavetank.run.compile_status import compile_status
-from wavetank.run.folder import SUMMARY, Run, RunFolder
+from wavetank.run.folder import SUMMARY, Run, RunFolder, claimed
 from wavetank.run.options import RunOptions
 from wavetank.run.outputs import Outputs, check_exports
 from wavetank.run.signals import StopRequest, stop_on_signal
@@ -34,6 +36,7 @@ from wavetank.view.camera import Camera
 from wavetank.view.renderer import Renderer
 from wavetank.view.style import quality_options
 
+STOPPING = "interrupted; completing the files (once more stops at once)"
 Sink = Callable[[int, Frame, Any], None]  # takes the number of a frame, the frame and its picture (or None)
 
 
@@ -43,8 +46,8 @@ class _Figures(ProgressColumn):
     def render(self, task: Task) -> Text:
         figures = task.fields
         return Text(
-            f"{figures['time']:5.2f} s of water  {figures['fps']:5.1f} fps  {figures['count']:,} particles  "
-            f"density error {100 * figures['error']:.2f} %"
+            f"{figures['time']:.2f} s  {figures['fps']:.1f} fps  {figures['count']:,} particles  "
+            f"error {100 * figures['error']:.2f} %"
         )
 
 
@@ -58,12 +61,13 @@ def record(
     """
     check_exports(options.exports, options.only, sim.scene)
     check_time(sim.count, sim.scene, options.seconds, "this run")
-    with stop_on_signal(say="interrupted; completing the files (once more stops at once)") as stop:
+    with stop_on_signal(say=STOPPING) as stop, ExitStack() as claim:
         supersample, _ = quality_options(options.quality)
         renderer = Renderer(*options.size, supersample)
         with compile_status(console) if console else nullcontext():
             # Wrong options of a picture raise before anything is written.
             renderer.render(sim.frame(), **options.style | {"samples": 1})
+        claim.enter_context(claimed(options.out))
         work = _ActiveRun(sim, options, stop, resumed)
         with ExitStack() as stack:
             sinks = _open_sinks(options, stack, work)
@@ -83,15 +87,21 @@ def record(
         figures = summary.figures() | {"files": files, "waited_for_files": work.outputs.waited, "exit_code": stop.code}
         with atomic_write(stats) as partial:
             partial.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
-        if work.checkpoints and not stop and summary.broken is None:
-            work.checkpoints.finish()
+        if not stop and summary.broken is None:
+            work.finish(summary)
     if summary.broken is not None:
         raise summary.broken
     return figures
 
 
-def resume_run(out: Path, arch: str = "", console: Console | None = None) -> dict[str, Any]:
-    """Continue the run of a folder from its last good checkpoint; return its figures, as `record` does."""
+def resume_run(
+    out: Path, arch: str = "", console: Console | None = None, seconds: float | None = None
+) -> dict[str, Any]:
+    """Continue the run of a folder from its last good checkpoint; return its figures, as `record` does.
+
+    With `seconds` it becomes a run of so many [s of water] in all, also where it is complete. The figures of a complete
+    one have the key `complete`. Raises `WavetankError`.
+    """
     run = load_run(out, arch)
     if run.note and console is not None:
         console.print(f"continuing from the checkpoint before the last one: {run.note}", markup=False)
@@ -99,7 +109,21 @@ def resume_run(out: Path, arch: str = "", console: Console | None = None) -> dic
         table = dict(run.progress.order)
         for name in ("size", "exports", "only"):
             table[name] = tuple(table[name])
-        options = RunOptions(**table | {"out": out})
+        options = RunOptions(**table | {"out": out} | ({} if seconds is None else {"seconds": seconds}))
+    done, wanted = run.checkpoint.frame, round(options.seconds * options.fps)
+    if seconds is not None and wanted < done:
+        raise WavetankError(
+            f"--seconds = {seconds:g} is less than the {done / options.fps:g} s that the run in {printable(out)} has."
+        )
+    if done == wanted and (out / SUMMARY).is_file():
+        figures: dict[str, Any] = json.loads(read_text(out / SUMMARY, "figures"))
+        return figures | {"complete": True}
+    if options.gif:
+        raise WavetankError(f"{printable(out)}: a GIF cannot be continued; run it again with --seconds {seconds:g}.")
+    if options.video and not run.checkpoint.parts and options.path(".mp4").is_file():
+        part = f"film-{done:05d}.mp4"
+        shutil.copyfile(options.path(".mp4"), out / FOLDER / part)
+        run.checkpoint.parts = [part]
     return record(run.sim, options, console, run)
 
 
@@ -121,27 +145,38 @@ class _ActiveRun:
         self.folder.keep_stats(self.done + 1)
         self.checkpoints: Checkpoints | None = None
         if options.checkpoint_every:
-            plain = dataclasses.asdict(options)
-            del plain["out"]
-            self.checkpoints = Checkpoints(options.out, options.checkpoint_every, self.start, plain)
+            self.checkpoints = self._checkpoints()
             if resumed:
                 self.checkpoints.written = [resumed.checkpoint]
                 self.checkpoints.next = sim.time + options.checkpoint_every
 
+    def _checkpoints(self) -> Checkpoints:
+        plain = dataclasses.asdict(self.options)
+        del plain["out"]
+        return Checkpoints(self.options.out, self.options.checkpoint_every, self.start, plain)
+
+    def finish(self, summary: "Summary") -> None:
+        """Keep the last instant of a complete run, unless the folder has the checkpoints of another one."""
+        if self.checkpoints is None and name_of_run(self.options.out) not in ("", self.options.name):
+            return
+        number = round(self.options.seconds * self.options.fps)
+        (self.checkpoints or self._checkpoints()).finish(self.sim, number, summary.plain())
+
     def _folder(self, run: Run) -> RunFolder:
         """Return the folder of this run; that of another run is overwritten."""
         if self.resumed is not None and RunFolder.is_one(self.options.out):
-            folder, ignored = RunFolder.open(self.options.out), {"wavetank", "arch"}
+            folder, ignored = RunFolder.open(self.options.out), {"wavetank", "arch", "seconds"}
             if folder.run.model_dump(exclude=ignored) == run.model_dump(exclude=ignored):
+                folder.extend(run.seconds)
                 return folder
         return RunFolder.create(self.options.out, run, self.sim.scene)
 
     def open_film(self, stack: ExitStack) -> Any:
         """Open the video, in segments where there are checkpoints."""
         path, size, fps = self.options.path(".mp4"), self.options.size, self.options.fps
-        if self.checkpoints is None:
+        if self.checkpoints is None and self.resumed is None:
             return stack.enter_context(VideoWriter(path, *size, fps))
-        folder = self.checkpoints.folder
+        folder = make_folder(self.options.out / FOLDER)
         parts = [folder / part for part in self.resumed.checkpoint.parts] if self.resumed else []
         self.film = stack.enter_context(SegmentedVideo(path, size, fps, folder, parts))
         return self.film
@@ -193,19 +228,25 @@ def _open_sinks(options: RunOptions, stack: ExitStack, work: _ActiveRun) -> dict
     return sinks
 
 
+def progress_bar(console: Console) -> Progress:
+    """Return the line that shows a run: time, speed, particles and density error, one line at any width."""
+    return Progress(
+        TextColumn("{task.description}", table_column=Column(no_wrap=True)),
+        BarColumn(bar_width=None, table_column=Column(min_width=4, ratio=1)),
+        _Figures(table_column=Column(no_wrap=True)),
+        TimeRemainingColumn(table_column=Column(no_wrap=True)),
+        console=console,
+        transient=False,
+        expand=True,
+    )
+
+
 def _run(work: _ActiveRun, renderer: Renderer | None, sinks: Sequence[Sink], console: Console | None) -> "Summary":
     """Advance the water and give each frame to every sink, with its picture where there is a renderer."""
     sim, options = work.sim, work.options
     summary = Summary(sim, work.resumed.checkpoint.figures if work.resumed else None)
     moving = options.style | {"shutter": min(sim.scene.frame_time, 1.0 / options.fps)}
-    progress = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        _Figures(),
-        TimeRemainingColumn(),
-        console=console or Console(stderr=True),
-        transient=False,
-    )
+    progress = progress_bar(console or Console(stderr=True))
 
     def show_compile(number: int, _: str) -> None:
         progress.update(task, description=f"compiling kernel {number}")

@@ -23,7 +23,7 @@ def import_engine() -> Any:
         import rapier3d
     except ImportError:
         raise WavetankError(
-            "this scene has bodies, and these need the package rapier3d; install it with: pip install wavetank[bodies]"
+            "this scene has bodies, and these need the package rapier3d; install it: pip install rapier3d"
         ) from None
     return rapier3d
 

@@ -39,7 +39,7 @@ def _arrays(path: Path) -> tuple[np.ndarray, np.ndarray]:
     try:
         import trimesh
     except ModuleNotFoundError:
-        raise ValueError(f"{path}: mesh files are read by trimesh; install it: pip install 'wavetank[mesh]'.") from None
+        raise ValueError(f"{path}: mesh files are read by trimesh; install it: pip install trimesh.") from None
     options: dict[str, Any] = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
     try:
         scene = trimesh.load_scene(path, process=False, **options)
