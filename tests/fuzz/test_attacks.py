@@ -163,3 +163,18 @@ def test_a_million_particles_in_one_place():
 def test_points_that_are_none_hold_no_water():
     text = 'spacing = 0.05\ntank.size = [1, 1]\nfluids = [{ shape = "points", positions = [] }]'
     assert wt.Simulation(wt.Scene.from_text(text)).count == 0
+
+
+@pytest.mark.parametrize(
+    "call", ["sim.add(np.zeros((100_000_000, 2), np.float32))", "wt.render(sim, width=8192, height=8192)"]
+)
+def test_memory_is_asked_for_first(call, monkeypatch):
+    """Before anything of that size is made: of new particles, of pictures."""
+    from wavetank.foundation import memory
+    from wavetank.simulation import cost
+
+    sim = wt.Simulation(wt.Scene.from_text(POOL))
+    for module in (memory, cost):
+        monkeypatch.setattr(module, "free_memory", lambda: 2_000_000_000)
+    refused(lambda: eval(call, {"sim": sim, "wt": wt, "np": np}), "of memory")
+    sim.step()

@@ -1,5 +1,6 @@
 """A run that ends early goes on from its last checkpoint to the same bits, whatever ended it."""
 
+import dataclasses
 import json
 import os
 import shutil
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 import wavetank as wt
+from wavetank.foundation.json_text import json_text
 from wavetank.run.checkpoints import load_run
 from wavetank.run.folder import RunFolder
 from wavetank.run.options import RunOptions
@@ -74,9 +76,21 @@ def crash_at(monkeypatch, frame: int, error: type[BaseException] = Crash) -> Non
     monkeypatch.setattr(Simulation, "_advance_frame", advance)
 
 
+def strict(path: Path) -> dict:
+    """What is in a file of JSON that has no NaN."""
+
+    def refuse(name: str) -> None:
+        raise AssertionError(f"{path} holds {name}")
+
+    return json.loads(path.read_text(), parse_constant=refuse)
+
+
 def same(out: Path, whole: Path) -> None:
     """The files of two runs hold the same."""
-    ours, theirs = (json.loads((path / "stats.json").read_text()) for path in (out, whole))
+    ours, theirs = (strict(path / "stats.json") for path in (out, whole))
+    for figures in (ours, theirs):
+        del figures["last"]["milliseconds_per_frame"], figures["mean"]["milliseconds_per_frame"]  # of the machine
+    assert ours["last"] == theirs["last"] and ours["mean"] == theirs["mean"]
     assert ours["digest"] == theirs["digest"]
     for name in ("worst", "energy_start", "seconds_of_water"):
         assert ours[name] == theirs[name]
@@ -99,6 +113,30 @@ def test_a_run_goes_on_to_the_same_bits(whole, tmp_path, monkeypatch, frame):
     resume_run(tmp_path)
     same(tmp_path, whole)
     assert films(tmp_path / "run.mp4") == films(whole / "run.mp4") == 21
+
+
+@pytest.mark.parametrize("place", ["write_png", "Checkpoints.finish"])
+def test_a_run_that_is_killed_after_its_last_frame_goes_on(place, whole, tmp_path, monkeypatch):
+    """Before its summary, and between that and the end: no frame is left to compute, and none counts twice."""
+    from wavetank.run import record as module
+
+    def crash(*arguments: object) -> None:
+        raise Crash
+
+    with monkeypatch.context() as patch, pytest.raises(Crash):
+        if place == "write_png":
+            patch.setattr(module, place, crash)
+        else:
+            patch.setattr(module.Checkpoints, "finish", crash)
+        record(started(), order(tmp_path, video=True))
+    resume_run(tmp_path)
+    same(tmp_path, whole)
+
+
+def test_figures_of_a_run_without_time_are_json(tmp_path):
+    figures = record(started(), dataclasses.replace(order(tmp_path), seconds=0.0))
+    assert strict(tmp_path / "stats.json")["last"]["milliseconds_per_frame"] is None
+    assert json_text(figures)
 
 
 def test_a_damaged_checkpoint_gives_way_to_the_one_before(whole, tmp_path, monkeypatch):

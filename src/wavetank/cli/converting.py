@@ -1,6 +1,5 @@
 """Commands between wavetank and other programs: export, import."""
 
-import json
 import math
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +8,7 @@ import typer
 
 from wavetank.cli.options import Json, Only, app, configured, console, names_in
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.json_text import json_text
 
 
 @app.command()
@@ -31,7 +31,7 @@ def export(
 
     figures = convert(source, names_in(to), out=out, only=names_in([only]), every=every, arch=arch, console=console)
     if as_json:
-        print(json.dumps(figures))
+        print(json_text(figures))
         return
     print(f"{figures['frames']:,} frames, {figures['fps']:g} a second of water")
     for path in figures["files"]:
@@ -67,7 +67,7 @@ def import_scene(
         scene, notes = imported.scene, imported.notes
     scene.save(out)
     if as_json:
-        print(json.dumps({"file": str(out), "notes": notes}))
+        print(json_text({"file": str(out), "notes": notes}))
         return
     print(out)
     for note in notes:

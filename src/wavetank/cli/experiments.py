@@ -1,6 +1,5 @@
 """Commands that measure: converge, validate, bench, doctor."""
 
-import json
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +11,7 @@ from rich.table import Column, Table
 
 from wavetank import Scene, WavetankError
 from wavetank.cli.options import Arch, Json, Plain, SceneName, app, console
+from wavetank.foundation.json_text import json_text
 
 CASE_NAMES = (
     "buckling, buoyancy, calm-vorticity, coiling, column, creep, cup, drop, elliptical-drop, emitter, energy, "
@@ -35,7 +35,7 @@ def converge(
 
     result = study(Scene.load(scene), out, seconds=seconds, iterations=iterations, arch=arch, console=console)
     if as_json:
-        print(json.dumps(result))
+        print(json_text(result))
     else:
         for path in result["files"]:
             print(path)
@@ -55,7 +55,7 @@ def validate(
 
     result = compare(cases, quick=quick, out=out, arch=arch, console=console)
     if as_json:
-        print(json.dumps(result))
+        print(json_text(result))
     else:
         Console(width=None if sys.stdout.isatty() else 150).print(table(result))
     if wrong := out_of_bounds(result):
@@ -108,7 +108,7 @@ def bench(
     for table in tables:
         Console(width=None if sys.stdout.isatty() else 150).print(table)
     if as_json:
-        print(json.dumps(result))
+        print(json_text(result))
 
 
 @app.command()
@@ -128,7 +128,7 @@ def doctor(
 
     findings = examine(why_no_window())
     if as_json:
-        print(json.dumps(findings))
+        print(json_text(findings))
         return
     table = Table("what", "found", Column("note", overflow="fold"))
     for row in told(findings["checks"]):
@@ -142,7 +142,7 @@ def _compare_backends(arch: str, as_json: bool) -> None:
     with console.status(f"the same water on cpu and {arch}"):
         result = backends.compare(arch)
     if as_json:
-        print(json.dumps(result))
+        print(json_text(result))
         return
     table = Table(f"{result['scene']}, {result['particles']:,} particles, {result['seconds']:g} s", "cpu", arch)
     for name, values in {**result["figures"], "mean height, m": result["height"]}.items():

@@ -1,6 +1,5 @@
 """The command that films a scene."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -20,6 +19,7 @@ from wavetank.cli.options import (
     console,
     size_of,
 )
+from wavetank.foundation.json_text import json_text
 
 
 @app.command()
@@ -65,7 +65,7 @@ def film(
             **changes,
         )
     if as_json:
-        print(json.dumps(figures))
+        print(json_text(figures))
     elif figures["interrupted"]:
         print(f"{figures['frames']:,} of {figures['of']:,} frames are done; the same command continues.")
     else:

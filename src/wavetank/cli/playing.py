@@ -1,6 +1,5 @@
 """Interactive commands: play, and replay of a recording."""
 
-import json
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +8,7 @@ import typer
 
 from wavetank import WavetankError
 from wavetank.cli.options import Arch, Json, Settings, Size, app, configured, console, size_of
+from wavetank.foundation.json_text import json_text
 from wavetank.scene.scene import bundled_levels, with_particles
 
 
@@ -72,7 +72,7 @@ def replay(
 
     figures = replay_session(session, video=video, fps=fps, size=size_of(size), arch=arch, console=console)
     if as_json:
-        print(json.dumps(figures))
+        print(json_text(figures))
     if figures["interrupted"]:
         print(f"the replay was interrupted after {figures['frames']:,} frames", file=sys.stderr)
         raise typer.Exit(figures["exit_code"])

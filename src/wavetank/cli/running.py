@@ -1,6 +1,5 @@
 """Commands that compute: scenes, run, resume, render."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,6 +32,7 @@ from wavetank.cli.options import (
     say,
     size_of,
 )
+from wavetank.foundation.json_text import json_text
 from wavetank.scene.scene import bundled_levels, scene_schema
 from wavetank.scene.summary import bundled_counts, bundled_title
 
@@ -61,7 +61,7 @@ def scenes(
             for name, s in rows
         }
         games = {name: {"title": s.title, "goal": s.goal.text, "best": best.get(name)} for name, s in levels if s.goal}
-        print(json.dumps({**about, "levels": games}))
+        print(json_text({**about, "levels": games}))
         return
     table = Table("scene", "title", "world", "particles")
     for name, scene in rows:
@@ -174,7 +174,7 @@ def resume(
 
 def _finish(figures: dict[str, Any], as_json: bool) -> None:
     if as_json:
-        print(json.dumps(figures))
+        print(json_text(figures))
     else:
         _report(figures)
     if figures["interrupted"]:
@@ -273,7 +273,7 @@ def render(
         floor=floor,
     )
     if as_json:
-        print(json.dumps(figures))
+        print(json_text(figures))
     if figures.get("interrupted"):
         if not as_json:
             print(f"{figures['samples']} of {figures['of']} samples are done; the same command continues.")
@@ -300,7 +300,7 @@ def _film(
     if at is not None:
         raise WavetankError(f"--at cannot be used with a film, {out}, which shows all frames; name a .png.")
     figures = film_archived(world, out, *size, console=console, **options)
-    print(json.dumps(figures) if as_json else f"{figures['frames']:,} frames\n{out}")
+    print(json_text(figures) if as_json else f"{figures['frames']:,} frames\n{out}")
     if figures["interrupted"]:
         raise typer.Exit(figures["exit_code"])
 

@@ -24,6 +24,7 @@ from wavetank.formats import hdf5, npz
 from wavetank.foundation.atomic_write import atomic_write, make_folder, partial_path
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import explain_errors, parse_toml, printable, read_text
+from wavetank.foundation.json_text import json_text
 from wavetank.foundation.model import Model
 from wavetank.foundation.version import VERSION
 from wavetank.scene.scene import Scene
@@ -152,11 +153,12 @@ class RunFolder:
             table.writerows({name: "" if math.isnan(value) else value for name, value in row.items()} for row in rows)
         return self.path / TABLE
 
-    def keep_stats(self, count: int) -> None:
-        """Keep the figures of the first `count` frames only, before the run continues from there."""
+    def keep_stats(self, count: int) -> dict[str, float]:
+        """Keep the figures of the first `count` frames only, from which the run continues; return those of the last."""
         rows = self.stats()[:count]
         with atomic_write(self.path / STATS) as partial:
             partial.write_text("".join(map(_line, rows)), encoding="utf-8")
+        return rows[-1] if rows else {}
 
     # --- frames ---
 
@@ -196,9 +198,9 @@ class RunFolder:
         return sorted(self.path.glob(f"{_escaped(self.run.name)}-{NUMBER}{npz.SUFFIXES[0]}"))
 
 
-def _line(row: Mapping[str, float]) -> str:
-    """Return a row as a line of JSON, with null for non-finite numbers."""
-    return json.dumps({name: value if math.isfinite(value) else None for name, value in row.items()}) + "\n"
+def _line(row: Mapping[str, float | None]) -> str:
+    """Return a row as a line of JSON."""
+    return json_text(row) + "\n"
 
 
 def _row(line: str, origin: str) -> dict[str, float]:

@@ -1,7 +1,6 @@
 """Runs without a screen: video, pictures, particle files and figures into a folder."""
 
 import dataclasses
-import json
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, nullcontext
@@ -20,7 +19,8 @@ from wavetank.formats.plan import Viewpoint
 from wavetank.formats.png import write_png
 from wavetank.foundation.atomic_write import atomic_write, make_folder
 from wavetank.foundation.errors import NotFiniteError, WavetankError
-from wavetank.foundation.input_limits import explain_errors, printable, read_text
+from wavetank.foundation.input_limits import explain_errors, parse_json, printable, read_text
+from wavetank.foundation.json_text import json_text
 from wavetank.run.checkpoints import FOLDER, Checkpoints, ResumedRun, SegmentedVideo, load_run, name_of_run
 from wavetank.run.compile_status import compile_status
 from wavetank.run.folder import SUMMARY, Run, RunFolder, claimed
@@ -86,7 +86,7 @@ def record(
         files = [*sinks, *work.outputs.files, str(work.folder.write_table()), str(stats)]
         figures = summary.figures() | {"files": files, "waited_for_files": work.outputs.waited, "exit_code": stop.code}
         with atomic_write(stats) as partial:
-            partial.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+            partial.write_text(json_text(figures, indent=2) + "\n", encoding="utf-8")
         if not stop and summary.broken is None:
             work.finish(summary)
     if summary.broken is not None:
@@ -115,8 +115,9 @@ def resume_run(
         raise WavetankError(
             f"--seconds = {seconds:g} is less than the {done / options.fps:g} s that the run in {printable(out)} has."
         )
-    if done == wanted and (out / SUMMARY).is_file():
-        figures: dict[str, Any] = json.loads(read_text(out / SUMMARY, "figures"))
+    is_finished = len(run.progress.checkpoints) == 1 and not run.checkpoint.parts  # see `Checkpoints.finish`
+    if done == wanted and is_finished and (out / SUMMARY).is_file():
+        figures: dict[str, Any] = parse_json(read_text(out / SUMMARY, "figures"), printable(out / SUMMARY))
         return figures | {"complete": True}
     if options.gif:
         raise WavetankError(f"{printable(out)}: a GIF cannot be continued; run it again with --seconds {seconds:g}.")
@@ -142,7 +143,7 @@ class _ActiveRun:
         self.done = resumed.checkpoint.frame if resumed else -1  # number of the last frame that was written
         self.film: SegmentedVideo | None = None
         self.folder = self._folder(options.run(sim, self.start))
-        self.folder.keep_stats(self.done + 1)
+        self.last = self.folder.keep_stats(self.done + 1)  # figures of that frame
         self.checkpoints: Checkpoints | None = None
         if options.checkpoint_every:
             self.checkpoints = self._checkpoints()
@@ -244,7 +245,7 @@ def progress_bar(console: Console) -> Progress:
 def _run(work: _ActiveRun, renderer: Renderer | None, sinks: Sequence[Sink], console: Console | None) -> "Summary":
     """Advance the water and give each frame to every sink, with its picture where there is a renderer."""
     sim, options = work.sim, work.options
-    summary = Summary(sim, work.resumed.checkpoint.figures if work.resumed else None)
+    summary = Summary(sim, work.resumed.checkpoint.figures if work.resumed else None, work.last)
     moving = options.style | {"shutter": min(sim.scene.frame_time, 1.0 / options.fps)}
     progress = progress_bar(console or Console(stderr=True))
 

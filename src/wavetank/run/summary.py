@@ -9,12 +9,17 @@ WORST = ("density_error_mean", "density_error_p99", "speed_max")
 
 
 class Summary:
-    """Collects the figures of a run; `before` are those of a run that is resumed."""
+    """Collects the figures of a run; of one that is resumed, `before` are its sums and `last` those of its last frame.
 
-    def __init__(self, sim: Simulation, before: dict[str, Any] | None = None) -> None:
+    What only a step leaves, such as its duration, is lost where a run is resumed: only `add` reads it.
+    """
+
+    def __init__(
+        self, sim: Simulation, before: dict[str, Any] | None = None, last: dict[str, float] | None = None
+    ) -> None:
         self.sim, self.interrupted = sim, False
         self.broken: NotFiniteError | None = None
-        self.last: dict[str, float] = {}
+        self.last = last or {}
         self._sums: dict[str, float] = {"frames": 0, "error": 0.0, "milliseconds": 0.0, "begin": sim.time}
         self._sums |= {f"worst {name}": 0.0 for name in WORST} | {"rise": 0.0}
         for name, value in (before or {}).items():
@@ -45,7 +50,7 @@ class Summary:
 
     def figures(self) -> dict[str, Any]:
         """Return means, worst values and the last frame's figures."""
-        if not self.last and self.broken is None:
+        if not self._sums["frames"] and self.broken is None:
             self.add()
         sums, frames = self._sums, int(self._sums["frames"])
         joints = {name.removeprefix("power "): total for name, total in sums.items() if name.startswith("power ")}

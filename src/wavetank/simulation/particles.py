@@ -23,6 +23,7 @@ from wavetank.physics.pressure.grid import OPEN_CELLS, new_pressure_grid
 from wavetank.physics.smoothing import half_space_table
 from wavetank.physics.world import World
 from wavetank.scene.scene import MAX_PARTICLES, Scene
+from wavetank.simulation.cost import check_cost
 from wavetank.simulation.solids import Solids
 from wavetank.simulation.state import VISCOUS, Counters, State
 from wavetank.solids.distance import SolidSet
@@ -162,7 +163,8 @@ class ParticleSystem:
             self.world.frozen = int(population.freeze_particles(self.world.particles, capsule, int(frozen), self.count))
 
     def enlarge(self, capacity: int) -> None:
-        """Move to arrays for more particles."""
+        """Move to arrays for more particles; raises `WavetankError` where there is not enough memory."""
+        check_cost(self.scene, capacity)
         before, scene = self.world, self.scene
         self.world = _new_world(scene, capacity, before.solids, before.pieces, has_friction=before.has_friction)
         self.counters.capacity, self.outdated = capacity, True

@@ -477,6 +477,9 @@ class Simulation(KnownAttributes):
         `materials` are numbers in `Scene.palette`, [n]; that of the first fluid at the start where None. Particles may
         overlap others: see `free_places`. Raises `WavetankError` for wrong shapes, and places outside of the tank.
         """
+        rows = len(positions) if hasattr(positions, "__len__") else 0
+        if self.count + rows > self.counters.capacity:  # before any of them is copied
+            check_cost(self.scene, self.count + rows)
         new = check_newcomers(self.scene, positions, velocities, dyes, materials, self.particles.default_kind)
         check_inside(self.scene, new.x)
         return self.particles.add(new)

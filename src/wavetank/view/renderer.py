@@ -15,6 +15,7 @@ from wavetank.device.state import interned
 from wavetank.device.turns import TURN, one_at_a_time
 from wavetank.foundation.arguments import instance_of
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.memory import check_free
 from wavetank.simulation.frame import Frame
 from wavetank.view import legend as legends
 from wavetank.view.buffers import allocate
@@ -41,6 +42,7 @@ from wavetank.view.views import Pass, View
 from wavetank.view.water_buffers import sun_texels, water_of
 
 LARGEST_SIDE, LARGEST_SUPERSAMPLE = 8192, 4
+PER_SAMPLE = 125.0  # bytes of all buffers of a picture, and of what is made of them
 KEPT_RENDERERS, KEPT_SAMPLES = 4, 2**24
 Timings = dict[str, float] | None  # milliseconds of each pass, added up
 POINT_SUN = 0.004  # tangent of the sun's radius where many suns are averaged
@@ -358,6 +360,8 @@ def check_size(width: Any, height: Any, supersample: Any) -> None:
     ):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= most:
             raise WavetankError(f"render: {name} = {value!r} must be a whole number from 1 to {most}.")
+    needed = PER_SAMPLE * float(width) * float(height) * float(supersample) ** 2
+    check_free(needed, f"render: a picture of {width}x{height}", "; make it smaller")
 
 
 def affordable(width: Any, height: Any, supersample: int) -> int:

@@ -5,7 +5,6 @@ There is no server: messages and pictures use the connection that the notebook h
 
 import functools
 import importlib.resources
-import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -14,6 +13,7 @@ from typing_extensions import override
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import explain_errors
+from wavetank.foundation.json_text import plain
 from wavetank.page.theme import COLORS
 from wavetank.page.viewers import Ray, Submit, Viewer, Viewers
 
@@ -50,7 +50,7 @@ class Seat(Viewer):
         if isinstance(message, bytes):
             self.widget.send({"type": "picture"}, [message])
         else:
-            self.widget.send(_plain(message))
+            self.widget.send(plain(message))
 
 
 class Channel:
@@ -111,12 +111,3 @@ class Channel:
         else:
             self._sent_at = time.monotonic()  # any message shows that it responds
             self.viewers.hear(self.seat, table)
-
-
-def _plain(value: Any) -> Any:
-    """Return data with null for numbers that JSON does not have."""
-    if isinstance(value, dict):
-        return {key: _plain(member) for key, member in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(member) for member in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
