@@ -71,6 +71,20 @@ def test_its_motors_move_it(arm, wavetank, tmp_path):
     assert sim.joints["lift"].position == pytest.approx(0.15, abs=0.01)
 
 
+def test_open_meshes_get_walls_of_a_thickness(arm):
+    trimesh = pytest.importorskip("trimesh")
+    box = trimesh.creation.box((1, 1, 1))
+    box.update_faces(box.face_normals[:, 2] < 0.5)
+    (arm.parent / "meshes").mkdir()
+    box.export(arm.parent / "meshes" / "block.stl")
+    mesh = "<mesh filename='package://arm/meshes/block.stl' scale='0.1 0.1 0.2'/>"
+    arm.write_text(ARM.replace('<sphere radius="0.06"/>', mesh))
+    cup = wt.load_urdf(arm, thickness=0.01).solids[-1].parts[-1]
+    assert isinstance(cup, wt.Mesh) and cup.thickness == 0.01
+    with pytest.raises(WavetankError, match="thickness = -1"):
+        wt.load_robot(arm, thickness=-1)
+
+
 def test_meshes_lie_beside_it(arm):
     mesh = "<mesh filename='package://arm/meshes/block.stl' scale='0.1 0.1 0.2'/>"
     arm.write_text(ARM.replace('<sphere radius="0.06"/>', mesh))

@@ -211,6 +211,7 @@ def test_every_number_of_a_scene_is_a_length_or_known_not_to_be():
         "axis",
         "duration",
         "acceleration",
+        "scale",
         "frequency",
         "phase",
         "tilt",

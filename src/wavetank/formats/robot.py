@@ -34,6 +34,22 @@ class Robot:
     joints: tuple[Joint, ...]
     notes: tuple[str, ...]
 
+    def with_walls(self, thickness: float) -> "Robot":
+        """Return this with walls of that thickness [m] for the faces of meshes that are not closed."""
+        from wavetank.formats.splishsplash_solids import is_closed
+
+        def walled(solid: Any) -> Any:
+            if hasattr(solid, "parts"):
+                return solid.model_copy(update={"parts": [walled(part) for part in solid.parts]})
+            is_open = isinstance(solid, Mesh) and not is_closed(solid.surface()[1])
+            if not is_open:
+                return solid
+            changed = solid.model_copy()
+            changed.thickness = thickness
+            return changed
+
+        return dataclasses.replace(self, solids=tuple(map(walled, self.solids)))
+
     def joined(self, scene: Any) -> Any:
         """Return a scene with this robot in it. Raises `WavetankError` where names are taken."""
         if scene.dim == 2:

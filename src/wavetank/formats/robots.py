@@ -16,13 +16,19 @@ from wavetank.foundation.rotations import product, unit_quaternion
 
 
 def load_robot(
-    path: str | Path, position: Any = (0.0, 0.0, 0.0), angle: float = 0.0, prefix: str = "", held: bool | None = None
+    path: str | Path,
+    position: Any = (0.0, 0.0, 0.0),
+    angle: float = 0.0,
+    prefix: str = "",
+    held: bool | None = None,
+    thickness: float | None = None,
 ) -> Robot:
     """Read a URDF file, or an MJCF file (`.xml`) of MuJoCo, as a robot as its file has it, its motors holding it there.
 
     Its origin is at `position` [m], shape [3], turned by `angle` [rad] about the upright axis; with `held` true or
     false its base is fixed to the ground or free, else it is as the file says, and that of a URDF file is fixed.
-    `prefix` comes before all names. Raises `WavetankError`.
+    `prefix` comes before all names. Meshes that are not closed get walls of that `thickness` [m]. Raises
+    `WavetankError`.
     """
     upright = unit_quaternion([math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0])
     place = np.array(position, float), product(upright, STANDING)
@@ -35,7 +41,8 @@ def load_robot(
                 f"{origin}: a URDF file has a robot at its top, an MJCF file mujoco; this one has <{root.tag[:60]}>."
             )
         try:
-            return readers[root.tag](root, Path(path), place, prefix, held)
+            robot = readers[root.tag](root, Path(path), place, prefix, held)
+            return robot if thickness is None else robot.with_walls(thickness)
         except RecursionError:
             raise WavetankError(f"{origin}: its elements are nested too deep.") from None
         except (WavetankError, LookupError, ValueError, TypeError, AttributeError, OverflowError, OSError) as error:
@@ -49,10 +56,15 @@ def is_mjcf(path: Path) -> bool:
 
 
 def load_urdf(
-    path: str | Path, position: Any = (0.0, 0.0, 0.0), angle: float = 0.0, prefix: str = "", held: bool = True
+    path: str | Path,
+    position: Any = (0.0, 0.0, 0.0),
+    angle: float = 0.0,
+    prefix: str = "",
+    held: bool = True,
+    thickness: float | None = None,
 ) -> Robot:
     """Read a robot as `load_robot` does; `held` is false for one that is not fixed to the ground."""
-    return load_robot(path, position, angle, prefix, held)
+    return load_robot(path, position, angle, prefix, held, thickness)
 
 
 load_mjcf = load_robot

@@ -34,6 +34,24 @@ def read_file(path: Path) -> Triangles:
     return Triangles.of(*_arrays(path), str(path))
 
 
+def bounds_in_file(path: str, folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners [2, 3] of the box around the faces of a file or a bundled model, in the file's own numbers.
+
+    Raises `ValueError` with one sentence for a file that cannot be read.
+    """
+    if path in bundled_models():
+        with importlib.resources.as_file(_models() / path.removeprefix(BUNDLED)) as model:
+            return bounds_of(*_arrays(model))
+    read_file(folder / path)  # says what is wrong with it
+    return bounds_of(*_arrays(folder / path))
+
+
+def bounds_of(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of the box around the vertices that faces use, [3] each."""
+    used = vertices[np.unique(faces)]
+    return used.min(axis=0), used.max(axis=0)
+
+
 def _arrays(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Vertices and faces of all that is in a file, where its scene puts them."""
     try:
