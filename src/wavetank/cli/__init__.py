@@ -4,6 +4,7 @@ import sys
 
 from wavetank import WavetankError
 from wavetank.cli.options import app
+from wavetank.foundation.input_limits import visible
 
 # isort: off
 from wavetank.cli import running, filming, playing, converting, experiments  # noqa: F401  (the order of --help)
@@ -18,7 +19,7 @@ def main() -> None:
             print("wavetank: stopped.", file=sys.stderr)
         raise
     except WavetankError as error:
-        print(f"wavetank: {' '.join(str(error).splitlines())}", file=sys.stderr)
+        print(f"wavetank: {visible(' '.join(str(error).splitlines()))}", file=sys.stderr)
         sys.exit(1)
     except (OSError, MemoryError) as error:
         place, reason = getattr(error, "filename", None), getattr(error, "strerror", None)

@@ -8,6 +8,7 @@ import typer
 
 from wavetank.cli.options import Json, Only, app, configured, console, names_in
 from wavetank.foundation.errors import WavetankError
+from wavetank.foundation.input_limits import visible
 from wavetank.foundation.json_text import json_text
 
 
@@ -71,7 +72,7 @@ def import_scene(
         return
     print(out)
     for note in notes:
-        print(f"  {note}")
+        print(f"  {visible(note)}")
 
 
 def _place(text: str) -> tuple[float, ...]:

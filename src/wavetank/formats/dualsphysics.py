@@ -17,7 +17,7 @@ from wavetank.formats.dualsphysics_motion import courses
 from wavetank.formats.dualsphysics_solids import OURS, Placed, placed_solids
 from wavetank.formats.imported import Imported
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.input_limits import explain_errors, one_line, parse_xml, printable, read_text
+from wavetank.foundation.input_limits import explain_errors, one_line, parse_xml, printable, read_text, why_unreadable
 from wavetank.foundation.materials import Material
 from wavetank.scene.filled import Filled
 from wavetank.scene.fluids import Ball, Block, Fluid
@@ -44,8 +44,7 @@ def load_dualsphysics(path: str | Path, spacing: float | None = None) -> Importe
         try:
             return _Reader(root, Path(path), spacing).read()
         except (WavetankError, *UNREADABLE) as error:
-            reason = str(error) if isinstance(error, WavetankError) else f"{type(error).__name__} {error}"
-            raise WavetankError(f"{origin}: the case cannot be read: {one_line(reason)}.".replace("..", ".")) from None
+            raise WavetankError(f"{origin}: the case cannot be read: {one_line(why_unreadable(error))}.") from None
 
 
 class _Reader:

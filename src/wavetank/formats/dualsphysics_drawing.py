@@ -176,7 +176,10 @@ class Drawing:
         elif tag in _SILENT or row.get("active", "true") in ("false", "0"):
             pass
         else:
-            self._draw(tag, row)
+            try:
+                self._draw(tag, row)
+            except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+                raise WavetankError(f"<{one_line(tag, 40)}> lacks points or numbers that it needs") from None
 
     def _load(self, is_matrix: bool) -> None:
         for k in range(len(self._kept) - 1, -1, -1):
@@ -223,7 +226,9 @@ class Drawing:
             self.notes.append(f"<{one_line(tag, 40)}> has no counterpart; it is left out.")
 
     def _add(self, shape: str, points: np.ndarray, **rest: Any) -> None:
-        self.items.append(Item(self.what, self.mk, shape, points, self.matrix.copy(), **rest))
+        item = Item(self.what, self.mk, shape, points, self.matrix.copy(), **rest)
+        item.corners()  # raises where points are missing
+        self.items.append(item)
 
     def _add_file(self, row: Element) -> None:
         name = row.get("file", "")
@@ -254,6 +259,8 @@ class Drawing:
         else:
             n = len(points)
             faces = _triangles([tuple(range(1, n))[::-1], *((0, k, k % (n - 1) + 1) for k in range(1, n))])
+        if not len(faces):
+            raise WavetankError(f"<{tag}> has no triangles; it needs more points.")
         self._add("mesh", points, faces=faces)
 
 

@@ -11,7 +11,7 @@ from wavetank.formats.mjcf import read_mjcf
 from wavetank.formats.robot import LARGEST, STANDING, Robot
 from wavetank.formats.urdf import read_urdf
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.input_limits import explain_errors, one_line, parse_xml, printable, read_text
+from wavetank.foundation.input_limits import explain_errors, one_line, parse_xml, printable, read_text, why_unreadable
 from wavetank.foundation.rotations import product, unit_quaternion
 
 
@@ -46,8 +46,7 @@ def load_robot(
         except RecursionError:
             raise WavetankError(f"{origin}: its elements are nested too deep.") from None
         except (WavetankError, LookupError, ValueError, TypeError, AttributeError, OverflowError, OSError) as error:
-            reason = f"{type(error).__name__} {error}" if not isinstance(error, WavetankError) else str(error)
-            raise WavetankError(f"{origin}: the robot cannot be read: {one_line(reason)}.") from None
+            raise WavetankError(f"{origin}: the robot cannot be read: {one_line(why_unreadable(error))}.") from None
 
 
 def is_mjcf(path: Path) -> bool:

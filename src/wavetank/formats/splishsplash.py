@@ -16,7 +16,7 @@ from wavetank.formats.bgeo import read_bgeo
 from wavetank.formats.imported import Imported
 from wavetank.formats.splishsplash_solids import Solids, arrays_of, turn_of
 from wavetank.foundation.errors import WavetankError
-from wavetank.foundation.input_limits import explain_errors, one_line, parse_json, printable, read_text
+from wavetank.foundation.input_limits import explain_errors, one_line, parse_json, printable, read_text, why_unreadable
 from wavetank.foundation.materials import Material
 from wavetank.foundation.params import PARAMETERS
 from wavetank.foundation.rotations import turned
@@ -57,9 +57,7 @@ def load_splishsplash(path: str | Path, spacing: float | None = None) -> Importe
         except UNREADABLE as error:
             if isinstance(error, WavetankError):
                 raise
-            raise WavetankError(
-                f"{origin}: the scene cannot be read: {one_line(f'{type(error).__name__} {error}')}."
-            ) from None
+            raise WavetankError(f"{origin}: the scene cannot be read: {one_line(why_unreadable(error))}.") from None
 
 
 class _Reader:

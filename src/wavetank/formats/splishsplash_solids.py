@@ -15,7 +15,7 @@ from wavetank.foundation.rotations import length_of, turned
 from wavetank.scene.tank import Tank
 from wavetank.solids.ground.polygon import Polygon
 from wavetank.solids.meshes.counted import check_file
-from wavetank.solids.meshes.files import SUFFIXES
+from wavetank.solids.meshes.files import ALONE, SUFFIXES
 from wavetank.solids.meshes.mesh import Mesh
 from wavetank.solids.shapes import Box, Sphere
 from wavetank.solids.solid import Solid
@@ -51,13 +51,13 @@ def arrays_of(path: Path) -> tuple[np.ndarray, np.ndarray]:
         raise WavetankError(f"{path}: meshes are read from {', '.join(SUFFIXES)} files; convert this one.")
     try:
         check_file(path)
-        loaded = trimesh.load(path, process=False, skip_materials=True, force="mesh")
+        loaded = trimesh.load(path, process=False, force="mesh", **ALONE)
         vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64)
     except Exception as error:  # a damaged file fails in as many ways as there are formats
         reason = (str(error) or type(error).__name__).splitlines()[0]
         raise WavetankError(f"{path}: this mesh cannot be read: {reason}.") from None
     if not len(faces):
-        return vertices, faces.reshape(-1, 3)
+        raise WavetankError(f"{path} has no faces; a solid needs a surface of triangles.")
     _, first, place = np.unique(np.round(vertices / CORNER), axis=0, return_index=True, return_inverse=True)
     return vertices[first], place.reshape(-1)[faces]
 

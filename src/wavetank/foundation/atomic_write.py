@@ -7,6 +7,7 @@ import itertools
 import os
 import re
 import socket
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,6 +26,10 @@ def partial_path(path: str | Path) -> Path:
         raise WavetankError(f"{str(path)!r} is not the name of a file.")
     if not target.parent.is_dir():
         raise WavetankError(f"{str(target)!r} cannot be written: there is no folder {str(target.parent)!r}.")
+    with contextlib.suppress(OSError):  # a file that is there is replaced, and nothing else
+        if not stat.S_ISREG(target.stat().st_mode):
+            kind = "a folder" if target.is_dir() else "a device or a pipe"
+            raise WavetankError(f"{str(target)!r} cannot be written: it is {kind}; name a file.")
     sweep(target.parent)
     # The process id tells later whether the writer still runs; the counter keeps writers of one process apart.
     return target.with_name(f".{target.name[:200]}.{_here()}-{os.getpid()}-{next(_numbers)}.partial")
@@ -95,7 +100,8 @@ def atomic_write(path: str | Path, *, lasting: bool = False, suffixed: bool = Fa
     except OSError as error:
         raise WavetankError(f"{str(path)!r} cannot be written: {error.strerror or error}.") from error
     finally:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            partial.unlink()
 
 
 def flush(path: Path) -> None:

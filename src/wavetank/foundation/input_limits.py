@@ -56,6 +56,22 @@ def printable(path: Any) -> str:
     return text if text.isprintable() and len(text) <= 300 else repr(text[:300])
 
 
+def visible(text: str) -> str:
+    """Return a text for a terminal, where a character that cannot be seen is written as its escape."""
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+
+
+def why_unreadable(error: Exception) -> str:
+    """Return in plain words why an importer could not go on: what a library raises is not for users."""
+    if isinstance(error, WavetankError):
+        return str(error)
+    if isinstance(error, KeyError):
+        return f"{one_line(error, 60)} is missing"
+    if isinstance(error, OSError):
+        return one_line(error.strerror or error)
+    return "a value is missing, or not of the kind that its place needs"
+
+
 @contextlib.contextmanager
 def explain_errors(origin: str, what: str) -> Iterator[None]:
     """Raise every error within as a `WavetankError` of one line, which begins with `origin` and says `what` is read."""

@@ -43,9 +43,10 @@ class RunOptions:
             raise WavetankError(f"--fps = {self.fps} is not allowed; it must be a number from 1 to 240.")
         if self.gif and self.fps > LARGEST_RATE:
             raise WavetankError(f"--fps = {self.fps} is too fast for --gif; at most {LARGEST_RATE:g}.")
-        if not self.name or Path(self.name).name != self.name:
+        if not self.name or Path(self.name).name != self.name or not self.name.isprintable():
             raise WavetankError(
-                f"--name = {self.name!r} is not allowed; it is the prefix of file names; --out is the folder."
+                f"--name = {self.name!r} is not allowed; it is the prefix of file names, of printable characters; "
+                "--out is the folder."
             )
         if not (self.checkpoint_every == 0.0 or 1e-3 <= self.checkpoint_every <= 86400.0):
             raise WavetankError(

@@ -11,13 +11,14 @@ from typing import Any
 
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import one_line, open_regular, parse_json
-from wavetank.foundation.memory import in_words
+from wavetank.foundation.memory import check_free, in_words
 
 MOST_FACES = 3_000_000  # before duplicates are dropped
 MOST_NUMBERS = 40_000_000  # in all accessors
 MOST_PLACED = 2_000  # meshes in a scene, with repetitions
 DEEPEST = 64  # nodes within nodes
 LARGEST_FILE = 500_000_000  # bytes
+TIMES = 8  # memory that reading takes, over the size of a file of text
 
 
 def check_file(path: Path) -> None:
@@ -25,6 +26,11 @@ def check_file(path: Path) -> None:
     try:
         with open_regular(path, LARGEST_FILE, "mesh file") as file:
             kind = path.suffix.lower()
+            size = file.seek(0, 2)
+            check_free(TIMES * size, f"{path}: reading it")
+            file.seek(0)
+            _check_mark(kind, file.read(1024), size)
+            file.seek(0)
             faces, why = _CHECKS[kind](file) if kind in _CHECKS else (0, "")
     except WavetankError as error:
         raise ValueError(f"{error} Simplify the mesh.") from None
@@ -35,6 +41,14 @@ def check_file(path: Path) -> None:
             f"{path} has {faces:,} triangles{why}; at most {MOST_FACES:,} are read: simplify it, details below half a "
             "spacing are lost anyway."
         )
+
+
+def _check_mark(kind: str, head: bytes, size: int) -> None:
+    """Raise `ValueError` where a file does not begin as its kind does, before all of it is read as text."""
+    is_binary = kind == ".stl" and size == 84 + 50 * int.from_bytes(head[80:84], "little")
+    marks = {".ply": head.startswith(b"ply"), ".glb": head.startswith(b"glTF"), ".stl": is_binary or b"solid" in head}
+    if not marks.get(kind, True) or (kind in (".stl", ".obj") and not is_binary and b"\0" in head):
+        raise ValueError(f"it does not begin as a {kind} file does")
 
 
 def _stl(file: Any) -> tuple[int, str]:

@@ -10,6 +10,8 @@ from wavetank.solids.meshes.counted import check_file
 from wavetank.solids.meshes.triangles import Triangles
 
 SUFFIXES = (".obj", ".stl", ".ply", ".glb")
+#: how trimesh reads a file, and none that it names
+ALONE: dict[str, Any] = {"skip_materials": True, "resolver": {}}
 BUNDLED = "wavetank/"  # how the names of bundled models begin
 
 
@@ -58,9 +60,8 @@ def _arrays(path: Path) -> tuple[np.ndarray, np.ndarray]:
         import trimesh
     except ModuleNotFoundError:
         raise ValueError(f"{path}: mesh files are read by trimesh; install it: pip install trimesh.") from None
-    options: dict[str, Any] = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
     try:
-        scene = trimesh.load_scene(path, process=False, **options)
+        scene = trimesh.load_scene(path, process=False, **ALONE)
         parts = [part for part in scene.dump() if hasattr(part, "faces")]
     except Exception as error:  # a damaged file fails in as many ways as there are formats
         reason = (str(error) or type(error).__name__).splitlines()[0]
