@@ -4,6 +4,8 @@ import io
 import json
 import os
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -159,3 +161,16 @@ def test_the_bar_and_the_doctor_fit_a_screen(wavetank, monkeypatch):
     assert len(lines) == 1
     monkeypatch.setenv("COLUMNS", "100")
     assert len(wavetank("doctor").stdout.splitlines()) <= 40
+
+
+@pytest.mark.skipif(os.name == "nt", reason="names of files are text there")
+def test_names_of_files_need_not_be_utf8(tmp_path):
+    """As in a folder of a disk from another system."""
+    scene = tmp_path / os.fsdecode(b"caf\xe9.toml")
+    scene.write_text("spacing=0.1\n[tank]\nsize=[1,1]\n[[fluids]]\nlower=[0,0]\nupper=[0.4,0.4]\n")
+    for command in (["run", scene, "--seconds", "0", "--export", "npz"], ["run", scene, "--seconds", "0", "--json"]):
+        out = tmp_path / os.fsdecode(b"o\xe9")
+        arguments = [sys.executable, "-m", "wavetank", *map(str, command), "--size", "32x32", "--out", str(out)]
+        done = subprocess.run(arguments, capture_output=True, timeout=200, env={**os.environ, "PYTHONUTF8": "1"})
+        assert done.returncode == 0, done.stderr[-600:]
+        assert (out / "stats.json").is_file()

@@ -1,5 +1,6 @@
 """The command `wavetank`: thin, every command calls one room. A file here registers its commands by being imported."""
 
+import io
 import sys
 
 from wavetank import WavetankError
@@ -12,6 +13,9 @@ from wavetank.cli import running, filming, playing, converting, experiments  # n
 
 def main() -> None:
     """Run the command line; a mistake is one line on stderr and exit code 1, Ctrl-C exit code 130."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="surrogateescape")  # names of files need not be UTF-8
     try:
         app(standalone_mode=True)
     except SystemExit as end:

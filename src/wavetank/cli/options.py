@@ -63,6 +63,11 @@ AllowLarge = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object as the last line.")]
 
 
+def as_text(name: str) -> str:
+    """Return the name of a file as text: bytes of it that are no UTF-8 become question marks."""
+    return name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+
+
 def say(text: str) -> None:
     """Print a sentence on stderr, in one line however long it is."""
     console.print(text, markup=False, highlight=False, soft_wrap=True)

@@ -24,6 +24,7 @@ from wavetank.cli.options import (
     Sun,
     View,
     app,
+    as_text,
     changes_in,
     configured,
     console,
@@ -127,7 +128,7 @@ def run(
     from wavetank.run.starting import start_world
     from wavetank.simulation.cost import large_worlds_allowed
 
-    changes, name = changes_in(settings), name or Path(scene).stem
+    changes, name = changes_in(settings), as_text(name or Path(scene).stem)
     order = RunOptions(
         out or Path("out", name),
         seconds,

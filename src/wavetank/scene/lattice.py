@@ -5,6 +5,8 @@ a metre at d = 2.4 cm began at 0.45 m/s. Rows therefore fill the distance betwee
 block, or around a periodic world. Along the other axes their distance is changed such that particles keep their volume.
 """
 
+import itertools
+
 import numpy as np
 
 UNLIKE = 0.1  # of a spacing: by how much rows may lie closer or farther apart than that
@@ -36,6 +38,27 @@ def touching(lower: np.ndarray, upper: np.ndarray, low: np.ndarray, high: np.nda
     overlaps = np.minimum(upper, high) - np.maximum(lower, low) > NEAR * spacing
     beside = np.stack([np.delete(overlaps, axis, axis=1).all(axis=1) for axis in range(len(lower))], axis=1)
     return np.any(beside & (np.abs([lower - high, upper - low]) < NEAR * spacing), axis=1)
+
+
+def covered(x: np.ndarray, places: np.ndarray, spacing: float) -> np.ndarray:
+    """Say which of the points `x` [n, dim] [m] lie in a cube of edge `spacing` around one of `places` [m, dim]."""
+    result = np.zeros(len(x), bool)
+    if not len(x) or not len(places):
+        return result
+    cells, own = (np.floor(points / spacing).astype(np.int64) for points in (places, x))
+    low = np.minimum(cells.min(axis=0), own.min(axis=0)) - 1
+    span = np.maximum(cells.max(axis=0), own.max(axis=0)) - low + 2
+    strides = np.cumprod([1, *span[:-1]])
+    keys = (cells - low) @ strides
+    order = np.argsort(keys, kind="stable")
+    for shift in itertools.product((-1, 0, 1), repeat=x.shape[1]):
+        wanted = (own + shift - low) @ strides
+        begin, end = (np.searchsorted(keys[order], wanted, side) for side in ("left", "right"))
+        while (some := begin < end).any():  # one place of each cell after the other
+            way = np.abs(places[order[begin[some]]] - x[some]).max(axis=1)
+            result[some] |= way < 0.5 * spacing * (1.0 - 1e-6)
+            begin = begin + 1
+    return result
 
 
 def fitted(lower: np.ndarray, upper: np.ndarray, spacing: float, held: np.ndarray, rings: list[int]) -> np.ndarray:

@@ -29,6 +29,7 @@ from wavetank.scene.fluids import Earlier, Points, boxes_of
 from wavetank.scene.forces import AnyForce
 from wavetank.scene.goal import Goal
 from wavetank.scene.joints import AnyJoint, check_joints
+from wavetank.scene.lattice import covered
 from wavetank.scene.light import Light
 from wavetank.scene.schedule import Timetable
 from wavetank.scene.summary import summary
@@ -244,6 +245,7 @@ class Scene(Timetable, Parameters):
         numbers = {None: 0} | {material.name: k for k, material in enumerate(self.materials, 1)}
         boxes, earlier = boxes_of(self.fluids, self.solids, self.dim), Earlier(self.dim)
         positions, velocities = [np.empty((0, self.dim))], [np.empty((0, self.dim))]
+        points: list[np.ndarray] = []  # of those that are given one by one
         kinds, placed = [np.empty(0, np.int32)], [np.empty(0, bool)]
         for fluid in self.fluids:
             x = fluid.placed(self.spacing, self.tank, boxes)
@@ -251,9 +253,13 @@ class Scene(Timetable, Parameters):
             v = np.zeros_like(x) if fluid.velocity is None else np.tile(np.array(fluid.velocity, float), (len(x), 1))
             if isinstance(fluid, Points):
                 v = v if fluid.velocities is None else fluid.velocities.reshape(x.shape)
+            free = ~earlier.contain(x)
+            for other in points if not isinstance(fluid, Points) else []:
+                free &= ~covered(x, other, self.spacing)
+            x, v = x[free], v[free]
+            if isinstance(fluid, Points):
+                points.append(x)
             else:
-                free = ~earlier.contain(x)
-                x, v = x[free], v[free]
                 earlier.append(fluid)
             positions.append(x)
             velocities.append(v)

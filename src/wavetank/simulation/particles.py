@@ -28,6 +28,7 @@ from wavetank.simulation.solids import Solids
 from wavetank.simulation.state import VISCOUS, Counters, State
 from wavetank.solids.distance import SolidSet
 
+HASH = np.array([1_000_003, 8_191_000_111, 67_280_421_310_721])  # odd factors of the bits of coordinates
 CROWD = 100  # particles within a cube of one spacing, at most
 
 
@@ -88,6 +89,7 @@ class ParticleSystem:
         x = self.scene.tank.within(x) if self.scene.tank else x
         check_crowd("positions", x, self.scene.spacing)
         check_inside(self.scene, x)
+        x = parted(x, x[:0], self.scene.spacing)
         if not np.array_equal(x, by_id(self.world.particles, self.count, "x")):
             population.clear_forces(self.world.particles, self.count)  # the pressure there was is that of other places
             put_by_id(self.world.particles, self.count, "x", x)
@@ -288,6 +290,29 @@ def check_inside(scene: Scene, x: np.ndarray) -> None:
             f"positions[{row}] = {x[row].tolist()} is outside of the tank, as are {int(far.sum()) - 1:,} others; it "
             f"must lie between {lower.tolist()} and {upper.tolist()}."
         )
+
+
+def parted(x: np.ndarray, others: np.ndarray, spacing: float) -> np.ndarray:
+    """Return positions `x` [n, dim] [m], moved by 0.01 spacings where they equal another one of them or of `others`.
+
+    Particles in exactly one place have no direction to part in.
+    """
+    if not len(x):
+        return x
+    near = others[((others >= x.min(axis=0)) & (others <= x.max(axis=0))).all(axis=1)]
+    both = np.concatenate([near, x]).astype(np.float32) + np.float32(0.0)  # no -0.0
+    hashes = np.sort(both.view(np.int32).astype(np.int64) @ HASH[: x.shape[1]])
+    if (hashes[1:] != hashes[:-1]).all():  # far cheaper than to sort rows
+        return x
+    _, first, place = np.unique(both, axis=0, return_index=True, return_inverse=True)
+    again = np.flatnonzero(first[place.reshape(-1)] != np.arange(len(both)))
+    again = again[again >= len(near)] - len(near)
+    if not len(again):
+        return x
+    result, angle = x.copy(), 2.4 * np.arange(1, len(again) + 1)  # the golden angle: no two directions are near
+    result[again, 0] += 0.01 * spacing * np.cos(angle).astype(np.float32)
+    result[again, 1] += 0.01 * spacing * np.sin(angle).astype(np.float32)
+    return result
 
 
 def check_rows(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:

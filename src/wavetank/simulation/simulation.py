@@ -40,7 +40,7 @@ from wavetank.simulation.instant import PlacedSolid
 from wavetank.simulation.joints import Joints
 from wavetank.simulation.packing import pack
 from wavetank.simulation.parameters import LiveParameters
-from wavetank.simulation.particles import ParticleSystem, check_inside, check_newcomers
+from wavetank.simulation.particles import ParticleSystem, by_id, check_inside, check_newcomers, parted
 from wavetank.simulation.solids import Solids, restored_solids, solids_of
 from wavetank.simulation.sources import Sources, check_places
 from wavetank.simulation.state import Continuation, Counters, State
@@ -482,6 +482,8 @@ class Simulation(KnownAttributes):
             check_cost(self.scene, self.count + rows)
         new = check_newcomers(self.scene, positions, velocities, dyes, materials, self.particles.default_kind)
         check_inside(self.scene, new.x)
+        there = by_id(self.world.particles, self.count, "x")
+        new = dataclasses.replace(new, x=parted(new.x, there, self.scene.spacing))
         return self.particles.add(new)
 
     def remove(self, ids: Any) -> int:
