@@ -100,7 +100,10 @@ def tables_of(draw: Any, content: bytes) -> bytes:
         file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
         name = draw(st.sampled_from([*names, "attribute"]))
         value = draw(st.sampled_from([0, 1, -1, 7, 10**6, 2**31, 2**62, np.nan, np.inf]))
-        if name == "attribute":
+        what = draw(st.sampled_from(["value"] * 4 + ["external", "virtual", "link", "zeros"]))
+        if what != "value" and name != "attribute":
+            _elsewhere(file, name, what)
+        elif name == "attribute":
             file.attrs[draw(st.sampled_from(sorted(file.attrs)))] = draw(st.sampled_from([value, "x", [1, 2]]))
         elif draw(st.integers(0, 2)) or file[name].shape == ():
             del file[name]
@@ -114,6 +117,23 @@ def tables_of(draw: Any, content: bytes) -> bytes:
                 value = int(np.clip(np.nan_to_num(value), limits.min, limits.max))
             file[name][draw(st.integers(0, len(file[name]) - 1))] = value
     return whole.getvalue()
+
+
+def _elsewhere(file: Any, name: str, what: str) -> None:
+    """Put the data of a table into another file, or make it stand for far more than the file holds."""
+    h5py = __import__("h5py")
+    shape, kind = file[name].shape or (10,), file[name].dtype
+    del file[name]
+    if what == "external":
+        file.create_dataset(name, shape=shape, dtype=kind, external=[("/etc/passwd", 0, h5py.h5f.UNLIMITED)])
+    elif what == "virtual":
+        layout = h5py.VirtualLayout(shape=shape, dtype=kind)
+        layout[...] = h5py.VirtualSource("/etc/passwd", "x", shape=shape)
+        file.create_virtual_dataset(name, layout)
+    elif what == "link":
+        file[name] = h5py.ExternalLink("/etc/passwd", "/x")
+    else:
+        file.create_dataset(name, shape=(2**32, *shape[1:]), dtype=kind, chunks=(2**16, *shape[1:]), compression="gzip")
 
 
 def try_checkpoint(files: Files) -> None:
@@ -159,6 +179,7 @@ ROBOT = """<?xml version="1.0"?>
 </robot>"""
 NUMBERS = (
     "0",
+    "1e12",
     "-1",
     "1e308",
     "nan",
@@ -385,10 +406,30 @@ def try_particles(content: bytes) -> None:
     assert rows is None or (rows.shape[1:] == (3,) and not np.isnan(rows).any())
 
 
+@st.composite
+def inclusions(draw: Any) -> Files:
+    """Models of MuJoCo that include each other, and themselves, again and again."""
+    number = draw(st.integers(1, 12))
+    files = {}
+    for k in range(number):
+        rows = "".join(
+            f'<include file="{other}.xml"/>' for other in draw(st.lists(st.integers(0, number), max_size=12))
+        )
+        geom = f'<worldbody><body name="b{k}"><geom size="0.1"/></body></worldbody>'
+        files[f"{k}.xml"] = f"<mujoco>{rows}{geom}</mujoco>".encode()
+    return files
+
+
+def try_inclusions(files: Files) -> None:
+    folder = fresh("inclusions", files)
+    taken_or_refused(lambda: wt.load_robot(folder / "0.xml"))
+
+
 FILES: dict[str, tuple[st.SearchStrategy[Any], Any]] = {
     "checkpoint": (runs(), try_checkpoint),
     "run": (runs(), try_run),
     "robot": (robots(), try_robot),
+    "inclusion": (inclusions(), try_inclusions),
     "other": (others(), try_other),
     "case": (cases(), try_case),
     "particles": (particles, try_particles),

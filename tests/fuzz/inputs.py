@@ -79,6 +79,18 @@ scenes = st.one_of(
 )
 
 
+@st.composite
+def repetitions(draw: Any) -> str:
+    """Scenes whose fluids or solids are there many times."""
+    table = dict(draw(st.deferred(lambda: st.sampled_from(good_scenes()))))
+    what = draw(st.sampled_from([key for key in ("fluids", "solids") if table.get(key)]))
+    rows = [{**row} for row in table[what]]
+    for row in rows:
+        row.pop("name", None)
+    table[what] = (rows * 400)[: draw(st.sampled_from([2, 50, 400]))]
+    return toml_of(table)
+
+
 def try_scene(text: str) -> None:
     scene = taken_or_refused(lambda: wt.Scene.from_text(text, "scene", files=False))
     if scene is not None:
@@ -159,7 +171,16 @@ def try_state(content: bytes) -> None:
 
         def on() -> None:
             sim.step()
-            sim.step()
+            sim.save(path)  # and from there as from here, also with particles that came since
+            other = wt.Simulation.restore(path)
+            assert other.digest() == sim.digest()
+            middle = (
+                0.5 * np.ones((1, sim.scene.dim)) if sim.scene.tank is None else np.mean(sim.scene.tank.box(), axis=0)
+            )
+            for one in (sim, other):
+                one.add(np.reshape(middle, (1, -1)))
+                one.step()
+            assert other.digest() == sim.digest()
             assert np.isfinite(sim.positions).all() and np.isfinite(sim.velocities).all()
 
         taken_or_refused(on)
@@ -210,6 +231,21 @@ def try_message(text: str) -> None:
     goes(session, 1)
     if session.sim.count > MOST or len(session.sim.scene.solids) > 40 or len(session.log) > 200:
         _sessions.clear()
+
+
+def try_watching(text: str) -> None:
+    """Whoever watches changes nothing, but may take control."""
+    heard: list[Any] = []
+    viewers = Viewers(lambda command, tell: heard.append(command) or True, lambda u, v, tool: {}, dict)
+    from wavetank.page.viewers import Viewer
+
+    viewers.driver = driver = Viewer(None)
+    watcher = Viewer(None)
+    viewers.all += [driver, watcher]
+    viewers.drop_mesh = viewers.aim = lambda *given: heard.append(given)
+    taken_or_refused(lambda: viewers.hear(watcher, _table({"text": text})))
+    assert not heard and viewers.detail == "auto" and driver.size == (960, 540)
+    assert len(watcher.outbox) < 30
 
 
 def _is_sentence(note: str) -> bool:
@@ -281,7 +317,20 @@ def good_meshes() -> list[tuple[str, bytes]]:
 @st.composite
 def meshes(draw: Any) -> tuple[str, bytes]:
     kind, content = draw(st.deferred(lambda: st.sampled_from(good_meshes())))
+    if not draw(st.integers(0, 4)):
+        content = draw(st.sampled_from(HEADERS_ALONE))
     return kind.partition("_")[0], draw(torn(st.just(content)))
+
+
+#: files that say that much follows, and that begin as another kind
+HEADERS_ALONE = [
+    b"ply\nformat binary_little_endian 1.0\nelement vertex 1000000000\nproperty float x\nelement face 3\n"
+    b"property list uint int vertex_indices\nend_header\n",
+    b"ply\nformat ascii 1.0\ncomment TextureFile /etc/passwd\nelement vertex 0\nend_header\n",
+    bytes(80) + b"\xff\xff\xff\x7f",
+    b"glTF\x02\0\0\0\xff\xff\xff\x7f\xff\xff\xff\x7fJSON{}",
+    bytes(1 << 20),
+]
 
 
 def try_mesh(given: tuple[str, bytes]) -> None:
@@ -298,8 +347,10 @@ def try_mesh(given: tuple[str, bytes]) -> None:
 
 INPUTS: dict[str, tuple[st.SearchStrategy[Any], Any]] = {
     "scene": (scenes, try_scene),
+    "repetition": (repetitions(), try_scene),
     "state": (states(), try_state),
     "message": (messages, try_message),
+    "watcher": (messages, try_watching),
     "recording": (recordings, try_recording),
     "mesh": (meshes(), try_mesh),
     **FILES,

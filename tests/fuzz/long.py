@@ -25,6 +25,9 @@ from pathlib import Path
 HERE = Path(__file__).parent
 FOUND = HERE / "found"
 SHARES = {
+    "repetition": 0.02,
+    "watcher": 0.05,
+    "inclusion": 0.02,
     "scene": 0.25,
     "state": 0.15,
     "message": 0.25,

@@ -10,13 +10,16 @@ from inputs import INPUTS
 
 SHARES = {
     "scene": 40,
+    "repetition": 6,
     "state": 25,
     "message": 80,
+    "watcher": 80,
     "recording": 25,
     "mesh": 25,
     "checkpoint": 20,
     "run": 30,
     "robot": 30,
+    "inclusion": 30,
     "other": 30,
     "case": 30,
     "particles": 30,
