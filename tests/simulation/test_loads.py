@@ -205,3 +205,33 @@ def test_joints_without_an_axis_have_no_effort():
     sim.step()
     with pytest.raises(wt.WavetankError, match="'line' is a ball-joint"):
         _ = sim.joints["line"].effort
+
+
+@pytest.mark.parametrize(
+    ("spacing", "thickness", "offset"), [(0.02, 3, 0.0), (0.02, 3, 0.25), (0.02, 5, 0.5), (0.01, 4, 0.0)]
+)
+@pytest.mark.parametrize("height", [0.3, 0.5])
+def test_water_on_one_side_presses_on_a_gate_as_hydrostatics_says(spacing, thickness, offset, height):
+    """rho g H^2 / 2 at a third of the depth. What was carried on of it was bounded by what the plate displaces."""
+    left = 0.6 + offset * spacing
+    plate = wt.Box(
+        name="gate",
+        center=(left + 0.5 * thickness * spacing, 0.4),
+        size=(thickness * spacing, 0.8),
+        density=1000,
+        held=True,
+    )
+    water = wt.Block(lower=(0, 0), upper=(left, height))
+    sim = wt.Simulation(
+        wt.Scene(spacing=spacing, tank=wt.Tank(size=(1.0, 0.9)), foam=0, solids=[plate], fluids=[water])
+    )
+    rows = []
+    for frame in range(40):
+        sim.step()
+        if frame >= 20:
+            gate = sim.bodies["gate"]
+            rows.append((gate.force[0], gate.torque[-1]))
+    force, torque = np.mean(rows, axis=0)
+    wanted = 0.5 * 1000 * 9.81 * height**2
+    assert force == pytest.approx(wanted, rel=0.04)
+    assert torque == pytest.approx(wanted * (0.4 - height / 3), rel=0.06)

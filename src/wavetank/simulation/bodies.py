@@ -29,7 +29,7 @@ from wavetank.scene.forces import Force
 from wavetank.scene.scene import Scene
 from wavetank.simulation.body import Body
 from wavetank.simulation.body_forces import BodyForces
-from wavetank.simulation.coupling import DENSITY, Coupling, norms
+from wavetank.simulation.coupling import DENSITY, Coupling, limited_lift
 from wavetank.simulation.engine import import_engine, isometry, keep_in_plane, poses_of, shapes_of, velocities_of
 from wavetank.simulation.joints import Joints, joint_reaction, put_joints
 from wavetank.simulation.mass_properties import AFLOAT, grip, mass_properties
@@ -315,9 +315,7 @@ class Bodies(Mapping[str, Body]):
         coupling.displaced = np.minimum(1.0, rows[:, DISPLACING] * particle / (wet * cell))
         keeps = (warm_start_share(dt, self._scene.frame_time) * coupling.warm_start_share)[:, None]
         force = keeps * coupling.warm_started_force + rows[:, OF_GRID : OF_GRID + 6] * scale / dt
-        most = THRESHOLDS.largest_warm_start * float(np.linalg.norm(self._gravity)) * wet
-        share = np.minimum(1.0, most / np.maximum(norms(force[:, :3]), 1e-30))
-        coupling.grid_force = force * share[:, None]
+        coupling.grid_force = limited_lift(force, self._gravity, THRESHOLDS.largest_warm_start * wet)
         coupling.impulse = rows[:, :6] * scale + force * dt
         if world.remembers_viscosity:
             each, spread = hold_on_bodies(blend(world.materials, self._scene), self._scene, dt)

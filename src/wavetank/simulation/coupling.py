@@ -90,6 +90,24 @@ def density_in(arrays: dict[str, np.ndarray]) -> float:
     return density if 0.0 < density < 1e6 else 0.0
 
 
+def limited_lift(force: np.ndarray, gravity: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    """Return forces [n, 6] [N, N m] that lift bodies by no more than the weight of a `mass` [n] [kg]; none without it.
+
+    Water that closes around a body lifts it by the weight of what it displaces. Sideways and downwards it may press on
+    one side alone, as on a gate or a plug, with any force.
+    """
+    strength = float(np.linalg.norm(gravity))
+    if not strength:
+        return np.zeros_like(force)
+    up = -gravity / strength
+    lift = force[:, :3] @ up
+    share = np.minimum(1.0, mass * strength / np.maximum(lift, 1e-30))
+    result: np.ndarray = force.copy()
+    result[:, :3] -= np.outer((1.0 - share) * lift, up)
+    result[:, 3:] *= share[:, None]
+    return result
+
+
 def norms(rows: np.ndarray) -> np.ndarray:
     """Return the norms of vectors [n, 3], three times as fast as `numpy.linalg.norm`."""
     root: np.ndarray = np.sqrt((rows * rows).sum(axis=1))
