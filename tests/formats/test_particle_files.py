@@ -123,6 +123,8 @@ class Unreadable:
     def __array__(self, *args, **kwargs):
         raise RuntimeError("the device is lost")
 
+    view = __array__
+
 
 @pytest.mark.parametrize("suffix", suffixes("particles"))
 def test_a_broken_write_leaves_the_old_file(tmp_path, frame, suffix):

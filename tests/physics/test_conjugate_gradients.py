@@ -171,5 +171,5 @@ def test_particles_that_go_take_their_pull_along():
     assert download(sim.world.particles.viscous)[: sim.count].any()
     sim.remove(np.arange(10))
     assert not download(sim.world.particles.viscous)[: sim.count].any()
-    sim.add(np.full((10, 2), 0.15))
+    sim.add(np.full((10, 2), (0.04, 0.15)))
     assert not download(sim.world.particles.viscous)[: sim.count].any()

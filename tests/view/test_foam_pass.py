@@ -20,7 +20,7 @@ def with_foam(frame, positions, kind=2, age=0.2):
     for array, value in ((diffuse.kind, kind), (diffuse.age, age), (diffuse.life, 1.0)):
         upload(array, np.full(len(x) + 3, value))
     upload(diffuse.id, np.arange(len(x)))
-    frame.diffuse, frame.foam_count = diffuse, len(x)
+    vars(frame).update(diffuse=diffuse, foam_count=len(x))
     return frame
 
 

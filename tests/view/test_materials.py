@@ -136,7 +136,7 @@ def test_dye_in_a_plane_reaches_the_walls():
     """A wall takes as much of the dye's discs as of the water's: the colour is the same in the middle and beside it."""
     frame = filled([], lambda x: np.zeros(len(x), int), dim=2)
     dye = np.full(frame.count, (127 << 24) | (220 << 16) | (40 << 8) | 40)
-    frame.dye = device(dye, frame.dye.dtype, frame.count + 3)
+    vars(frame).update(dye=device(dye, frame.dye.dtype, frame.count + 3))
     camera = Camera(eye=(0.5, 0.5, 1.0), target=(0.5, 0.5, 0.0), height=1.2)
     image = picture(frame, camera)
     middle, beside = (at(image, camera, x, 0.3, 0.0, half=1).mean(axis=0) for x in (0.5, 0.03))

@@ -51,6 +51,9 @@ def arrays_of(path: Path) -> tuple[np.ndarray, np.ndarray]:
         raise WavetankError(f"{path}: meshes are read from {', '.join(SUFFIXES)} files; convert this one.")
     try:
         check_file(path)
+    except ValueError as error:
+        raise WavetankError(str(error)) from None
+    try:
         loaded = trimesh.load(path, process=False, force="mesh", **ALONE)
         vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64)
     except Exception as error:  # a damaged file fails in as many ways as there are formats

@@ -69,6 +69,9 @@ def why_unreadable(error: Exception) -> str:
         return f"{one_line(error, 60)} is missing"
     if isinstance(error, OSError):
         return one_line(error.strerror or error)
+    value = re.search(r": ('.*')$", one_line(error)) if isinstance(error, ValueError) else None
+    if value:
+        return f"{value[1]} is not of the kind that its place needs"
     return "a value is missing, or not of the kind that its place needs"
 
 

@@ -1,9 +1,10 @@
 """Bounds of a frame: the number of its time steps and the largest speed of water, by solids, forces and jets.
 
-The largest speed is there for single particles that a position-based step throws. What a flow can reach has no such
-bound: a piston drives water through a neck as fast as continuity asks for, and a force that lasts along a periodic axis
-as fast as friction allows. A flow moves whole neighbourhoods one way. So where more particles than there are in the
-support of a kernel are as fast as the limit, and go the same way, it is lifted for all that follows.
+The largest speed is there for single particles that a position-based step throws. Gravity gives none more than its
+energy, but what solids and forces drive has no such bound: a piston drives water through a neck as fast as continuity
+asks for, and a force that lasts along a periodic axis as fast as friction allows. A flow moves whole neighbourhoods one
+way. So where more particles than there are in the support of a kernel are as fast as the limit, and go the same way, it
+is lifted for all that follows.
 """
 
 import math
@@ -88,7 +89,8 @@ def _limit(world: World, scene: Scene, counters: Counters) -> float:
 def _lift_for_flow(world: World, scene: Scene, counters: Counters, fastest: float) -> None:
     """Lift the speed limit where particles as fast as it, `fastest` [m/s], are a flow."""
     limit = LIMITED * _limit(world, scene, counters)
-    if fastest < limit or scene.speed_limit < 1.0:  # below 1 it is asked for
+    driven = counters.fastest_solid + counters.fastest_force > 0.0
+    if fastest < limit or not driven or scene.speed_limit < 1.0:  # below 1 it is asked for
         return
     v = download(world.particles.v)[: world.count].astype(float)
     speed = np.linalg.norm(v, axis=1)

@@ -45,7 +45,12 @@ def check_file(path: Path) -> None:
 
 def _check_mark(kind: str, head: bytes, size: int) -> None:
     """Raise `ValueError` where a file does not begin as its kind does, before all of it is read as text."""
-    is_binary = kind == ".stl" and size == 84 + 50 * int.from_bytes(head[80:84], "little")
+    claimed = int.from_bytes(head[80:84], "little")
+    is_binary = kind == ".stl" and size == 84 + 50 * claimed
+    if kind == ".stl" and not is_binary and b"solid" not in head:
+        raise ValueError(
+            f"it does not begin as a .stl file does; {size:,} bytes are not those of {claimed:,} triangles"
+        )
     marks = {".ply": head.startswith(b"ply"), ".glb": head.startswith(b"glTF"), ".stl": is_binary or b"solid" in head}
     if not marks.get(kind, True) or (kind in (".stl", ".obj") and not is_binary and b"\0" in head):
         raise ValueError(f"it does not begin as a {kind} file does")
