@@ -188,6 +188,8 @@ def _in_own_coordinates(values: dict[str, Any], bounds: Callable[[], Any]) -> di
         raise ValueError("size and scale, or units, exclude each other: both say how large the mesh is.")
     if units is not None and units not in METRES_IN:
         raise ValueError(f"units = {units!r} is not allowed; it must be one of {', '.join(METRES_IN)}.")
+    if isinstance(scale, bool):
+        raise ValueError(f"scale = {scale} is not allowed; it must be a number.")
     factor = finite("scale", 1.0 if scale is None else scale, 0.0) * METRES_IN[units or "m"]
     lower, upper = (factor * np.asarray(corner, float) for corner in bounds())
     size = float((upper - lower).max())
