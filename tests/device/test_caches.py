@@ -85,6 +85,7 @@ tempfile.TemporaryFile = refused
         subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, env=os.environ | more, timeout=600)
         for text, more in ((RUN, {}), (code, places))
     ]
-    assert runs[1].returncode == 0 and runs[1].stderr == "", runs[1].stderr[-2000:]
+    told = [line for line in runs[1].stderr.splitlines() if "preparing kernels" not in line]  # where that takes long
+    assert runs[1].returncode == 0 and not told, runs[1].stderr[-2000:]
     assert runs[0].stdout == runs[1].stdout
     assert not [*(tmp_path / "temporary").glob("wavetank-kernels-*")]
