@@ -19,10 +19,9 @@ Packing particles by their own density errors: Colagrossi et al. 2012, "Particle
 import dataclasses
 import itertools
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-from typing_extensions import override
 
 from wavetank.device.compiler import upload
 from wavetank.foundation.errors import WavetankError
@@ -32,8 +31,8 @@ from wavetank.scene.fluids import Ball, Block, Fluid, Points
 from wavetank.scene.lattice import plain_lattice
 from wavetank.scene.scene import Scene
 from wavetank.solids.sampling import nearest_distances
-from wavetank.solids.shapes import Box, Difference, Sphere
-from wavetank.solids.solid import ENDLESS, Node, Solid
+from wavetank.solids.shapes import Box, Difference, Sphere, moved, still
+from wavetank.solids.solid import ENDLESS, Solid
 
 STEPS, MOST_STEPS = 30, 120  # frames of packing, at most
 EVEN = 0.004  # mean of the positive density errors at which packing ends
@@ -42,51 +41,6 @@ MOST_POINTS = 40_000_000
 DEEP = 0.3  # d: places for particles are where the shape is this deep, and half a spacing around
 LEAST_VOLUME = 0.5  # share of the volume that must have places for particles
 SLACK = 0.02  # d: by how much a shape may reach beyond the tank by rounding
-
-
-#: what makes a solid one that stays where it is
-FIXED = {
-    "name": "",
-    "motion": None,
-    "density": None,
-    "mass": None,
-    "hollow": False,
-    "held": False,
-    "velocity": None,
-    "angular_velocity": None,
-}
-
-
-class Still(Solid):
-    """A solid at a pose of its own."""
-
-    solid: Any
-    pose: Any
-
-    @property
-    @override
-    def origin(self) -> np.ndarray:
-        place: np.ndarray = self.pose[0]
-        return place
-
-    @property
-    @override
-    def quaternion(self) -> np.ndarray:
-        turn: np.ndarray = self.pose[1]
-        return turn
-
-    @override
-    def program(self) -> list[Node]:
-        nodes: list[Node] = self.solid.program()
-        return nodes
-
-    @override
-    def reach(self) -> float:
-        return float(self.solid.reach())
-
-    @override
-    def span(self) -> float:
-        return float(self.solid.span())
 
 
 class Packed(Protocol):
@@ -136,7 +90,7 @@ def _packed(name: str, fluid: Filled, scene: Scene, before: list[Fluid], simulat
     world = scene.model_copy(
         update={
             "fluids": [Points(positions=places)],
-            "solids": [*obstacles, container.model_copy(update=FIXED)],
+            "solids": [*obstacles, still(container)],
             "forces": [],
             "materials": [],
             "goal": None,
@@ -237,10 +191,9 @@ def _to_tank(points: np.ndarray, scene: Scene) -> np.ndarray:
 
 def _at_rest(solid: Solid, time: float) -> Solid:
     """Return a solid that stays where its motion has it at a `time` [s]."""
-    still = solid.model_copy(update=FIXED)
     if solid.motion is None:
-        return still
-    return Still(solid=still, pose=solid.motion.path().pose(time, (solid.origin, solid.quaternion)))
+        return still(solid)
+    return moved(still(solid), *solid.motion.path().pose(time, (solid.origin, solid.quaternion)))
 
 
 def _inside_out(solid: Solid, dim: int) -> Solid:

@@ -33,6 +33,24 @@ def moved(solid: Solid, position: np.ndarray, rotation: np.ndarray) -> Solid:
     return result
 
 
+#: What makes a body of a solid, and moves it, as it is without.
+STILL = {
+    "name": "",
+    "density": None,
+    "mass": None,
+    "hollow": False,
+    "held": False,
+    "velocity": None,
+    "angular_velocity": None,
+    "motion": None,
+}
+
+
+def still(solid: Solid) -> Solid:
+    """Return the same solid without a name, as one that nothing moves."""
+    return solid.model_copy(update=STILL)
+
+
 class Box(Solid):
     """A box; in a 2-D world a rectangle."""
 

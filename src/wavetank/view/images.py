@@ -15,21 +15,10 @@ from wavetank.simulation.frame import Frame
 from wavetank.simulation.instant import PlacedSolid
 from wavetank.simulation.solids import Solids
 from wavetank.solids.seams import is_short
-from wavetank.solids.shapes import Difference, HalfSpace, moved
+from wavetank.solids.shapes import Difference, HalfSpace, moved, still
 from wavetank.solids.solid import ENDLESS, Solid
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-#: What makes a body of a solid, and moves it: a part has none of it.
-LIVELY = {
-    "name": "",
-    "density": None,
-    "mass": None,
-    "hollow": False,
-    "held": False,
-    "velocity": None,
-    "angular_velocity": None,
-    "motion": None,
-}
 
 
 class Images:
@@ -107,7 +96,7 @@ def _cut(one: PlacedSolid, tank: Tank, way: np.ndarray, axes: list[int]) -> Plac
     """Return a solid moved by a `way` [m], without what is beyond the seams along some axes."""
     dim = len(tank.size)
     place = one.position + way
-    parts: list[Solid] = [moved(one.solid.model_copy(update=LIVELY), np.zeros(3), one.rotation)]
+    parts: list[Solid] = [moved(still(one.solid), np.zeros(3), one.rotation)]
     for axis in axes:
         for side, corner in zip((1.0, -1.0), tank.box(), strict=True):
             across = np.eye(dim)[axis]
