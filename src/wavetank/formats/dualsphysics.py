@@ -264,6 +264,24 @@ def _volume(item: Item) -> float:
     return float(np.prod(np.maximum(upper - lower, 1e-9)))
 
 
+def _cut_off(
+    box: tuple[np.ndarray, np.ndarray], low: np.ndarray, high: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield the parts of a box that planes through the corners `low` and `high` of a hole cut off, axis by axis."""
+    lower, upper = box[0].copy(), box[1].copy()
+    for axis in range(3):
+        if lower[axis] < low[axis] < upper[axis]:
+            before = upper.copy()
+            before[axis] = low[axis]
+            yield lower.copy(), before
+            lower[axis] = low[axis]
+        if lower[axis] < high[axis] < upper[axis]:
+            after = lower.copy()
+            after[axis] = high[axis]
+            yield after, upper.copy()
+            upper[axis] = high[axis]
+
+
 def _without(box: tuple[np.ndarray, np.ndarray], holes: list[Any]) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return a box less others, as boxes."""
     parts = [box]
@@ -272,14 +290,7 @@ def _without(box: tuple[np.ndarray, np.ndarray], holes: list[Any]) -> list[tuple
         overlaps = (np.minimum(corners[:, 1], high) - np.maximum(corners[:, 0], low) > 1e-12).all(axis=1)
         left = [part for part, overlap in zip(parts, overlaps, strict=True) if not overlap]
         for number in np.flatnonzero(overlaps):
-            lower, upper = parts[number][0].copy(), parts[number][1].copy()
-            for axis in range(3):
-                for is_upper, edge in ((False, low[axis]), (True, high[axis])):
-                    if lower[axis] < edge < upper[axis]:
-                        a, b = lower.copy(), upper.copy()
-                        (a if is_upper else b)[axis] = edge
-                        (upper if is_upper else lower)[axis] = edge
-                        left.append((a, b))
+            left += _cut_off(parts[number], low, high)
         parts = left
         if not parts:
             break

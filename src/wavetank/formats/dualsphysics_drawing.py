@@ -8,7 +8,7 @@ import dataclasses
 import functools
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -152,46 +152,65 @@ class Drawing:
             )
 
     def _run(self, row: Element, depth: int) -> None:
+        """Run a command, `depth` lists deep: a change of what is drawn next, a list, or a shape."""
         self._charge(depth)
         tag = str(row.tag)
-        if tag in ("newvar", "newvarcte", "setvar"):
-            for name, text in row.attrib.items():
-                if not name.startswith("_"):
-                    self.variables[name] = self.number(text)
-        elif tag == "setmkvoid":
-            self.what, self.mk = "void", 0
-        elif tag in ("setmkfluid", "setmkbound"):
-            self.what, self.mk = tag.removeprefix("setmk"), int(self.number(row.get("mk", "0")))
-        elif tag in ("mksave", "matrixsave"):
-            self._kept.append((self.what, self.mk) if tag == "mksave" else self.matrix)
-        elif tag in ("mkload", "matrixload"):
-            self._load(is_matrix=tag == "matrixload")
-        elif tag in ("move", "scale", "rotate", "rotateline", "matrixreset"):
-            self.matrix = np.eye(4) if tag == "matrixreset" else self.matrix @ self._moved(row)
+        change = self._changes().get(tag)
+        if change is not None:
+            change(row)
         elif tag == "runlist":
-            for _ in range(int(self.number(row.get("times", "1")))):
-                self._charge(depth)
-                for part in self.lists.get(row.get("name", ""), ()):
-                    self._run(part, depth + 1)
-        elif tag in _SILENT or row.get("active", "true") in ("false", "0"):
-            pass
-        else:
+            self._run_list(row, depth)
+        elif tag not in _SILENT and row.get("active", "true") not in ("false", "0"):
             try:
                 self._draw(tag, row)
             except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
                 raise WavetankError(f"<{one_line(tag, 40)}> lacks points or numbers that it needs") from None
 
+    def _changes(self) -> dict[str, Callable[[Element], None]]:
+        """Return the commands that change what is drawn next and how, by their tags."""
+        return {
+            **dict.fromkeys(("newvar", "newvarcte", "setvar"), self._set_variables),
+            **dict.fromkeys(("setmkvoid", "setmkfluid", "setmkbound"), self._set_mk),
+            **dict.fromkeys(("move", "scale", "rotate", "rotateline"), self._transform),
+            "matrixreset": lambda row: self._set_matrix(np.eye(4)),
+            "mksave": lambda row: self._kept.append((self.what, self.mk)),
+            "matrixsave": lambda row: self._kept.append(self.matrix),
+            "mkload": lambda row: self._load(is_matrix=False),
+            "matrixload": lambda row: self._load(is_matrix=True),
+        }
+
+    def _set_variables(self, row: Element) -> None:
+        for name, text in row.attrib.items():
+            if not name.startswith("_"):
+                self.variables[name] = self.number(text)
+
+    def _set_mk(self, row: Element) -> None:
+        self.what = str(row.tag).removeprefix("setmk")
+        self.mk = 0 if self.what == "void" else int(self.number(row.get("mk", "0")))
+
+    def _set_matrix(self, matrix: np.ndarray) -> None:
+        self.matrix = matrix
+
+    def _transform(self, row: Element) -> None:
+        self.matrix = self.matrix @ self._moved(row)
+
+    def _run_list(self, row: Element, depth: int) -> None:
+        """Run the commands of a named list, as many times as it says."""
+        for _ in range(int(self.number(row.get("times", "1")))):
+            self._charge(depth)
+            for part in self.lists.get(row.get("name", ""), ()):
+                self._run(part, depth + 1)
+
     def _load(self, is_matrix: bool) -> None:
-        for k in range(len(self._kept) - 1, -1, -1):
-            if isinstance(self._kept[k], np.ndarray) == is_matrix:
-                kept = self._kept.pop(k)
-                if is_matrix:
-                    self.matrix = kept
-                else:
-                    self.what, self.mk = kept
-                return
+        """Take back the matrix that was saved last, or else what was drawn with which mk; keep it if none was saved."""
+        saved = [k for k, kept in enumerate(self._kept) if isinstance(kept, np.ndarray) == is_matrix]
+        if saved and is_matrix:
+            self.matrix = self._kept.pop(saved[-1])
+        elif saved:
+            self.what, self.mk = self._kept.pop(saved[-1])
 
     def _moved(self, row: Element) -> np.ndarray:
+        """Return the matrix [4, 4] of a command that moves, scales or turns."""
         matrix = np.eye(4)
         if row.tag == "move":
             matrix[:3, 3] = self.vector(row)

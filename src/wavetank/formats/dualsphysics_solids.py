@@ -114,26 +114,31 @@ def placed_solids(
     """Return the solids of these items: those of a mk that moves or floats as one."""
     found: list[Solid] = []
     for mk in dict.fromkeys(item.mk for item in items):
-        parts: list[Solid] = []
-        for item in items:
-            if item.mk == mk:
-                parts += [
-                    solid
-                    for piece in _pieces(item, fluids, place)
-                    for solid in place.shapes(piece, f"mk {mk}" if not parts else f"mk {mk}, {len(parts) + 1}")
-                ]
+        parts = _solids_of(mk, items, fluids, place)
+        if len(parts) > 1 and (mk in bodies or mk in courses):
+            parts = [Union(name=f"mk {mk}", parts=[part.model_copy(update={"name": ""}) for part in parts])]
         fields = {**bodies.get(mk, {})}
-        if not parts:
-            continue
-        names = [f"mk {mk}"] + [f"mk {mk}, {k + 1}" for k in range(1, len(parts))]
-        if (mk in bodies or mk in courses) and len(parts) > 1:
-            parts = [Union(name=names[0], parts=[part.model_copy(update={"name": ""}) for part in parts])]
-        if mk in courses:
+        if parts and mk in courses:
             fields["motion"] = _motion(parts[0], courses[mk], seconds, place)
-        for solid, name in zip(parts, names, strict=False):
+        for number, solid in enumerate(parts):
+            name = _name_of(mk, number)
             kept = {key: getattr(solid, key) for key in solid.model_fields_set if key != "name"}
             found.append(type(solid).model_validate({**kept, "name": name, **fields}))
     return found
+
+
+def _name_of(mk: int, number: int) -> str:
+    return f"mk {mk}, {number + 1}" if number else f"mk {mk}"
+
+
+def _solids_of(mk: int, items: list[Item], fluids: list[Item], place: Placed) -> list[Solid]:
+    """Return the solids of the items with that mk, one by one; boxes that hold fluids are their faces."""
+    parts: list[Solid] = []
+    for item in items:
+        if item.mk == mk:
+            pieces = _pieces(item, fluids, place)
+            parts += [solid for piece in pieces for solid in place.shapes(piece, _name_of(mk, len(parts)))]
+    return parts
 
 
 def _pieces(item: Item, fluids: list[Item], place: Placed) -> Iterator[Item]:

@@ -1,7 +1,7 @@
 """H.264 video in MP4, for every browser and player."""
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -176,15 +176,20 @@ def join(parts: Sequence[Path], path: Path) -> None:
             with av.open(str(part), format="mp4") as source:
                 track = source.streams.video[0]
                 stream = stream or target.add_stream_from_template(track)
-                end = shift
-                for packet in source.demux(track):
-                    if packet.dts is None or packet.pts is None:
-                        continue
-                    packet.pts, packet.dts = packet.pts + shift, packet.dts + shift
-                    end = max(end, packet.pts + max(packet.duration or 0, 1))
-                    packet.stream = stream
-                    target.mux(packet)
-                shift = end
+                shift = _copy(source.demux(track), target, stream, shift)
+
+
+def _copy(packets: Iterable[Any], target: Any, stream: Any, shift: int) -> int:
+    """Write packets to a `stream` of the `target`, later by a `shift`; return when the last ends, in its ticks."""
+    end = shift
+    for packet in packets:
+        if packet.dts is None or packet.pts is None:
+            continue
+        packet.pts, packet.dts = packet.pts + shift, packet.dts + shift
+        end = max(end, packet.pts + max(packet.duration or 0, 1))
+        packet.stream = stream
+        target.mux(packet)
+    return end
 
 
 write = VideoWriter

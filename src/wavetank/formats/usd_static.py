@@ -69,13 +69,25 @@ def up_axis(scene: Scene) -> str:
 
 def build_static(plan: Plan, instant: State, solids: dict[str, str], folder: Path) -> None:
     """Write `static.usdc` and `manifest.usda` into `folder`; `solids` are prims by the names of solids."""
-    from pxr import Sdf, Usd, UsdGeom
+    from pxr import Usd, UsdGeom
 
     static, manifest = (Usd.Stage.CreateInMemory() for _ in range(2))
     for stage in (static, manifest):
         UsdGeom.SetStageUpAxis(stage, up_axis(plan.scene))
         UsdGeom.SetStageMetersPerUnit(stage, 1.0)
         stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/World").GetPrim())
+        _define_prims(stage, _prims(plan, solids))
+    _materials(static, plan)
+    if "solids" in plan.parts:
+        _solids(static, plan, instant, solids)
+    _surroundings(static, plan)
+    for stage, name in ((manifest, "manifest.usda"), (static, "static.usdc")):
+        with atomic_write(folder / name, suffixed=True) as partial:
+            stage.GetRootLayer().Export(str(partial))
+
+
+def _prims(plan: Plan, solids: dict[str, str]) -> list[tuple[str, str, Any]]:
+    """Return (path, type, attributes) of all prims that hold what a plan writes, in the order of the file."""
     prims: list[tuple[str, str, Any]] = []
     if "particles" in plan.parts:
         prims.append(("/World/particles", "Points", PARTICLES))
@@ -86,23 +98,21 @@ def build_static(plan: Plan, instant: State, solids: dict[str, str], folder: Pat
         prims += [(f"/World/surface/{name}", "Mesh", SURFACE) for name in names.values()]
     if "solids" in plan.parts:
         prims += [(f"/World/solids/{name}", "Mesh", SOLIDS) for name in solids.values()]
-    prims.append(("/World", "Xform", (("wavetank:time", "double", ""),)))
-    for stage in (static, manifest):
-        for group in sorted({path.rpartition("/")[0] for path, _, _ in prims if path.count("/") == 3}):
-            UsdGeom.Xform.Define(stage, group)
-        for path, kind, attributes in prims:
-            prim = stage.DefinePrim(path, kind)
-            for name, type_, interpolation in attributes:
-                attribute = prim.CreateAttribute(name, Sdf.ValueTypeNames.Find(type_), name.startswith("wavetank:"))
-                if interpolation:
-                    attribute.SetMetadata("interpolation", interpolation)
-    _materials(static, plan)
-    if "solids" in plan.parts:
-        _solids(static, plan, instant, solids)
-    _surroundings(static, plan)
-    for stage, name in ((manifest, "manifest.usda"), (static, "static.usdc")):
-        with atomic_write(folder / name, suffixed=True) as partial:
-            stage.GetRootLayer().Export(str(partial))
+    return [*prims, ("/World", "Xform", (("wavetank:time", "double", ""),))]
+
+
+def _define_prims(stage: Any, prims: list[tuple[str, str, Any]]) -> None:
+    """Define prims with their attributes, and before them the groups that hold them."""
+    from pxr import Sdf, UsdGeom
+
+    for group in sorted({path.rpartition("/")[0] for path, _, _ in prims if path.count("/") == 3}):
+        UsdGeom.Xform.Define(stage, group)
+    for path, kind, attributes in prims:
+        prim = stage.DefinePrim(path, kind)
+        for name, type_, interpolation in attributes:
+            attribute = prim.CreateAttribute(name, Sdf.ValueTypeNames.Find(type_), name.startswith("wavetank:"))
+            if interpolation:
+                attribute.SetMetadata("interpolation", interpolation)
 
 
 def _materials(stage: Any, plan: Plan) -> None:

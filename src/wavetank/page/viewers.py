@@ -26,6 +26,7 @@ LARGEST_DEBT = 20_000.0  # messages beyond the rate after which a viewer is disc
 MOST_NOTES = 20  # that wait to be sent
 MOST_VIEWERS = 16
 LONGEST_SIDE = 8192  # px
+POINTS = ("point-begin", "point-move", "point-end")  # messages of a pointer that is down
 REPEAT_AFTER = 1.0  # s after which the same note is sent again
 LONGEST_MESSAGE = 2_500_000  # bytes: a dropped scene file
 
@@ -171,40 +172,56 @@ class Viewers:
     def hear(self, viewer: Viewer, table: dict[str, Any]) -> None:
         """Act on one message; raises `WavetankError` where it is not allowed."""
         do = table.get("do")
-        if do == "ack":
-            viewer.acknowledge()
-            self.wake()
-        elif do == "size":
-            viewer.size = (_whole_number(table, "width", LONGEST_SIDE), _whole_number(table, "height", LONGEST_SIDE))
-            self.wake()
-        elif do == "drive":
-            self.end_tools()
-            self.driver = viewer
-            self._tell_roles()
-        elif do == "fit":
-            self.fit(viewer)
-        elif do == "hover" and viewer is not self.driver:
-            viewer.post({"type": "aim"})
+        from_anyone = {"ack": self._acknowledge, "size": self._resize, "drive": self._take_control, "fit": self._fit}
+        from_driver = {"hover": self._hover, "mesh": self._drop_mesh, **dict.fromkeys(POINTS, self._point)}
+        if isinstance(do, str) and do in from_anyone:
+            from_anyone[do](viewer, table)
         elif viewer is not self.driver:
-            raise WavetankError("You are watching; take control to use tools.")
+            self._refuse_watcher(viewer, do)
         elif do == "detail" and table.get("detail") in ("auto", "full", "half"):
             self.detail = table["detail"]
             self.wake()
-        elif do == "hover":
-            self.aim(viewer, *_hovered(table))
-        elif do == "mesh":
-            self.drop_mesh(viewer, str(table.get("text", "")), str(table.get("file", "the mesh"))[:200])
-        elif do in ("point-begin", "point-move", "point-end"):
-            self._point(table, self._reporter(viewer))
+        elif isinstance(do, str) and do in from_driver:
+            from_driver[do](viewer, table)
         elif not self.submit(command_of(table), self._reporter(viewer)):
             raise WavetankError("Too many commands at once: one was dropped.")
+
+    def _acknowledge(self, viewer: Viewer, _: dict[str, Any]) -> None:
+        viewer.acknowledge()
+        self.wake()
+
+    def _resize(self, viewer: Viewer, table: dict[str, Any]) -> None:
+        """Set the size of a viewer's pictures [px]."""
+        viewer.size = (_whole_number(table, "width", LONGEST_SIDE), _whole_number(table, "height", LONGEST_SIDE))
+        self.wake()
+
+    def _take_control(self, viewer: Viewer, _: dict[str, Any]) -> None:
+        self.end_tools()
+        self.driver = viewer
+        self._tell_roles()
+
+    def _fit(self, viewer: Viewer, _: dict[str, Any]) -> None:
+        self.fit(viewer)
+
+    def _refuse_watcher(self, viewer: Viewer, do: Any) -> None:
+        """Refuse what only the driver may do; a pointer that hovers is answered, with nothing to mark."""
+        if do != "hover":
+            raise WavetankError("You are watching; take control to use tools.")
+        viewer.post({"type": "aim"})
+
+    def _hover(self, viewer: Viewer, table: dict[str, Any]) -> None:
+        self.aim(viewer, *_hovered(table))
+
+    def _drop_mesh(self, viewer: Viewer, table: dict[str, Any]) -> None:
+        self.drop_mesh(viewer, str(table.get("text", "")), str(table.get("file", "the mesh"))[:200])
 
     def _reporter(self, viewer: Viewer) -> Tell:
         """Return a function that sends notes to one viewer, from any thread."""
         return lambda text: self.in_server(lambda: viewer.note(text))
 
-    def _point(self, table: dict[str, Any], tell: Tell) -> None:
-        """Convert a point of the picture, as shares of its width and height, to a ray into the world."""
+    def _point(self, viewer: Viewer, table: dict[str, Any]) -> None:
+        """Begin, move or end a tool at a point of the picture: it acts along the ray into the world there."""
+        tell = self._reporter(viewer)
         pointer = _whole_number(table, "pointer", 9, least=0)
         if table["do"] == "point-end":
             self.down.discard(pointer)

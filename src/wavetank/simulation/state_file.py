@@ -215,7 +215,15 @@ def _state(header: Header, about: dict[str, Any], scene: Scene, arrays: dict[str
 
 def _check_header(header: Header, scene: Scene, refuse: str) -> None:
     """Raise `WavetankError` where the header does not fit its scene: numbers of solids and sources, names."""
-    count = (len(scene.tank.walls()) if scene.tank else 0) + len(scene.solids)
+    _check_solids(header, (len(scene.tank.walls()) if scene.tank else 0) + len(scene.solids), refuse)
+    if len(header.sources.emitters) > len(scene.emitters) or len(header.sources.drains) > len(scene.drains):
+        raise WavetankError(f"{refuse}: sources has more emitters or drains than its scene.")
+    if any(len(corner) not in (scene.dim, 3) for corner in header.numbers.start_box):
+        raise WavetankError(f"{refuse}: start_box must be two corners of {scene.dim} numbers.")
+
+
+def _check_solids(header: Header, count: int, refuse: str) -> None:
+    """Raise `WavetankError` where names, poses or motions do not fit the `count` solids of the scene."""
     if len(header.names) != count or len(header.poses) != count:
         raise WavetankError(
             f"{refuse}: it has {len(header.names)} names and {len(header.poses)} poses; its scene has {count} solids."
@@ -231,10 +239,6 @@ def _check_header(header: Header, scene: Scene, refuse: str) -> None:
         raise WavetankError(f"{refuse}: poses: a rotation is not a unit quaternion.")
     if any(name not in header.names for name in (*header.courses.held, *header.courses.returning)):
         raise WavetankError(f"{refuse}: courses names a solid that is not there.")
-    if len(header.sources.emitters) > len(scene.emitters) or len(header.sources.drains) > len(scene.drains):
-        raise WavetankError(f"{refuse}: sources has more emitters or drains than its scene.")
-    if any(len(corner) not in (scene.dim, 3) for corner in header.numbers.start_box):
-        raise WavetankError(f"{refuse}: start_box must be two corners of {scene.dim} numbers.")
 
 
 def _check_kinds(header: Header, scene: Scene, refuse: str) -> None:
