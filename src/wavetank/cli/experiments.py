@@ -132,7 +132,7 @@ def doctor(
         return
     table = Table("what", "found", Column("note", overflow="fold"))
     for row in told(findings["checks"]):
-        table.add_row(*(escape(row[key]) for key in ("name", "found", "note")))  # wavetank[window] is no markup
+        table.add_row(*(escape(row[key]) for key in ("name", "found", "note")))  # wavetank[window] is not markup
     Console().print(table)
 
 

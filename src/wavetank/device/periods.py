@@ -73,7 +73,7 @@ def nearest_image(difference, periods: Periods):
 
 @qd.func
 def within_along(place, axis: qd.template(), periods: Periods):
-    """The coordinate `place` [m], of its image within the world where the axis repeats; what is no number stays."""
+    """The coordinate `place` [m], of its image within the world where the axis repeats; what is not a number stays."""
     found = place
     if qd.static(periods.axes >> axis & 1):
         lower = qd.Vector([periods.x0, periods.y0, periods.z0])[axis]

@@ -42,7 +42,7 @@ def steps_needed(
     forced: bool = False,
     carried: float = 0.0,
 ) -> float:
-    """Return how many of the longest time steps that are allowed make up `duration` [s], which is no whole number.
+    """Return how many of the longest time steps that are allowed make up `duration` [s], which is not a whole number.
 
     Pressure that is solved `on_grid` reaches any depth. Where iterations alone carry it, the shallowest water needs two
     a frame by default; and so does water on which more than gravity acts (`forced`), because a force acts before the
@@ -101,7 +101,7 @@ def pool_depth(
 def square_at(particles: Particles, i):
     """The bits of a squared speed: as integers, numbers of one sign stand in the same order.
 
-    What is no number comes after all others, but for its sign, which says nothing and is taken away.
+    What is not a number comes after all others, but for its sign, which says nothing and is taken away.
     """
     return qd.bit_cast(particles.v[i].norm_sqr(), qd.i32) & 0x7FFFFFFF
 

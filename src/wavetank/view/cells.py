@@ -89,7 +89,7 @@ def sort_particles(cells: Cells, x: qd.types.ndarray(), id: qd.types.ndarray(), 
         p = lift(x[i])
         c = qd.Vector([0, 0, 0])
         for k in qd.static(range(x[0].n)):
-            # Bounded, because a particle that is no number must still have a cell.
+            # Bounded, because a particle that is not a number must still have a cell.
             c[k] = qd.cast(qd.min(qd.max(qd.floor(p[k] / cells.edge), -1e6), 1e6), qd.i32)
         cells.cell[i] = qd.min(qd.max(cell_number(cells, c), 0), cells.cells - 1)
     sort_by(cells.cell, cells.order, cells.start, cells.fill, cells.blocks, cells.cells, count, shared)

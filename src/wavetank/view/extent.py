@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 IN_SIGHT = 99.8  # per cent of the water that a still shows for certain
-ENDLESS = 1e4  # m: what reaches that far, a half-space, is no reason to step back
+ENDLESS = 1e4  # m: what reaches that far, a half-space, is not a reason to step back
 
 
 @dataclasses.dataclass(frozen=True)

@@ -65,8 +65,8 @@ def pixels_of(data: bytes, origin: str) -> np.ndarray:
     size = re.fullmatch(rb"-Y ([0-9]{1,6}) \+X ([0-9]{1,6})", line.strip())
     if not head.startswith((b"#?RADIANCE", b"#?RGBE")) or b"FORMAT=32-bit_rle_rgbe" not in head or size is None:
         raise WavetankError(
-            f"{origin}: this is no environment; give a Radiance picture (.hdr) in 32-bit_rle_rgbe whose rows run from "
-            "-Y to +X."
+            f"{origin}: this is not an environment; give a Radiance picture (.hdr) in 32-bit_rle_rgbe whose rows run "
+            "from -Y to +X."
         )
     rows, columns = int(size[1]), int(size[2])
     if not (rows >= 2 and columns >= 4 and rows * columns <= MOST_PIXELS):

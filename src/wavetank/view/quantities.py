@@ -124,7 +124,7 @@ def color_of(coloring: Coloring, value):
     """The colour of a value."""
     last = coloring.colors.shape[0] - 1
     entry = qd.cast(qd.min(qd.max((value - coloring.low) * coloring.scale, 0.0), 1.0) * last + 0.5, qd.i32)
-    # Once more as an integer: a quantity that is no number must still be a colour.
+    # Once more as an integer: a quantity that is not a number must still be a colour.
     return coloring.colors[qd.min(qd.max(entry, 0), last)]
 
 

@@ -153,7 +153,7 @@ def move(
         diffuse.kind[i] = kind
         age = diffuse.age[i] + a.dt
         diffuse.age[i] = age
-        # Written so that what is no number ends as well.
+        # Written so that what is not a number ends as well.
         births.kept[i] = qd.cast(age < diffuse.life[i] and target.norm_sqr() < 1e30, qd.i32)
     sum_up(births.kept, births.blocks, count, shared)
     for i in range(count):

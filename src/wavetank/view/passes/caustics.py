@@ -44,7 +44,7 @@ def gather(sunlit: SunlitWater, thickness: qd.types.ndarray(), sun: Lens, to_sun
             at = sun.eye + from_view(sun, point_at(sun, row, column, z))
             tau = thickness_at(thickness, vec2(column + 0.5, row + 0.5), unit)
             travel = above_floor(tau, at, bent)
-            # A film is as lumpy as its particles are: what these would gather is no light of the water's.
+            # A film is as lumpy as its particles are: what these would gather is not light that the water bends.
             travel *= smoothstep(0.5 * (tau / spacing - 1.0))
             moved = to_pixel(sun, to_view(sun, at + travel * bent)) - to_pixel(sun, to_view(sun, at))
         # Light that the water does not touch adds up to one everywhere and is not sent.

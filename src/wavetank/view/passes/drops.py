@@ -1,6 +1,6 @@
 """Lone particles: drops in front of the finished picture, which they refract.
 
-A particle with hardly a neighbour is no part of any surface: it has no share in the depth and the thickness of the
+A particle with hardly a neighbour is not part of a surface: it has no share in the depth and the thickness of the
 water behind it (`ellipsoids.lone`), and is drawn over the picture when that is finished. A drop is a ball of its own:
 a ray is turned twice by the same angle, so that the ball shows the world behind it upside down, and dimmed by the chord
 that it takes. A lone particle that is fast stands for spray: water of so many particles' volume that flies apart, some

@@ -14,7 +14,7 @@ Graphics 32 (2013), doi:10.1145/2421636.2421641: Eq. 6 (smoothed centres), Eq. 9
 Where we differ: no eigenvalues are taken. B = a + b C^2 has the axes of C, a lower bound on its radii (which is what
 the paper clamps for) and flattens like the paper's C, without a decomposition per particle. Centres at a surface move
 only by what they stick out of it or lie too deep, judged by how far off the mean is, so that water keeps its volume.
-Few neighbours fade to a ball, so that a drop is round. Walls are no surface: what touches one reaches through it.
+Few neighbours fade to a ball, so that a drop is round. Walls are not a surface: what touches one reaches through it.
 Particles deep inside are not drawn: cells whose neighbours are all well filled are left out.
 """
 

@@ -276,7 +276,7 @@ def blur_together(
                 own[4, lane], own[5, lane], own[6, lane] = 1.0, ratio, ratio * ratio
                 own[7, lane] = reach / step + 1e-3
             for turn in range((last + 1) // 2):
-                # What is read is put in columns first, two taps at a time: else the loop over lanes is no vectors'.
+                # What is read is put in columns first, two taps at a time: else the loop over lanes is not vectorised.
                 taps = qd.Matrix.zero(qd.f32, 4, lanes)
                 for k in qd.static(range(2)):
                     off = (2 * turn + k + 1) * step
