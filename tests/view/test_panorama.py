@@ -95,9 +95,9 @@ GOOD = written(under(SUN), True)
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (b"", "no environment"),
-        (b"#?RADIANCE\n\n-Y 4 +X 8\n" + bytes(128), "no environment"),
-        (HEAD + b"+Y 4 +X 8\n" + bytes(128), "no environment"),
+        (b"", "not an environment"),
+        (b"#?RADIANCE\n\n-Y 4 +X 8\n" + bytes(128), "not an environment"),
+        (HEAD + b"+Y 4 +X 8\n" + bytes(128), "not an environment"),
         (HEAD + b"-Y 999999 +X 999999\n", "pixels"),
         (HEAD + b"-Y 1 +X 1\n" + bytes(4), "pixels"),
         (GOOD[:-1], "too soon"),
