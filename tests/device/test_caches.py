@@ -89,3 +89,10 @@ tempfile.TemporaryFile = refused
     assert runs[1].returncode == 0 and not told, runs[1].stderr[-2000:]
     assert runs[0].stdout == runs[1].stdout
     assert not [*(tmp_path / "temporary").glob("wavetank-kernels-*")]
+
+
+def test_the_environment_names_the_folder_of_kernels(monkeypatch, tmp_path):
+    """A start with an empty folder is a cold one: `wavetank bench` and a first start of the page rely on it."""
+    usual = cache_folder()
+    monkeypatch.setenv("QD_OFFLINE_CACHE_FILE_PATH", str(tmp_path))
+    assert cache_folder() == tmp_path != usual

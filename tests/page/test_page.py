@@ -251,7 +251,7 @@ def test_a_level_is_played_and_won(open_page, browser, tmp_path, monkeypatch):
 
 
 def test_a_first_start_says_that_it_compiles_and_then_shows_water(browser, tmp_path):
-    command = [sys.executable, "-m", "wavetank", "play", "obstacle-tank", "--web", "--no-browser", "--port", "0"]
+    command = [sys.executable, "-m", "wavetank", "play", "drop-2d", "--web", "--no-browser", "--port", "0"]
     env = os.environ | {"QD_OFFLINE_CACHE_FILE_PATH": str(tmp_path), "PYTHONUNBUFFERED": "1"}
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=env) as server:
         try:

@@ -86,10 +86,13 @@ def current_backend() -> str | None:
 
 
 def cache_folder() -> pathlib.Path:
-    """Return the folder where compiled kernels are kept, for all programs of this user; it may be deleted."""
+    """Return the folder where compiled kernels are kept, for all programs of this user; it may be deleted.
+
+    The environment's QD_OFFLINE_CACHE_FILE_PATH names another one.
+    """
     from quadrants.lang import impl
 
-    return pathlib.Path(impl.default_cfg().offline_cache_file_path)
+    return pathlib.Path(os.environ.get("QD_OFFLINE_CACHE_FILE_PATH") or impl.default_cfg().offline_cache_file_path)
 
 
 @TURN
