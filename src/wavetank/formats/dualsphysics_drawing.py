@@ -155,9 +155,8 @@ class Drawing:
         """Run a command, `depth` lists deep: a change of what is drawn next, a list, or a shape."""
         self._charge(depth)
         tag = str(row.tag)
-        change = self._changes().get(tag)
-        if change is not None:
-            change(row)
+        if tag in _CHANGES:
+            _CHANGES[tag](self, row)
         elif tag == "runlist":
             self._run_list(row, depth)
         elif tag not in _SILENT and row.get("active", "true") not in ("false", "0"):
@@ -165,19 +164,6 @@ class Drawing:
                 self._draw(tag, row)
             except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
                 raise WavetankError(f"<{one_line(tag, 40)}> lacks points or numbers that it needs") from None
-
-    def _changes(self) -> dict[str, Callable[[Element], None]]:
-        """Return the commands that change what is drawn next and how, by their tags."""
-        return {
-            **dict.fromkeys(("newvar", "newvarcte", "setvar"), self._set_variables),
-            **dict.fromkeys(("setmkvoid", "setmkfluid", "setmkbound"), self._set_mk),
-            **dict.fromkeys(("move", "scale", "rotate", "rotateline"), self._transform),
-            "matrixreset": lambda row: self._set_matrix(np.eye(4)),
-            "mksave": lambda row: self._kept.append((self.what, self.mk)),
-            "matrixsave": lambda row: self._kept.append(self.matrix),
-            "mkload": lambda row: self._load(is_matrix=False),
-            "matrixload": lambda row: self._load(is_matrix=True),
-        }
 
     def _set_variables(self, row: Element) -> None:
         for name, text in row.attrib.items():
@@ -188,11 +174,11 @@ class Drawing:
         self.what = str(row.tag).removeprefix("setmk")
         self.mk = 0 if self.what == "void" else int(self.number(row.get("mk", "0")))
 
-    def _set_matrix(self, matrix: np.ndarray) -> None:
-        self.matrix = matrix
-
     def _transform(self, row: Element) -> None:
-        self.matrix = self.matrix @ self._moved(row)
+        self.matrix = np.eye(4) if row.tag == "matrixreset" else self.matrix @ self._moved(row)
+
+    def _save(self, row: Element) -> None:
+        self._kept.append((self.what, self.mk) if row.tag == "mksave" else self.matrix)
 
     def _run_list(self, row: Element, depth: int) -> None:
         """Run the commands of a named list, as many times as it says."""
@@ -201,8 +187,9 @@ class Drawing:
             for part in self.lists.get(row.get("name", ""), ()):
                 self._run(part, depth + 1)
 
-    def _load(self, is_matrix: bool) -> None:
+    def _load(self, row: Element) -> None:
         """Take back the matrix that was saved last, or else what was drawn with which mk; keep it if none was saved."""
+        is_matrix = row.tag == "matrixload"
         saved = [k for k, kept in enumerate(self._kept) if isinstance(kept, np.ndarray) == is_matrix]
         if saved and is_matrix:
             self.matrix = self._kept.pop(saved[-1])
@@ -281,6 +268,16 @@ class Drawing:
         if not len(faces):
             raise WavetankError(f"<{tag}> has no triangles; it needs more points.")
         self._add("mesh", points, faces=faces)
+
+
+#: Commands that change what is drawn next and how, by their tags.
+_CHANGES: dict[str, Callable[[Drawing, Element], None]] = {
+    **dict.fromkeys(("newvar", "newvarcte", "setvar"), Drawing._set_variables),
+    **dict.fromkeys(("setmkvoid", "setmkfluid", "setmkbound"), Drawing._set_mk),
+    **dict.fromkeys(("move", "scale", "rotate", "rotateline", "matrixreset"), Drawing._transform),
+    **dict.fromkeys(("mksave", "matrixsave"), Drawing._save),
+    **dict.fromkeys(("mkload", "matrixload"), Drawing._load),
+}
 
 
 def _faces_of(mode: str) -> tuple[str, ...]:

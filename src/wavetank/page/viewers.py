@@ -26,7 +26,6 @@ LARGEST_DEBT = 20_000.0  # messages beyond the rate after which a viewer is disc
 MOST_NOTES = 20  # that wait to be sent
 MOST_VIEWERS = 16
 LONGEST_SIDE = 8192  # px
-POINTS = ("point-begin", "point-move", "point-end")  # messages of a pointer that is down
 REPEAT_AFTER = 1.0  # s after which the same note is sent again
 LONGEST_MESSAGE = 2_500_000  # bytes: a dropped scene file
 
@@ -171,18 +170,16 @@ class Viewers:
 
     def hear(self, viewer: Viewer, table: dict[str, Any]) -> None:
         """Act on one message; raises `WavetankError` where it is not allowed."""
-        do = table.get("do")
-        from_anyone = {"ack": self._acknowledge, "size": self._resize, "drive": self._take_control, "fit": self._fit}
-        from_driver = {"hover": self._hover, "mesh": self._drop_mesh, **dict.fromkeys(POINTS, self._point)}
-        if isinstance(do, str) and do in from_anyone:
-            from_anyone[do](viewer, table)
+        do = str(table.get("do"))
+        if do in FROM_ANYONE:
+            FROM_ANYONE[do](self, viewer, table)
         elif viewer is not self.driver:
             self._refuse_watcher(viewer, do)
         elif do == "detail" and table.get("detail") in ("auto", "full", "half"):
             self.detail = table["detail"]
             self.wake()
-        elif isinstance(do, str) and do in from_driver:
-            from_driver[do](viewer, table)
+        elif do in FROM_DRIVER:
+            FROM_DRIVER[do](self, viewer, table)
         elif not self.submit(command_of(table), self._reporter(viewer)):
             raise WavetankError("Too many commands at once: one was dropped.")
 
@@ -200,10 +197,7 @@ class Viewers:
         self.driver = viewer
         self._tell_roles()
 
-    def _fit(self, viewer: Viewer, _: dict[str, Any]) -> None:
-        self.fit(viewer)
-
-    def _refuse_watcher(self, viewer: Viewer, do: Any) -> None:
+    def _refuse_watcher(self, viewer: Viewer, do: str) -> None:
         """Refuse what only the driver may do; a pointer that hovers is answered, with nothing to mark."""
         if do != "hover":
             raise WavetankError("You are watching; take control to use tools.")
@@ -264,6 +258,21 @@ class Viewers:
     def _tell_roles(self) -> None:
         for viewer in self.all:
             viewer.post({"type": "role", "driving": viewer is self.driver, "viewers": len(self.all)})
+
+
+Hear = Callable[[Viewers, Viewer, dict[str, Any]], None]
+#: What messages of any viewer do, by their names; then those that the driver alone may send.
+FROM_ANYONE: dict[str, Hear] = {
+    "ack": Viewers._acknowledge,
+    "size": Viewers._resize,
+    "drive": Viewers._take_control,
+    "fit": lambda viewers, viewer, _: viewers.fit(viewer),
+}
+FROM_DRIVER: dict[str, Hear] = {
+    "hover": Viewers._hover,
+    "mesh": Viewers._drop_mesh,
+    **dict.fromkeys(("point-begin", "point-move", "point-end"), Viewers._point),
+}
 
 
 def _table(message: dict[str, Any]) -> dict[str, Any]:

@@ -42,7 +42,7 @@ def steps_needed(
     forced: bool = False,
     carried: float = 0.0,
 ) -> float:
-    """Return how many of the longest time steps that are allowed make up `duration` [s], which is not a whole number.
+    """Return how many of the longest time steps that are allowed make up `duration` [s], a fraction in general.
 
     Pressure that is solved `on_grid` reaches any depth. Where iterations alone carry it, the shallowest water needs two
     a frame by default; and so does water on which more than gravity acts (`forced`), because a force acts before the

@@ -178,8 +178,8 @@ class State(Instant):
         births of foam, every array in the order of particle ids (positions, velocities, warm-started pressure,
         viscosity, dyes, ice, materials), foam in the order of births, bodies and their engine, poses, targets and
         growth of solids, which of them are held, emitters and drains, the scene without what the water does not feel,
-        and the material of new particles and all materials so far where they are not those of the particles. There
-        is not a state of random numbers: they follow from ids and the number of the frame. Recordings, tests and
+        and the material of new particles and all materials so far where they are not those of the particles. Random
+        numbers have no state: they follow from ids and the number of the frame. Recordings, tests and
         `wavetank run` compare by this and nothing else.
         """
         more = self.resumable
