@@ -50,6 +50,7 @@ QUICK = [
     "buoyancy",
     "heave",
     "water-entry",
+    "u-tube",
 ]
 
 

@@ -27,6 +27,7 @@ from wavetank.lab.cases import (
     standing_wave,
     still_tank,
     tension_drop,
+    u_tube,
     water_entry,
 )
 from wavetank.lab.cases.case import Case
@@ -59,4 +60,5 @@ CASES: tuple[Case, ...] = (
     buoyancy.CASE,
     heave.CASE,
     water_entry.CASE,
+    u_tube.CASE,
 )

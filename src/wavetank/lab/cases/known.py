@@ -32,6 +32,9 @@ KNOWN = {
     "lobovsky: 300 mm: at the far wall": Known(2.4, 2.7, "2026-11-27", f"{PLANE} 2.54"),
     "heave: 2-D barge, heave: half a period, over linear theory's": Known(0.8, 1.35, "2026-11-24", f"{DRAFT} 1.03"),
     "heave: 2-D barge, roll: half a period, over linear theory's": Known(0.9, 1.1, "2026-11-24", f"{DRAFT} 1.01"),
+    "u-tube: 16 particles across: period, error": Known(
+        4.0, 12.0, "2026-11-29", "calming at solids bends slow water, here as in the full run"
+    ),
 }
 
 

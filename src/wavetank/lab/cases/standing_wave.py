@@ -7,12 +7,12 @@ divergence-free field, at rest. The mode's amplitude is (2 / L) sum_i d^2 cos(k 
 The same wave, once whole, in a tank without ends that is one wavelength long, 2 L: its crest starts at the seam.
 """
 
-import itertools
 import math
 from typing import Any
 
 import numpy as np
 
+from wavetank.lab.cases import swing
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.scene.fluids import Points
@@ -51,18 +51,17 @@ def run(quick: bool, arch: str) -> Outcome:
     d, periods = (0.04, 2) if quick else (0.025, 4)
     start = displaced(d)
     t, a = follow(Tank(size=(LENGTH, 1.5)), start, d, periods, arch)
-    zeros, period = _crossings(t, a), _period(t, a)
+    period = swing.period(t, a)
     ring = Tank(size=(2.0 * LENGTH, 1.5), periodic=["x"])
-    in_ring = 100.0 * (_period(*follow(ring, ring.within(displaced(d, 2.0 * LENGTH)), d, periods, arch)) / PERIOD - 1.0)
-    peaks = [float(np.abs(a[(t > low) & (t < high)]).max()) for low, high in itertools.pairwise(zeros)]
-    kept = (peaks[-1] / peaks[0]) ** (2.0 / (len(peaks) - 1)) if len(peaks) > 1 else math.nan
+    around = follow(ring, ring.within(displaced(d, 2.0 * LENGTH)), d, periods, arch)
+    in_ring = 100.0 * (swing.period(*around) / PERIOD - 1.0)
     limit = 4.0 if quick else 2.0
     theory = f"{PERIOD:.4f} s"
     figures = [
         Figure("period, error", 100.0 * (period / PERIOD - 1.0), "%", -limit, limit, theory, "Lamb, art. 228"),
         Figure("period", period, "s", reference=theory, source="Lamb, art. 228"),
         Figure("period in a periodic tank, error", in_ring, "%", -limit, limit, theory, "Lamb, art. 228"),
-        Figure("amplitude kept per period", 100.0 * kept, "%", reference="100 %", source="no friction"),
+        Figure("amplitude kept per period", 100.0 * swing.kept(t, a), "%", reference="100 %", source="no friction"),
     ]
 
     def draw(plot: Any) -> None:
@@ -88,18 +87,6 @@ def follow(tank: Tank, start: np.ndarray, spacing: float, periods: int, arch: st
         mode = float(np.cos(K * frame.positions[:, 0].astype(float)).sum())
         amplitudes.append(2.0 / tank.size[0] * spacing * spacing * mode)
     return np.array(times), np.array(amplitudes)
-
-
-def _period(t: np.ndarray, a: np.ndarray) -> float:
-    """Return the period [s]: neighbouring zeros are half of it apart."""
-    zeros = _crossings(t, a)
-    return 2.0 * float(zeros[-1] - zeros[0]) / (len(zeros) - 1) if len(zeros) > 1 else math.nan
-
-
-def _crossings(t: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """Return the times at which `a` passes zero, interpolated."""
-    k = np.flatnonzero(np.sign(a[1:]) != np.sign(a[:-1]))
-    return t[k] - a[k] * (t[k + 1] - t[k]) / (a[k + 1] - a[k])
 
 
 CASE = Case("standing-wave", "First sloshing mode", run)
