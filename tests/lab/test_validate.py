@@ -51,6 +51,8 @@ QUICK = [
     "heave",
     "water-entry",
     "u-tube",
+    "frame-rate",
+    "scale",
 ]
 
 

@@ -15,8 +15,8 @@ from wavetank.foundation.json_text import json_text
 
 CASE_NAMES = (
     "buckling, buoyancy, calm-vorticity, coiling, column, creep, cup, drop, elliptical-drop, emitter, energy, "
-    "gravity-current, heave, layers, lobovsky, lock-exchange, martin-moyce, momentum, resolution, rest, seeds, "
-    "shear-wave, solids-at-rest, standing-wave, still-tank, tension-drop, u-tube, water-entry"
+    "frame-rate, gravity-current, heave, layers, lobovsky, lock-exchange, martin-moyce, momentum, resolution, rest, "
+    "scale, seeds, shear-wave, solids-at-rest, standing-wave, still-tank, tension-drop, u-tube, water-entry"
 )
 Cases = Annotated[list[str], typer.Argument(metavar="[CASE]...", help=f"{CASE_NAMES}; not rest, creep without one.")]
 

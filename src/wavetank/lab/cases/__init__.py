@@ -12,6 +12,7 @@ from wavetank.lab.cases import (
     elliptical_drop,
     emitter,
     energy,
+    frame_rate,
     gravity_current,
     heave,
     layers,
@@ -21,6 +22,7 @@ from wavetank.lab.cases import (
     momentum,
     resolution,
     rest,
+    scale,
     seeds,
     shear_wave,
     solids_at_rest,
@@ -61,4 +63,6 @@ CASES: tuple[Case, ...] = (
     heave.CASE,
     water_entry.CASE,
     u_tube.CASE,
+    frame_rate.CASE,
+    scale.CASE,
 )
