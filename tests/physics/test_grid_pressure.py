@@ -398,8 +398,8 @@ def test_solids_together_leave_the_room_that_their_union_does(count):
     def room(solids) -> tuple[np.ndarray, ...]:
         scene = wt.Scene(spacing=0.05, tank=wt.Tank(size=(1.0, 0.6, 0.6)), fluids=[water], solids=solids)
         sim = Simulation(scene)
-        level, workspace = sim.world.pressure.finest, sim.world.pressure.workspace
         update_open_volume(sim.world, sim.world.pressure, sim.scene, coefficients(sim.scene, 1.0 / 60.0))
+        level, workspace = sim.world.pressure.finest, sim.world.pressure.workspace
         nodes = level.nx * level.ny * level.nz
         return level.open_volume.to_numpy()[:nodes], workspace.thin_distance.to_numpy()[:nodes]
 

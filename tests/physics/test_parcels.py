@@ -8,7 +8,7 @@ import wavetank as wt
 from wavetank.device import compiler
 from wavetank.device.compiler import qd, upload
 from wavetank.device.state import Particles, Temporaries, new_particles, new_temporaries
-from wavetank.physics.pressure.grid import Level, Variant, Workspace, new_pressure_grid
+from wavetank.physics.pressure.grid import Level, Part, Variant, Workspace, new_pressure_grid
 from wavetank.physics.pressure.liquid import add_footprints
 
 UNIT = float(1 << 24)
@@ -49,6 +49,7 @@ def grid():
     compiler.start("cpu")
     found = new_pressure_grid((np.zeros(3), np.array([1.0, 1.2, 0.8])), 0.1)
     found.finest.open_volume.fill(1.0)
+    found.make_room(Part.SOLIDS)
     return found
 
 

@@ -68,9 +68,13 @@ def frame_launches(sim: Simulation) -> dict[str, int]:
 
 
 def device_bytes(value: Any) -> int:
-    """Return the bytes that the device arrays of a dataclass take, those of dataclasses in it included."""
+    """Return the bytes that the device arrays of a dataclass take, those of dataclasses in it included.
+
+    An array that has two names counts once.
+    """
     if dataclasses.is_dataclass(value):
-        return sum(device_bytes(getattr(value, field.name)) for field in dataclasses.fields(value))
+        parts = {id(part): part for field in dataclasses.fields(value) for part in [getattr(value, field.name)]}
+        return sum(map(device_bytes, parts.values()))
     if not hasattr(value, "to_numpy"):
         return 0
     elements = int(np.prod([*value.shape, *getattr(value, "element_shape", ())]))

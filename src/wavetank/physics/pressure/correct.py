@@ -54,6 +54,7 @@ from wavetank.physics.pressure.bodies import push_bodies_by_pressure
 from wavetank.physics.pressure.grid import (
     THRESHOLDS,
     Level,
+    Part,
     PressureGrid,
     Variant,
     Workspace,
@@ -70,6 +71,7 @@ from wavetank.physics.pressure.multigrid import is_shared, restrict_solids, solv
 from wavetank.physics.pressure.regions import find_regions, fix_null_space, make_compatible
 from wavetank.physics.pressure.solids import (
     UNIT,
+    clear_solids,
     find_apertures,
     find_nearest_walls,
     find_open_volume,
@@ -286,10 +288,12 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     """
     grid = world.pressure
     assert grid is not None, "there is no tank"
-    finest, w, gravity = grid.finest, grid.workspace, (c.gravity_x, c.gravity_y, c.gravity_z)
+    finest, gravity = grid.finest, (c.gravity_x, c.gravity_y, c.gravity_z)
     if grid.solids_version != world.solids_version or (world.pieces and grid.gravity != gravity):
         update_open_volume(world, grid, params, c)
     has = variant_of(world, mixed=kinds.mixed, thin_walls=grid.has_thin_walls)
+    grid.make_room(*parts_for(has))
+    w = grid.workspace
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     source = source_of(finest, params, stiffness, bodies=world.pieces is not None)
     sum_liquid(finest, w, world.particles, world.temporaries, world.grid, source, world.count, has)
@@ -339,13 +343,23 @@ def variant_of(world: World, *, mixed: int = 0, thin_walls: bool) -> Variant:
     )
 
 
+def parts_for(has: Variant) -> list[Part]:
+    """Return the parts of the workspace that kernels of a variant use, besides those of enclosed regions."""
+    needed = ((Part.SOLIDS, has.solids), (Part.BODIES, has.bodies), (Part.MIXED, has.mixed))
+    return [part for part, is_needed in needed if is_needed]
+
+
 def update_open_volume(world: World, grid: PressureGrid, params: Parameters, c: Coefficients) -> None:
     """Find what solids leave open of the cells, once they have moved."""
     has = variant_of(world, thin_walls=world.may_have_thin_walls)
     grid.found.fill(0)
-    find_nearest_walls(grid.finest, grid.workspace, grid.found, world.solids, has)
-    find_open_volume(grid.finest, grid.workspace, c, UNIT, params.spacing, params.dim, has)
-    find_apertures(grid.finest, grid.workspace, params.spacing, has)
+    grid.make_room(*parts_for(has))
+    if has.solids:
+        find_nearest_walls(grid.finest, grid.workspace, grid.found, world.solids, has)
+        find_open_volume(grid.finest, grid.workspace, c, UNIT, params.spacing, params.dim, has)
+        find_apertures(grid.finest, grid.workspace, params.spacing, has)
+    else:
+        clear_solids(grid.finest, grid.workspace)
     find_regions(grid.finest, grid.workspace, grid.found)
     restrict_solids(grid.levels)
     grid.solids_version, grid.gravity = world.solids_version, (c.gravity_x, c.gravity_y, c.gravity_z)
@@ -358,16 +372,17 @@ def solve_enclosed(grid: PressureGrid, per_error: float, gravity: tuple[float, f
 
     `per_error` [1/m^2] is what an error of one is on the right-hand side.
     """
-    finest, w = grid.finest, grid.workspace
+    finest = grid.finest
     lid = int(-gravity[1] > 0.7 * math.hypot(*gravity))
     open_volume = grid.open_nodes * finest.dx * finest.dy * finest.dz
     may_be_enclosed = grid.regions > 1 or liquid > THRESHOLDS.mostly_full * open_volume
     if may_be_enclosed:
         nodes = finest.nx * finest.ny * finest.nz
-        make_compatible(finest, w, LARGEST_SUM / nodes / per_error if per_error else 0.0, lid)
+        grid.make_room(Part.ENCLOSED)
+        make_compatible(finest, grid.workspace, LARGEST_SUM / nodes / per_error if per_error else 0.0, lid)
     solve_levels(grid.levels, lid)
     if may_be_enclosed:
-        fix_null_space(finest, w)
+        fix_null_space(finest, grid.workspace)
 
 
 def displacement_of(params: Parameters, stiffness: float, h: float) -> Displacement:

@@ -7,7 +7,9 @@ methods (Harlow 1964); beyond the outermost nodes the nearest one counts.
 """
 
 import dataclasses
+import enum
 import math
+from collections.abc import Iterable
 from typing import Any, Final
 
 import numpy as np
@@ -90,6 +92,8 @@ class Thresholds:
 
 
 THRESHOLDS = Thresholds()
+#: Arrays of the workspace that hold whole numbers.
+WHOLE = ("sums", "mass_sums", "blocked_faces", "region", "region_air", "region_error", "region_least")
 #: Liquid fraction over which a cell that reads too little density draws nothing in, with bodies or without: beside
 #: bodies all cells draw, or a box of half the density of water swings for ever in 2-D.
 DRAW_RAMP = {True: (1e3, 2e3), False: (0.96, 1.0)}
@@ -132,7 +136,10 @@ class Level:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Workspace:
-    """What only the finest level has; each array means one thing, and is valid from where it is written to the next."""
+    """What only the finest level has; each array means one thing, and is valid from where it is written to the next.
+
+    Arrays that a world does not need, see `Part`, have one entry.
+    """
 
     # What solids do, renewed when they move: `solids.py`, `thin_walls.py`, `regions.py`
     wall_x: qd.types.ndarray()  # f32 [nodes]: outward normal of the nearest wall, up where none is near
@@ -162,12 +169,12 @@ class Workspace:
     mean_xz: qd.types.ndarray()  # likewise along x and z
     mean_yz: qd.types.ndarray()  # likewise along y and z
     voids: qd.types.ndarray()  # f32 [nodes]: void fraction between rows of particles
-    row_least: qd.types.ndarray()  # f32 [rows]: smallest liquid fraction of a row along x
-    row_most: qd.types.ndarray()  # f32 [rows]: largest
+    row_least: qd.types.ndarray()  # f32 [ny nz]: smallest liquid fraction of a row along x
+    row_most: qd.types.ndarray()  # f32 [ny nz]: largest
     own_depth: qd.types.ndarray()  # f32 [nodes], m: depth below the surface along the axes of the grid
-    depth: qd.types.ndarray()  # f32 [nodes], m: the same, told by the nodes beside where solids are in the way
+    depth: qd.types.ndarray()  # f32 [nodes], m: the same array, or where solids are in the way that of nodes beside
     inside: qd.types.ndarray()  # f32 [nodes]: how far inside of the liquid: below 0 no error counts, above 1 all
-    # Enclosed regions, at the root of each: `regions.py`
+    # Enclosed regions, at the root of each: `regions.py`, made when a region may be enclosed
     region_air: qd.types.ndarray()  # i32 [nodes]: confidence that a region has air, in 1024ths
     region_error: qd.types.ndarray()  # i32 [nodes]: fixed-point sum of the right-hand side
     region_nodes: qd.types.ndarray()  # f32 [nodes]: number of nodes with liquid
@@ -190,6 +197,31 @@ class Variant:
     few_nodes: Final[int]  # so few that one thread is done with them before others have started
 
 
+class Part(enum.Enum):
+    """Arrays of the workspace that only some worlds need, by their names; room for them is made when they are used."""
+
+    SOLIDS = (
+        "wall_x",
+        "wall_y",
+        "wall_z",
+        "wall_distance",
+        "uncut_cells",
+        "volume_change",
+        "near_closed",
+        "thin_x",
+        "thin_y",
+        "thin_z",
+        "thin_distance",
+        "roof",
+        "liquid_below_roofs",
+        "slit_deficit",
+        "depth",
+    )
+    BODIES = ("slit_cells", "known_after")
+    MIXED = ("mass_sums",)
+    ENCLOSED = ("region_air", "region_error", "region_nodes", "region_least")
+
+
 @dataclasses.dataclass
 class PressureGrid:
     """The pressure grid of a world, and what is known of the solids in it."""
@@ -202,6 +234,15 @@ class PressureGrid:
     has_thin_walls: bool = False
     regions: int = 1
     open_nodes: int = 0
+    parts: frozenset[Part] = frozenset()  # of the workspace that there is room for
+
+    def make_room(self, *parts: Part) -> None:
+        """Make room for these parts of the workspace, zeros, where there is none yet."""
+        missing = [part for part in parts if part not in self.parts]
+        if missing:
+            names = [name for part in missing for name in part.value]
+            self.workspace = dataclasses.replace(self.workspace, **_new_arrays(self.finest, names))
+            self.parts |= {*missing}
 
     @property
     def finest(self) -> Level:
@@ -467,7 +508,7 @@ def count_nodes(box: tuple[np.ndarray, np.ndarray], h: float, periodic: int = 0)
 
 
 def bytes_per_node() -> int:
-    """Return how much memory a node of the finest level takes on a processor, its coarser levels and sums included."""
+    """Return the most bytes that a node of the finest level takes on a processor, coarser levels and sums included."""
     fields = len(dataclasses.fields(Level)) + len(dataclasses.fields(Workspace))
     return 4 * (fields + 2 * MOST_PARTS) * 8 // 7
 
@@ -534,13 +575,21 @@ def _new_level(shape: list[int], box: tuple[np.ndarray, np.ndarray], periodic: i
 
 
 def _new_workspace(finest: Level) -> Workspace:
-    nodes = finest.nx * finest.ny * finest.nz
-    sums = finest.parts * nodes + 2  # where a row is shorter than three, `liquid.py` adds nothing beyond its end
-    rim = _with_rim(finest.nx, finest.ny, finest.nz)
-    lengths = {"sums": sums, "mass_sums": sums}
-    whole = ("sums", "mass_sums", "blocked_faces", "region", "region_air", "region_error", "region_least")
-    names = [field.name for field in dataclasses.fields(Workspace)]
-    return Workspace(**{name: (integers if name in whole else scalars)(lengths.get(name, rim)) for name in names})
+    """Allocate the arrays that every world needs; the others have one entry, and are made by `make_room`."""
+    names = {field.name for field in dataclasses.fields(Workspace)}
+    later = {name for part in Part for name in part.value}
+    arrays = _new_arrays(finest, names - later)
+    missing = {name: (integers if name in WHOLE else scalars)(1) for name in later - {"depth"}}
+    return Workspace(**arrays, **missing, depth=arrays["own_depth"])  # no solid is in the way of any node
+
+
+def _new_arrays(finest: Level, names: Iterable[str]) -> dict[str, Any]:
+    """Allocate these arrays of the workspace, zeros."""
+    sums = finest.parts * finest.nx * finest.ny * finest.nz
+    sums += 2  # where a row is shorter than three, `liquid.py` adds nothing beyond its end
+    rows, rim = finest.ny * finest.nz, _with_rim(finest.nx, finest.ny, finest.nz)
+    lengths = {"sums": sums, "mass_sums": sums, "row_least": rows, "row_most": rows}
+    return {name: (integers if name in WHOLE else scalars)(lengths.get(name, rim)) for name in names}
 
 
 def _with_rim(nx: int, ny: int, nz: int) -> int:

@@ -273,11 +273,11 @@ def clear_solids(grid: Level, w: Workspace):
     """Leave all cells and faces open, in a world without solids but for the walls of the tank."""
     for n in range(grid.nx * grid.ny * grid.nz):
         grid.open_volume[n] = 1.0
+        grid.overhang[n] = -1.0
         w.far_from_solids[n] = 1.0
-        w.near_closed[n] = 0.0
         w.blocked_faces[n] = 0
     for n in range(grid.nx * grid.ny * grid.nz):
-        find_apertures(grid, w, n)
+        set_apertures(grid, w, n)
 
 
 @qd.kernel(fastcache=True)
