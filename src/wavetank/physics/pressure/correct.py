@@ -289,11 +289,10 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     grid = world.pressure
     assert grid is not None, "there is no tank"
     finest, gravity = grid.finest, (c.gravity_x, c.gravity_y, c.gravity_z)
+    grid.make_room(*parts_for(world, mixed=kinds.mixed))
     if grid.solids_version != world.solids_version or (world.pieces and grid.gravity != gravity):
         update_open_volume(world, grid, params, c)
-    has = variant_of(world, mixed=kinds.mixed, thin_walls=grid.has_thin_walls)
-    grid.make_room(*parts_for(has))
-    w = grid.workspace
+    w, has = grid.workspace, variant_of(world, mixed=kinds.mixed, thin_walls=grid.has_thin_walls)
     stiffness = rest_lattice(params.kernel, params.dim, params.support).stiffness
     source = source_of(finest, params, stiffness, bodies=world.pieces is not None)
     sum_liquid(finest, w, world.particles, world.temporaries, world.grid, source, world.count, has)
@@ -343,9 +342,9 @@ def variant_of(world: World, *, mixed: int = 0, thin_walls: bool) -> Variant:
     )
 
 
-def parts_for(has: Variant) -> list[Part]:
-    """Return the parts of the workspace that kernels of a variant use, besides those of enclosed regions."""
-    needed = ((Part.SOLIDS, has.solids), (Part.BODIES, has.bodies), (Part.MIXED, has.mixed))
+def parts_for(world: World, *, mixed: int = 0) -> list[Part]:
+    """Return the parts of the workspace that a world's kernels use, besides those of enclosed regions."""
+    needed = ((Part.SOLIDS, world.has_solids), (Part.BODIES, world.pieces is not None), (Part.MIXED, mixed))
     return [part for part, is_needed in needed if is_needed]
 
 
@@ -353,7 +352,7 @@ def update_open_volume(world: World, grid: PressureGrid, params: Parameters, c: 
     """Find what solids leave open of the cells, once they have moved."""
     has = variant_of(world, thin_walls=world.may_have_thin_walls)
     grid.found.fill(0)
-    grid.make_room(*parts_for(has))
+    grid.make_room(*parts_for(world))
     if has.solids:
         find_nearest_walls(grid.finest, grid.workspace, grid.found, world.solids, has)
         find_open_volume(grid.finest, grid.workspace, c, UNIT, params.spacing, params.dim, has)

@@ -238,11 +238,13 @@ class PressureGrid:
 
     def make_room(self, *parts: Part) -> None:
         """Make room for these parts of the workspace, zeros, where there is none yet."""
-        missing = [part for part in parts if part not in self.parts]
+        missing = {*parts} - self.parts
         if missing:
             names = [name for part in missing for name in part.value]
             self.workspace = dataclasses.replace(self.workspace, **_new_arrays(self.finest, names))
-            self.parts |= {*missing}
+            self.parts |= missing
+            if not missing.isdisjoint({Part.SOLIDS, Part.BODIES}):
+                self.solids_version = -1  # what they hold has not been found yet
 
     @property
     def finest(self) -> Level:
