@@ -1,11 +1,11 @@
-"""What cases read from a swing, and the length of a bend that `u-tube` counts with."""
+"""What cases read from a swing, and the theory that `u-tube`, `resonance` and `vortex` count with."""
 
 import math
 
 import numpy as np
 import pytest
 
-from wavetank.lab.cases import swing
+from wavetank.lab.cases import resonance, swing, vortex
 from wavetank.lab.cases.u_tube import CORNER, DEPTH, LIFT, WIDTH, level, scene
 
 
@@ -53,3 +53,20 @@ def test_a_corner_is_as_long_as_potential_flow_has_it():
     potential = np.linalg.solve(system, load)
     flow = float(np.sum(2.0 * (1.0 - potential[number[-1, :n]])))
     assert 1.0 / flow - 2 * arm == pytest.approx(CORNER, abs=0.01)  # the sharp corner costs cells 0.008
+
+
+def test_the_swayed_mode_solves_its_equation():
+    t, step = np.linspace(0.0, 4.0 * resonance.PERIOD, 4001, retstep=True)
+    q = resonance.theory(t)
+    force = 4.0 / math.pi * math.tanh(resonance.K * resonance.DEPTH) * resonance.ACCELERATION
+    left = np.gradient(np.gradient(q, step), step) + resonance.OMEGA**2 * q
+    assert left[2:-2] == pytest.approx(force * np.sin(resonance.OMEGA * t)[2:-2], abs=1e-3 * force)
+    assert np.abs(q).max() == pytest.approx(4.0 * resonance.GROWTH, rel=1e-3)
+    assert resonance.left_of(1) == 1.0
+    assert resonance.left_of(2) == pytest.approx(0.985)
+
+
+def test_the_vortex_has_a_quarter_of_its_greatest_energy_and_rests_at_walls():
+    fluid = vortex.scene(20, 0.0).fluids[0]
+    assert np.mean(np.sum(fluid.velocities**2, axis=1)) == pytest.approx(vortex.SPEED**2 / 2.0, rel=1e-3)
+    assert np.abs(fluid.velocities[np.abs(fluid.positions[:, 0]) < 0.03, 0]).max() < 0.1 * vortex.SPEED

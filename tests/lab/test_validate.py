@@ -53,6 +53,8 @@ QUICK = [
     "u-tube",
     "frame-rate",
     "scale",
+    "resonance",
+    "vortex",
 ]
 
 

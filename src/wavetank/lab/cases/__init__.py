@@ -21,6 +21,7 @@ from wavetank.lab.cases import (
     martin_moyce,
     momentum,
     resolution,
+    resonance,
     rest,
     scale,
     seeds,
@@ -30,6 +31,7 @@ from wavetank.lab.cases import (
     still_tank,
     tension_drop,
     u_tube,
+    vortex,
     water_entry,
 )
 from wavetank.lab.cases.case import Case
@@ -65,4 +67,6 @@ CASES: tuple[Case, ...] = (
     u_tube.CASE,
     frame_rate.CASE,
     scale.CASE,
+    resonance.CASE,
+    vortex.CASE,
 )
