@@ -55,6 +55,10 @@ QUICK = [
     "scale",
     "resonance",
     "vortex",
+    "gate",
+    "hull",
+    "torricelli",
+    "submerged-inlet",
 ]
 
 

@@ -15,9 +15,9 @@ from wavetank.foundation.json_text import json_text
 
 CASE_NAMES = (
     "buckling, buoyancy, calm-vorticity, coiling, column, creep, cup, drop, elliptical-drop, emitter, energy, "
-    "frame-rate, gravity-current, heave, layers, lobovsky, lock-exchange, martin-moyce, momentum, resolution, "
-    "resonance, rest, scale, seeds, shear-wave, solids-at-rest, standing-wave, still-tank, tension-drop, u-tube, "
-    "vortex, water-entry"
+    "frame-rate, gate, gravity-current, heave, hull, layers, lobovsky, lock-exchange, martin-moyce, momentum, "
+    "resolution, resonance, rest, scale, seeds, shear-wave, solids-at-rest, standing-wave, still-tank, "
+    "submerged-inlet, tension-drop, torricelli, u-tube, vortex, water-entry"
 )
 Cases = Annotated[list[str], typer.Argument(metavar="[CASE]...", help=f"{CASE_NAMES}; not rest, creep without one.")]
 

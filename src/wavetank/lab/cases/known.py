@@ -18,6 +18,7 @@ class Known:
 
 PLANE = "twenty layers in a plane; the full run has"
 DRAFT = "five particles of draft, with layers of slow water that move along (docs/bodies.md); the full run has"
+THIN = "pressure is read across thin walls, here as in the full run"
 KNOWN = {
     "elliptical-drop: area at tau = 1, error": Known(
         -4.0, 15.0, "2026-11-24", "a hull of few particles; the full run has 2 %"
@@ -34,6 +35,15 @@ KNOWN = {
     "heave: 2-D barge, roll: half a period, over linear theory's": Known(0.9, 1.1, "2026-11-24", f"{DRAFT} 1.01"),
     "u-tube: 16 particles across: period, error": Known(
         4.0, 12.0, "2026-11-29", "calming at solids bends slow water, here as in the full run"
+    ),
+    "gate: 2-D, d = H / 20: 2 d thick: force, error at the worst place": Known(-30.0, -4.0, "2026-11-29", THIN),
+    "gate: 2-D, d = H / 20: 2 d thick: moment, error at the worst place": Known(-30.0, -4.0, "2026-11-29", THIN),
+    "hull: B / d = 20, boards of 4 d: draft, error": Known(4.0, 20.0, "2026-11-29", THIN),
+    "torricelli: slot of 10 d: flow, error": Known(
+        -20.0, -6.0, "2026-11-29", "edges of a slot count as half-spaces, here as in the full run"
+    ),
+    "submerged-inlet: mouth of 5 d: energy in the pool, of what was brought": Known(
+        1.2, 60.0, "2026-11-29", "the pressure grid knows no source, here as in the full run"
     ),
 }
 
