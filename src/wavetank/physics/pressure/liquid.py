@@ -153,9 +153,10 @@ def add_footprints(
     lanes: qd.template(),
     has: Variant,
 ):
-    """Add to the sums of a `part` what nodes have of a cluster's `lanes` particles, and that times densities.
+    """Add the volume of a cluster's `lanes` particles to the nodes that their boxes overlap, in the sums of a `part`.
 
-    Nodes without open volume, and those behind a thin wall, leave theirs to others.
+    Where fluids are mixed their masses are added as well. A node without open volume, or behind a thin wall, takes
+    nothing: its share goes to the particle's other nodes.
     """
     # All loops over lanes but the last become vectors, which takes half of the time; shares and sums in one would not.
     first, begin = cluster * lanes, part * grid.nx * grid.ny * grid.nz

@@ -97,7 +97,10 @@ def cells_to_air(grid: Level, w: Workspace, n, axis, side, gravity):
 
 @qd.func
 def depth_in_air(grid: Level, w: Workspace, n, axis, side):
-    """Depth [cells] of node `n`, in the air, if there is liquid at the next node; else one cell above the surface."""
+    """Depth [cells] of node `n`, which has air, below the surface at the next node on a `side` along an `axis`.
+
+    It is below 0, and -1 where that node has no liquid.
+    """
     m = neighbor(grid, n, axis, side) if nodes_beyond(grid, n, axis, side) > 0 else n
     has_liquid = grid.open_volume[m] > 0.0 and grid.liquid[m] >= 0.5 and is_blocked_between(grid, w, n, m, axis) == 0
     return grid.liquid[n] + qd.min(grid.liquid[m], 1.0) - 1.5 if has_liquid else -1.0

@@ -109,7 +109,11 @@ def is_free_beyond(solids: SolidSet, around: qd.template(), surface, outward, th
 
 @qd.func
 def continues(solids: SolidSet, around: qd.template(), middle, way, outward):
-    """Return 1 where a solid continues from its `middle` by a `way` along it, or bends up or down from there."""
+    """Return 1 where a solid extends from the place `middle` in it by a `way` [m] along it, else 0.
+
+    It may bend: the way is turned in steps of a sixteenth of a turn, three towards `outward` [m], as long, and three
+    away from it.
+    """
     found = 0
     # Straight on first; thin walls are met by a step of a sixteenth of a turn. Kept, as they are asked for so often.
     cosines = qd.Vector([1.0, 0.9238795, 0.70710677, 0.38268343])

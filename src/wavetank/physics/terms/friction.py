@@ -103,7 +103,7 @@ def slow_cluster(
 
 @qd.func
 def load_velocities(v_of: qd.template(), first, particles: Particles):
-    """Write the velocities of the particles from number `first` on, a column for each."""
+    """Copy the velocities [m/s] of the particles from number `first` on to `v_of`, one column for each."""
     for lane in range(v_of.m):
         v = particles.v[first + lane]
         for axis in qd.static(range(v.n)):

@@ -149,7 +149,10 @@ def add_gradient(sums: qd.template(), r, square, a, b, c: Coefficients, method: 
 
 @qd.func
 def add_pull(sums: qd.template(), r, square, a, b, c: Coefficients, method: qd.template()):
-    """Add neighbour j to the force on i, over the scale of the force: (skin, cohesion) are in c."""
+    """Add neighbour j to the force F_i of skin and cohesion; A and B are `c.skin` and `c.cohesion`.
+
+    `a` and `b` are of i and j: h times the gradient of the relative density, and the tension [N/m].
+    """
     length = qd.sqrt(square)
     q = length * c.inverse_h
     n = lift(r) / qd.max(length, 1e-15)

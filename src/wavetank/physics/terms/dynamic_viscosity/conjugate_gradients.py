@@ -152,10 +152,11 @@ def multiply(
 
 @qd.kernel(fastcache=True)
 def iterate(state: Iterates, grid: Grid, first: qd.i32, looked: qd.i32, count: qd.i32, shared: qd.template()):
-    """Go on to the next x. Threads share the sums where `shared`.
+    """Do one iteration: sum the products of all clusters, then update x, residual, direction and slope.
 
-    `totals` has (gamma, alpha, beta, 0), then (what was gained since it was `looked` at, (x - b, x - b), 0, 0), then
-    the slices.
+    `first` is 1 in the first iteration, and `looked` where the host has just read the error. Threads share the sums
+    where `shared`. `totals` has (gamma, alpha, beta, 0); (decrease of the squared error in the energy norm since the
+    host read it, (x - b, x - b), 0, 0); and the sums of the slices.
     """
     qd.loop_config(serialize=not shared)
     for b in range(slices()):
@@ -197,7 +198,11 @@ def iterate(state: Iterates, grid: Grid, first: qd.i32, looked: qd.i32, count: q
 
 
 def solve(world: World, damping: Damping, x: Any, c: Coefficients, rate: float, most: int) -> int:
-    """Solve for the velocities `x`, which hold where to start; return the number of iterations, at most `most`."""
+    """Solve the equation above for the velocities `x` [m/s], vec4 [capacity], from the guess that they hold.
+
+    `rate` [1/(Pa s)] is dt B over the largest density (`implicit_viscosity.py`). Return the number of
+    iterations, at most `most`.
+    """
     particles, temporaries, grid, fluids, count = (
         world.particles,
         world.temporaries,

@@ -75,7 +75,10 @@ def trace_of(sums):
 
 @qd.func
 def angular_velocity(sums, gate):
-    """Return omega as far as the fluid turns as a whole, of a particle's sums; `gate` is RIGID / SHEARED."""
+    """Angular velocity [rad/s] of the fluid around a particle by its `sums`; 0 where it is sheared, not turned.
+
+    It is reduced by `gate`, which is RIGID / SHEARED, times the strain over the squared angular velocity.
+    """
     omega = vec3(0.0, 0.0, 0.0)
     dim = qd.static(2 if sums.n == 5 else 3)
     trace = trace_of(sums)
