@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+import types
 from pathlib import Path
 from typing import Final
 
@@ -247,3 +248,16 @@ def test_a_kernel_is_told_before_it_is_compiled():
         double(array, 4)
         double(array, 3)
     assert told == [(1, "double")]
+
+
+def test_an_array_that_outlives_its_program_is_not_given_away_again():
+    """What an earlier program made went with it; it was kept for the next one, and given to it as an array."""
+    array = types.SimpleNamespace(dtype="f32", shape=(4,), element_size=lambda: 4)
+    deleted = []
+    freed = freed_arrays.FreedArrays(
+        lambda program, *_: array if program == "first" else "new", lambda program, array: deleted.append(array)
+    )
+    freed.create("first", "f32", (4,))
+    freed.create("second", "f32", (8,))
+    freed.delete("second", array)
+    assert freed.create("second", "f32", (4,)) == "new" and not deleted

@@ -25,26 +25,31 @@ class FreedArrays:
         self.kept: collections.OrderedDict[Kind, list[Any]] = collections.OrderedDict()  # the latest kind last
         self.bytes = 0
         self.program: Any = None
+        self.used: dict[int, Any] = {}  # the present program's arrays that somebody uses, by their id
         self.lock = threading.RLock()  # an array may go in any thread, and within `create`
 
     def create(self, program: Any, dtype: Any, shape: Any, *args: Any, **kwargs: Any) -> Any:
         """Return an array of zeros, as the compiler's own function does."""
         kind = (str(dtype), tuple(shape))
         with self.lock:
-            handles = self.kept.get(kind) if program is self.program else None
+            self._turn_to(program)
+            handles = self.kept.get(kind)
             if not handles:
-                return self.really_create(program, dtype, shape, *args, **kwargs)
+                array = self.really_create(program, dtype, shape, *args, **kwargs)
+                self.used[id(array)] = array
+                return array
             array = handles.pop()
+            self.used[id(array)] = array
             self.bytes -= _size(array)
         ctypes.memset(program.get_ndarray_data_ptr_as_int(array), 0, _size(array))
         return array
 
     def delete(self, program: Any, array: Any) -> None:
-        """Keep an array that nobody uses, where it is one of the CPU's."""
+        """Keep an array that nobody uses, where it is one of the CPU's; one of an earlier program went with that."""
         with self.lock:
-            if program is not self.program:
-                self.program, self.bytes = program, 0
-                self.kept.clear()  # they went with their program
+            self._turn_to(program)
+            if self.used.pop(id(array), None) is None:
+                return
             kind, size = (str(array.dtype), tuple(array.shape)), _size(array)
             if size > MOST:
                 self.really_delete(program, array)
@@ -59,6 +64,13 @@ class FreedArrays:
                     self.really_delete(program, handles.pop())
                 else:
                     del self.kept[oldest]
+
+    def _turn_to(self, program: Any) -> None:
+        """Forget the arrays of an earlier program."""
+        if program is not self.program:
+            self.program, self.bytes = program, 0
+            self.kept.clear()
+            self.used.clear()
 
 
 def _size(array: Any) -> int:
