@@ -34,14 +34,13 @@ class FreedArrays:
         with self.lock:
             self._turn_to(program)
             handles = self.kept.get(kind)
-            if not handles:
+            if handles:
+                array = handles.pop()
+                self.bytes -= _size(array)
+                ctypes.memset(program.get_ndarray_data_ptr_as_int(array), 0, _size(array))
+            else:
                 array = self.really_create(program, dtype, shape, *args, **kwargs)
-                self.used[id(array)] = array
-                return array
-            array = handles.pop()
             self.used[id(array)] = array
-            self.bytes -= _size(array)
-        ctypes.memset(program.get_ndarray_data_ptr_as_int(array), 0, _size(array))
         return array
 
     def delete(self, program: Any, array: Any) -> None:

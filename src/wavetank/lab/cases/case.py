@@ -73,6 +73,11 @@ def measured(name: str) -> dict[str, np.ndarray]:
     return {key: np.array([float(row[key]) for row in rows]) for key in rows[0]}
 
 
+def columns(name: object, **rows: np.ndarray) -> dict[str, Sequence[float]]:
+    """Return columns of a case's table, one for each of the `rows`, as KEY_NAME."""
+    return {f"{key}_{name}": row.tolist() for key, row in rows.items()}
+
+
 def surface(x: np.ndarray, spacing: float, size: Sequence[float]) -> np.ndarray:
     """Return the height [m] of the topmost particle and half a spacing, for each column two spacings wide.
 

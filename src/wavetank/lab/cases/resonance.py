@@ -11,12 +11,13 @@ of the forced height what is left of it where each period keeps 0.97. The mode i
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from wavetank.lab.cases import swing
-from wavetank.lab.cases.case import Case, Figure, Outcome
+from wavetank.lab.cases.case import Case, Figure, Outcome, columns
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.scene.fluids import Block
 from wavetank.scene.forces.sway import Sway
@@ -91,9 +92,9 @@ def run(quick: bool, arch: str) -> Outcome:
         axis.legend(frameon=False, loc="upper left")
         tidy(axis)
 
-    series: dict[str, list[float]] = {}
+    series: dict[str, Sequence[float]] = {}
     for layers, (t, q) in found.items():
-        series |= {f"time_{layers}": t.tolist(), f"mode_{layers}": q.tolist()}
+        series |= columns(layers, time=t, mode=q)
     return Outcome(figures, series, draw)
 
 

@@ -6,11 +6,12 @@ brought (conservation of energy), but for the level's slow rise: the bound is 1.
 source, so that what comes in is an error of density, which it pushes away.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from wavetank.lab.cases.case import Case, Figure, Outcome
+from wavetank.lab.cases.case import Case, Figure, Outcome, columns
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.physics.measure import kinetic_energy
 from wavetank.scene.emitters import Emitter
@@ -70,13 +71,9 @@ def run(quick: bool, arch: str) -> Outcome:
         axis.legend(frameon=False)
         tidy(axis)
 
-    series: dict[str, list[float]] = {}
+    series: dict[str, Sequence[float]] = {}
     for spacing, (t, held, brought, _) in found.items():
-        series |= {
-            f"time_{spacing}": t.tolist(),
-            f"held_{spacing}": held.tolist(),
-            f"brought_{spacing}": brought.tolist(),
-        }
+        series |= columns(spacing, time=t, held=held, brought=brought)
     return Outcome(figures, series, draw)
 
 

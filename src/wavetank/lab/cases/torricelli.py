@@ -8,11 +8,12 @@ of a solid counts as a half-space.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from wavetank.lab.cases.case import Case, Figure, Outcome
+from wavetank.lab.cases.case import Case, Figure, Outcome, columns
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.scene.fluids import Block
 from wavetank.scene.scene import Scene
@@ -84,9 +85,9 @@ def run(quick: bool, arch: str) -> Outcome:
         axis.legend(frameon=False)
         tidy(axis)
 
-    series: dict[str, list[float]] = {}
+    series: dict[str, Sequence[float]] = {}
     for slot, (times, depths) in found.items():
-        series |= {f"time_{slot}": times.tolist(), f"depth_{slot}": depths.tolist()}
+        series |= columns(slot, time=times, depth=depths)
     return Outcome(figures, series, draw)
 
 

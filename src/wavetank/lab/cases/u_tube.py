@@ -12,12 +12,13 @@ them. Known: what calms slow water beside solids makes the period longer, the mo
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from wavetank.lab.cases import swing
-from wavetank.lab.cases.case import Case, Figure, Outcome
+from wavetank.lab.cases.case import Case, Figure, Outcome, columns
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.scene.fluids import Block
 from wavetank.scene.scene import Scene
@@ -73,9 +74,9 @@ def run(quick: bool, arch: str) -> Outcome:
     sims = {layers: Simulation(scene(layers), arch) for layers in ((LAYERS,) if quick else (LAYERS, FINER))}
     found = {layers: follow(sim, 1.5 if quick else 3.3) for layers, sim in sims.items()}
     figures = [figure for layers, one in found.items() for figure in compare(f"{layers} particles across", one)]
-    series: dict[str, list[float]] = {}
+    series: dict[str, Sequence[float]] = {}
     for layers, one in found.items():
-        series |= {f"time_{layers}": one.times.tolist(), f"level_{layers}": one.levels.tolist()}
+        series |= columns(layers, time=one.times, level=one.levels)
     if not quick:
         sim = sims[LAYERS]
         sim.advance(ALONE)

@@ -9,11 +9,12 @@ of the rest; in a full tank the pressure grid brings energy, and without the gri
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from wavetank.lab.cases.case import Case, Figure, Outcome
+from wavetank.lab.cases.case import Case, Figure, Outcome, columns
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.physics.measure import kinetic_energy
 from wavetank.scene.fluids import Points
@@ -85,9 +86,9 @@ def run(quick: bool, arch: str) -> Outcome:
         for axis in (left, right):
             tidy(axis)
 
-    series: dict[str, list[float]] = {}
+    series: dict[str, Sequence[float]] = {}
     for layers, (t, energy, _) in found.items():
-        series |= {f"time_{layers}": t.tolist(), f"energy_{layers}": energy.tolist()}
+        series |= columns(layers, time=t, energy=energy)
     return Outcome(figures, series, draw)
 
 

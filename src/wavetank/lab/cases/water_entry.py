@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from wavetank.lab.cases.case import Case, Figure, Outcome
+from wavetank.lab.cases.case import Case, Figure, Outcome, columns
 from wavetank.lab.plots import BLUE, RED, tidy
 from wavetank.scene.fluids import Block
 from wavetank.scene.scene import Scene
@@ -48,14 +48,14 @@ def run(quick: bool, arch: str) -> Outcome:
         times, depths = fall(wedge(mass, 0.005 if quick else 0.0025), arch, WETTED, SPEED)
         theory = course(wedge_motion(mass), times, SPEED)
         figures += compare(f"wedge of {mass:g} kg/m", times, depths, theory, WETTED, 0.1 if quick else 0.05)
-        series |= columns(f"wedge_{mass:g}", times, depths, theory)
+        series |= columns(f"wedge_{mass:g}", time=times, depth=depths, theory=theory)
     for ratio in ratios:
         times, depths = fall(sphere(ratio, RADIUS / (4 if quick else 6)), arch, FAR * RADIUS, IMPACT)
         theory = course(sphere_motion(ratio), times, IMPACT)
         figures += compare(
             f"sphere of {ratio:g} times water's density", times, depths, theory, FAR * RADIUS, 0.15 if quick else 0.1
         )
-        series |= columns(f"sphere_{ratio:g}", times, depths, theory)
+        series |= columns(f"sphere_{ratio:g}", time=times, depth=depths, theory=theory)
 
     def draw(plot: Any) -> None:
         left, right = plot.subplots(1, 2)
@@ -71,12 +71,6 @@ def run(quick: bool, arch: str) -> Outcome:
             tidy(axis)
 
     return Outcome(figures, series, draw)
-
-
-def columns(name: str, times: np.ndarray, depths: np.ndarray, theory: np.ndarray) -> dict[str, Sequence[float]]:
-    """Return the columns of the table of a fall."""
-    rows = {"time": times, "depth": depths, "theory": theory}
-    return {f"{key}_{name}": row.tolist() for key, row in rows.items()}
 
 
 def wedge(mass: float, spacing: float) -> Scene:
