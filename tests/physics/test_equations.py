@@ -89,7 +89,8 @@ def test_correction_eq_8(dim, kernel):
     name = NAMES[kernel][0]
     ratio = kernel_shape(name, cloud.distance / cloud.h)[0] / kernel_shape(name, np.array(0.3))[0]
     s_0 = rest_lattice(kernel, dim, cloud.scene.support).squared_gradients / cloud.h**2
-    s_corr = -0.2 * (cloud.c.dt / cloud.scene.frame_time) ** 2 / s_0 * ratio**4.0
+    fall = 9.81 * cloud.c.dt**2 / cloud.scene.spacing  # in a step, in spacings
+    s_corr = -0.2 * min(1.0, fall / 0.1089) / s_0 * ratio**4.0
     expected = volume * np.sum((lam[:, None] + lam[None, :] + s_corr)[..., None] * cloud.grad_w(), axis=1)
     moved = cloud.predictions(cloud.world.spare) - cloud.x
     np.testing.assert_allclose(moved, expected, atol=2e-4 * np.abs(expected).max())
@@ -186,7 +187,7 @@ def test_slow_motion_is_taken_sooner(dim, turning):
     cloud = Cloud(dim, viscosity=0.2, calming=0.9)
     smooth(cloud, turning)
     v_ij = cloud.v[None, :, :] - cloud.v[:, None, :]
-    in_a_step = 1.0 - 0.1 ** (cloud.c.dt / cloud.scene.frame_time)
+    in_a_step = 1.0 - 0.1 ** min(1.0, (9.81 * cloud.c.dt**2 / cloud.scene.spacing / 0.1089) ** 0.5)
     slow = np.maximum(0.0, 1.0 - np.sum(v_ij**2, axis=-1) / (0.1**2 * 9.81 * cloud.scene.spacing))
     share = 0.2 + (in_a_step - 0.2) * slow
     assert np.sum(slow > 0.0) > cloud.count, "some pairs are slow"

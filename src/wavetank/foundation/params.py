@@ -47,6 +47,7 @@ def parameter(
     return Field(default=default, description=sentence, json_schema_extra=note, **limits)
 
 
+USUAL_FALL = 0.1089  # spacings: fall of water at rest in a usual time step
 SURFACE_TENSION = 0.0728  # N/m, of water against air at 20 degrees Celsius
 
 KernelName = Literal["spiky", "poly6", "cubic", "wendland", "poly6-spiky"]
@@ -70,12 +71,12 @@ class Parameters(Model):
     relaxation: float = parameter(1.0, 0.1, 3.0, "", "omega", "First relaxation factor of a time step, in units of the largest stable one.")
     slowest_mode: float = parameter(0.15, 0.0, 0.5, "", "a", "Lower end of the interval of eigenvalues for the Chebyshev iteration; 0 is plain Jacobi.")
     force_mixing: float = parameter(0.01, 0.0, 1e4, "S_0", "eps", "Constraint force mixing (Eq. 5), relative to the sum of squared gradients in the rest lattice.")
-    tensile_strength: float = parameter(0.01, 0.0, 1.0, "1/S_0", "k", "Artificial pressure against clustering (Eq. 7) in a step of one frame; less in shorter steps and weaker gravity.")
+    tensile_strength: float = parameter(0.01, 0.0, 1.0, "1/S_0", "k", "Artificial pressure against clustering (Eq. 7) in a usual step, 1/60 s at 25 mm; less in shorter steps and weaker gravity.")
     tensile_exponent: float = parameter(4.0, 1.0, 8.0, "", "n", "Exponent of the artificial pressure (Eq. 7).")
     tensile_distance: float = parameter(0.3, 0.05, 0.95, "h", "dq", "Distance at which the artificial pressure is k (Eq. 7).")
     grid_pressure: float = parameter(1.0, 0.0, 1.0, "", "", "Share of the density error that the coarse pressure grid removes before the iterations; 0 switches it off.")
     attraction: float = parameter(0.0, 0.0, 1.0, "", "", "Share of negative pressure that is allowed; with 0 water separates freely.")
-    calming: float = parameter(0.95, 0.0, 1.0, "", "", "Share of slow motion relative to neighbours and solids that is damped in a frame; with 0 calm water creeps.")
+    calming: float = parameter(0.95, 0.0, 1.0, "", "", "Share of slow motion relative to neighbours and solids that is damped in a usual step, 1/60 s at 25 mm; with 0 calm water creeps.")
     viscosity: float = parameter(0.08, 0.0, 1.0, "", "c", "XSPH viscosity (Eq. 11), dimensionless, for a step of 1/240 s.")
     dynamic_viscosity: float = parameter(0.0, 0.0, 1e6, "Pa s", "mu", "Dynamic viscosity of fluids whose material names none, solved implicitly; honey has 10.")
     viscosity_iterations: int = parameter(100, 1, 1000, "", "", "Largest number of iterations of the implicit viscosity in a time step.")
@@ -104,6 +105,14 @@ class Parameters(Model):
     def particle_mass(self) -> float:
         """Mass of a particle, rho_0 d^dim [kg] (per metre of depth in a 2-D world)."""
         return float(self.rest_density * self.spacing**self.dim)
+
+    def usual_steps(self, dt: float) -> float:
+        """Return how many usual time steps one of `dt` [s] is, 1 at most.
+
+        In a usual step water at rest falls by `USUAL_FALL` spacings, g dt^2 / d: 1/60 s at 25 mm. What acts in a step
+        goes by this, so that it is the same at any frame rate, and in tanks of any size (Froude's similarity).
+        """
+        return min(1.0, math.sqrt(math.hypot(*self.gravity) * dt**2 / self.spacing / USUAL_FALL))
 
     @property
     def foaming_speed(self) -> float:

@@ -14,7 +14,6 @@ from wavetank.physics.pressure.grid import THRESHOLDS
 from wavetank.physics.smoothing import KERNELS, NAMES, SLOPES, kernel_shape, rest_lattice
 
 LEAST_MIXING = 1e-6  # of S_0: a particle without neighbours has no gradient to divide by
-EARTH = 9.81  # m/s^2
 REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter is the share of one substep
 #: By how much water in motion exceeds the stiffest mode of its rest lattice, in 2-D and 3-D; notebook/solver.md.
 DISORDER = {2: 0.75, 3: 0.35}
@@ -46,9 +45,10 @@ def coefficients(
     tensile = params.tensile_strength / s_0 / (pressure_iterations or iterations) / w_dq**params.tensile_exponent
     # Packings need it that gravity presses; without gravity it would blow them up (notebook/calm.md). It is the
     # same force in steps of any length.
-    tensile *= (dt / params.frame_time) ** 2 * min(1.0, math.hypot(*params.gravity) / EARTH)
+    usual_steps = params.usual_steps(dt)
+    tensile *= usual_steps**2
     viscosity = min(1.0, params.viscosity * REFERENCE_RATE * dt)
-    calming = 1.0 - (1.0 - params.calming) ** (dt / params.frame_time)
+    calming = 1.0 - (1.0 - params.calming) ** usual_steps
     # Of what an iteration may move a particle by: as fast as it goes, and as it falls past a neighbour.
     pace = dt / iterations / push_limit if push_limit > 0.0 else 0.0
     # Without gravity nothing is slow: there is no speed to compare with.

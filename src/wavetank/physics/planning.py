@@ -51,7 +51,7 @@ def plan_step(world: World, params: Parameters, dt: float) -> Plan:
         xsph_is_central=not (world.pressure or kinds.mixed),
         on_grid=on_grid,
         # What thick fluids carry on has been shortened to their share already.
-        warm_start=warm_start_share(dt, params.frame_time) if on_grid else float(thick),
+        warm_start=warm_start_share(params, dt) if on_grid else float(thick),
     )
 
 

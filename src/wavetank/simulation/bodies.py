@@ -313,7 +313,7 @@ class Bodies(Mapping[str, Body]):
         cell = world.pressure.finest.dy if world.pressure else 1.0
         coupling.immersed = np.minimum(1.0, rows[:, IMMERSION] * particle / (wet * cell))
         coupling.displaced = np.minimum(1.0, rows[:, DISPLACING] * particle / (wet * cell))
-        keeps = (warm_start_share(dt, self._scene.frame_time) * coupling.warm_start_share)[:, None]
+        keeps = (warm_start_share(self._scene, dt) * coupling.warm_start_share)[:, None]
         force = keeps * coupling.warm_started_force + rows[:, OF_GRID : OF_GRID + 6] * scale / dt
         coupling.grid_force = limited_lift(force, self._gravity, THRESHOLDS.largest_warm_start * wet)
         coupling.impulse = rows[:, :6] * scale + force * dt

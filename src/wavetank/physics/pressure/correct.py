@@ -20,9 +20,9 @@ prediction; the grid corrects what that leaves. What acts is the sum of (1 - w) 
 steps ago, w / (1 - w) steps late on average. With w = 1/2 that is one step, and just what takes a velocity from half a
 step before a place to half a step after it, as v = (p - x) / dt is: leapfrog, of second order, and waves keep their
 height. Below, the share (1 - 2 w) / (1 - w) of the damping stays: w is such that a step of any length damps as one of
-the share `damping` of a frame would, and steps shorter than that are not warm-started. It is stable for every omega dt,
-and modes that are much stiffer than a step are stopped at once, as without it. No more than `largest_warm_start` times
-gravity is kept, so that water that hits a wall does not bounce.
+the share `damping` of a usual one would (`Parameters.usual_steps`), and steps shorter than that are not warm-started.
+It is stable for every omega dt, and modes that are much stiffer than a step are stopped at once, as without it. No more
+than `largest_warm_start` times gravity is kept, so that water that hits a wall does not bounce.
 
 Dispersed particles. The displacement accelerates all particles of a place alike, and bears a drop of brine in water as
 it bears the water. A particle that is dispersed in another fluid has the displacement of a sphere: the buoyancy
@@ -97,9 +97,9 @@ class Displacement:
     carried_fade: qd.f32  # m: by how much higher they take nothing
 
 
-def warm_start_share(dt: float, frame_time: float) -> float:
-    """Return the share w of the grid's pressure that a step of `dt` [s] starts with."""
-    share = min(1.0, THRESHOLDS.damping * frame_time / dt)
+def warm_start_share(params: Parameters, dt: float) -> float:
+    """Return the share w of the grid's pressure that a step of `dt` [s] starts with; 0 without gravity."""
+    share = min(1.0, THRESHOLDS.damping / max(params.usual_steps(dt), 1e-6))
     return (1.0 - share) / (2.0 - share)
 
 
@@ -324,7 +324,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         has,
     )
     if world.pieces:
-        acting = (1.0 - warm_start_share(c.dt, params.frame_time)) * math.hypot(*params.gravity) * c.dt**2
+        acting = (1.0 - warm_start_share(params, c.dt)) * math.hypot(*params.gravity) * c.dt**2
         per_lambda = stiffness / acting if acting else 0.0  # nothing is deep without gravity
         push_bodies_by_pressure(world, stiffness, per_lambda, c, mixed=kinds.mixed)
 

@@ -87,7 +87,7 @@ class Thresholds:
     carried_fade: Final[float] = 1.0  # spacings above that at which it carries nothing
     dispersed_from: qd.f32 = 0.45  # how far a particle's density is from that around: of the fluid around
     dispersed_to: qd.f32 = 0.8  # a drop of its own
-    damping: Final[float] = 0.1  # of a frame: the length of a step that damps as much
+    damping: Final[float] = 0.1  # of a usual step: the length of a step that damps as much
     largest_warm_start: Final[float] = 1.2  # of gravity: the largest acceleration that is carried on
 
 
