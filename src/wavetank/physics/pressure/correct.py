@@ -68,7 +68,7 @@ from wavetank.physics.pressure.grid import (
     ramp,
 )
 from wavetank.physics.pressure.multigrid import is_shared, restrict_solids, solve_levels
-from wavetank.physics.pressure.regions import find_regions, fix_null_space, make_compatible
+from wavetank.physics.pressure.regions import fill_enclosed, find_regions, fix_null_space, make_compatible
 from wavetank.physics.pressure.solids import (
     UNIT,
     clear_solids,
@@ -297,6 +297,12 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     source = source_of(finest, params, stiffness, bodies=world.pieces is not None)
     sum_liquid(finest, w, world.particles, world.temporaries, world.grid, source, world.count, has)
     find_surface(finest, w, c, source, has)
+    lid = int(-c.gravity_y > 0.7 * math.hypot(*gravity))
+    may_be_enclosed = grid.may_be_enclosed(world.count * params.spacing**params.dim)
+    if may_be_enclosed:
+        grid.make_room(Part.ENCLOSED)
+        w = grid.workspace
+        fill_enclosed(finest, w, lid)
     assemble(
         finest,
         w,
@@ -310,7 +316,12 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
         world.count,
         has,
     )
-    solve_enclosed(grid, source.per_way, gravity, world.count * params.spacing**params.dim)
+    if may_be_enclosed:
+        nodes = finest.nx * finest.ny * finest.nz
+        make_compatible(finest, w, LARGEST_SUM / nodes / source.per_way if source.per_way else 0.0)
+    solve_levels(grid.levels, lid)
+    if may_be_enclosed:
+        fix_null_space(finest, w)
     displace_particles(
         finest,
         w,
@@ -364,24 +375,6 @@ def update_open_volume(world: World, grid: PressureGrid, params: Parameters, c: 
     grid.solids_version, grid.gravity = world.solids_version, (c.gravity_x, c.gravity_y, c.gravity_z)
     thin, grid.regions, grid.open_nodes = map(int, download(grid.found))
     grid.has_thin_walls = thin > 0
-
-
-def solve_enclosed(grid: PressureGrid, per_error: float, gravity: tuple[float, float, float], liquid: float) -> None:
-    """Solve the equation, which is singular in regions that no air bounds; `liquid` is the volume of all of it [m^dim].
-
-    `per_error` [1/m^2] is what an error of one is on the right-hand side.
-    """
-    finest = grid.finest
-    lid = int(-gravity[1] > 0.7 * math.hypot(*gravity))
-    open_volume = grid.open_nodes * finest.dx * finest.dy * finest.dz
-    may_be_enclosed = grid.regions > 1 or liquid > THRESHOLDS.mostly_full * open_volume
-    if may_be_enclosed:
-        nodes = finest.nx * finest.ny * finest.nz
-        grid.make_room(Part.ENCLOSED)
-        make_compatible(finest, grid.workspace, LARGEST_SUM / nodes / per_error if per_error else 0.0, lid)
-    solve_levels(grid.levels, lid)
-    if may_be_enclosed:
-        fix_null_space(finest, grid.workspace)
 
 
 def displacement_of(params: Parameters, stiffness: float, h: float) -> Displacement:

@@ -246,6 +246,11 @@ class PressureGrid:
             if not missing.isdisjoint({Part.SOLIDS, Part.BODIES}):
                 self.solids_version = -1  # what they hold has not been found yet
 
+    def may_be_enclosed(self, liquid: float) -> bool:
+        """Say whether some region may have no air, where there is that volume of `liquid` [m^dim] in all of them."""
+        open_volume = self.open_nodes * self.finest.dx * self.finest.dy * self.finest.dz
+        return self.regions > 1 or liquid > THRESHOLDS.mostly_full * open_volume
+
     @property
     def finest(self) -> Level:
         """The level that particles exchange with."""

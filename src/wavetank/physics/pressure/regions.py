@@ -7,8 +7,9 @@ alternately, and each step was left with a pattern of stripes. So the mean of an
 side. Where it is negative there is open volume that lacks liquid, lambda <= 0 leaves it at the top, and all is well.
 The null space is fixed by the least pressure that the region can have.
 
-Air is where a cell is less than half full, softly from a quarter of a cell of air on: a sliver that a corner leaves
-reads more open volume than it has, seemed empty, and all of its region was left unsolved.
+Such a region has no surface: all of its nodes count as full. A sliver that a corner leaves of a cell reads half full
+and counted as air, into which all that the errors add up to ran. Air is where a cell is less than half full, softly
+from a quarter of a cell of air on: a sliver reads more open volume than it has as well.
 
 Regions are found by joining rows in a forest, each with the lowest number of its nodes as its root, which does not
 depend on the order of threads (Tarjan 1975, 10.1145/321879.321884).
@@ -100,14 +101,13 @@ def air_in(w: Workspace, root):
 
 
 @qd.kernel(fastcache=True)
-def make_compatible(grid: Level, w: Workspace, per_error: qd.f32, lid: qd.i32):
-    """Take the mean of an enclosed region from its right-hand side, where it is positive.
+def fill_enclosed(grid: Level, w: Workspace, lid: qd.i32):
+    """Find how surely each region has air, and count its nodes as liquid where it has none: there is no surface.
 
-    Sums are of whole multiples of the inverse of `per_error` [m^2], so that the order of threads does not matter. `lid`
-    is 1 in a tank that is closed above its liquid.
+    `lid` is 1 in a tank that is closed above its liquid.
     """
     for n in range(grid.nx * grid.ny * grid.nz):
-        w.region_air[n], w.region_error[n], w.region_nodes[n] = 0, 0, 0.0
+        w.region_air[n] = 0
     for n in range(grid.nx * grid.ny * grid.nz):
         if grid.open_volume[n] > 0.0:
             air = ramp(grid.open_volume[n] * (1.0 - grid.liquid[n]), grid.limits.air_from, grid.limits.air_to)
@@ -116,6 +116,20 @@ def make_compatible(grid: Level, w: Workspace, per_error: qd.f32, lid: qd.i32):
             amount = qd.cast(1024.0 * air, qd.i32)
             if amount > w.region_air[w.region[n]]:
                 qd.atomic_max(w.region_air[w.region[n]], amount)
+    for n in range(grid.nx * grid.ny * grid.nz):
+        if grid.open_volume[n] > 0.0:
+            lacks = qd.max(grid.limits.borne_to - grid.liquid[n], 0.0)
+            grid.liquid[n] += (1.0 - air_in(w, w.region[n])) * lacks
+
+
+@qd.kernel(fastcache=True)
+def make_compatible(grid: Level, w: Workspace, per_error: qd.f32):
+    """Take the mean of an enclosed region from its right-hand side, where it is positive.
+
+    Sums are of whole multiples of the inverse of `per_error` [m^2], so that the order of threads does not matter.
+    """
+    for n in range(grid.nx * grid.ny * grid.nz):
+        w.region_error[n], w.region_nodes[n] = 0, 0.0
     for n in range(grid.nx * grid.ny * grid.nz):
         root = w.region[n]
         if grid.inverse_diagonal[n] > 0.0 and air_in(w, root) < 1.0:
