@@ -20,6 +20,7 @@ import numpy as np
 from wavetank.device.compiler import qd, upload
 from wavetank.device.state import integers, scalars, vectors
 from wavetank.solids.distance import SolidSet, image_near, parts
+from wavetank.solids.mass import lattice_of
 
 
 @qd.func
@@ -80,8 +81,41 @@ class Pieces:
     solid: qd.types.ndarray()  # i32 [pieces]: number of the solid
     edges: qd.types.ndarray()  # vec3 [pieces], m: of the box that it is cut from
     volume: qd.types.ndarray()  # f32 [pieces]: over that of a particle
+    ahead: qd.types.ndarray()  # vec3 [pieces]: by axis, which way the body's surface in the face ahead looks, 1 or -1;
+    behind: qd.types.ndarray()  # 0 where it has none there, and the same of the face behind
     count: qd.i32
     reach: qd.f32  # m: radius of the largest body
+
+
+def _less_beyond(places: np.ndarray, edges: np.ndarray, volumes: np.ndarray, side: int) -> np.ndarray:
+    """Return by how much less than a piece's own volume that beyond its faces on a `side` is, along each axis, [n, 3].
+
+    The pieces, with these `places` [n, 3] [m] and `volumes` [n], are of a lattice with boxes of these `edges` [3] [m].
+    Over the edge it is the area of the body's surface that lies in the face and looks to that side.
+    """
+    place = lattice_of(places, edges)
+    lattice = np.zeros(place.max(axis=0) + 2)
+    lattice[tuple(place.T)] = volumes
+    beyond = [lattice[tuple((place + side * np.eye(3, dtype=int)[axis]).T)] for axis in range(3)]
+    less = volumes[:, None] - np.stack(beyond, axis=1)
+    found: np.ndarray = np.where(np.abs(less) > 1e-4 * volumes.max(), less, 0.0)
+    return found
+
+
+def largest_displacement(places: np.ndarray, edges: np.ndarray, volumes: np.ndarray) -> float:
+    """Return the volume, in the unit of `volumes`, whose weight in a liquid at rest lifts a body at most.
+
+    That is where the liquid stands up to its top everywhere but above what looks up: a tub floats by the volume to its
+    rim. Of the six ways up along its axes it is the largest; the arguments are those of `new_pieces`.
+    """
+    largest = float(volumes.sum())
+    for side in (1, -1):
+        less = np.maximum(_less_beyond(places, edges, volumes, side), 0.0)
+        for axis in np.flatnonzero(edges > 0.0).tolist():
+            along = side * places[:, axis]
+            deep = (along - along.min()) / edges[axis] + 1.0
+            largest = max(largest, float(np.sum(less[:, axis] * deep)))
+    return largest
 
 
 def new_pieces(bodies: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]], reach: float) -> Pieces:
@@ -92,9 +126,12 @@ def new_pieces(bodies: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]], rea
     sizes = [len(places) for places, _, _ in bodies.values()]
     count = sum(sizes)
     place, solid, edges, volume = vectors(3, count), integers(count), vectors(3, count), scalars(count)
+    ahead, behind = vectors(3, count), vectors(3, count)
     if count:
         upload(place, np.concatenate([places for places, _, _ in bodies.values()]))
         upload(solid, np.repeat(list(bodies), sizes))
         upload(edges, np.repeat([edges for _, edges, _ in bodies.values()], sizes, axis=0))
         upload(volume, np.concatenate([volumes for _, _, volumes in bodies.values()]))
-    return Pieces(place, solid, edges, volume, count, reach)
+        upload(ahead, np.concatenate([np.sign(_less_beyond(*cut, 1)) for cut in bodies.values()]))
+        upload(behind, np.concatenate([-np.sign(_less_beyond(*cut, -1)) for cut in bodies.values()]))
+    return Pieces(place, solid, edges, volume, ahead, behind, count, reach)

@@ -16,7 +16,7 @@ from typing_extensions import override
 from wavetank.device.compiler import Mirror, synchronize
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.rotations import quaternion_of
-from wavetank.physics.bodies import DISPLACING, IMMERSION, OF_GRID, RUBBING, Pieces, new_pieces
+from wavetank.physics.bodies import DISPLACING, IMMERSION, OF_GRID, RUBBING, Pieces, largest_displacement, new_pieces
 from wavetank.physics.mixture import blend
 from wavetank.physics.pressure.correct import warm_start_share
 from wavetank.physics.pressure.grid import THRESHOLDS
@@ -42,6 +42,7 @@ from wavetank.solids.solid import Solid
 MOST_TRIES = 4  # of a step
 FARTHEST = 0.3  # of a spacing: a larger correction of a body repeats the step
 FEWEST = 4.0  # pieces across a body
+FINEST = 0.25  # of a spacing: longer pieces are halved where a body is no thicker than two of them
 IN_JOINTS = 16  # inner iterations of the engine with joints: with 1 a motor sagged by 0.3 rad/s under a load
 IN_CONTACTS = 2  # without joints: with 1 a heavy box at rest on the floor had 5 mm/s, by which it did not move
 DRY = 0.5  # Coulomb's coefficient between solids where none is given: wood on wood
@@ -94,6 +95,7 @@ class Bodies(Mapping[str, Body]):
             }
         )
         self._units = np.array([body.unit for body in self.members])  # 1/m
+        self._largest_lifts = np.zeros(len(self.members))  # kg: of displaced fluid, as a tub has up to its rim
         self._displaced_masses = np.array([body.wet.mass for body in self.members])  # kg
         displaced = self._displaced_masses / self._density
         self._radii = np.cbrt(0.75 / np.pi * displaced) if self._dim == 3 else np.sqrt(displaced / np.pi)  # m
@@ -209,11 +211,13 @@ class Bodies(Mapping[str, Body]):
         spacing, table = self._scene.spacing, {}
         for body in self.members:
             edge = min(spacing, 2.0 * float(body.wet.axes[3 - self._dim]) / FEWEST)
-            cut = Ruler(body.solid, self._dim, spacing).cut(edge)
+            cut = Ruler(body.solid, self._dim, spacing).cut_for_surface(edge, FINEST * spacing)
             inside = cut.volumes > 0.0
             # Their volumes add up to the body's: with a cut surface a body of water's density would rise.
             volumes = cut.volumes[inside] * (body.wet.mass / self._density / cut.volumes.sum())
             table[body.number] = (cut.places[inside], cut.edges, volumes / spacing**self._dim)
+        lifts = [self._density * spacing**self._dim * largest_displacement(*table[number]) for number in table]
+        self._largest_lifts = np.array(lifts)
         return new_pieces(table, max(body.solid.reach() for body in self.members))
 
     # --- a step ---
@@ -315,7 +319,7 @@ class Bodies(Mapping[str, Body]):
         coupling.displaced = np.minimum(1.0, rows[:, DISPLACING] * particle / (wet * cell))
         keeps = (warm_start_share(self._scene, dt) * coupling.warm_start_share)[:, None]
         force = keeps * coupling.warm_started_force + rows[:, OF_GRID : OF_GRID + 6] * scale / dt
-        coupling.grid_force = limited_lift(force, self._gravity, THRESHOLDS.largest_warm_start * wet)
+        coupling.grid_force = limited_lift(force, self._gravity, THRESHOLDS.largest_warm_start * self._largest_lifts)
         coupling.impulse = rows[:, :6] * scale + force * dt
         if world.remembers_viscosity:
             each, spread = hold_on_bodies(blend(world.materials, self._scene), self._scene, dt)

@@ -20,6 +20,7 @@ from wavetank.solids.solid import Solid
 SEARCH = 48  # boxes along an axis in which the extent is looked for
 PIECES = 200_000  # about, of a quadrature
 LEAST = 4  # boxes along an axis
+SEEN = 3  # boxes from which the middle of a solid is looked for
 MOST_PIECES = 4_000_000  # of a solid: half a gigabyte while they are measured
 
 
@@ -38,6 +39,7 @@ class Cut:
     volumes: np.ndarray  # [n], m^3: what of each is inside
     shells: np.ndarray  # [n]: how near to the surface each is, 1 at it, 0 half a box away
     edges: np.ndarray  # [3], m: of a box; 0 along z in 2-D
+    depths: np.ndarray  # [n], m: of the centres below the surface, less than 0 outside
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,14 +97,35 @@ class Ruler:
             )
         numbers[: self.dim] = np.maximum(np.ceil(used / edge - 1e-6), LEAST)
         edges = np.where(np.arange(3) < self.dim, size / numbers, 0.0)
-        places = _centers(lower, upper, numbers)
-        distance = self.distances(places)
-        width = float(edges[: self.dim].min())
+        return self._kept(_centers(lower, upper, numbers), edges)
+
+    def cut_for_surface(self, edge: float, least: float) -> Cut:
+        """Cut the solid into boxes of about `edge` [m], or halved until they are half as large as it is thick.
+
+        The differences of the volumes of boxes that share a face are then areas of the surface, in sheets too. They are
+        halved while they are longer than `least` [m].
+        """
+        cut = self.cut(edge)
+        while float(cut.edges[: self.dim].min()) > least and thickness(cut) < 2.0 * float(cut.edges.max()):
+            cut = self._halved(cut)
+        return cut
+
+    def _halved(self, cut: Cut) -> Cut:
+        """Return a cut with boxes of half the edges."""
+        edges, pieces = 0.5 * cut.edges, []
+        for k in range(2**self.dim):
+            way = edges * (np.array([k >> axis & 1 for axis in range(3)]) - 0.5)
+            pieces.append(cut.places + np.where(edges > 0.0, way, 0.0))
+        return self._kept(np.concatenate(pieces), edges)
+
+    def _kept(self, places: np.ndarray, edges: np.ndarray) -> Cut:
+        """Return those of the boxes at these places that are inside in part, or near to the surface."""
+        distance, width = self.distances(places), float(edges[: self.dim].min())
         inside = np.clip(0.5 - distance / width, 0.0, 1.0)
-        kept = inside > 0.0
         shells = np.clip(1.0 - np.abs(distance) / width, 0.0, 1.0)
-        kept |= shells > 0.0
-        return Cut(places[kept], inside[kept] * float(np.prod(edges[: self.dim])), shells[kept], edges)
+        kept = (inside > 0.0) | (shells > 0.0)
+        volumes = inside[kept] * float(np.prod(edges[: self.dim]))
+        return Cut(places[kept], volumes, shells[kept], edges, -distance[kept])
 
     def _tight(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the corners of the box around the solid; of one that has its axes, exactly."""
@@ -111,6 +134,24 @@ class Ruler:
         half = np.array([*self.solid.size, 0.0][:3]) / 2.0 if isinstance(self.solid, Box) else self.solid.radius
         corner = half * np.array([1.0, 1.0, float(self.dim == 3)])
         return -corner, corner
+
+
+def lattice_of(places: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Return the whole coordinates [n, 3] of boxes with these centres [n, 3] and edges [3], from 1 on."""
+    found: np.ndarray = np.round((places - places.min(axis=0)) / np.where(edges > 0.0, edges, 1.0)).astype(int) + 1
+    return found
+
+
+def thickness(cut: Cut) -> float:
+    """Return how thick [m] the thinnest tenth of a solid is: twice the depth of its middle, if that is near."""
+    place = lattice_of(cut.places, cut.edges) + SEEN
+    depths = np.full(place.max(axis=0) + 1 + SEEN, -np.inf)
+    depths[tuple(place.T)] = cut.depths
+    for _ in range(SEEN):
+        for axis in range(3):
+            ahead, behind = (np.roll(depths, side, axis) for side in (1, -1))  # the rim is empty
+            depths = np.maximum(depths, np.maximum(ahead, behind))
+    return 2.0 * float(np.quantile(depths[tuple(place[cut.volumes > 0.0].T)], 0.1))
 
 
 def inertia_of(solid: Solid, cut: Cut) -> Inertia:

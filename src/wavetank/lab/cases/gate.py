@@ -4,8 +4,7 @@ A gate T thick stands from the floor to above the water, which is H deep on one 
 water pushes with rho g H^2 / 2 a metre, at H / 3 above the floor (hydrostatics), whatever the thickness and wherever
 the gate stands in the cells of the pressure grid. It is a body that is held; its `force` and its `torque` about the
 middle of its foot are means over a quarter of a second of still water. The bound of 4 % holds for the worst place, of
-up to four that are a quarter of a spacing apart. Known: a gate under four spacings feels too little, because pressure
-is read across thin walls, and what is carried on to the next step is capped by the weight of its volume.
+up to four that are a quarter of a spacing apart.
 """
 
 from typing import Any

@@ -1,10 +1,10 @@
-"""An open boat of boards floats at its draft and stays dry inside, in two dimensions.
+"""An open boat of boards floats at its draft and stays dry inside, in two dimensions; and a bowl, a mesh, in space.
 
 Three boards, T thick, make a tub B wide; it weighs as much as the water that B times its draft takes (Archimedes),
 boards and air together, whatever the boards are made of. It starts at that draft beside still water and is left alone
 for 20 s, at the finer spacing for 5 s. Water inside counts where it is lower than the rim and between the boards; the
-level outside is that of the water that is not inside. Known: pressure is read across thin boards, and what is carried
-on to the next step is capped by the weight of the boards' own volume.
+level outside is that of the water that is not inside. The bowl is half a hollow ball, and has the draft h at which a
+cap of the ball displaces its weight, pi h^2 (R - h / 3).
 """
 
 import dataclasses
@@ -14,15 +14,20 @@ import numpy as np
 
 from wavetank.lab.cases.case import Case, Figure, Outcome
 from wavetank.lab.plots import BLUE, RED, tidy
+from wavetank.scene.filled import Filled
 from wavetank.scene.fluids import Block
 from wavetank.scene.scene import Scene
 from wavetank.scene.tank import Tank
 from wavetank.simulation.simulation import Simulation
-from wavetank.solids.shapes import Box, Union
+from wavetank.solids.meshes.mesh import Mesh
+from wavetank.solids.shapes import Box, Difference, Sphere, Union
 
 BEAM, SIDE, LONG, HIGH, DEPTH, DRAFT = 0.4, 0.4, 1.2, 1.1, 0.5, 0.2  # m: boat's beam and height, tank, water
 BOARDS = (1, 2, 4)  # d
 SECONDS, FINER = 20.0, 5.0  # s: at the coarser spacing, at the finer
+RADIUS, ROOM, POOL, CAP = 0.25, 0.9, 0.45, 0.125  # m: of the bowl; tank, water, and the bowl's draft
+WALLS = {0.03: (1, 3), 0.02: (2,)}  # d, by spacing [m]
+AFLOAT = 5.0  # s
 
 
 @dataclasses.dataclass
@@ -75,6 +80,45 @@ def follow(world: Scene, boards: int, seconds: float, arch: str) -> Float:
     return Float(np.array(times), np.array(drafts), np.array(inside), sim.positions)
 
 
+def bowl(spacing: float, wall: int) -> Scene:
+    """Return half a hollow ball, open above, whose wall is so many spacings thick, in still water."""
+    angle, around = np.linspace(-0.5 * np.pi, 0.0, 25), np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+    radii = np.concatenate([np.full(25, RADIUS), np.full(25, RADIUS - wall * spacing)])
+    angles = np.concatenate([angle, angle[::-1]])
+    rings = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
+    points = rings[:, None, [0, 1, 0]] * np.stack([np.cos(around), np.ones(48), np.sin(around)], axis=1)
+    row, column = np.meshgrid(np.arange(49), np.arange(48), indexing="ij")
+    a, b = 48 * row + column, 48 * row + (column + 1) % 48
+    faces = np.concatenate([np.stack(three, axis=-1).reshape(-1, 3) for three in ((a, a + 48, b), (b, a + 48, b + 48))])
+    points[[0, -1]] = points[[0, -1]] * (0.0, 1.0, 0.0)
+    middle = (0.5 * ROOM, POOL - CAP + RADIUS, 0.5 * ROOM)
+    solid = Mesh.of(
+        points.reshape(-1, 3),
+        faces,
+        name="boat",
+        mass=1000.0 * np.pi * CAP**2 * (RADIUS - CAP / 3.0),
+        size=(2.0 * RADIUS, RADIUS, 2.0 * RADIUS),
+        center=(middle[0], middle[1] - 0.5 * RADIUS, middle[2]),
+    )
+    pool = Box(center=(0.5 * ROOM, 0.5 * POOL, 0.5 * ROOM), size=(ROOM, POOL, ROOM))
+    water = Filled(inside=Difference(parts=[pool, Sphere(center=middle, radius=RADIUS)]))
+    return Scene(spacing=spacing, tank=Tank(size=(ROOM,) * 3), fluids=[water], solids=[solid], foam=0.0)
+
+
+def draft_of_bowl(spacing: float, wall: int, arch: str) -> tuple[float, float]:
+    """Return the draft of a bowl after `AFLOAT` over that which it should have, and its water over its room."""
+    sim = Simulation(bowl(spacing, wall), arch)
+    sim.advance(AFLOAT)
+    middle = np.asarray(sim.bodies["boat"].position, float) + (0.0, 0.5 * RADIUS, 0.0)
+    x, level = sim.positions - middle, POOL
+    inner = RADIUS - wall * spacing
+    inside = int(np.sum((np.linalg.norm(x, axis=1) < inner) & (x[:, 1] < 0.0))) * spacing**3
+    for _ in range(50):
+        deep = level - float(middle[1]) + RADIUS
+        level = (sim.count * spacing**3 - inside + np.pi * deep**2 * (RADIUS - deep / 3.0)) / ROOM**2
+    return (level - float(middle[1]) + RADIUS) / CAP, inside / (2.0 / 3.0 * np.pi * inner**3)
+
+
 def run(quick: bool, arch: str) -> Outcome:
     """Leave boats of thin and thick boards alone at two spacings (quick: of thick ones, for 2 s)."""
     ways = {(d, boards): seconds for d, seconds in ((0.02, SECONDS), (0.01, FINER)) for boards in BOARDS}
@@ -90,6 +134,15 @@ def run(quick: bool, arch: str) -> Outcome:
             Figure(f"{name}: draft, error", off, "%", -4.0, 4.0, f"{DRAFT} m", "Archimedes"),
             Figure(f"{name}: water inside, of its room", wet, "%", None, 0.0, "0", "it floats"),
         ]
+
+    for d, walls in {} if quick else WALLS.items():
+        for wall in walls:
+            draft, wet = draft_of_bowl(d, wall, arch)
+            name = f"bowl, R / d = {RADIUS / d:.3g}, wall of {wall} d"
+            figures += [
+                Figure(f"{name}: draft, error", 100.0 * (draft - 1.0), "%", -4.0, 4.0, f"{CAP} m", "Archimedes"),
+                Figure(f"{name}: water inside, of its room", 100.0 * wet, "%", None, 0.0, "0", "it floats"),
+            ]
 
     def draw(plot: Any) -> None:
         left, right = plot.subplots(1, 2, width_ratios=(2, 1))

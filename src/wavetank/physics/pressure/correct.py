@@ -337,7 +337,7 @@ def correct_pressure(world: World, kinds: Blend, params: Parameters, c: Coeffici
     if world.pieces:
         acting = (1.0 - warm_start_share(params, c.dt)) * math.hypot(*params.gravity) * c.dt**2
         per_lambda = stiffness / acting if acting else 0.0  # nothing is deep without gravity
-        push_bodies_by_pressure(world, stiffness, per_lambda, c, mixed=kinds.mixed)
+        push_bodies_by_pressure(world, stiffness, per_lambda, c, has)
 
 
 def variant_of(world: World, *, mixed: int = 0, thin_walls: bool) -> Variant:

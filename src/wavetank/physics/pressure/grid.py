@@ -47,6 +47,8 @@ class Thresholds:
     thickest: Final[float] = 1.6  # cells: a wall that is thicker is not a thin one
     inside_kept: Final[float] = 0.35  # cells up to which a node inside of a thin wall belongs to the nearer side
     behind: Final[float] = 0.15  # cells behind the plane of a thin wall from which a place is behind it
+    outside: Final[float] = 0.25  # cells outside of a body's surface where it is asked which nodes are open to that
+    open_from_outside: Final[float] = 0.25  # sum of weights of such nodes from which on only they count
     # The liquid
     full: qd.f32 = 0.98  # liquid fraction that cells without voids have at least
     slit_full: qd.f32 = 0.7  # liquid fraction that a cell at a solid has where there is no slit
