@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from clouds import Cloud
 
+import wavetank as wt
+from wavetank.physics.coefficients import coefficients
 from wavetank.physics.density_constraint import correct_positions, schedule, start_multipliers
 from wavetank.physics.terms.vorticity import confine_vorticity
 from wavetank.physics.terms.xsph_viscosity import apply_xsph
@@ -178,6 +180,15 @@ def test_xsph_eq_11(dim, kernel, turning):
     v_ij = cloud.v[None, :, :] - cloud.v[:, None, :]
     expected = cloud.v + 0.2 * cloud.mass_over_rest_density() * np.sum(v_ij * cloud.w()[..., None], axis=1)
     np.testing.assert_allclose(world.spare.v.to_numpy()[: cloud.count], expected, atol=1e-5 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("spacing", [0.01, 0.03])
+def test_xsph_makes_up_for_what_a_fluid_s_own_viscosity_lacks(spacing):
+    """XSPH has a kinematic viscosity of 24 c d^2 /s; with a fluid that has half of that it takes half of its share."""
+    water = wt.Block(lower=(0, 0), upper=(0.1, 0.1))
+    params, own = wt.Scene(spacing=spacing, viscosity=0.1, fluids=[water]), 24.0 * 0.1 * spacing**2
+    shares = [coefficients(params, 1 / 240, kinematic_viscosity=part * own).viscosity for part in (0.0, 0.5, 1.0, 9.0)]
+    np.testing.assert_allclose(shares, [0.1, 0.05, 0.0, 0.0], atol=1e-9)
 
 
 @pytest.mark.parametrize("turning", [0, 1])

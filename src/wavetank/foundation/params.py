@@ -77,7 +77,7 @@ class Parameters(Model):
     grid_pressure: float = parameter(1.0, 0.0, 1.0, "", "", "Share of the density error that the coarse pressure grid removes before the iterations; 0 switches it off.")
     attraction: float = parameter(0.0, 0.0, 1.0, "", "", "Share of negative pressure that is allowed; with 0 water separates freely.")
     calming: float = parameter(0.95, 0.0, 1.0, "", "", "Share of slow motion relative to neighbours and solids that is damped in a usual step, 1/60 s at 25 mm; with 0 calm water creeps.")
-    viscosity: float = parameter(0.08, 0.0, 1.0, "", "c", "XSPH viscosity (Eq. 11), dimensionless, for a step of 1/240 s.")
+    viscosity: float = parameter(0.08, 0.0, 1.0, "", "c", "XSPH viscosity (Eq. 11), dimensionless, for a step of 1/240 s; less by what the fluids have of their own.")
     dynamic_viscosity: float = parameter(0.0, 0.0, 1e6, "Pa s", "mu", "Dynamic viscosity of fluids whose material names none, solved implicitly; honey has 10.")
     viscosity_iterations: int = parameter(100, 1, 1000, "", "", "Largest number of iterations of the implicit viscosity in a time step.")
     no_slip: float = parameter(1.0, 0.0, 1.0, "", "", "Share of the viscous drag of solids; 1 is no-slip, 0 is free slip.")

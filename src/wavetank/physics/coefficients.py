@@ -19,6 +19,7 @@ REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter 
 DISORDER = {2: 0.75, 3: 0.35}
 #: Of sqrt(g d): below which motion past neighbours, and along solids, is slow. A wave that can be seen is faster.
 SLOW, SLOW_AT_SOLIDS = 0.1, 0.2
+XSPH_VISCOSITY = 0.1  # kinematic viscosity of XSPH, over d^2 times the share that it takes in a second
 CALM = 0.1  # of sqrt(g / h), the rate of the shortest waves: water that turns slower counts as calm
 
 
@@ -31,11 +32,13 @@ def coefficients(
     pressure_iterations: int = 0,
     push_limit: float = 0.0,
     iterations: int = 0,
+    kinematic_viscosity: float = 0.0,
 ) -> Coefficients:
     """Return the scalars of a substep of `dt` [s]; lengths relative to the rest lattice become metres here.
 
     Artificial pressure comes in so many `parts`, one an iteration where 0. Pushes of thick fluids are `held` back.
-    `iterations` are those of `params` where 0.
+    `iterations` are those of `params` where 0. XSPH makes up for what the fluids' `kinematic_viscosity` [m^2/s] lacks
+    of its own, so that a viscosity that is asked for is the one that acts.
     """
     h, gravity = params.support * params.spacing, (*params.gravity, 0.0)
     iterations = iterations or params.iterations
@@ -47,7 +50,8 @@ def coefficients(
     # same force in steps of any length.
     usual_steps = params.usual_steps(dt)
     tensile *= usual_steps**2
-    viscosity = min(1.0, params.viscosity * REFERENCE_RATE * dt)
+    lacking = max(0.0, params.viscosity * REFERENCE_RATE - kinematic_viscosity / XSPH_VISCOSITY / params.spacing**2)
+    viscosity = min(1.0, lacking * dt)
     calming = 1.0 - (1.0 - params.calming) ** usual_steps
     # Of what an iteration may move a particle by: as fast as it goes, and as it falls past a neighbour.
     pace = dt / iterations / push_limit if push_limit > 0.0 else 0.0

@@ -52,6 +52,11 @@ class Blend:
         return max(fluid.viscosity / fluid.density for fluid in self.fluids.values())
 
     @property
+    def least_kinematic_viscosity(self) -> float:
+        """Smallest viscosity over density [m^2/s]."""
+        return min(fluid.viscosity / fluid.density for fluid in self.fluids.values())
+
+    @property
     def surface_tension(self) -> float:
         """Largest surface tension [N/m]."""
         return max(fluid.surface_tension for fluid in self.fluids.values())

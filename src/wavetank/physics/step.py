@@ -60,6 +60,7 @@ def step(
         pressure_iterations=plan.pressure_iterations,
         push_limit=plan.push_limit,
         iterations=plan.iterations,
+        kinematic_viscosity=plan.kinds.least_kinematic_viscosity,
     )
     world.keep_viscosity(plan.has_viscosity)
     world.keep_solids()
