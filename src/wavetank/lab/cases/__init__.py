@@ -17,11 +17,16 @@ from wavetank.lab.cases import (
     gravity_current,
     heave,
     hull,
+    jurin,
     layers,
     lobovsky,
     lock_exchange,
     martin_moyce,
     momentum,
+    nusselt_film,
+    pipe,
+    plates,
+    rayleigh_taylor,
     resolution,
     resonance,
     rest,
@@ -37,6 +42,7 @@ from wavetank.lab.cases import (
     u_tube,
     vortex,
     water_entry,
+    weir,
 )
 from wavetank.lab.cases.case import Case
 
@@ -77,4 +83,10 @@ CASES: tuple[Case, ...] = (
     hull.CASE,
     torricelli.CASE,
     submerged_inlet.CASE,
+    plates.CASE,
+    pipe.CASE,
+    nusselt_film.CASE,
+    weir.CASE,
+    rayleigh_taylor.CASE,
+    jurin.CASE,
 )
