@@ -12,11 +12,11 @@ import pytest
 
 #: of the third frame of each scene of `worlds.compile_kernels`; the driver's launches are the loops of ours
 FRAMES = {
-    "obstacle-tank": {"steps": 1, "launch": 113, "wait": 4},
-    "obstacle-tank-2d": {"steps": 1, "launch": 115, "wait": 4},
+    "obstacle-tank": {"steps": 1, "launch": 116, "wait": 4},
+    "obstacle-tank-2d": {"steps": 1, "launch": 118, "wait": 4},
     "honey": {"steps": 2, "launch": 215, "wait": 10},
-    "oil-and-water": {"steps": 1, "launch": 109, "wait": 4},
-    "crates": {"steps": 1, "launch": 170, "wait": 15},
+    "oil-and-water": {"steps": 1, "launch": 112, "wait": 4},
+    "crates": {"steps": 1, "launch": 173, "wait": 15},
 }
 
 
