@@ -15,9 +15,10 @@ from wavetank.foundation.json_text import json_text
 
 CASE_NAMES = (
     "buckling, buoyancy, calm-vorticity, coiling, column, creep, cup, drop, elliptical-drop, emitter, energy, "
-    "frame-rate, gate, gravity-current, heave, hull, layers, lobovsky, lock-exchange, martin-moyce, momentum, "
-    "resolution, resonance, rest, scale, seeds, shear-wave, solids-at-rest, standing-wave, still-tank, "
-    "submerged-inlet, tension-drop, torricelli, u-tube, vortex, water-entry"
+    "frame-rate, gate, gravity-current, heave, hull, jurin, layers, lobovsky, lock-exchange, martin-moyce, "
+    "momentum, nusselt-film, pipe, plates, rayleigh-taylor, resolution, resonance, rest, scale, seeds, shear-wave, "
+    "solids-at-rest, standing-wave, still-tank, submerged-inlet, tension-drop, torricelli, u-tube, vortex, "
+    "water-entry, weir"
 )
 Cases = Annotated[list[str], typer.Argument(metavar="[CASE]...", help=f"{CASE_NAMES}; not rest, creep without one.")]
 
