@@ -95,13 +95,12 @@ class Bodies(Mapping[str, Body]):
             }
         )
         self._units = np.array([body.unit for body in self.members])  # 1/m
-        self._largest_lifts = np.zeros(len(self.members))  # kg: of displaced fluid, as a tub has up to its rim
         self._displaced_masses = np.array([body.wet.mass for body in self.members])  # kg
         displaced = self._displaced_masses / self._density
         self._radii = np.cbrt(0.75 / np.pi * displaced) if self._dim == 3 else np.sqrt(displaced / np.pi)  # m
         self.coupling.smallness = np.clip(2.0 - self._radii / (SMALL * scene.spacing), 0.0, 1.0)
         self.coupling.sinks = self.coupling.weights > self._displaced_masses
-        self.pieces = self._cut_pieces()
+        self.pieces, self._largest_lifts = self._cut_pieces()
         self._sums = Mirror(solids.device.reaction)
         self._levers = np.repeat(np.stack([np.ones(len(numbers)), self.coupling.reaches], axis=1), 3, axis=1)  # 1, m
 
@@ -206,8 +205,8 @@ class Bodies(Mapping[str, Body]):
             self._rigid[row].set_additional_mass_properties(properties)
         self._engine_masses = added
 
-    def _cut_pieces(self) -> Pieces:
-        """Return the pieces of all bodies on the device."""
+    def _cut_pieces(self) -> tuple[Pieces, np.ndarray]:
+        """Return the pieces of all bodies on the device, and the masses of fluid that each displaces at most [kg]."""
         spacing, table = self._scene.spacing, {}
         for body in self.members:
             edge = min(spacing, 2.0 * float(body.wet.axes[3 - self._dim]) / FEWEST)
@@ -217,8 +216,7 @@ class Bodies(Mapping[str, Body]):
             volumes = cut.volumes[inside] * (body.wet.mass / self._density / cut.volumes.sum())
             table[body.number] = (cut.places[inside], cut.edges, volumes / spacing**self._dim)
         lifts = [self._density * spacing**self._dim * largest_displacement(*table[number]) for number in table]
-        self._largest_lifts = np.array(lifts)
-        return new_pieces(table, max(body.solid.reach() for body in self.members))
+        return new_pieces(table, max(body.solid.reach() for body in self.members)), np.array(lifts)
 
     # --- a step ---
 

@@ -80,23 +80,24 @@ def follow(world: Scene, boards: int, seconds: float, arch: str) -> Float:
     return Float(np.array(times), np.array(drafts), np.array(inside), sim.positions)
 
 
-def bowl(spacing: float, wall: int) -> Scene:
-    """Return half a hollow ball, open above, whose wall is so many spacings thick, in still water."""
-    angle, around = np.linspace(-0.5 * np.pi, 0.0, 25), np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
-    radii = np.concatenate([np.full(25, RADIUS), np.full(25, RADIUS - wall * spacing)])
-    angles = np.concatenate([angle, angle[::-1]])
-    rings = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
-    points = rings[:, None, [0, 1, 0]] * np.stack([np.cos(around), np.ones(48), np.sin(around)], axis=1)
-    row, column = np.meshgrid(np.arange(49), np.arange(48), indexing="ij")
-    a, b = 48 * row + column, 48 * row + (column + 1) % 48
-    faces = np.concatenate([np.stack(three, axis=-1).reshape(-1, 3) for three in ((a, a + 48, b), (b, a + 48, b + 48))])
-    points[[0, -1]] = points[[0, -1]] * (0.0, 1.0, 0.0)
-    middle = (0.5 * ROOM, POOL - CAP + RADIUS, 0.5 * ROOM)
+def bowl(spacing: float, wall: float, draft: float) -> Scene:
+    """Return half a hollow ball, open above, whose wall is so many spacings thick, in still water at its draft [m]."""
+    import trimesh
+
+    angle = np.linspace(-0.5 * np.pi, 0.0, 25)
+    turned = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    profile = np.concatenate([RADIUS * turned, (RADIUS - wall * spacing) * turned[::-1]])
+    profile[[0, -1], 0] = 0.0
+    mesh = trimesh.creation.revolve(
+        profile, sections=48, transform=trimesh.transformations.rotation_matrix(-0.5 * np.pi, [1, 0, 0])
+    )
+    mesh.fix_normals()
+    middle = (0.5 * ROOM, POOL - draft + RADIUS, 0.5 * ROOM)
     solid = Mesh.of(
-        points.reshape(-1, 3),
-        faces,
+        mesh.vertices,
+        mesh.faces,
         name="boat",
-        mass=1000.0 * np.pi * CAP**2 * (RADIUS - CAP / 3.0),
+        mass=1000.0 * np.pi * draft**2 * (RADIUS - draft / 3.0),
         size=(2.0 * RADIUS, RADIUS, 2.0 * RADIUS),
         center=(middle[0], middle[1] - 0.5 * RADIUS, middle[2]),
     )
@@ -105,10 +106,10 @@ def bowl(spacing: float, wall: int) -> Scene:
     return Scene(spacing=spacing, tank=Tank(size=(ROOM,) * 3), fluids=[water], solids=[solid], foam=0.0)
 
 
-def draft_of_bowl(spacing: float, wall: int, arch: str) -> tuple[float, float]:
-    """Return the draft of a bowl after `AFLOAT` over that which it should have, and its water over its room."""
-    sim = Simulation(bowl(spacing, wall), arch)
-    sim.advance(AFLOAT)
+def draft_of_bowl(spacing: float, wall: float, draft: float, seconds: float, arch: str) -> tuple[float, float]:
+    """Return the draft of a bowl after so long over that which it should have, and its water over its room."""
+    sim = Simulation(bowl(spacing, wall, draft), arch)
+    sim.advance(seconds)
     middle = np.asarray(sim.bodies["boat"].position, float) + (0.0, 0.5 * RADIUS, 0.0)
     x, level = sim.positions - middle, POOL
     inner = RADIUS - wall * spacing
@@ -116,7 +117,7 @@ def draft_of_bowl(spacing: float, wall: int, arch: str) -> tuple[float, float]:
     for _ in range(50):
         deep = level - float(middle[1]) + RADIUS
         level = (sim.count * spacing**3 - inside + np.pi * deep**2 * (RADIUS - deep / 3.0)) / ROOM**2
-    return (level - float(middle[1]) + RADIUS) / CAP, inside / (2.0 / 3.0 * np.pi * inner**3)
+    return (level - float(middle[1]) + RADIUS) / draft, inside / (2.0 / 3.0 * np.pi * inner**3)
 
 
 def run(quick: bool, arch: str) -> Outcome:
@@ -137,7 +138,7 @@ def run(quick: bool, arch: str) -> Outcome:
 
     for d, walls in {} if quick else WALLS.items():
         for wall in walls:
-            draft, wet = draft_of_bowl(d, wall, arch)
+            draft, wet = draft_of_bowl(d, wall, CAP, AFLOAT, arch)
             name = f"bowl, R / d = {RADIUS / d:.3g}, wall of {wall} d"
             figures += [
                 Figure(f"{name}: draft, error", 100.0 * (draft - 1.0), "%", -4.0, 4.0, f"{CAP} m", "Archimedes"),

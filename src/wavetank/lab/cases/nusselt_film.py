@@ -5,30 +5,19 @@ creeps less than it should.
 """
 
 from wavetank.lab.cases.case import Case, Outcome
-from wavetank.lab.cases.viscous_flow import DRIVES, GRAVITY, HIGH, LONG, VISCOSITY, compared
-from wavetank.scene.fluids import Block
+from wavetank.lab.cases.viscous_flow import DRIVES, GRAVITY, NUSSELT, compared, layers_in
 from wavetank.scene.scene import Scene
-from wavetank.scene.tank import Tank
 
 
 def scene(dim: int, layers: int, drive: float) -> Scene:
     """Return the film with so many layers, its gravity leant by the `drive` [m/s^2]."""
-    d = HIGH / layers
-    size = (LONG * d, HIGH, 12 * d)[:dim]
-    return Scene(
-        spacing=d,
-        gravity=(drive, -GRAVITY, 0.0)[:dim],
-        tank=Tank(size=(size[0], 2.0 * HIGH, *size[2:]), periodic=["x", "z"][: dim - 1]),
-        fluids=[Block(lower=(0.0,) * dim, upper=size)],
-        dynamic_viscosity=VISCOSITY,
-        foam=0.0,
-    )
+    return layers_in(dim, layers, 2.0, gravity=(drive, -GRAVITY, 0.0)[:dim])
 
 
 def run(quick: bool, arch: str) -> Outcome:
     """Drive it hard and gently, in 2-D at two spacings and in 3-D (quick: once)."""
     flows = [(2, 16, 1.0)] if quick else [(2, n, a) for n in (16, 32) for a in DRIVES] + [(3, 16, a) for a in DRIVES]
-    return compared(scene, 1.0 / 3.0, flows, "Nusselt 1916", arch)
+    return compared(scene, NUSSELT, flows, arch)
 
 
 CASE = Case("nusselt-film", "A film that runs down a slope", run)

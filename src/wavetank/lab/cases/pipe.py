@@ -5,7 +5,7 @@ the roof and loses its drag.
 """
 
 from wavetank.lab.cases.case import Case, Outcome
-from wavetank.lab.cases.viscous_flow import DRIVES, GRAVITY, HIGH, LONG, VISCOSITY, compared
+from wavetank.lab.cases.viscous_flow import DRIVES, GRAVITY, HIGH, LONG, POISEUILLE, VISCOSITY, compared
 from wavetank.scene.fluids import Block
 from wavetank.scene.scene import Scene
 from wavetank.scene.tank import Tank
@@ -37,7 +37,7 @@ def scene(dim: int, layers: int, drive: float) -> Scene:
 def run(quick: bool, arch: str) -> Outcome:
     """Drive it hard and gently, in 2-D at two spacings (quick: once)."""
     flows = [(2, 16, 1.0)] if quick else [(2, n, a) for n in (16, 32) for a in DRIVES]
-    return compared(scene, 1.0 / 12.0, flows, "Poiseuille", arch)
+    return compared(scene, POISEUILLE, flows, arch)
 
 
 CASE = Case("pipe", "A closed channel full of honey", run)

@@ -1,32 +1,21 @@
 """A thick fluid without weight between two walls of its tank, driven along them: Poiseuille's flow."""
 
 from wavetank.lab.cases.case import Case, Outcome
-from wavetank.lab.cases.viscous_flow import DRIVES, HIGH, LONG, VISCOSITY, compared
-from wavetank.scene.fluids import Block
+from wavetank.lab.cases.viscous_flow import DRIVES, POISEUILLE, compared, layers_in
 from wavetank.scene.forces.sway import Sway
 from wavetank.scene.scene import Scene
-from wavetank.scene.tank import Tank
 
 
 def scene(dim: int, layers: int, drive: float) -> Scene:
     """Return the channel with so many layers; the `drive` [m/s^2] is that of a tank that accelerates the other way."""
-    d = HIGH / layers
-    size = (LONG * d, HIGH, 12 * d)[:dim]
-    return Scene(
-        spacing=d,
-        gravity=(0.0,) * dim,
-        tank=Tank(size=size, periodic=["x", "z"][: dim - 1]),
-        fluids=[Block(lower=(0.0,) * dim, upper=size)],
-        forces=[Sway(acceleration=(-drive, 0.0, 0.0)[:dim])],
-        dynamic_viscosity=VISCOSITY,
-        foam=0.0,
-    )
+    sway = Sway(acceleration=(-drive, 0.0, 0.0)[:dim])
+    return layers_in(dim, layers, 1.0, gravity=(0.0,) * dim, forces=[sway])
 
 
 def run(quick: bool, arch: str) -> Outcome:
     """Drive it hard and gently, in 2-D at two spacings and in 3-D (quick: once)."""
     flows = [(2, 16, 1.0)] if quick else [(2, n, a) for n in (16, 32) for a in DRIVES] + [(3, 16, a) for a in DRIVES]
-    return compared(scene, 1.0 / 12.0, flows, "Poiseuille", arch)
+    return compared(scene, POISEUILLE, flows, arch)
 
 
 CASE = Case("plates", "Flow between two plates", run)
