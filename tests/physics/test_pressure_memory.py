@@ -114,7 +114,7 @@ def test_a_world_without_solids_is_what_the_kernels_of_solids_find_where_none_is
     for name in found:
         getattr(grid.finest, name).fill(0.0)
     correct.find_nearest_walls(grid.finest, grid.workspace, grid.found, sim.world.solids, has)
-    correct.find_open_volume(grid.finest, grid.workspace, c, correct.UNIT, 0.04, 2, has)
+    correct.find_open_volume(grid.finest, grid.workspace, sim.world.solids, c, correct.UNIT, 0.04, 2, has)
     correct.find_apertures(grid.finest, grid.workspace, 0.04, has)
     for own, other in zip(cleared, arrays(), strict=True):
         np.testing.assert_array_equal(own, other)

@@ -366,7 +366,7 @@ def update_open_volume(world: World, grid: PressureGrid, params: Parameters, c: 
     grid.make_room(*parts_for(world))
     if has.solids:
         find_nearest_walls(grid.finest, grid.workspace, grid.found, world.solids, has)
-        find_open_volume(grid.finest, grid.workspace, c, UNIT, params.spacing, params.dim, has)
+        find_open_volume(grid.finest, grid.workspace, world.solids, c, UNIT, params.spacing, params.dim, has)
         find_apertures(grid.finest, grid.workspace, params.spacing, has)
     else:
         clear_solids(grid.finest, grid.workspace)

@@ -36,6 +36,7 @@ class Thresholds:
     # Solids and open volume
     least_open: qd.f32 = 0.1  # open volume fraction below which a cell is solid
     hat_beside: Final[float] = 0.125  # share of a free cell that counts at the next node along an axis
+    plane: Final[float] = 0.1  # cells by which distances beside a node differ from those of its wall, a plane
     seam_touching: Final[float] = 0.08  # cells up to which two solids touch
     seam_beyond: Final[float] = 0.5  # cells beyond a seam at which the wall that two solids make is looked for
     slit: Final[float] = 0.5  # cells between two solids up to which there is a slit
@@ -237,6 +238,8 @@ class PressureGrid:
     regions: int = 1
     open_nodes: int = 0
     parts: frozenset[Part] = frozenset()  # of the workspace that there is room for
+    last_step: float = 0.0  # s: the length of the step that the multipliers are of, 0 before the first one
+    pressure: Any = None  # f32 [nodes], m^2/s^2: over the density of the heaviest fluid, once asked for: `probes.py`
 
     def make_room(self, *parts: Part) -> None:
         """Make room for these parts of the workspace, zeros, where there is none yet."""
@@ -322,6 +325,15 @@ def in_cells(grid: Level, p: qd.template()):
     return vec3(
         point.x / grid.dx - 0.5, point.y / grid.dy - 0.5, point.z / grid.dz - (0.5 if qd.static(p.n == 3) else 0.0)
     )
+
+
+@qd.func
+def shortest_edge(grid: Level):
+    """The shortest edge of a cell [m]."""
+    edge = qd.min(grid.dx, grid.dy)
+    if grid.nz > 1:
+        edge = qd.min(edge, grid.dz)
+    return edge
 
 
 @qd.func

@@ -3,6 +3,8 @@
 A cell counts the volume that solids leave it as particles there would count, so that a cell at a wall that is full of
 liquid has the liquid fraction 1 (`liquid.py`). Half-edge pieces of the cells that a wall cuts are asked for how much of
 them is free of it, and add that to the nodes around with hat weights; cells that no wall cuts are added by a filter.
+A plane wall is asked for once a cell, any other, in a corner say, by each piece: of a corner's cell with a third more
+open volume than it has the grid bore three quarters of the weight, and water turned there at 0.2 m/s.
 
 Where there are bodies, the slits between them and what they lie on have no open volume. The layer that a body comes
 down on is a lone row of particles in less than half a cell, and all of its density error had to leave through the
@@ -29,8 +31,10 @@ from wavetank.physics.pressure.grid import (
     largest_along,
     longest_edge,
     on_axis,
+    shortest_edge,
     smooth_along,
 )
+from wavetank.physics.pressure.grid import edge as edge_along
 from wavetank.physics.pressure.thin_walls import (
     find_thin_wall,
     is_open_to,
@@ -69,13 +73,13 @@ def nearest_solid(grid: Level, solids: SolidSet, around: qd.template(), at):
 
 
 @qd.func
-def nearest_wall(grid: Level, solids: SolidSet, around: qd.template(), n):
-    """Return (gradient, distance [m]) of the wall nearest to node `n`; far away where none is near.
+def nearest_wall(grid: Level, solids: SolidSet, around: qd.template(), center):
+    """Return (gradient, distance [m]) of the wall nearest to the place `center`; far away where none is near.
 
     Where solids touch, or parts of one, the surfaces between them are not walls: open volume along the seams of a box
     of boards let the pressure out. Beyond a seam the wall is that of the solid there.
     """
-    edge, center = longest_edge(grid), center_of(grid, n)
+    edge = longest_edge(grid)
     wall, touching, at = vec4(0.0, 1.0, 0.0, 4.0 * edge), 1.0, center
     outward, surface, queries = vec3(0.0, 1.0, 0.0), center, 0
     while queries < 3:  # one query in a loop, as what a kernel takes to compile grows with the places that have one
@@ -104,28 +108,13 @@ def nearest_wall(grid: Level, solids: SolidSet, around: qd.template(), n):
     return wall
 
 
-@qd.func
-def kept_wall(w: Workspace, n):
-    """(gradient, distance [m]) that `nearest_wall` found at node `n`."""
-    return vec4(w.wall_x[n], w.wall_y[n], w.wall_z[n], w.wall_distance[n])
-
-
 # --- open volume ---
 
 
 @qd.func
-def free_of(wall, way, edge):
-    """Share of a piece with that `edge` [m] that is free of a wall, a `way` from where the wall was queried."""
-    return qd.min(qd.max(0.5 + (wall.w + way.dot(vec3(wall.x, wall.y, wall.z))) / edge, 0.0), 1.0)
-
-
-@qd.func
-def free_share(grid: Level, w: Workspace, n):
-    """Share of the cell of node `n` that no solid takes."""
-    edge = qd.min(grid.dx, grid.dy)
-    if grid.nz > 1:
-        edge = qd.min(edge, grid.dz)
-    return free_of(kept_wall(w, n), vec3(0.0, 0.0, 0.0), edge)
+def free_of(distance, edge):
+    """Share of a cell or piece with that `edge` [m] that is free of a wall at a `distance` [m] from its middle."""
+    return qd.min(qd.max(0.5 + distance / edge, 0.0), 1.0)
 
 
 @qd.func
@@ -145,21 +134,44 @@ def open_hat_weights(grid: Level, w: Workspace, at: qd.template(), s, dim: qd.te
 
 
 @qd.func
-def add_free_pieces(grid: Level, w: Workspace, n, part, unit, dim: qd.template(), thin: qd.template()):
-    """Add the free pieces of the cell of node `n` to the sums of a `part`, with the weights of particles there."""
+def is_at_plane(grid: Level, w: Workspace, n):
+    """Say whether the wall nearest to node `n` is a plane there: the distances of the nodes beside tell the same."""
+    found = True
+    for axis in range(3 if grid.nz > 1 else 2):
+        slope = on_axis(w.wall_x[n], w.wall_y[n], w.wall_z[n], axis) * edge_along(grid, axis)
+        for side in range(2):
+            m = clamped_neighbor(grid, n, axis, 2 * side - 1)
+            if found and m != n:
+                bend = w.wall_distance[m] - w.wall_distance[n] - slope * (2 * side - 1)
+                found = qd.abs(bend) < grid.limits.plane * shortest_edge(grid)
+    return found
+
+
+@qd.func
+def add_free_pieces(
+    grid: Level, w: Workspace, solids: SolidSet, n, part, unit, dim: qd.template(), thin: qd.template()
+):
+    """Add the free pieces of the cell of node `n` to the sums of a `part`, with the weights of particles there.
+
+    Where the wall is not a plane, as in a corner, each piece is asked for its own.
+    """
     own = coordinates(grid, n)
     edges = vec3(grid.dx, grid.dy, grid.dz)
-    edge = 0.5 * qd.min(grid.dx, grid.dy)
-    if grid.nz > 1:
-        edge = qd.min(edge, 0.5 * grid.dz)
-    wall = kept_wall(w, n)
+    wall = vec4(w.wall_x[n], w.wall_y[n], w.wall_z[n], w.wall_distance[n])
+    is_plane = wall.w > shortest_edge(grid) or is_at_plane(grid, w, n)
+    around = qd.Vector.zero(qd.i32, 17)
+    if not is_plane:
+        around = solids_near(grid, solids, n, 1, 2.0 * longest_edge(grid))
     for k in range(qd.static(2**dim)):
         way, s = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
         for axis in qd.static(range(dim)):
             aside = 0.5 * ((k >> axis) % 2) - 0.25  # of the piece, in cells from the node
             s[axis] = own[axis] + aside
             way[axis] = aside * edges[axis]
-        free = free_of(wall, way, edge)
+        distance = wall.w + way.dot(vec3(wall.x, wall.y, wall.z))
+        if not is_plane:
+            distance = nearest_wall(grid, solids, around, center_of(grid, n) + way).w
+        free = free_of(distance, 0.5 * shortest_edge(grid))
         if free > 0.0:
             at = corners(grid, qd.floor(s, qd.i32), dim)
             weights = open_hat_weights(grid, w, at, s, dim, thin)
@@ -233,10 +245,10 @@ def find_walls(grid: Level, w: Workspace, found: qd.template(), solids: SolidSet
     nodes = qd.min(grid.width, grid.nx - first)
     around = solids_near(grid, solids, begin, nodes, grid.limits.search * longest_edge(grid))
     for n in range(begin, begin + nodes):
-        wall = nearest_wall(grid, solids, around, n)
+        wall = nearest_wall(grid, solids, around, center_of(grid, n))
         w.wall_x[n], w.wall_y[n], w.wall_z[n], w.wall_distance[n] = wall.x, wall.y, wall.z, wall.w
         grid.overhang[n] = -wall.y
-        grid.open_volume[n] = qd.cast(free_share(grid, w, n) >= grid.limits.least_open, qd.f32)
+        grid.open_volume[n] = qd.cast(free_of(wall.w, shortest_edge(grid)) >= grid.limits.least_open, qd.f32)
         if qd.static(has.thin_walls):
             if find_thin_wall(grid, w, solids, around, n, wall) == 1:
                 qd.atomic_add(found[0], 1)
@@ -244,12 +256,12 @@ def find_walls(grid: Level, w: Workspace, found: qd.template(), solids: SolidSet
 
 
 @qd.func
-def sum_free_volume(grid: Level, w: Workspace, n, part, unit, dim: qd.template(), has: Variant):
+def sum_free_volume(grid: Level, w: Workspace, solids: SolidSet, n, part, unit, dim: qd.template(), has: Variant):
     """Mark node `n` as uncut where nothing closed is near, else add the free pieces of its cell to the sums."""
     edge = longest_edge(grid)
     w.uncut_cells[n] = qd.cast(w.near_closed[n] == 0.0 and w.wall_distance[n] >= 0.75 * edge, qd.f32)
     if w.uncut_cells[n] == 0.0 and w.wall_distance[n] > -edge:
-        add_free_pieces(grid, w, n, part, unit, dim, has.thin_walls)
+        add_free_pieces(grid, w, solids, n, part, unit, dim, has.thin_walls)
 
 
 @qd.func
@@ -289,7 +301,14 @@ def find_nearest_walls(grid: Level, w: Workspace, found: qd.types.ndarray(), sol
 
 @qd.kernel(fastcache=True)
 def find_open_volume(
-    grid: Level, w: Workspace, c: Coefficients, unit: qd.f32, spacing: qd.f32, dim: qd.template(), has: Variant
+    grid: Level,
+    w: Workspace,
+    solids: SolidSet,
+    c: Coefficients,
+    unit: qd.f32,
+    spacing: qd.f32,
+    dim: qd.template(),
+    has: Variant,
 ):
     """Find the open volume of each cell; slits are closed where there are bodies.
 
@@ -303,7 +322,7 @@ def find_open_volume(
     for chunk in range(chunks_over(grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)):
         first = first_of_part(chunk, grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)
         for n in range(first, end_of_part(chunk, grid.nx * grid.ny * grid.nz, grid.parts, 1 + grid.alone)):
-            sum_free_volume(grid, w, n, grid.alone * part_of(chunk), unit, dim, has)
+            sum_free_volume(grid, w, solids, n, grid.alone * part_of(chunk), unit, dim, has)
     qd.loop_config(serialize=bool(has.few_nodes))
     for row in range(grid.ny * grid.nz):
         smooth_along(w.mean_x, w.uncut_cells, grid, row, 0, grid.limits.hat_beside)
