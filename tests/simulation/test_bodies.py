@@ -438,17 +438,14 @@ def kept_in_a_gap(center, fixed, is_in_gap):
     return sim.velocities[inside, 2].mean() / 0.02
 
 
-def test_slow_water_rests_between_upright_sides_and_leaves_from_below():
-    """Lubrication beside a body and a wall; what lies below it is to be squeezed out, or it would bear the body.
+def test_slow_water_rests_between_upright_sides():
+    """Static friction beside a body and a wall; that what lies below a body leaves is asked where one sinks.
 
     The wall is three cells thick. Beside one of a cell and a half water is thrown, and what is left of it is chance.
     """
     wall = wt.Box(name="wall", center=(0.12, 0.2, 0.5 * WIDE), size=(0.24, 0.4, WIDE))
-    step = wt.Box(name="step", center=(0.48, 0.02, 0.5 * WIDE), size=(0.4, 0.04, WIDE))
     beside = kept_in_a_gap((0.40, 0.2, 0.5 * WIDE), wall, lambda x: (x[:, 0] < 0.28) & (abs(x[:, 1] - 0.2) < 0.1))
-    below = kept_in_a_gap((0.48, 0.2, 0.5 * WIDE), step, lambda x: (x[:, 1] < 0.08) & (abs(x[:, 0] - 0.48) < 0.1))
     assert beside < 0.5
-    assert below > 0.65
 
 
 def test_slow_water_rests_between_two_bodies_that_rest():

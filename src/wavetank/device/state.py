@@ -203,7 +203,8 @@ class Coefficients:
     viscosity: qd.f32  # share per substep
     calming: qd.f32  # share per substep of what is slow, over that of the viscosity
     slow: qd.f32  # s^2/m^2: inverse square of the speed below which motion past neighbours is slow
-    calming_at_solids: qd.f32  # share per substep of slow sliding
+    calming_at_solids: qd.f32  # share per substep of what moves slowly to and fro before them
+    static_friction: qd.f32  # m/s, what solids take from slow sliding in a substep
     slow_at_solids: qd.f32  # s^2/m^2: inverse square of the speed below which sliding is slow
     vorticity: qd.f32  # m/s
     coherence: qd.f32

@@ -19,6 +19,7 @@ REFERENCE_RATE = 240.0  # substeps per second for which the viscosity parameter 
 DISORDER = {2: 0.75, 3: 0.35}
 #: Of sqrt(g d): below which motion past neighbours, and along solids, is slow. A wave that can be seen is faster.
 SLOW, SLOW_AT_SOLIDS = 0.1, 0.2
+STATIC_FRICTION = 0.05  # coefficient of what lies on solids while it is slow; on steep ones at least a fifth of it
 XSPH_VISCOSITY = 0.1  # kinematic viscosity of XSPH, over d^2 times the share that it takes in a second
 CALM = 0.1  # of sqrt(g / h), the rate of the shortest waves: water that turns slower counts as calm
 
@@ -81,6 +82,7 @@ def coefficients(
             calming=max(0.0, calming - viscosity),
             slow=slow / SLOW**2,
             calming_at_solids=calming,
+            static_friction=STATIC_FRICTION * params.calming * math.hypot(*params.gravity) * dt,
             slow_at_solids=slow / SLOW_AT_SOLIDS**2,
             vorticity=params.vorticity,
             coherence=params.vorticity_coherence,

@@ -41,8 +41,9 @@ CUT = 0.5  # spacings: cells closer than this to a surface are cut by it
 TOUCH = 0.1  # spacings: between solids closer to each other than this there is no place for water
 EVEN = 0.2  # spacings: dither in the order of places, which spreads a part of a row along it
 SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])  # low-discrepancy dither of cells: Roberts 2018, R3
-FEWEST, MOST, MOST_BESIDE_BODIES = 8, 60, 24  # steps
+FEWEST, MOST, MOST_BESIDE_BODIES = 8, 60, 24  # steps; the last also of water that is nearly at rest
 CALM = 0.04  # of the fall: mean displacement in a step of what does not fall freely, below which all water is at rest
+STILL = 0.005  # of the fall, the same: below it steps end early
 RUNS = 0.1  # of the fall, the same: above it water flows
 CALMER = 0.98  # mean displacement over that in the step before: where it falls by less, water flows and will not rest
 FARTHEST = 0.1  # of a spacing: largest displacement in a step
@@ -117,7 +118,8 @@ def relax(
         borne = length if near is None else length[~is_free]
         mean, last = float(borne.sum()) / max(len(borne), 1) / free_fall, mean
         lively = near is not None and np.count_nonzero(borne > STANDING * free_fall) >= LIVELY * count
-        if number + 1 >= FEWEST and ((mean < CALM and not lively) or mean > CALMER * last):
+        at_rest = mean < CALM and not lively and (mean < STILL or number + 1 >= MOST_BESIDE_BODIES)
+        if number + 1 >= FEWEST and (at_rest or mean > max(CALM, CALMER * last)):
             break
     if near is None or mean >= CALM:
         too_near = False if near is None else near(start_x)

@@ -29,9 +29,6 @@ KNOWN = {
     ),
     "lobovsky: 300 mm: speed of the front, 1 < T < 2.4": Known(1.4, 1.65, "2026-11-27", f"{PLANE} 1.56"),
     "lobovsky: 300 mm: at the far wall": Known(2.4, 2.7, "2026-11-27", f"{PLANE} 2.54"),
-    "u-tube: 16 particles across: period, error": Known(
-        4.0, 12.0, "2026-11-29", "calming at solids bends slow water, here as in the full run"
-    ),
     "torricelli: slot of 10 d: flow, error": Known(
         -20.0, -6.0, "2026-11-29", "edges of a slot count as half-spaces, here as in the full run"
     ),

@@ -4,20 +4,16 @@ A wall that has pushed a particle by delta along its normal in this substep may 
 mu delta. The push is that of the wall's share of the density (`boundary.py`): |lambda_i grad rho_wall|.
 Position-based friction after Macklin et al. 2014, "Unified Particle Physics" (10.1145/2601097.2601152), Sec. 6.1.
 
-Solids of a scene (not the walls of its tank) also take a share of slow sliding from the layer of particles that lies on
-them. A layer or two of water on a ledge is thinner than the boundary layer that it has in nature, and without that it
-slid to and fro for minutes on what the coarse grid has wrong about the room beside an edge.
+Solids of a scene and bodies also have a static friction: they hold back water that moves slowly along them, as
+Coulomb's friction does by a share of the load that lies on them. On steep sides that is a fifth of this at least, about
+what the pressure is wrong by where a solid cuts the coarse cells: a layer on a ledge would slide on it for minutes.
+What gravity or a wave drives is stronger and hardly feels it. It is an acceleration, so that steps of any length and
+tanks of any size feel the same.
 
-The tank's floor takes it from puddles, a layer at most.
-
-And all of them, but bodies, take the same share from slow motion towards them and away, from the layer next to them.
-Iterations answer what presses a layer or two together with more than all of it, so that it jumped from step to step.
-
-Where water lies between a body and another solid, that takes none where water is squeezed out: by a body that is on
-its way, and where one lies above the other. A layer that cannot leave would bear it. Beside upright sides of bodies
-that rest solids do as elsewhere, the tank's walls as other solids do, and so do two bodies: without that, water there
-was thrown to and fro without end, crept up and down walls and went up and down between bodies (notebook/calm.md,
-"Upright slits", "Between two bodies"). A body beside what is none takes nothing, or small ones turn back and forth.
+No water flows through a wall: of what moves slowly to and fro in the layer at one, as seen from there, `calming` takes
+its share; not at solids where a body is near, with which the layer goes that it presses out. It takes its share also of
+a puddle that slides on the floor of the tank, a layer at most (`temporaries.shallow`). Without `calming` there is
+neither.
 
     code     symbol    meaning                                           unit
     push     delta     displacement that the wall has given              m
@@ -28,14 +24,13 @@ from wavetank.device.compiler import qd
 from wavetank.device.state import Coefficients, Grid, Particles, Temporaries, Walls
 from wavetank.foundation.params import Parameters
 from wavetank.physics.boundary import wall_share
-from wavetank.physics.broad_phase import Obstacles, is_marked, marked_walls
+from wavetank.physics.broad_phase import is_marked, marked_walls
 from wavetank.physics.clusters import chunks, end_cluster, end_of, first_cluster
 from wavetank.physics.contact import flattened
 from wavetank.physics.near_solids import contact_plane, known_solids, slot_index
 from wavetank.physics.pairs import column
 from wavetank.physics.plan import Plan
 from wavetank.physics.predicted_positions import predicted
-from wavetank.physics.pressure.grid import ramp
 from wavetank.physics.terms.term import Hook, Term
 from wavetank.physics.world import World
 from wavetank.solids.distance import SolidSet, image_near, lift, plane_distance, rotate, to_local, vec3
@@ -51,12 +46,11 @@ def slow_at_solids(
     c: Coefficients,
     count: qd.i32,
     on_grid: qd.template(),
-    felt: qd.template(),
 ):
     """Reduce the velocities along walls and solids, and slow ones towards them and away.
 
-    Where the step was taken `on_grid`, the floor of the tank lets puddles come to rest. Bodies are `felt` where there
-    are some. The tank's walls are computed for a cluster at once.
+    Where the step was taken `on_grid`, the floor of the tank lets puddles come to rest. The tank's walls are computed
+    for a cluster at once.
     """
     for chunk in range(chunks(grid, count)):
         for cluster in range(first_cluster(chunk, grid, count), end_cluster(chunk, grid, count)):
@@ -64,7 +58,7 @@ def slow_at_solids(
             for i in range(first, end):
                 near |= particles.near[i]
             if near != 0:
-                slow_cluster(first, end, near, particles, temporaries, grid, solids, walls, c, on_grid, felt)
+                slow_cluster(first, end, near, particles, temporaries, grid, solids, walls, c, on_grid)
 
 
 @qd.func
@@ -79,25 +73,21 @@ def slow_cluster(
     walls: Walls,
     c: Coefficients,
     on_grid: qd.template(),
-    felt: qd.template(),
 ):
     """Let the solids that particles `first` to `end` - 1 are `near` slow them."""
     v_of = qd.Matrix.zero(qd.f32, 3, grid.lanes)
-    calmings = qd.Matrix.zero(qd.f32, 3, grid.lanes)  # by the tank next to bodies, by bodies, by other solids
     load_velocities(v_of, first, particles)
-    find_calming(calmings, first, end, particles, temporaries, solids, c, felt)
     tank = marked_walls(near, solids)
     while tank != 0:
         k = qd.math.ffs(tank) - 1
         for lane in range(grid.lanes):
-            slow_at_wall(v_of, calmings, lane, k, first, particles, temporaries, solids, walls, c, on_grid)
+            slow_at_wall(v_of, lane, k, first, particles, temporaries, solids, walls, c, on_grid)
         tank &= tank - 1
     for i in range(first, end):
         if particles.near[i] != 0:
             v = column(v_of, i - first)
             if particles.near[i] >> solids.tank_count != 0:
-                calming = column(calmings, i - first)
-                v = slow_at_obstacles(v, calming, i, particles, temporaries, solids, walls, c)
+                v = slow_at_obstacles(v, i, particles, temporaries, solids, walls, c)
             particles.v[i] = flattened(v, particles.v[i])
 
 
@@ -108,29 +98,6 @@ def load_velocities(v_of: qd.template(), first, particles: Particles):
         v = particles.v[first + lane]
         for axis in qd.static(range(v.n)):
             v_of[axis, lane] = v[axis]
-
-
-@qd.func
-def find_calming(
-    calmings: qd.template(),
-    first,
-    end,
-    particles: Particles,
-    temporaries: Temporaries,
-    solids: SolidSet,
-    c: Coefficients,
-    felt: qd.template(),
-):
-    """Find the shares of slow sliding that (tank next to bodies, bodies, solids) take, a column for each particle."""
-    for lane in range(calmings.m):
-        calmings[1, lane] = c.calming_at_solids
-        calmings[2, lane] = c.calming_at_solids
-    if qd.static(felt):
-        for i in range(first, end):
-            found = slit_shares(i, lift(predicted(particles, i)), temporaries, particles.near[i], solids, c)
-            calmings[0, i - first] = c.calming_at_solids * (found[0] - found[1])
-            calmings[1, i - first] = c.calming_at_solids * (1.0 - found[0])
-            calmings[2, i - first] = c.calming_at_solids * (1.0 - found[1])
 
 
 @qd.func
@@ -152,7 +119,6 @@ def coulomb_share(i, k, distance, slip, temporaries: Temporaries, solids: SolidS
 @qd.func
 def slow_at_wall(
     v_of: qd.template(),
-    calmings: qd.template(),
     lane,
     k,
     first,
@@ -169,12 +135,10 @@ def slow_at_wall(
     n, v = vec3(value.x, value.y, value.z), column(v_of, lane)
     towards = n.dot(v)
     slip = v - n * towards
-    settles = qd.select(value.w < layer_distance() * c.h, normal_calming_share(n, towards, calmings[2, lane], c), 0.0)
+    settles = qd.select(value.w < layer_distance() * c.h, normal_calming_share(n, towards, c), 0.0)
     share = coulomb_share(i, k, value.w, slip, temporaries, solids, walls, c)
     if qd.static(on_grid):
-        squared, in_shallow = slip.norm_sqr(), qd.max(0.0, -n.dot(down(c))) * temporaries.shallow[i]
-        on_floor = calming_share(squared, calmings[2, lane], c) * in_shallow
-        share += on_floor + calming_share(squared, calmings[0, lane], c)
+        share += calming_share(slip.norm_sqr(), c) * qd.max(0.0, -n.dot(down(c))) * temporaries.shallow[i]
     changed = v - n * (towards * settles) - slip * qd.min(solids.grip[k], share)
     is_at = value.w < c.h and is_marked(particles.near[i], k, solids) == 1
     for axis in qd.static(range(3)):
@@ -183,10 +147,14 @@ def slow_at_wall(
 
 @qd.func
 def slow_at_obstacles(
-    v, calmings, i, particles: Particles, temporaries: Temporaries, solids: SolidSet, walls: Walls, c: Coefficients
+    v, i, particles: Particles, temporaries: Temporaries, solids: SolidSet, walls: Walls, c: Coefficients
 ):
     """The velocity `v` [m/s] of particle `i` as the solids that it knows leave it; bodies feel what they take."""
-    p, left = lift(predicted(particles, i)), v
+    p, left, settles = lift(predicted(particles, i)), v, 1.0
+    for number in range(known_solids(temporaries, i)):
+        at = slot_index(temporaries, i, number)
+        if solids.unit[temporaries.solid[at]] > 0.0 and contact_plane(temporaries, at, i, p).w < c.h:
+            settles = 0.0
     for number in range(known_solids(temporaries, i)):
         at = slot_index(temporaries, i, number)
         k, value = temporaries.solid[at], contact_plane(temporaries, at, i, p)
@@ -195,51 +163,15 @@ def slow_at_obstacles(
             relative = left - moving
             towards = n.dot(relative)
             slip = relative - n * towards
-            calming = calmings[2]
-            if solids.unit[k] > 0.0:  # a body that is on its way is not held up
-                calming = calmings[1] * qd.max(moving_body_calming(), rest_confidence(moving, c))
-            elif value.w < layer_distance() * c.h:
-                left -= n * (towards * normal_calming_share(n, towards, calmings[2], c))
-            rubbed = coulomb_share(i, k, value.w, slip, temporaries, solids, walls, c)
-            share = rubbed + calming_share(slip.norm_sqr(), calming, c)
+            if value.w < layer_distance() * c.h:
+                left -= n * (towards * settles * normal_calming_share(n, towards, c))
+            share = coulomb_share(i, k, value.w, slip, temporaries, solids, walls, c)
+            share += static_share(slip.norm_sqr(), -n.dot(down(c)), c)
             change = slip * qd.min(solids.grip[k], share)
             left -= change
             if solids.unit[k] > 0.0:
                 temporaries.push[at] -= change * (c.dt / temporaries.inverse_mass[i])
     return left
-
-
-@qd.func
-def slit_shares(i, p, temporaries: Temporaries, near, solids: SolidSet, c: Coefficients):
-    """(share that bodies, share that other solids do not take where water is beside a body and another solid).
-
-    The latter is how surely it is to leave from between: where a body is on its way, and where one of the two lies
-    above the other: surfaces that lean by 60 degrees and more do not, below 30 they do. Two bodies do as other solids.
-    """
-    bodies, total = 0, 0
-    on_its_way, above, below = 0.0, 0.0, 0.0
-    others = known_solids(temporaries, i) if near >> solids.tank_count != 0 else 0
-    for number in range(others):
-        at = slot_index(temporaries, i, number)
-        k = temporaries.solid[at]
-        value = contact_plane(temporaries, at, i, p)
-        if value.w < c.h:
-            total += 1
-            if solids.unit[k] > 0.0:
-                bodies += 1
-                on_its_way = qd.max(on_its_way, 1.0 - rest_confidence(surface_velocity(solids, k, p, c.dt), c))
-            leans = vec3(value.x, value.y, value.z).dot(down(c))
-            above, below = qd.max(above, leans), qd.max(below, -leans)
-    if bodies > 0:
-        for k in range(solids.tank_count):
-            value = plane_distance(solids, k, p)
-            if is_marked(near, k, solids) == 1 and value.w < c.h:
-                total += 1
-                leans = vec3(value.x, value.y, value.z).dot(down(c))
-                above, below = qd.max(above, leans), qd.max(below, -leans)
-    is_between = qd.cast(bodies > 0 and total > 1, qd.f32)
-    leaves = qd.max(on_its_way, ramp(above, 0.5, 0.85) * ramp(below, 0.5, 0.85))
-    return qd.Vector([is_between * (1.0 if bodies == 1 else leaves), is_between * leaves])
 
 
 @qd.func
@@ -256,33 +188,31 @@ def layer_distance():
 
 
 @qd.func
-def calming_share(squared, calm, c: Coefficients):
-    """Share of a speed, `squared` [m^2/s^2], that solids take because it is slow: `calm` of what is very slow."""
-    return calm * qd.max(0.0, 1.0 - squared * c.slow_at_solids)
+def least_load():
+    """Load that a layer presses a solid with at least, over its own weight."""
+    return 0.2
 
 
 @qd.func
-def normal_calming_share(n, towards, calm, c: Coefficients):
+def static_share(squared, load, c: Coefficients):
+    """Share of a speed, `squared` [m^2/s^2], that static friction takes below a `load`, over the weight of the layer.
+
+    It takes nothing of what is not slow.
+    """
+    held = qd.min(1.0, c.static_friction * qd.max(load, least_load()) / qd.sqrt(qd.max(squared, 1e-12)))
+    return held * qd.max(0.0, 1.0 - squared * c.slow_at_solids)
+
+
+@qd.func
+def calming_share(squared, c: Coefficients):
+    """Share of a speed, `squared` [m^2/s^2], that is taken because it is slow."""
+    return c.calming_at_solids * qd.max(0.0, 1.0 - squared * c.slow_at_solids)
+
+
+@qd.func
+def normal_calming_share(n, towards, c: Coefficients):
     """Share of a speed [m/s] along the normal `n` of a solid that it takes; what hangs from a ceiling is left alone."""
-    return calming_share(towards * towards, calm, c) * (1.0 - qd.max(0.0, n.dot(down(c))))
-
-
-@qd.func
-def rest_speed_ratio():
-    """Inverse square of the speed up to which a body is taken for one at rest, over that of slow sliding."""
-    return 36.0
-
-
-@qd.func
-def rest_confidence(moving, c: Coefficients):
-    """How surely a body is at rest whose surface has the velocity `moving` [m/s], from 0 to 1."""
-    return qd.max(0.0, 1.0 - moving.norm_sqr() * rest_speed_ratio() * c.slow_at_solids)
-
-
-@qd.func
-def moving_body_calming():
-    """Share of the calming that is left for a body on its way."""
-    return 0.1
+    return calming_share(towards * towards, c) * (1.0 - qd.max(0.0, n.dot(down(c))))
 
 
 @qd.func
@@ -296,9 +226,8 @@ def surface_velocity(solids: SolidSet, k, x, dt):
 
 def apply_friction(world: World, plan: Plan, params: Parameters, c: Coefficients) -> None:
     """Let walls and solids hold back the water that slides along them."""
-    on_grid, coupled = int(plan.on_grid), int(plan.obstacles == Obstacles.TWO_WAY)
     slow_at_solids(
-        world.particles, world.temporaries, world.grid, world.solids, world.walls, c, world.count, on_grid, coupled
+        world.particles, world.temporaries, world.grid, world.solids, world.walls, c, world.count, int(plan.on_grid)
     )
 
 
