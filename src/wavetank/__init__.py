@@ -20,6 +20,7 @@ from wavetank.scene.filled import Filled
 from wavetank.scene.fluids import Ball, Block, Points
 from wavetank.scene.gauges import Gauge
 from wavetank.scene.joints import BallJoint, Hinge, Rope, Slider, Spring, Weld
+from wavetank.scene.probes import Probe
 from wavetank.scene.scene import Scene, bundled_scenes
 from wavetank.scene.tank import Tank
 from wavetank.solids.ground.height_field import HeightField
@@ -77,6 +78,7 @@ __all__ = [
     "Particles",
     "Points",
     "Polygon",
+    "Probe",
     "Recording",
     "Rope",
     "Scene",

@@ -38,7 +38,9 @@ Quality = Annotated[
     str,
     typer.Option(help="draft, standard (2 x 2 samples a pixel), high (64 pictures averaged) or film (paths of light)."),
 ]
-ColorBy = Annotated[str | None, typer.Option(help="speed, density, material, foam, or a colour such as #3f99da.")]
+ColorBy = Annotated[
+    str | None, typer.Option(help="speed, density, pressure, material, foam, or a colour such as #3f99da.")
+]
 Environment = Annotated[
     str | None,
     typer.Option(

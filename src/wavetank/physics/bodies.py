@@ -102,6 +102,15 @@ def _less_beyond(places: np.ndarray, edges: np.ndarray, volumes: np.ndarray, sid
     return found
 
 
+def surface_sides(places: np.ndarray, edges: np.ndarray, volumes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which way the surface in the faces ahead of and behind each piece looks, along each axis: 1, -1, or 0.
+
+    It is 0 where there is no surface, [n, 3] each; the arguments are those of `new_pieces`.
+    """
+    cut = places, edges, volumes
+    return np.sign(_less_beyond(*cut, 1)), -np.sign(_less_beyond(*cut, -1))
+
+
 def largest_displacement(places: np.ndarray, edges: np.ndarray, volumes: np.ndarray) -> float:
     """Return the volume, in the unit of `volumes`, whose weight in a liquid at rest lifts a body at most.
 
@@ -132,6 +141,7 @@ def new_pieces(bodies: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]], rea
         upload(solid, np.repeat(list(bodies), sizes))
         upload(edges, np.repeat([edges for _, edges, _ in bodies.values()], sizes, axis=0))
         upload(volume, np.concatenate([volumes for _, _, volumes in bodies.values()]))
-        upload(ahead, np.concatenate([np.sign(_less_beyond(*cut, 1)) for cut in bodies.values()]))
-        upload(behind, np.concatenate([-np.sign(_less_beyond(*cut, -1)) for cut in bodies.values()]))
+        sides = [surface_sides(*cut) for cut in bodies.values()]
+        upload(ahead, np.concatenate([one for one, _ in sides]))
+        upload(behind, np.concatenate([one for _, one in sides]))
     return Pieces(place, solid, edges, volume, ahead, behind, count, reach)

@@ -13,7 +13,16 @@ FINEST, COARSEST = 1e-7, 1e4  # m, of the spacing
 STRONGEST = 1e6  # m/s^2, of gravity
 LEAST_SUPPORTS = 4  # of a tank along an axis that is periodic
 #: how many of each there may be
-MOST = {"solids": 2000, "fluids": 2000, "emitters": 200, "drains": 200, "joints": 2000, "forces": 100, "materials": 100}
+MOST = {
+    "solids": 2000,
+    "fluids": 2000,
+    "emitters": 200,
+    "drains": 200,
+    "joints": 2000,
+    "forces": 100,
+    "materials": 100,
+    "probes": 1000,
+}
 
 
 def check_numbers(values: dict[str, Any]) -> None:

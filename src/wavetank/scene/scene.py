@@ -31,6 +31,7 @@ from wavetank.scene.goal import Goal
 from wavetank.scene.joints import AnyJoint, check_joints
 from wavetank.scene.lattice import covered
 from wavetank.scene.light import Light
+from wavetank.scene.probes import Probe, check_probes
 from wavetank.scene.schedule import Timetable
 from wavetank.scene.summary import summary
 from wavetank.scene.tank import Tank
@@ -71,6 +72,7 @@ class Scene(Timetable, Parameters):
     solids: Annotated[list[AnySolid], BeforeValidator(lambda v: _tagged(v, "box"))] = []
     joints: list[AnyJoint] = []
     forces: list[AnyForce] = []
+    probes: list[Probe] = []
     goal: Goal | None = None
     light: Light | None = None
     film: Film | None = None
@@ -105,6 +107,7 @@ class Scene(Timetable, Parameters):
         self._check_count()
         self._check_inside()
         self._check_names()
+        self._check_probes()
         self.check_sources()
         return self
 
@@ -132,7 +135,7 @@ class Scene(Timetable, Parameters):
 
     def _vectors(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         yield "gravity", self.gravity
-        for kind in ("fluids", "solids", "joints", "forces", "emitters", "drains"):
+        for kind in ("fluids", "solids", "joints", "forces", "emitters", "drains", "probes"):
             for number, member in enumerate(getattr(self, kind)):
                 motion = getattr(member, "motion", None)
                 moving = [(f"motion.{name}", vector) for name, vector in motion.vectors()] if motion else []
@@ -167,7 +170,7 @@ class Scene(Timetable, Parameters):
                 raise ValueError(f"{where}it must lie between {_numbers(first)} and {_numbers(last)}.")
 
     def _check_names(self) -> None:
-        for kind in ("solids", "joints", "materials", "emitters", "drains"):
+        for kind in ("solids", "joints", "materials", "emitters", "drains", "probes"):
             names = [member.name for member in getattr(self, kind) if member.name]
             twice = next((name for name in names if names.count(name) > 1), None)
             if twice is not None:
@@ -188,6 +191,11 @@ class Scene(Timetable, Parameters):
                     f"{where}.material = {material!r} is not one of the scene's materials; "
                     f"they are: {', '.join(known) or 'none; add one under [[materials]]'}."
                 )
+
+    def _check_probes(self) -> None:
+        named = {solid.name: solid for solid in self.solids if solid.name}
+        walls = [wall.name for wall in self.tank.walls()] if self.tank else []
+        check_probes(self.probes, named, walls, has_grid=self.tank is not None and self.grid_pressure > 0.0)
 
     def palette(self) -> list[Material]:
         """Return the materials by their numbers: 0 is the scene's own fluid, then `materials` in their order.

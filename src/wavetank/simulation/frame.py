@@ -16,7 +16,7 @@ from wavetank.device import compiler
 from wavetank.device.compiler import download, upload
 from wavetank.device.state import MARGIN, Diffuse, integers, new_diffuse, scalars, vectors
 from wavetank.device.turns import TURN, one_at_a_time
-from wavetank.foundation.errors import NotFiniteError
+from wavetank.foundation.errors import NotFiniteError, WavetankError
 from wavetank.scene.scene import Scene
 from wavetank.simulation.instant import FOAM, PARTICLES, Field, Instant, PlacedSolid, non_finite_rows
 from wavetank.simulation.solids import Solids, solids_of
@@ -44,11 +44,22 @@ class Frame(Instant):
     diffuse: Diffuse | None = None  # spray, foam and bubbles in device arrays, packed at the front
     foam_count: int = 0  # of them
     read_placed: Callable[[], tuple[PlacedSolid, ...]] = tuple  # reads `placed` of the simulation
+    read_pressure: Callable[[], Any] | None = None  # reads `pressure` of the simulation
 
     @functools.cached_property
     def placed(self) -> tuple[PlacedSolid, ...]:
         """The solids at their poses, without the walls of the tank."""
         return self.read_placed()
+
+    @functools.cached_property
+    def pressure(self) -> Any:
+        """The pressure at each particle [Pa], a device ndarray f32 in device order; 0 where none is known.
+
+        Raises `WavetankError` in a frame of a file.
+        """
+        if self.read_pressure is None:
+            raise WavetankError("this instant is from a file, which holds no pressures; look at it as it is computed.")
+        return self.read_pressure()
 
     def check_finite(self) -> None:
         """Raise `NotFiniteError` where a position or a velocity is not finite."""
@@ -76,6 +87,11 @@ class Frame(Instant):
     def frozen_by_id(self) -> np.ndarray:
         """Whether each particle is ice, int32 [count], ordered by particle id."""
         return self._by_id("frozen")
+
+    @property
+    def pressure_by_id(self) -> np.ndarray:
+        """The pressure at each particle [Pa], float32 [count], ordered by particle id; see `pressure`."""
+        return self._by_id("pressure")
 
     @functools.cached_property
     def _order(self) -> np.ndarray:

@@ -169,6 +169,7 @@ class ParticleSystem:
         check_cost(self.scene, capacity)
         before, scene = self.world, self.scene
         self.world = _new_world(scene, capacity, before.solids, before.pieces, has_friction=before.has_friction)
+        self.world.pressure = before.pressure  # as large as before, and asked for pressures perhaps
         self.counters.capacity, self.outdated = capacity, True
         self.world.adopt(population.at_capacity(before.particles, scene.dim, capacity))
         self.world.count, self.world.frozen, self.world.materials = before.count, before.frozen, before.materials

@@ -13,9 +13,9 @@ import numpy as np
 from typing_extensions import override
 
 from wavetank.device import compiler
-from wavetank.device.state import KINDS
+from wavetank.device.state import KINDS, scalars
 from wavetank.device.turns import TURN, one_at_a_time
-from wavetank.foundation.arguments import KnownAttributes, finite, instance_of
+from wavetank.foundation.arguments import KnownAttributes, array_of, finite, instance_of
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.input_limits import explain_errors, printable
 from wavetank.foundation.params import LIVE, refuse_assignment
@@ -23,6 +23,14 @@ from wavetank.physics import measure, population
 from wavetank.physics.foam.update import load_kernels, update_foam
 from wavetank.physics.mixture import blend
 from wavetank.physics.planning import has_grid_pressure
+from wavetank.physics.pressure.probes import (
+    knows_pressure,
+    pressures,
+    pressures_at,
+    record_pressure,
+    recorded_pressure,
+    restore_pressure,
+)
 from wavetank.physics.terms.term import Term
 from wavetank.physics.time_step import filled_share, whole
 from wavetank.physics.world import World
@@ -38,12 +46,13 @@ from wavetank.simulation.frame import Frame
 from wavetank.simulation.initial import cull, relax
 from wavetank.simulation.instant import PlacedSolid
 from wavetank.simulation.joints import Joints
+from wavetank.simulation.loads import Load, Panels, load_of, panels_of, panels_of_wall, unknown_load
 from wavetank.simulation.packing import pack
 from wavetank.simulation.parameters import LiveParameters
 from wavetank.simulation.particles import ParticleSystem, by_id, check_inside, check_newcomers, parted
 from wavetank.simulation.solids import Solids, restored_solids, solids_of
 from wavetank.simulation.sources import Sources, check_places
-from wavetank.simulation.state import Continuation, Counters, State
+from wavetank.simulation.state import PRESSURE, Continuation, Counters, State
 from wavetank.simulation.state_file import read_state, write_state
 from wavetank.solids.solid import Solid
 
@@ -70,6 +79,7 @@ class Simulation(KnownAttributes):
     forces: list[Force]  # that act in every frame; scripts may append their own
     pushed: list[Force]  # that act in the next frame only
     terms: list[Term]  # of a script, that act in every time step
+    _panels: dict[int, tuple[Solid, Panels]]  # of solids that loads were asked for, by number
     notes: list[str]  # for people, one sentence each; who shows them removes them
     time_steps: int  # of the last frame
     seconds_per_frame: float  # s that the last frame took to compute
@@ -88,7 +98,7 @@ class Simulation(KnownAttributes):
     def _start(self, scene: Scene, arch: str) -> None:
         compiler.start(arch)
         self.arch = compiler.current_backend()
-        self.counters, self.terms = Counters(), []
+        self.counters, self.terms, self._panels = Counters(), [], {}
         self.scene = scene.model_copy(deep=True)
         self.parameters = LiveParameters(self.scene, self.counters)
         self.particles = ParticleSystem(self.scene, self.counters)
@@ -236,6 +246,7 @@ class Simulation(KnownAttributes):
             frozen_count=world.frozen,
             dye=world.particles.dye,
             read_placed=self._placed_solids,
+            read_pressure=self._pressure_of_particles,
         )
 
     def _placed_solids(self) -> tuple[PlacedSolid, ...]:
@@ -269,9 +280,96 @@ class Simulation(KnownAttributes):
             "foaming": int(frame.foaming.sum()),
             **(self.sources.figures() if self.sources else {}),
             **self.bodies.figures(),
+            **self._probe_figures(),
             "substeps": self.time_steps,
             "milliseconds_per_frame": 1e3 * self.seconds_per_frame,
         }
+
+    def pressure(self, points: Any) -> np.ndarray:
+        """Return the pressure [Pa] at `points` [m], [n, dim] or one [dim], float32 [n] or a single one; 0 in the air.
+
+        It is that of the last time step, from the pressure grid, and reading it changes nothing. Liquid at rest reads
+        rho g h within half a percent of the depth, waves are right within a tenth; films thinner than two spacings read
+        too little. At a wall ask for a place before it: inside of a wall no side is meant. From the first call on
+        changes are followed from step to step; the first one takes the pressure for steady.
+
+        Raises `WavetankError` before the first step, and where the world has no pressure grid.
+        """
+        dim = self.scene.dim
+        places = array_of("points", points, np.float32, f"of shape [n, {dim}] or [{dim}]")
+        if places.shape[-1:] != (dim,) or places.ndim > 2 or not np.isfinite(places).all():
+            raise WavetankError(
+                f"points have shape {list(places.shape)}; give finite numbers of shape [n, {dim}] or [{dim}] [m]."
+            )
+        self._check_pressure()
+        places = self.scene.tank.within(places) if self.scene.tank else places
+        return pressures(self.world, self.parameters.at(self.time), places.reshape(-1, dim)).reshape(places.shape[:-1])
+
+    def load_on(self, name: str) -> Load:
+        """Return force [N] and moment [N m] of the liquid's pressure on a solid, still, moving or a body.
+
+        Walls of the tank are "tank y lower", "tank x upper" and so on; in a 2-D world both are per metre of depth. The
+        moment is about the origin of the solid's frame, or the middle of the wall. Right within one percent for gates,
+        discs and walls in water at rest; what lies beyond the walls of the tank, or in them, bears nothing. `pressure`
+        says what is not in it. Raises `WavetankError` as it does, for unknown names and solids without an end.
+        """
+        self._check_pressure()
+        number = self.solids.find(name)
+        if number in self.solids.growing:
+            raise WavetankError(f"the solid {name!r} is still growing; ask for the load on it when it has its size.")
+        return self._load_on(number)
+
+    def _load_on(self, number: int) -> Load:
+        scene, solid = self.parameters.at(self.time), self.solids.members[number]
+        if number not in self._panels or self._panels[number][0] is not solid:
+            if scene.tank and number < self.solids.tank_count:
+                self._panels[number] = solid, panels_of_wall(scene.tank, solid, scene.spacing)
+            else:
+                self._panels[number] = solid, panels_of(solid, scene.dim, scene.spacing)
+        return load_of(self.world, scene, self._panels[number][1], self.solids.poses[number], scene.dim)
+
+    def _has_grid_pressure(self) -> bool:
+        return bool(self.count and has_grid_pressure(self.world, self.parameters.at(self.time)))
+
+    def _check_pressure(self) -> None:
+        if not self._has_grid_pressure():
+            raise WavetankError(
+                "there is no pressure to read; it comes from the pressure grid, which needs a tank, liquid without ice "
+                "that is thin enough to splash, gravity, and grid_pressure above 0."
+            )
+        if not knows_pressure(self.world):
+            raise WavetankError("there is no pressure yet; it is found in a time step, so call step() first.")
+
+    @TURN
+    def _pressure_of_particles(self) -> Any:
+        """Return the pressure at each particle [Pa], a device array in device order; 0 where none is known."""
+        if not (self._has_grid_pressure() and knows_pressure(self.world)):
+            return scalars(self.count)
+        x = self.world.particles.x
+        return pressures_at(self.world, self.parameters.at(self.time), x, x, self.count)
+
+    def _probe_figures(self) -> dict[str, float]:
+        """Return the pressure [Pa] at each probe, or force [N] and moment [N m]; not a number where none is known."""
+        scene, probes = self.parameters.at(self.time), self.scene.probes
+        if not probes:
+            return {}
+        known = self._has_grid_pressure() and knows_pressure(self.world)
+        places = [self.solids.carried(probe.solid, probe.at) for probe in probes if probe.at is not None]
+        rows = pressures(self.world, scene, np.array(places)) if known and places else np.full(len(places), math.nan)
+        read = iter(rows.tolist())
+        figures: dict[str, float] = {}
+        for probe in probes:
+            if probe.at is None:
+                number = self.solids.find(probe.solid)
+                is_known = known and number not in self.solids.growing
+                found = (self._load_on(number) if is_known else unknown_load(scene.dim)).figures()
+            else:
+                found = {"pressure": next(read)}
+            figures |= {f"probes.{probe.name}.{what}": value for what, value in found.items()}
+        return figures
+
+    def _probe_arrays(self) -> dict[str, np.ndarray]:
+        return {PRESSURE: recorded_pressure(self.world)} if self.scene.probes else {}
 
     # --- time ---
 
@@ -367,6 +465,7 @@ class Simulation(KnownAttributes):
             for force in with_images(forces, scene.tank):
                 apply_force(force, self.world.particles, self.count, dt, start)
             self.bodies.step(self.world, scene, dt, limit, shares)
+            record_pressure(self.world, scene, dt)
 
     def _relax(self) -> bool:
         """Relax the water around solids to hydrostatic pressure; return whether it is at rest."""
@@ -385,6 +484,7 @@ class Simulation(KnownAttributes):
             )
         self.solids.passing = None
         self.solids.move_to(0.0, 1.0)
+        restore_pressure(self.world, np.zeros(0, np.float32))  # before the first step it is not known
         return at_rest
 
     def _too_near(self, places: np.ndarray) -> np.ndarray:
@@ -453,6 +553,9 @@ class Simulation(KnownAttributes):
         number = self.solids.find(name) - self.solids.tank_count
         if number < 0:
             raise WavetankError(f"{name!r} is a wall of the tank, which stays; only other solids can be removed.")
+        probe = next((probe.name for probe in self.scene.probes if probe.solid == name), None)
+        if probe is not None:
+            raise WavetankError(f"the probe {probe!r} measures {name!r}; take it out of the scene's probes first.")
         self.scene.solids = [solid for k, solid in enumerate(self.scene.solids) if k != number]
         device, reach = self.solids.device, 2.0 * self.scene.support * self.scene.spacing
         population.forget_solid(self.world.particles, self.count, device, number + self.solids.tank_count, reach)
@@ -518,7 +621,7 @@ class Simulation(KnownAttributes):
             scene=self.parameters.fixed(),
             number=self.frame_number,
             time=self.time,
-            arrays=self.particles.state_arrays() | self.bodies.state_arrays(),
+            arrays=self.particles.state_arrays() | self.bodies.state_arrays() | self._probe_arrays(),
             continuation=Continuation(
                 counters=self.counters.copy(),
                 foam_born=pool.born if pool else -1,
@@ -542,6 +645,7 @@ class Simulation(KnownAttributes):
         capacity, next_id = self.counters.capacity, max(more.counters.next_id, now.next_id)
         self.counters.assign(dataclasses.replace(more.counters, capacity=capacity, next_id=next_id))
         self.pushed = []
+        restore_pressure(self.world, state.arrays.get(PRESSURE, np.zeros(0, np.float32)))
         self.particles.restore(state)
         self.bodies.restore(state.arrays)
         self.sources = Sources(self.scene, self.notes)

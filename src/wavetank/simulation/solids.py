@@ -13,7 +13,7 @@ from wavetank.device.periods import NONE, Periods
 from wavetank.foundation.arguments import KnownAttributes, array_of, read_only
 from wavetank.foundation.errors import WavetankError
 from wavetank.foundation.model import FARTHEST
-from wavetank.foundation.rotations import interpolate, matrix_of, turned, unit_quaternion
+from wavetank.foundation.rotations import interpolate, inverse, matrix_of, turned, unit_quaternion
 from wavetank.scene.fluids import Points
 from wavetank.scene.scene import Scene
 from wavetank.simulation.prescribed_motion import PrescribedMotions
@@ -337,6 +337,20 @@ class Solids(Mapping[str, LiveSolid]):
             growing={**self.growing},
             motions=self.motions.plain(),
         )
+
+    def carried(self, name: str, place: Sequence[float]) -> np.ndarray:
+        """Return where a place [m] is that has moved with the solid of that name from the start on, [dim].
+
+        It stays where there is no solid of that name.
+        """
+        at = np.array(place, float)
+        if name not in self.names:
+            return at
+        number = self.names.index(name)
+        (start, start_turn), (now, turn) = self.starts[number], self.poses[number]
+        own = turned(inverse(start_turn), np.append(at, 0.0)[:3] - start)
+        moved: np.ndarray = (now + turned(turn, own))[: len(at)]
+        return moved
 
     def between(self, number: int, share: float) -> Pose:
         """Return the pose of a solid after a share of the frame: by its motion, or between pose and target."""

@@ -24,9 +24,10 @@ from wavetank.solids.motion import Pose
 VISCOUS = "viscous"  # column of particles that only worlds with viscous fluids have
 LARGEST_FINITE = 1e18  # the square of a larger number overflows in single precision
 SAMPLE, WORTH = 1024, 0.8  # bytes; share of these that compression must reach to be used
+PRESSURE = "pressure"  # f32 [nodes]: what probes read goes on from it, see `physics/pressure/probes.py`
 #: Fields of a scene that the water does not feel, or that describe its start.
 UNFELT: Any = {
-    **dict.fromkeys(("fluids", "title", "goal", "preset", "quality", "light", "film"), True),
+    **dict.fromkeys(("fluids", "title", "goal", "preset", "quality", "light", "film", "probes"), True),
     "materials": {"__all__": {"clarity", "glow"}},
 }
 
@@ -189,6 +190,8 @@ class State(Instant):
         order = np.argsort(self.arrays["id"], kind="stable")
         whole.update(json.dumps([counters, more.foam_born], sort_keys=True).encode())
         for name, rows in sorted(self.arrays.items()):
+            if name == PRESSURE:  # what probes have read
+                continue
             values = rows[order] if name in (*LASTING, VISCOUS) else rows
             whole.update(f"{name} {values.dtype.str} {values.shape}".encode() + np.ascontiguousarray(values).tobytes())
         poses = [*solids.poses, *(pose for _, pose in sorted(solids.targets.items()))]

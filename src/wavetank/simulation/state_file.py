@@ -23,7 +23,7 @@ from wavetank.scene.scene import MAX_PARTICLES, Scene
 from wavetank.simulation.coupling import STATE_ROWS, upgraded
 from wavetank.simulation.instant import COLUMNS, FOAM, Field
 from wavetank.simulation.particles import check_crowd
-from wavetank.simulation.state import VISCOUS, Continuation, Counters, SolidsState, State, kinds_of
+from wavetank.simulation.state import PRESSURE, VISCOUS, Continuation, Counters, SolidsState, State, kinds_of
 from wavetank.solids.motion import Pose
 
 FORMAT = 3  # 1 has no foam, 2 no seal; both are read
@@ -286,7 +286,8 @@ class _Arrays:
 def _checked_arrays(arrays: _Arrays, header: Header, scene: Scene) -> dict[str, np.ndarray]:
     """Return the arrays of a state, each of the type, shape and range that it must have."""
     particles = _checked_particles(arrays, header.numbers, scene)
-    return particles | _checked_foam(arrays, header.numbers) | _checked_bodies(arrays, scene)
+    pressure = {PRESSURE: arrays.take(PRESSURE, np.float32, (arrays.rows(PRESSURE),))} if scene.probes else {}
+    return particles | _checked_foam(arrays, header.numbers) | _checked_bodies(arrays, scene) | pressure
 
 
 def _checked_particles(arrays: _Arrays, numbers: _Numbers, scene: Scene) -> dict[str, np.ndarray]:

@@ -1,7 +1,7 @@
 """What particles can be coloured by: one device function and one entry in `QUANTITIES` each.
 
-The device functions take what the frame knows of one particle; kernels choose one by its key in
-`DEVICE_FUNCTIONS` at compile time.
+The device functions take what the frame knows of one particle, of which one `scalar`, see `scalars_of`; kernels choose
+one by its key in `DEVICE_FUNCTIONS` at compile time.
 """
 
 import dataclasses
@@ -17,25 +17,31 @@ Limits = tuple[float, float]
 
 
 @qd.func
-def speed(x, v, rho, kind):
+def speed(x, v, scalar, kind):
     """Speed |v| [m/s]."""
     return v.norm()
 
 
 @qd.func
-def density(x, v, rho, kind):
+def density(x, v, scalar, kind):
     """Density rho [kg/m^3]."""
-    return rho
+    return scalar
 
 
 @qd.func
-def material(x, v, rho, kind):
+def pressure(x, v, scalar, kind):
+    """Pressure p [Pa]."""
+    return scalar
+
+
+@qd.func
+def material(x, v, scalar, kind):
     """Number of the material."""
     return qd.cast(kind, qd.f32)
 
 
 @qd.func
-def nothing(x, v, rho, kind):
+def nothing(x, v, scalar, kind):
     """Zero: every particle has the first colour of the table."""
     return 0.0
 
@@ -52,6 +58,14 @@ def _density_limits(scene: Any) -> Limits:
     """A twentieth below and above the rest density."""
     densities = [fluid.density for fluid in scene.properties()]
     return 0.95 * min(densities), 1.05 * max(densities)
+
+
+def _pressure_limits(scene: Any) -> Limits:
+    """Zero to a round number near the pressure below half of the world's height, of the heaviest fluid."""
+    extent = extent_of(scene).turned(scene.upright)
+    weight = max(fluid.density for fluid in scene.properties()) * math.hypot(*scene.gravity)
+    top = 0.5 * weight * float(extent.upper[1] - extent.lower[1])
+    return 0.0, _round_up(top) if top > 0.0 else 1.0
 
 
 def _material_limits(scene: Any) -> Limits:
@@ -93,6 +107,7 @@ def usual(scene: Any) -> str:
 QUANTITIES: dict[str, Quantity] = {
     "speed": Quantity(speed, "m/s", "water", _speed_limits),
     "density": Quantity(density, "kg/m^3", "balance", _density_limits),
+    "pressure": Quantity(pressure, "Pa", "viridis", _pressure_limits),
     "material": Quantity(material, "", "viridis", _material_limits, _palette),
     "foam": Quantity(speed, "m/s", "foam", _foam_limits, title="speed"),
 }
@@ -105,6 +120,11 @@ def key_of(name: str) -> int:
     must not make it serve the kernel of another.
     """
     return zlib.crc32(name.encode()) & 0x7FFFFFFF if name in QUANTITIES else 0
+
+
+def scalars_of(frame: Any, key: int) -> Any:
+    """Return the scalar of each particle that the quantity with a `key` is found from: densities, or pressures."""
+    return frame.pressure if key == key_of("pressure") else frame.rho
 
 
 DEVICE_FUNCTIONS = {0: nothing, **{key_of(name): quantity.value for name, quantity in QUANTITIES.items()}}

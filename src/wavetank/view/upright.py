@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from wavetank.device.compiler import upload
-from wavetank.device.state import MARGIN, integers
+from wavetank.device.state import MARGIN, integers, scalars
 from wavetank.foundation.rotations import product, quaternion_of
 from wavetank.scene.fluids import Block
 from wavetank.scene.scene import Scene
@@ -34,11 +34,20 @@ class Upright:
         state = turned_state(frame.state(), frame.scene.upright)
         self._buffer.scene = state.scene
         result = self._buffer.frame(state)
+        if frame.read_pressure:
+            result = dataclasses.replace(result, read_pressure=lambda: _by_id(frame))
         if not frame.frozen_count:
             return result
         frozen = integers(frame.count + MARGIN)
         upload(frozen, frame.frozen_by_id)
         return dataclasses.replace(result, frozen=frozen, frozen_count=frame.frozen_count)
+
+
+def _by_id(frame: Frame) -> Any:
+    """Return the pressures of a frame ordered by particle id, as a turned frame has its particles."""
+    values = scalars(frame.count)
+    upload(values, frame.pressure_by_id)
+    return values
 
 
 def turned_state(state: State, turn: np.ndarray) -> State:

@@ -18,7 +18,7 @@ from wavetank.view.buffers import Buffers, Pixels
 from wavetank.view.cells import Cells, sort
 from wavetank.view.lens import Lens, ray_direction, ray_origin, vec3, vector, view_ray
 from wavetank.view.optics.dyes import ICE, dyed
-from wavetank.view.quantities import DEVICE_FUNCTIONS, Coloring, color_of
+from wavetank.view.quantities import DEVICE_FUNCTIONS, Coloring, color_of, scalars_of
 from wavetank.view.shot import Shot
 from wavetank.view.water_buffers import water_of
 from wavetank.view.weights import cell_beside, full_weight, weight_of, whole_place
@@ -49,7 +49,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
         buffers.pixels,
         frame.x,
         frame.v,
-        frame.rho,
+        scalars_of(frame, shot.quantity),
         frame.material,
         frame.frozen if ice else frame.material,
         cells,
@@ -65,7 +65,7 @@ def draw(shot: Shot, buffers: Buffers) -> None:
 def value_at(
     x: qd.template(),
     v: qd.template(),
-    rho: qd.template(),
+    scalar: qd.template(),
     material: qd.template(),
     cells: Cells,
     at,
@@ -82,7 +82,7 @@ def value_at(
             if w > 0.0:
                 i = cells.order[b]
                 weight += w
-                total += w * qd.static(DEVICE_FUNCTIONS[quantity])(x[i], v[i], rho[i], material[i])
+                total += w * qd.static(DEVICE_FUNCTIONS[quantity])(x[i], v[i], scalar[i], material[i])
     return weight, total
 
 
@@ -105,7 +105,7 @@ def draw_slice(
     pixels: Pixels,
     x: qd.types.ndarray(),
     v: qd.types.ndarray(),
-    rho: qd.types.ndarray(),
+    scalar: qd.types.ndarray(),
     material: qd.types.ndarray(),
     frozen: qd.types.ndarray(),
     cells: Cells,
@@ -124,7 +124,7 @@ def draw_slice(
             t = (plane.offset - plane.normal.dot(origin)) / across
             if t > lens.near and t < 1e4 and t < qd.bit_cast(pixels.depth[row, column], qd.f32):
                 at = origin + t * direction
-                weight, total = value_at(x, v, rho, material, cells, at, dim, quantity)
+                weight, total = value_at(x, v, scalar, material, cells, at, dim, quantity)
                 if weight > plane.least:
                     pixels.depth[row, column] = qd.bit_cast(t, qd.i32)
                     pixels.surface[row, column] = -1  # SOLID

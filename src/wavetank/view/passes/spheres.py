@@ -33,7 +33,7 @@ from wavetank.view.lens import (
     view_ray,
 )
 from wavetank.view.optics.dyes import dyed
-from wavetank.view.quantities import DEVICE_FUNCTIONS, Coloring, color_of
+from wavetank.view.quantities import DEVICE_FUNCTIONS, Coloring, color_of, scalars_of
 from wavetank.view.shot import Shot
 
 LARGEST = 0.25  # of the picture's height: radius up to which a ball is drawn at its size
@@ -49,7 +49,17 @@ def draw_at(x: Any, shot: Shot, buffers: Buffers) -> None:
     frame, pixels, largest = shot.frame, buffers.pixels, max(LARGEST * buffers.rows, 1.0)
     splat(pixels.depth, x, shot.lens, shot.radius, largest, frame.count)
     claim(pixels, x, shot.lens, shot.radius, largest, frame.count)
-    paint(pixels, x, frame.v, frame.rho, frame.material, frame.dye, shot.lens, shot.coloring, shot.quantity)
+    paint(
+        pixels,
+        x,
+        frame.v,
+        scalars_of(frame, shot.quantity),
+        frame.material,
+        frame.dye,
+        shot.lens,
+        shot.coloring,
+        shot.quantity,
+    )
 
 
 def draw_ice(shot: Shot, buffers: Buffers) -> None:
@@ -135,7 +145,7 @@ def paint(
     pixels: Pixels,
     x: qd.types.ndarray(),
     v: qd.types.ndarray(),
-    rho: qd.types.ndarray(),
+    scalar: qd.types.ndarray(),
     material: qd.types.ndarray(),
     dye: qd.types.ndarray(),
     lens: Lens,
@@ -149,5 +159,5 @@ def paint(
             c = to_view(lens, lift(x[i]))
             t = qd.bit_cast(pixels.depth[row, column], qd.f32)
             pixels.normal[row, column] = from_view(lens, (point_at(lens, row, column, t) - c).normalized(1e-12))
-            value = qd.static(DEVICE_FUNCTIONS[quantity])(x[i], v[i], rho[i], material[i])
+            value = qd.static(DEVICE_FUNCTIONS[quantity])(x[i], v[i], scalar[i], material[i])
             pixels.color[row, column] = dyed(color_of(coloring, value), dye[i])
