@@ -111,7 +111,7 @@ def tub(dim):
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_tub_floats_by_the_volume_to_its_rim(dim):
     for solid, volume in ((tub(dim), 0.4**dim), (wt.Box(center=(0.0,) * dim, size=(0.4,) * dim), 0.4**dim)):
-        cut = Ruler(solid, dim, D).cut_for_surface(D, 0.25 * D)
+        cut = Ruler(solid, dim, D).cut_for_surface(D)
         inside = cut.volumes > 0.0
         found = largest_displacement(cut.places[inside], cut.edges, cut.volumes[inside])
         assert 0.99 * volume < found < 1.07 * volume  # a little more on its side, where a wall's inner face looks down
@@ -120,8 +120,8 @@ def test_a_tub_floats_by_the_volume_to_its_rim(dim):
 @pytest.mark.parametrize("dim", [2, 3])
 def test_sheets_are_cut_into_boxes_of_half_their_thickness(dim):
     """Differences of volumes are areas of the surface only where some box is full."""
-    cut = Ruler(tub(dim), dim, D).cut_for_surface(D, 0.25 * D)
+    cut = Ruler(tub(dim), dim, D).cut_for_surface(D)
     assert thickness(cut) == pytest.approx(0.02, rel=0.3)
     assert cut.edges[:dim].max() <= 0.011
     assert cut.volumes.max() == pytest.approx(np.prod(cut.edges[:dim]))
-    assert Ruler(wt.Sphere(center=(0.0,) * dim, radius=0.1), dim, D).cut_for_surface(D, 0.25 * D).edges[0] > 0.9 * D
+    assert Ruler(wt.Sphere(center=(0.0,) * dim, radius=0.1), dim, D).cut_for_surface(D).edges[0] > 0.9 * D

@@ -42,7 +42,6 @@ from wavetank.solids.solid import Solid
 MOST_TRIES = 4  # of a step
 FARTHEST = 0.3  # of a spacing: a larger correction of a body repeats the step
 FEWEST = 4.0  # pieces across a body
-FINEST = 0.25  # of a spacing: longer pieces are halved where a body is no thicker than two of them
 IN_JOINTS = 16  # inner iterations of the engine with joints: with 1 a motor sagged by 0.3 rad/s under a load
 IN_CONTACTS = 2  # without joints: with 1 a heavy box at rest on the floor had 5 mm/s, by which it did not move
 DRY = 0.5  # Coulomb's coefficient between solids where none is given: wood on wood
@@ -210,7 +209,7 @@ class Bodies(Mapping[str, Body]):
         spacing, table = self._scene.spacing, {}
         for body in self.members:
             edge = min(spacing, 2.0 * float(body.wet.axes[3 - self._dim]) / FEWEST)
-            cut = Ruler(body.solid, self._dim, spacing).cut_for_surface(edge, FINEST * spacing)
+            cut = Ruler(body.solid, self._dim, spacing).cut_for_surface(edge)
             inside = cut.volumes > 0.0
             # Their volumes add up to the body's: with a cut surface a body of water's density would rise.
             volumes = cut.volumes[inside] * (body.wet.mass / self._density / cut.volumes.sum())

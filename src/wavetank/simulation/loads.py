@@ -24,8 +24,6 @@ from wavetank.solids.motion import Pose
 from wavetank.solids.shapes import HalfSpace
 from wavetank.solids.solid import ENDLESS, Solid
 
-FINEST = 0.25  # of a spacing: longer boxes are halved where a solid is no thicker than two of them
-
 
 @dataclasses.dataclass(frozen=True)
 class Load:
@@ -63,7 +61,7 @@ def panels_of(solid: Solid, dim: int, spacing: float) -> Panels:
     """Cut the surface of a solid into panels; raises `WavetankError` for one without an end."""
     if solid.reach() >= ENDLESS:
         raise WavetankError(f"the solid {solid.name!r} has no end, and so no force on it; use a box.")
-    cut = Ruler(solid, dim, spacing).cut_for_surface(spacing, FINEST * spacing)
+    cut = Ruler(solid, dim, spacing).cut_for_surface(spacing)
     places, outward, levers, areas = [], [], [], []
     for side, looks in zip((1, -1), surface_sides(cut.places, cut.edges, cut.volumes), strict=True):
         for axis in range(dim):

@@ -331,6 +331,9 @@ class Simulation(KnownAttributes):
     def _has_grid_pressure(self) -> bool:
         return bool(self.count and has_grid_pressure(self.world, self.parameters.at(self.time)))
 
+    def _knows_pressure(self) -> bool:
+        return self._has_grid_pressure() and knows_pressure(self.world)
+
     def _check_pressure(self) -> None:
         if not self._has_grid_pressure():
             raise WavetankError(
@@ -343,7 +346,7 @@ class Simulation(KnownAttributes):
     @TURN
     def _pressure_of_particles(self) -> Any:
         """Return the pressure at each particle [Pa], a device array in device order; 0 where none is known."""
-        if not (self._has_grid_pressure() and knows_pressure(self.world)):
+        if not self._knows_pressure():
             return scalars(self.count)
         x = self.world.particles.x
         return pressures_at(self.world, self.parameters.at(self.time), x, x, self.count)
@@ -353,7 +356,7 @@ class Simulation(KnownAttributes):
         scene, probes = self.parameters.at(self.time), self.scene.probes
         if not probes:
             return {}
-        known = self._has_grid_pressure() and knows_pressure(self.world)
+        known = self._knows_pressure()
         places = [self.solids.carried(probe.solid, probe.at) for probe in probes if probe.at is not None]
         rows = pressures(self.world, scene, np.array(places)) if known and places else np.full(len(places), math.nan)
         read = iter(rows.tolist())
@@ -484,7 +487,8 @@ class Simulation(KnownAttributes):
             )
         self.solids.passing = None
         self.solids.move_to(0.0, 1.0)
-        restore_pressure(self.world, np.zeros(0, np.float32))  # before the first step it is not known
+        assert self.world.pressure is not None, "it relaxed on the grid"
+        self.world.pressure.forget_pressure()  # what it pressed with in these steps is not that of the start
         return at_rest
 
     def _too_near(self, places: np.ndarray) -> np.ndarray:

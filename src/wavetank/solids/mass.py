@@ -20,6 +20,7 @@ from wavetank.solids.solid import Solid
 SEARCH = 48  # boxes along an axis in which the extent is looked for
 PIECES = 200_000  # about, of a quadrature
 LEAST = 4  # boxes along an axis
+FINEST = 0.25  # of a spacing: longer boxes are halved where a solid is no thicker than two of them
 SEEN = 3  # boxes from which the middle of a solid is looked for
 MOST_PIECES = 4_000_000  # of a solid: half a gigabyte while they are measured
 
@@ -56,7 +57,7 @@ class Ruler:
     """Measures one solid by its signed distances."""
 
     def __init__(self, solid: Solid, dim: int, spacing: float) -> None:
-        self.solid, self.dim = solid, dim
+        self.solid, self.dim, self.spacing = solid, dim, spacing
         self.device = build([solid.model_copy(update={"name": ""})], 0, 0.0, spacing)
 
     def distances(self, places: np.ndarray) -> np.ndarray:
@@ -99,13 +100,13 @@ class Ruler:
         edges = np.where(np.arange(3) < self.dim, size / numbers, 0.0)
         return self._kept(_centers(lower, upper, numbers), edges)
 
-    def cut_for_surface(self, edge: float, least: float) -> Cut:
+    def cut_for_surface(self, edge: float) -> Cut:
         """Cut the solid into boxes of about `edge` [m], or halved until they are half as large as it is thick.
 
         The differences of the volumes of boxes that share a face are then areas of the surface, in sheets too. They are
-        halved while they are longer than `least` [m].
+        halved while they are longer than `FINEST` spacings.
         """
-        cut = self.cut(edge)
+        cut, least = self.cut(edge), FINEST * self.spacing
         while float(cut.edges[: self.dim].min()) > least and thickness(cut) < 2.0 * float(cut.edges.max()):
             cut = self._halved(cut)
         return cut

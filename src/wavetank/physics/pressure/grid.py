@@ -256,6 +256,10 @@ class PressureGrid:
         open_volume = self.open_nodes * self.finest.dx * self.finest.dy * self.finest.dz
         return self.regions > 1 or liquid > THRESHOLDS.mostly_full * open_volume
 
+    def forget_pressure(self) -> None:
+        """Forget the pressures that places were asked for; they are known again after the next step."""
+        self.pressure, self.last_step = None, 0.0
+
     @property
     def finest(self) -> Level:
         """The level that particles exchange with."""

@@ -114,7 +114,7 @@ def record_pressure(world: World, params: Parameters, dt: float) -> None:
     """Add what the grid has pressed with in a step of `dt` [s], where someone asks for pressures."""
     grid = world.pressure
     if grid is not None and not has_grid_pressure(world, params):
-        grid.pressure, grid.last_step = None, 0.0
+        grid.forget_pressure()
     elif grid is not None:
         grid.last_step = dt
         if grid.pressure is not None:
@@ -175,7 +175,7 @@ def restore_pressure(world: World, recorded: np.ndarray) -> None:
     grid = world.pressure
     if grid is None:
         return
-    grid.pressure, grid.last_step = None, 0.0
+    grid.forget_pressure()
     if len(recorded):
         grid.pressure = scalars(grid.finest.lam.shape[0])
         if recorded.shape != tuple(grid.pressure.shape):
